@@ -85,7 +85,7 @@ def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Variant) ->
 def _fields(
     delta: FloatArray, bands: tuple[FloatArray, ...], D_top: Any, R_top: Any, variant: Variant
 ) -> dict[str, FloatArray]:
-    """`FIELDS` of islands from their bands, and the summits of all waves (top)."""
+    """`FIELDS` of islands from their bands, and the summits of all wavelengths (top)."""
     _, _, R_d, R_u, D, sigma, root_a, root_b, _, _, _ = bands
     h_d = root_a if variant.offset else np.zeros_like(root_a)
     return dict(zip(BANDS, bands, strict=True)) | {
@@ -124,7 +124,7 @@ def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:
     if not surface.q1 > variant.floor_u * surface.longest:
         raise OutOfRangeError(
             f"the spectrum ends at q = {surface.q1:.4g}, and MBMA's smallest band at {variant.floor_u:g} times "
-            f"{surface.longest:.4g}, where most height is: measure shorter waves, or ask another theory"
+            f"{surface.longest:.4g}, where most height is: measure shorter wavelengths, or ask another theory"
         )
     at_d, at_u = (surface.laws.place(floor * surface.longest) for floor in (variant.floor_d, variant.floor_u))
     root_d, root_u = (float(np.sqrt(surface.laws.above(place))) for place in (at_d, at_u))

@@ -162,10 +162,9 @@ class SelfAffine(AnySurface):
     ) -> Self:
         """The self-affine surface that numbers of a drawing or a profilometer describe.
 
-        One height, one highest point, a Hurst exponent, and two of slope, longest wave and shortest wave (or slope and
-        density of summits). What a drawing does not tell is to be given: nothing is filled in. `provenance` holds
-        what each number was taken to mean; docs/surfaces.md has typical values. Lengths are numbers in one unit, or
-        texts with theirs.
+        One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength (or slope
+        and density of summits); nothing is filled in. `provenance` holds the meaning assumed for each number;
+        docs/surfaces.md has typical values. Lengths are numbers in one unit, or texts with their unit.
 
         Parameters
         ----------
@@ -197,8 +196,8 @@ class SelfAffine(AnySurface):
         --------
         >>> from mbma_tables import Surface
         >>> ground = Surface.from_roughness(Ra="0.4 um", Rdq=0.1, longest="100 um", hurst=0.8, h_max="1.8 um")
-        >>> print(f"h_rms = {ground.h_rms:.3f} {ground.unit}, shortest wave {6.2832 / ground.q1:.2f} {ground.unit}")
-        h_rms = 0.501 um, shortest wave 1.12 um
+        >>> print(f"h_rms = {ground.h_rms:.3f} um, shortest wavelength {6.2832 / ground.q1:.2f} {ground.unit}")
+        h_rms = 0.501 um, shortest wavelength 1.12 um
         >>> ground.provenance[0]["assumed"][2]
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """

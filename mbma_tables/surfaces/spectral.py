@@ -43,7 +43,7 @@ PRESSED = {"skewness of heights": (-3.1, 3.3), "kurtosis of slopes": (2.6, 16.5)
 WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried
 SAME_LAW = 0.01  # of ln C about one power law: a spectrum this straight counts as self-affine
 FINE = 1.02  # between wavenumbers of a sum of spectra: a sum of power laws is none, by 1e-4 at most
-NO_POWER = 1e-3  # share of the squared gradient beyond the last waves that count
+NO_POWER = 1e-3  # share of the squared gradient beyond the last wavelengths that count
 SIDE = 1e-12  # beside a wavenumber, relative
 
 
@@ -91,7 +91,7 @@ class SpectralSurface(AnySurface):
     >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
     >>> surface = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1, unit="um")
     >>> surface
-    MeasuredSurface(200 waves from q = 0.2 to 50, h_rms=0.2634, h_max=1.1, rms gradient 0.7808, unit='um')
+    MeasuredSurface(200 samples from q = 0.2 to 50, h_rms=0.2634, h_max=1.1, rms gradient 0.7808, unit='um')
     """
 
     q: Any
@@ -123,9 +123,7 @@ class SpectralSurface(AnySurface):
         numbers = {"q0": self.q[0], "q1": self.q[-1], "h_rms": math.sqrt(self.laws.moment(0))}
         numbers |= {f"m{order}": self.laws.moment(order) for order in (2, 4)}
         vars(self).update({name: np.float64(number) for name, number in numbers.items()})
-        require(
-            "largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3 (more waves)"
-        )
+        require("largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3")
         if not all(math.isfinite(m) and m > 0 for m in (self.m0, self.m2, self.m4)):
             raise OutOfRangeError("the spectrum's moments overflow or vanish: choose another length unit")
         vars(self).update(unit=Units(self.unit).length)
@@ -144,7 +142,7 @@ class SpectralSurface(AnySurface):
     def __repr__(self) -> str:
         numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
         unit = "" if self.unit is None else f", unit={self.unit!r}"
-        return f"{type(self).__name__}({self.q.size} waves from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
+        return f"{type(self).__name__}({self.q.size} samples from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
 
     def _variables(self) -> dict[str, Variable]:
         length = self.unit or "length"
@@ -250,7 +248,7 @@ class SpectralSurface(AnySurface):
         )
 
     def between(self, low: float, high: float) -> Self:
-        """The waves from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
+        """The wavelengths from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
         inside = (self.q > low) & (self.q < high)
         q = np.concatenate([[low], self.q[inside], [high]])
         less = dataclasses.replace(
@@ -314,7 +312,7 @@ def resolution(surface: SpectralSurface) -> dict[str, Any]:
     shortest, unit = 2 * math.pi / end, f" {surface.unit}" if surface.unit else ""
     finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
     told = (
-        f"area is a matter of resolution: waves are known down to {shortest:.4g}{unit}{finer}, and without the last "
+        f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the last "
         f"octave of them area at light load would be {factor:.2f} times larger"
     )
     return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
