@@ -22,8 +22,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models.island4d import at_places
-from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, Axis, TableContent, error_cell
+from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, Axis, TableContent, check_content, error_cell
 
 BLAS_THREADS = 2  # as when the shipped tables were made
 LINES = 24  # sample lines along an axis that decide its resolution

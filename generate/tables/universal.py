@@ -27,8 +27,7 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu
 from mbma_tables.surfaces.variants import VARIANTS
-from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, Axis, TableContent
+from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, Axis, TableContent, check_content
 
 LOOKUP = (
     "X = (delta - h_d)/sigma and mu = (8/3) D sigma sqrt(2 R_u R_d) of the island, in any consistent units",

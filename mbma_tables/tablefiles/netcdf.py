@@ -20,7 +20,6 @@ import numpy as np
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import read_file
 from mbma_tables.tablefiles import schema
-from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
@@ -89,11 +88,11 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     described = {name: _attributes_of(variable) for name, variable in dataset.variables.items()}
     for owner, attributes in {"": own, **described}.items():
         for name, value in attributes.items():
-            check_attribute(owner, name, value)
+            schema.check_attribute(owner, name, value)
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
             raise ValueError(f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}")
-    missing = [name for name in REQUIRED if name not in own]
+    missing = [name for name in schema.REQUIRED if name not in own]
     if missing or own.get("attributes_sha256") != attributes_digest(dataset):
         raise ValueError(f"lacks attribute {missing[0]}" if missing else "has attributes that were edited")
     if dataset.groups or sum(variable.size for variable in dataset.variables.values()) * 8 > MAX_BYTES:
@@ -146,7 +145,7 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.
             if version != schema.FORMAT_VERSIONS[found]:
                 raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
             content = _content(dataset, found)
-        check_content(content)
+        schema.check_content(content)
     except ValueError as fault:
         raise _refuse(source, str(fault), kind or "all") from None
     # what netCDF4 raises on bytes that are no netCDF file, or that lack a variable

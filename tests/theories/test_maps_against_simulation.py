@@ -90,7 +90,7 @@ def test_they_are_answered_without_options(example):
         found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)
         assert found.pressure > 0
         assert found.area > 0
-    assert any("area is a matter of resolution" in entry.get("told", "") for entry in surface.provenance)
+    assert any("area depends on resolution" in entry.get("told", "") for entry in surface.provenance)
 
 
 @pytest.mark.slow
