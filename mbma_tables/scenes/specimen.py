@@ -81,10 +81,10 @@ def from_name(name: str) -> Specimen:
 def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
     """The surface of a measured map or line scan, with options of `Surface.from_map`."""
     options = dict(treatment)
-    if options.pop("model", "measured") == "measured":
-        return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
-    surface = Surface.from_map(path, model="self-affine", **options)
-    return Specimen(surface, f"fitted to the map {_printable(path)}")
+    if options.get("model", "measured") != "measured":
+        return Specimen(Surface.from_map(path, **options), f"fitted to the map {_printable(path)}")
+    options.pop("model", None)
+    return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
 
 
 def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated, MeasuredSurface]:

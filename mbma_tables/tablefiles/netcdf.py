@@ -101,33 +101,25 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
     if digest_arrays(values) != own["values_sha256"]:
         raise ValueError("has values that do not match their hash")
-    names = [name for name, _ in schema.AXES[kind]]
-    axes = tuple(
-        schema.Axis(
-            name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size
-        )
-        for name, text in ((name, described[name]) for name in names)
-    )
-    fields = schema.COEFFICIENTS[kind], "error"
-    for what, over in zip(fields, schema.dimensions(kind), strict=True):
+    names, fields = [name for name, _ in schema.AXES[kind]], ("long_name", "transform", "offset", "first", "last")
+    axes = tuple(schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size)) for name in names)
+    kinds = schema.COEFFICIENTS[kind], "error"
+    for what, over in zip(kinds, schema.dimensions(kind), strict=True):
         if any(dataset[f"{what}_{function}"].dimensions != over for function in schema.FUNCTIONS):
             raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
     coefficients, local_error = (
-        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1) for what in fields
+        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1) for what in kinds
     )
-    main = {f"{what}_{function}" for what in fields for function in schema.FUNCTIONS} | set(names)
-    beside = [name for name in values if name not in main and not name.startswith("conformance_")]
+    main = {f"{what}_{function}" for what in kinds for function in schema.FUNCTIONS} | set(names)
+    point = "conformance_"
+    beside = [name for name in values if name not in main and not name.startswith(point)]
     return schema.TableContent(
         kind=kind,
         axes=axes,
         coefficients=coefficients,
         local_error=local_error,
         auxiliary={name: (dataset[name].dimensions, values[name], described[name]) for name in beside},
-        conformance={
-            name.removeprefix("conformance_"): array
-            for name, array in values.items()
-            if name.startswith("conformance_")
-        },
+        conformance={name.removeprefix(point): values[name] for name in values if name.startswith(point)},
         attributes=own,
     )
 
