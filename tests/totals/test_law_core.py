@@ -14,17 +14,7 @@ import xarray as xr
 
 from mbma_tables import OutOfRangeError, Surface, contact_law
 from mbma_tables.core import core
-from mbma_tables.law.block import (
-    AREA,
-    EXPONENT,
-    FORCE,
-    HEAD,
-    HIGH,
-    MINUS_ROWS,
-    QUANTITIES,
-    RECORD,
-    RECORDS,
-)
+from mbma_tables.law.block import AREA, EXPONENT, FORCE, HEAD, HIGH, MINUS_ROWS, QUANTITIES, RECORD, RECORDS
 from mbma_tables.laws.effective_medium import wide_gap
 
 SURFACES = {
