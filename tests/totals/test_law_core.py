@@ -1,7 +1,5 @@
 """The core's law: the same bits however it is asked, and no gap, force or block that could make it read elsewhere."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -1,7 +1,5 @@
 """MBMA on surfaces that are their own spectrum, against the five numbers, quadrature, and boundary elements."""
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 
