@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -30,6 +30,9 @@ MISSED = 0.5  # of ln of a value that lies between two numbers u
 ENERGY_RTOL = 1e-9
 LEAST_LEVEL = 4  # of the rule of energies, whose estimate of its error may vanish by chance where it is coarse
 SCAN = 49  # compressions at which a law is looked at for a turning point
+
+# values at mean separations, about -d/du of them, and whether that is exact
+Curve = Callable[[FloatArray], tuple[Any, Any, bool]]
 
 
 class TheoryAnswer(NamedTuple):
@@ -167,13 +170,20 @@ class Theory(abc.ABC):
         """At how many gaps of each surface an inversion begins."""
         return LOOKS if surface.shape == () else FEW_LOOKS
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
-        """Force or area at mean separations, about -d/du of it, and whether that is exact; NaN where not known."""
-        found = self.answer(surface, mean_separation)
-        if quantity == "pressure":
-            return found.pressure, found.stiffness, True
-        # area rises nearly as force does
-        return found.area, found.area * found.stiffness / found.pressure, False
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
+        """What inversions work on: unchecked force or area of a surface against mean separations.
+
+        With each value, about -d/du of it, NaN where that is not known; and whether it is exact.
+        """
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            found = self.answer(surface, u)
+            if quantity == "pressure":
+                return found.pressure, found.stiffness, True
+            # area rises nearly as force does
+            return found.area, found.area * found.stiffness / found.pressure, False
+
+        return values
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "pressure" (over A0 E*) or "area" has a wanted value; h_max at zero.
@@ -199,7 +209,8 @@ class Theory(abc.ABC):
         near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
         shares = _shares(self.looks(surface)).reshape(-1, *(1 for _ in shape))
         looked = np.asarray(first + (near - first) * shares)
-        value, steep, exact = self.values(surface, looked, quantity)
+        curve = self.curve(surface, quantity)
+        value, steep, exact = curve(looked)
         # one column of places for all, or one for each
         whole = shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)
         seen = [np.ascontiguousarray(spread(each, whole)) for each in (looked, value, steep)]
@@ -212,7 +223,8 @@ class Theory(abc.ABC):
             if not left.size:
                 break
             u, more = state[0, left], np.empty(left.size, dtype=bool)
-            value, steep, _ = self.at(shape, left).values(select(surface, shape, left), u, quantity)
+            theory, own = self.at(shape, left), select(surface, shape, left)
+            value, steep, _ = (curve if theory is self and own is surface else theory.curve(own, quantity))(u)
             known = np.ascontiguousarray(value), np.ascontiguousarray(steep)
             core.gap_step(*known, exact, left, goal, ends, state, more)
             left = left[more]
@@ -309,8 +321,11 @@ class Wrapped(Theory):
         """Few: an answer may take long."""
         return FEW_LOOKS
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force or area alone."""
-        u = np.asarray(mean_separation, dtype=float)
-        found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)
-        return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)
+            return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False
+
+        return values

@@ -19,7 +19,7 @@ from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws import hardness as law
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
-from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished
+from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer, refuse_unfinished
 
 GROUP = "hardness"  # of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "stiffness")
@@ -192,7 +192,7 @@ class Yielding(Theory):
 
     def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations [length] of the elastic contact at the forces of this one."""
-        pressure, _, _ = self.values(surface, mean_separation, "pressure")
+        pressure = self.curve(surface, "pressure")(mean_separation)[0]
         # one without end has no gap without force
         least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
         return self._elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0]
@@ -209,12 +209,17 @@ class Yielding(Theory):
         """Few at many hardnesses, too."""
         return FEW_LOOKS if self.hardness.size > MANY else self._elastic.looks(surface)
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force without the area, which follows from it."""
         if quantity != "pressure":
-            return super().values(surface, mean_separation, quantity)
-        pressure, steep, exact = self._elastic.values(surface, mean_separation, quantity)
-        return *self._closed(surface, mean_separation, pressure, steep), exact
+            return super().curve(surface, quantity)
+        elastic = self._elastic.curve(surface, quantity)
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            pressure, steep, exact = elastic(u)
+            return *self._closed(surface, u, pressure, steep), exact
+
+        return values
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a "pressure" (over E*, below the hardness) or an "area"."""
