@@ -76,8 +76,8 @@ class _Straight(Theory):
         area, slope, at = self._line
         return area + slope * (pressure - at)
 
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return self._elastic.bearing_share(surface, mean_separation)
+    def heights(self, surface: AnySurface) -> Any:
+        return self._elastic.heights(surface)
 
 
 @np.errstate(all="ignore")

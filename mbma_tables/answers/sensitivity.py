@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.contact import contact, one_known
+from mbma_tables.answers.contact import chosen_theory, contact, one_known
 from mbma_tables.answers.result import Contact
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
@@ -25,7 +25,6 @@ from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import chosen_theory
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory

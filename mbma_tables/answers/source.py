@@ -63,16 +63,11 @@ class Source:
     E_star: Any
     hardness: Any
     units: Units
+    yields: bool  # whether a hardness is given, and not an infinite one
     answer: TheoryAnswer | None = None  # where it is known already
     loaded: Loaded | None = None  # likewise, with a hardness
     materials: Pair | None = None  # where they are named
     stated: bool = False  # whether the hardness is, infinite or not
-
-    @property
-    def yields(self) -> bool:
-        """Whether a hardness is given."""
-        # an empty one is refused where it is checked
-        return is_labelled(self.hardness) or not np.size(self.hardness) or not np.equal(self.hardness, np.inf).all()
 
     def theory_at(self, E_star: Any, hardness: Any) -> Theory:
         """The theory, with the hardness where there is one."""

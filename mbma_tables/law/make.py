@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbma_tables.answers.contact import chosen_theory
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
@@ -26,7 +27,6 @@ from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import chosen_theory
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.island import check_band

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows, spread
+from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -90,14 +90,18 @@ class Theory(abc.ABC):
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
 
+    def heights(self, surface: AnySurface) -> Any:
+        """Where the Gaussian heights end over h_rms, or a map's own `laws.hardness.BearingCurve`; for a hardness."""
+        return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if self.ends_at_h_max else np.inf
+
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
+        """Share of heights above the level whose mean gap is u, and its derivative by u."""
         # what needs it is asked for a hardness alone
         from mbma_tables.laws import hardness
 
-        h_rms = np.asarray(surface.h_rms)
-        end = np.asarray(surface.h_max) / h_rms if self.ends_at_h_max else None
-        share, slope = hardness.bearing_share(np.asarray(mean_separation) / h_rms, end)
+        h_rms, heights = np.asarray(surface.h_rms), self.heights(surface)
+        x = np.asarray(mean_separation) / h_rms
+        share, slope = heights(x) if callable(heights) else hardness.bearing_share(x, heights)
         return share, slope / h_rms
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
@@ -157,11 +161,6 @@ class Theory(abc.ABC):
         refuse_unfinished(found.success.all(axis=0), "the elastic energy")
         return np.asarray(found.integral.sum(axis=0))
 
-    @property
-    def knows_areas(self) -> bool:
-        """Whether the area at a force needs no separation."""
-        return type(self.elastic).area_at is not Theory.area_at
-
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
         """Derivatives of force and of area by "mean_separation" and the surface's parameters, where it knows them."""
         return None
@@ -207,17 +206,21 @@ class Theory(abc.ABC):
             allowed = f"positive: contact has no end in theory {self.name!r}"
             require(quantity, goal.reshape(shape), goal.reshape(shape) != 0, allowed)
         near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
-        shares = _shares(self.looks(surface)).reshape(-1, *(1 for _ in shape))
+        shares = _shares(self.looks(surface)).reshape(-1, *[1] * len(shape))
         looked = np.asarray(first + (near - first) * shares)
         curve = self.curve(surface, quantity)
         value, steep, exact = curve(looked)
         # one column of places for all, or one for each
-        whole = shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)
-        seen = [np.ascontiguousarray(spread(each, whole)) for each in (looked, value, steep)]
+        seen = np.empty(
+            (3, *(shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)))
+        )
+        seen[0], seen[1], seen[2] = looked, value, steep
         state = np.full((6, goal.size), np.nan)
         state[1], state[2] = low, high
         core.gap_start(seen[0][0].size, *seen, exact, goal, ends, state)
-        at_end = self._at_end(surface, quantity, goal, seen[1][-1], first, shape)
+        at_end = goal > seen[1][-1].ravel()
+        if at_end.any():
+            at_end = self._at_end(surface, quantity, goal, first, shape)
         left = np.flatnonzero((goal > 0) & ~at_end)
         for _ in range(STEPS):
             if not left.size:
@@ -234,12 +237,9 @@ class Theory(abc.ABC):
         return u.reshape(shape), missed.reshape(shape)
 
     def _at_end(
-        self, surface: AnySurface, quantity: str, goal: FloatArray, seen: FloatArray, first: FloatArray, shape: Any
+        self, surface: AnySurface, quantity: str, goal: FloatArray, first: FloatArray, shape: Any
     ) -> NDArray[np.bool_]:
-        """Which of the wanted values are the largest one; more is refused. No larger ones were `seen` before."""
-        beyond = goal > seen.ravel()
-        if not beyond.any():
-            return beyond
+        """Which of the wanted values are the largest one; more is refused."""
         largest = np.broadcast_to(getattr(self.answer(surface, first), quantity), shape)
         wanted = goal.reshape(shape)
         out = wanted > largest * (1 + self.reached)
