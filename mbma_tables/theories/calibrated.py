@@ -105,7 +105,7 @@ def _contact(batch: Batch, u: FloatArray) -> FloatArray:
     return out.reshape(3, *shape)
 
 
-def area_concerns(area: FloatArray) -> dict[str, Any]:
+def area_reasons(area: FloatArray) -> dict[str, Any]:
     """Contact fractions that were not simulated, or hardly."""
     low, high = TESTED_AREA
     return {f"A/A0 is below {low:g}": (area > 0) & (area < low), f"A/A0 is above {high:g}": area > high}
@@ -195,7 +195,7 @@ class Calibrated(Theory):
         own = _own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what boundary elements have tested."""
         if isinstance(surface, MeasuredSurface):
             law = _own_law(surface)
@@ -203,7 +203,7 @@ class Calibrated(Theory):
             if law.curve is not None:
                 straight |= law.curve.straight(np.asarray(mean_separation) / law.h_rms)
             text = "the map's tops and valleys contradict each other: one stiffness stands for a range of forces"
-            return {text: straight & (answer.area >= TESTED_AREA[0])} | area_concerns(answer.area)
+            return {text: straight & (answer.area >= TESTED_AREA[0])} | area_reasons(answer.area)
         assert isinstance(surface, Surface)
         heights = np.asarray(surface.h_max / surface.h_rms)
         reasons = {
@@ -212,7 +212,7 @@ class Calibrated(Theory):
             f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < TESTED_HEIGHTS[0]) | (heights > TESTED_HEIGHTS[1]),
         }
         found = {text: np.broadcast_to(mask, answer.area.shape) for text, mask in reasons.items()}
-        return found | area_concerns(answer.area)
+        return found | area_reasons(answer.area)
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """Why a measured surface is not like those that boundary elements have tested."""

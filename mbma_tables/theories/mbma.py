@@ -181,7 +181,7 @@ class Mbma(Theory):
             return f"{self.name}, a variant of one's own"
         return self.name if name == "reported" else f"{self.name}_{name}"
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""
         return {
             f"areas of islands are added, A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)

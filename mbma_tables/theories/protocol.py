@@ -113,7 +113,7 @@ class Theory(abc.ABC):
         """Mean separations [length], two at most, at which derivatives of force or area jump; rows of a batch's."""
         return np.empty(0)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
         if self.ends_at_h_max:
             return {}

@@ -301,7 +301,7 @@ class BoundaryElements(Theory):
         """The map's own bearing curve, for a hardness."""
         return Calibrated().heights(surface)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons against grids that are too coarse, and contact areas that were not tested."""
         coarse = self.points < MIN_POINTS * (1 - ROUNDING)
         text = f"the map's shortest wave has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"

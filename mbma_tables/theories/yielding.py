@@ -256,11 +256,11 @@ class Yielding(Theory):
         eta, elastic = self._eta(surface), self._elastic.scatter(surface, quantity, area)
         return shipped().standard_deviation(self._elastic.scatter_name(surface), quantity, eta, area, elastic)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
         soft = self._eta(surface) < TESTED_ETA * (1 - 1e-9)
         return {
-            **self._elastic.concerns(surface, answer, mean_separation),
+            **self._elastic.reasons(surface, answer, mean_separation),
             f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": np.broadcast_to(
                 soft, np.shape(answer.area)
             ),
