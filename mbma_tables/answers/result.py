@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbma_tables.answers.interface import Interface
-from mbma_tables.answers.source import MEANINGS, Source, concerns, named, untroubled
-from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
+from mbma_tables.answers.source import MEANINGS, Source, named, reasons_against
+from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.protocol import TheoryAnswer
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -252,28 +252,17 @@ class Contact(Interface, Displayed):
 
         return leakage_of(self._source, self, self._touching)
 
+    @property
+    def _against(self) -> tuple[Any, ...]:
+        """What `Source.valid` and `Source.reasons` need."""
+        return self, functools.partial(reasons_against, self._source), self._answer._asdict()
+
     @described
     def valid(self) -> Any:
-        """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
-
-        def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
-            return (untroubled(concerns(source, theory, s, u, E, TheoryAnswer(*answer))),)
-
-        source = self._source
-        return source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
+        """Whether the theory was tested for contacts such as these; `reasons` has where and why not."""
+        return self._source.valid(*self._against)
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
         """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
-        source, answer = self._source, self._answer
-        surface = source.surface
-        own: list[Any] = [getattr(surface, name) for name in surface.parameters]
-        fields: list[Any] = [*answer, self.mean_separation, source.E_star, source.hardness, *own]
-        if is_labelled(answer.pressure):
-            import xarray as xr
-
-            fields = list(xr.broadcast(*map(xr.DataArray, fields)))
-            surface = surface.with_numbers(*map(np.asarray, fields[7:]))
-        *known, u, E_star, hardness = map(np.asarray, fields[:7])
-        found = concerns(source, source.theory_at(E_star, hardness), surface, u, E_star, TheoryAnswer(*known))
-        return {reason: mask for reason, mask in found.items() if mask.any()}
+        return self._source.reasons(*self._against)

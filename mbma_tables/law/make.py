@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbma_tables.answers.contact import chosen_theory
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
@@ -26,9 +27,9 @@ from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import chosen_theory
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.totals.island import check_band
 from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile, source_of
 
@@ -170,8 +171,7 @@ def _islands(surface: AnySurface, model: AnyModel, variant: Variant, rtol: float
     h_rms, stress = float(surface.h_rms), 1.0
     shape: Any = surface
     if isinstance(surface, Surface):
-        if not surface.zeta_1 > variant.floor_u:
-            raise OutOfRangeError(f"q1/q0 must be greater than {variant.floor_u:g}, the variant's floor of zeta_u")
+        check_band(surface, variant)
         stress = float(surface.q0 * surface.s)
         shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max) / h_rms
     end = 2 * float(surface.h_max)

@@ -145,6 +145,29 @@ def force(
     return found, steep
 
 
+def closed(
+    heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
+) -> tuple[FloatArray, FloatArray]:
+    """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
+    x, elastic, c = u / h_rms, (pressure / gradient, stiffness / gradient), CONSTANTS
+    if isinstance(heights, BearingCurve):
+        share, slope = heights(x)
+        load, steep = force(*elastic, share, slope / h_rms, eta)
+    else:
+        given = x, heights, h_rms, *elastic, eta
+        load, steep = answered(_closed, given, 2, c.force_light, c.force_eta, c.force_share)
+    return load * gradient, steep * gradient
+
+
+def _closed(
+    x: FloatArray, end: FloatArray, h_rms: FloatArray, elastic: FloatArray, stiffness: FloatArray, *more: Any
+) -> None:
+    share, slope = np.empty((2, x.size))
+    core.bearing_share(x, end, share, slope)
+    slope /= h_rms
+    core.capped_force(elastic, stiffness, share, slope, *more)
+
+
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """Stiffness of the frozen contact over the elastic -dF/du at the same mean gap."""
     return np.asarray(1 + constants.frozen * np.exp(-np.asarray(eta, float) / constants.frozen_eta))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import reprlib
 from typing import TYPE_CHECKING, Any
@@ -28,7 +29,7 @@ __all__ = [
     "Theory",
     "TheoryAnswer",
     "UserTheory",
-    "chosen_theory",
+    "default_theory",
     "get_theory",
     "theory_name",
 ]
@@ -83,24 +84,16 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     )
 
 
+@functools.cache
+def default_theory(name: str) -> Theory:
+    """One of `THEORIES` with its defaults, made once a process."""
+    return get_theory(name)
+
+
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
     """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
     from mbma_tables.surfaces.surface import Surface
 
     if theory is not None:
         return theory
-    asked = any(value != OPTIONS[name] for name, value in options.items())
-    return "mbma" if isinstance(surface, Surface) or asked else "calibrated"
-
-
-def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
-    """The theory asked for, with MBMA's `options`, which others refuse."""
-    named = theory_name(surface, theory, **options)
-    if isinstance(named, str) and named == "mbma":
-        from mbma_tables.theories.mbma import Mbma
-
-        return Mbma(**options)
-    given = ", ".join(name for name, value in options.items() if value != OPTIONS[name])
-    if given:
-        raise InputError(f"{given}: options of theory 'mbma' alone, asked for by its name")
-    return get_theory(named, surface)
+    return "mbma" if isinstance(surface, Surface) or OPTIONS | options != OPTIONS else "calibrated"

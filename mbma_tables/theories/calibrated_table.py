@@ -15,17 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray, filled
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import core
 from mbma_tables.laws.calibrated import Constants
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "pressure", "stiffness")
-BLOCK = 65536  # entries answered between two chances of Ctrl-C
 FEW, MIN_SHARED = 64, 40  # surfaces up to which, and entries a surface from which, its polynomials are worth making
 
 Owners = NDArray[np.int64]
@@ -90,22 +89,21 @@ class Table(SurfaceSpline):
         """Of the area."""
         return self.constants.area_s0, self.constants.area_slope, self.constants.area_t0
 
-    def _given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
+    def given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
+        """The table and surfaces (columns: H, ln zeta_1, h_max/h_rms) as the core takes them, for so many entries."""
         ends = np.empty((surfaces.shape[1], 2))
         core.calibrated_ends(*self.core_table, *surfaces, None, None, ends)
         return *self.core_table, *surfaces, ends, self.shared(surfaces, entries)
 
     def fill(self, surfaces: FloatArray, owner: Owners, u: FloatArray) -> FloatArray:
-        """Force, area and -dF/du, shape (3, n), at u [h_rms] of surfaces (columns: H, ln zeta_1, h_max/h_rms)."""
-        given, out = self._given(surfaces, u.size), np.empty((3, u.size))
-        in_blocks(lambda k: core.calibrated_contact(*given, owner[k], u[k], *out[:, k]), u.size, BLOCK)
-        return out
+        """Force, area and -dF/du, shape (3, n), at u [h_rms] of surfaces."""
+        return filled(functools.partial(core.calibrated_contact, *self.given(surfaces, u.size)), (owner, u), 3)
 
     def separations(self, surfaces: FloatArray, owner: Owners, pressure: FloatArray) -> FloatArray:
         """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
-        given, out = self._given(surfaces, pressure.size), np.empty(pressure.size)
-        in_blocks(lambda k: core.calibrated_separation(*given, owner[k], pressure[k], out[k]), pressure.size, BLOCK)
-        return out
+        given = self.given(surfaces, pressure.size)
+        u: FloatArray = filled(functools.partial(core.calibrated_separation, *given), (owner, pressure), 1)[0]
+        return u
 
     def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""

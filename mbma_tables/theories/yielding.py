@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws import hardness as law
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
-from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished
+from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer, refuse_unfinished
 
 GROUP = "hardness"  # of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "stiffness")
@@ -122,6 +122,8 @@ class Yielding(Theory):
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
         self._elastic, self.hardness, self.reached = theory, checked_hardness(hardness), REACHED
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
+        # whether the elastic area at a force needs no separation
+        self.knows_areas = type(theory).area_at is not Theory.area_at
 
     def changed(self, **fields: Any) -> Yielding:
         """The same with another elastic theory, or other hardnesses, checked before."""
@@ -169,7 +171,7 @@ class Yielding(Theory):
         eta, gradient, endless = self._eta(surface), np.asarray(surface.rms_gradient), np.isinf(self.hardness)
         if endless.all():
             return Loaded(u, h_rms, eta, elastic.pressure / gradient, elastic, elastic, elastic.area)
-        pressure, stiffness = self._closed(surface, u, elastic.pressure, elastic.stiffness)
+        pressure, stiffness = self._closed(surface, eta)(u, elastic.pressure, elastic.stiffness)
         if at_force is None:
             needed = (pressure > 0) & ~endless
             # where nothing yields or touches, a force that the theory is sure to reach
@@ -182,17 +184,14 @@ class Yielding(Theory):
             capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
         return Loaded(u, h_rms, eta, capped.pressure / gradient, capped, elastic, at_force)
 
-    def _closed(
-        self, surface: AnySurface, u: FloatArray, pressure: Any, stiffness: Any
-    ) -> tuple[FloatArray, FloatArray]:
-        """Force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
-        gradient, bearing = np.asarray(surface.rms_gradient), self._elastic.bearing_share(surface, u)
-        load, steep = law.force(pressure / gradient, stiffness / gradient, *bearing, self._eta(surface))
-        return load * gradient, steep * gradient
+    def _closed(self, surface: AnySurface, eta: FloatArray) -> Callable[..., Any]:
+        """Force over A0 E* and its -d/du at mean separations, between the elastic ones and the bearing curve."""
+        sizes = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient), eta
+        return functools.partial(law.closed, self._elastic.heights(surface), *sizes)
 
     def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations [length] of the elastic contact at the forces of this one."""
-        pressure, _, _ = self.values(surface, mean_separation, "pressure")
+        pressure = self.curve(surface, "pressure")(mean_separation)[0]
         # one without end has no gap without force
         least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
         return self._elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0]
@@ -209,12 +208,17 @@ class Yielding(Theory):
         """Few at many hardnesses, too."""
         return FEW_LOOKS if self.hardness.size > MANY else self._elastic.looks(surface)
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force without the area, which follows from it."""
         if quantity != "pressure":
-            return super().values(surface, mean_separation, quantity)
-        pressure, steep, exact = self._elastic.values(surface, mean_separation, quantity)
-        return *self._closed(surface, mean_separation, pressure, steep), exact
+            return super().curve(surface, quantity)
+        elastic, closed = self._elastic.curve(surface, quantity), self._closed(surface, self._eta(surface))
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            pressure, steep, exact = elastic(u)
+            return *closed(u, pressure, steep), exact
+
+        return values
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a "pressure" (over E*, below the hardness) or an "area"."""
@@ -230,8 +234,12 @@ class Yielding(Theory):
 
     def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Mean separations u at forces over A0 E*, and `lighter` of `loaded` where areas need that."""
-        if self.knows_areas or np.isinf(self.hardness).all():
-            return self.mean_separation_at(surface, "pressure", pressure), None
+        if np.isinf(self.hardness).all():
+            return self._elastic.mean_separation_at(surface, "pressure", pressure), None
+        if self.knows_areas:
+            u, missed = self.inverted(surface, "pressure", pressure)
+            refuse_unfinished(~missed, "the separation at this pressure")
+            return u, None
         shape = np.broadcast_shapes(pressure.shape, surface.shape, self.hardness.shape)
         cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
         both = self.changed(hardness=np.stack([cap, np.full(cap.shape, np.inf)]))
@@ -248,11 +256,11 @@ class Yielding(Theory):
         eta, elastic = self._eta(surface), self._elastic.scatter(surface, quantity, area)
         return shipped().standard_deviation(self._elastic.scatter_name(surface), quantity, eta, area, elastic)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
         soft = self._eta(surface) < TESTED_ETA * (1 - 1e-9)
         return {
-            **self._elastic.concerns(surface, answer, mean_separation),
+            **self._elastic.reasons(surface, answer, mean_separation),
             f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": np.broadcast_to(
                 soft, np.shape(answer.area)
             ),

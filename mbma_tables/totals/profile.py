@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.core import core
+from mbma_tables.core import core, in_blocks
 from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
@@ -33,6 +33,7 @@ from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Pa
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS = 30
+BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
 MOST = 1000  # panels to be answered anew at a time
 
 # of approaches and which of them count: rows of `Panels.fields`, and their error
@@ -102,12 +103,15 @@ class Profile:
         """The largest compression that it answers."""
         return float(self.edges[-1]) * (1 + 1e-14)
 
-    def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
+    def totals(self, compression: FloatArray, slopes: bool = False, workers: int = 1) -> FloatArray:
         """Totals at (h_max - d)/h_rms > 0 within the profile, shape (rows, gaps), and slopes by the compression below.
 
         F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area and the Hertz area; of a
         measured surface F/(A0 E*).
         """
+        if compression.size > BLOCK:
+            parts = in_blocks(lambda block: self.totals(compression[block], slopes), compression.size, BLOCK, workers)
+            return np.concatenate(parts, axis=1)
         rows = self.series.shape[1]
         out = np.empty((2 * rows if slopes else rows, compression.size))
         core.profile_totals(np.ascontiguousarray(compression), self.edges, self.series, rows, int(slopes), out)
