@@ -306,12 +306,10 @@ static mbma_spline spline_of(const argument *a) {
     FN(spectrum_waves, "Dn Dn wm wm wm w4", true, mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5))) \
     FN(spectrum_law_of, "Dn Dn Dn D10 w3n w", N(5) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_of(WAVES, CONSTANTS, NUMBER(9), P(4), P(5))) \
-    FN(spectrum_law_persson, "D Dn wn wn", N(0) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_persson(P(0), N(1), P(1), P(2), P(3))) \
     FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4))) \
-    FN(spectrum_law_separation, "D Dn wn", N(0) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_separation(P(0), N(1), P(1), P(2))) \
+    FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4))) \
     /* hardness.c */ \
     FN(gaussian_level, "Dn wn", true, mbma_gaussian_level(N(0), P(0), P(1))) \
     FN(bearing_share, "Dn Dn wn wn", true, mbma_bearing_share(N(0), P(0), P(1), P(2), P(3))) \
