@@ -1,4 +1,4 @@
-"""Flow factors against Reynolds' equation on simulated gaps: ``python -m generate.boundary_elements.film``.
+"""Flow factors against Reynolds' equation on simulated gaps: ``python -m generate.machined.film``.
 
 Gaussian surfaces with lays up to 8:1; five mean gaps above contact, and five loads on which Tamaas deforms the faces.
 No constant of `mbma_tables.laws.film` was fitted to them; six minutes on one core.
