@@ -87,11 +87,12 @@ def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowCons
     Wide gaps across (x) and along (y) ridges, by c = 1/(1 + gamma):
 
     >>> import numpy as np
+    >>> from mbma_tables.laws.film import factors
     >>> from mbma_tables.laws.effective_medium import FlowConstants
     >>> u = np.array([20.0])
     >>> ratio, shear = factors(u, np.zeros(1), 0.25, FlowConstants())
-    >>> (1 - 1.5 / u**2) * ratio[:, 0], [1 + 3 * (1 - 3 * c) / 400 for c in (0.8, 0.2)]
-    (array([0.98955571, 1.00300...]), [0.9895, 1.003])
+    >>> ((1 - 1.5 / u**2) * ratio[:, 0]).round(4), [1 + 3 * (1 - 3 * c) / 400 for c in (0.8, 0.2)]
+    (array([0.9895, 1.0029]), [0.9895, 1.003])
     """
     share, gap = open_gaps(u, area, 1.0)
     held = np.minimum(area, flow.threshold - NEAREST)

@@ -36,9 +36,10 @@ def stress_shares(
 
     Examples
     --------
+    >>> from mbma_tables.laws.lay import stress_shares
     >>> along, across = stress_shares(4.0, 0.12, 0.3)
     >>> round(float(along), 3), round(float(across), 3)
-    (0.21, 0.825)
+    (0.211, 0.821)
     """
     r, A, poisson = (np.asarray(each, float) for each in (anisotropy, area, nu))
     low, high = TESTED_AREA

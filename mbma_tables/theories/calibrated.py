@@ -24,7 +24,7 @@ TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 # h_max/h_rms: simulated up to 5.5, beyond which separation and stiffness change by 0.1% at most from 0.1% contact on
 TESTED_HEIGHTS = (2.5, 8.0)
 NEAREST = 0.95  # of h_max: where the certificate of the table ends
-TAIL = 3.0, 0.9  # u/h_rms from which the table's error grows, and how fast: exp(0.9 (u/h_rms - 3))
+TAIL = 3.0, 0.8  # u/h_rms from which the error of the table grows, and its rate: exp(0.8 (u/h_rms - 3))
 # standard deviations that come on top of what is stated for Gaussian maps, of maps without `departures` and of others;
 # of docs/data/machined.nc, where so many leave 70% within one and 93.5% within two
 MAP_SCATTER = {"area": (0.038, 0.075), "pressure": (0.046, 0.13), "stiffness": (0.13, 0.21)}
