@@ -67,10 +67,10 @@ def contact_law(
     theory : str or theory, optional
         As for `contact`.
     rtol : float
-        Relative error asked of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; no more than a
-        tenth of its own error, the median over gaps, is asked of another theory's.
+        Requested relative error of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; for
+        other theories at least a tenth of their own error, the median over gaps.
     island model, variant, E_star
-        As for `contact`; `island_model` may be an island model of one's own.
+        As for `contact`; `island_model` may be a user-defined island model.
     hardness, materials : optional
         As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
 
@@ -161,7 +161,7 @@ class Islands(NamedTuple):
     """What a law needs of a surface's islands."""
 
     end: float  # largest approach [length]
-    layer: float  # approach at which an island's band leaves the shortest wave [length]
+    layer: float  # approach at which an island's band leaves the shortest wavelength [length]
     kinks: list[float]  # approaches at floors of the band [length]
     leverage: float  # what their error is worth in slopes
     totals: Callable[[FloatArray], tuple[FloatArray, float]]  # force with E* = 1, sum of areas; error, at h_max - d
@@ -220,7 +220,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
         return np.stack([found.pressure, found.area])
 
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
-    # where it has far larger errors at some gaps, as at the lightest contact of a small map, these tell of no others
+    # where it has far larger errors at some gaps, as at the lightest contact of a small map, these do not count
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
     bends = np.asarray(theory.elastic.bends(surface), dtype=float)
 

@@ -1,7 +1,7 @@
 """Persson's theory of area and average separation (Eqs. 18-21).
 
 The double integral (19) is the calibrated law's energy integral with the weight W = gamma P + (1 - gamma) P^3 and
-without its tail, u_P of `mbma_tables.laws.calibrated`; u0 and lambda of (21) are sums over the same waves.
+without its tail, u_P of `mbma_tables.laws.calibrated`; u0 and lambda of (21) are sums over the same wavenumbers.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _light(law: Law) -> tuple[float, float]:
 
 
 def _by_law(surface: AnySurface, given: FloatArray, answer: Callable[[Law, FloatArray], FloatArray]) -> FloatArray:
-    """Rows of what `answer` says of each law and of its entries, columns of `given`, among those of a batch."""
+    """Rows of ``answer(law, columns of given)`` of each distinct law, in the places of its entries."""
     if isinstance(surface, MeasuredSurface):
         return answer(_own_law(surface), given)
     assert isinstance(surface, Surface)
@@ -176,7 +176,7 @@ class Persson(Theory):
 
     def _self_affine(self, surface: AnySurface) -> AnySurface:
         if isinstance(surface, MeasuredSurface):
-            raise InputError("the simplified form (20) is of self-affine surfaces: ask method='full', or surface.fit()")
+            raise InputError("the simplified form (20) is of self-affine surfaces: use method='full', or surface.fit()")
         return surface
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:

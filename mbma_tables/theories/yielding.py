@@ -18,7 +18,7 @@ from mbma_tables.common.arguments import FloatArray, checked_hardness
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws import hardness as law
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.calibrated_table import at_contact, shipped_part
+from mbma_tables.theories.calibrated_table import known_at, shipped_part
 from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer, refuse_unfinished
 
 GROUP = "hardness"  # of the calibrated laws' file
@@ -42,7 +42,9 @@ class Scatter(NamedTuple):
     def _at(self, rows: FloatArray, eta: FloatArray, area: FloatArray) -> FloatArray:
         """At hardnesses and contact fractions, held constant beyond those simulated."""
         shape = np.broadcast_shapes(np.shape(eta), np.shape(area))
-        values = np.array([at_contact(self.log_area, row, np.broadcast_to(area, shape)) for row in rows])
+        with np.errstate(divide="ignore"):
+            log_area = np.log(np.broadcast_to(area, shape))
+        values = np.array([known_at(self.log_area, row, log_area) for row in rows])
         y = np.interp(np.log(np.broadcast_to(eta, shape)), np.log(self.eta), np.arange(self.eta.size))
         below = np.minimum(y.astype(int), self.eta.size - 2)
         low, high = (np.take_along_axis(values, k[None], 0)[0] for k in (below, below + 1))

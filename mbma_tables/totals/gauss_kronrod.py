@@ -29,7 +29,7 @@ NODES_21, KRONROD_21, GAUSS_21 = _rule(21)
 
 BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
 DEPTH = 64  # halvings of an interval before giving up
-MOST = 1000  # intervals of an integral, likewise
+MOST = 1000  # intervals of an integral before giving up
 LEAST = 1e-290  # of integrals: smaller ones have lost digits that no halving brings back
 
 Integrand = Callable[[NDArray[np.intp], FloatArray], FloatArray]

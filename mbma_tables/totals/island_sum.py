@@ -19,9 +19,9 @@ from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.island import scale_area, scale_force
 
-QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
+QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
-BLOCK = 256  # pairs between two looks for Ctrl-C
+BLOCK = 256  # pairs between two checks for interrupts
 STRETCH = 8.0  # scale of the approach's map, in boundary layers zeta_1^(-H), as in the core
 # of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
 COLUMNS, BY_COMPRESSION = 5, 3
@@ -49,7 +49,7 @@ class Pairs(NamedTuple):
 class Totals(NamedTuple):
     """F/(A0 E* q0 s) and A/A0 of pairs, the bound on their relative error, and the islands evaluated.
 
-    Of the two, one that was not asked for holds the other, or NaN.
+    Of the two, one that was not requested holds the other, or NaN.
     """
 
     force: FloatArray

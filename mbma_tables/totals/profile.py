@@ -30,10 +30,10 @@ from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels
 
-KEPT = 64  # profiles, for whoever asks the same surface again
+KEPT = 64  # profiles in the cache
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS = 30
-BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
+BLOCK = 1 << 14  # gaps between two checks for interrupts
 MOST = 1000  # panels to be answered anew at a time
 
 # of approaches and which of them count: rows of `Panels.fields`, and their error
@@ -46,7 +46,7 @@ class Source(NamedTuple):
     islands: Callable[[FloatArray], dict[str, FloatArray]]  # `geometry.FIELDS`
     h_rms: float  # in their unit of height
     peak: float  # h_max/h_rms
-    layer: float  # where a band leaves the shortest wave
+    layer: float  # where a band leaves the shortest wavelength
     at_d: float  # where zeta_d reaches its floor
     breaks: FloatArray  # where anything changes
     jacobian: float  # K1 (47) below at_d
