@@ -158,7 +158,8 @@ class Theory(abc.ABC):
             rtol=ENERGY_RTOL,
             minlevel=LEAST_LEVEL,
         )
-        refuse_unfinished(found.success.all(axis=0), "the elastic energy")
+        if not found.success.all():
+            raise unfinished(~found.success.all(axis=0), "the elastic energy")
         return np.asarray(found.integral.sum(axis=0))
 
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
@@ -193,7 +194,8 @@ class Theory(abc.ABC):
             Where the branch of first contact does not reach it.
         """
         u, missed = self.inverted(surface, quantity, np.asarray(wanted, dtype=float))
-        refuse_unfinished(~missed, f"the separation at this {quantity}")
+        if missed.any():
+            raise unfinished(missed, f"the separation at this {quantity}")
         return u
 
     @np.errstate(all="ignore")
@@ -267,11 +269,9 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurfac
     return surface.with_numbers(*numbers)
 
 
-def refuse_unfinished(success: Any, what: str) -> None:
-    """Say which entries were not found."""
-    failed = ~np.asarray(success)
-    if failed.any():
-        raise ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
+def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:
+    """The error of entries that were not found."""
+    return ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
 
 
 def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
