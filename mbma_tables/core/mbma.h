@@ -354,15 +354,14 @@ size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_
 mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *constants, double h_max,
                                  double *work, mbma_spectrum_law *law);
 
-/* Mean separation and its derivative by ln F of a surface without end, before the tail's factor. */
-size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const double *force, double *u, double *slope);
-
 /* Force, area and -dF/du at mean separations. */
 size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
                                  double *stiffness);
 
-/* Mean separations at forces > 0; 0 at forces that leave none. */
-size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, double *u);
+/* Mean separations at forces > 0, 0 at forces that leave none, and du/d ln F of what is solved for; without `whole` of
+ * a surface without end, before the tail's factor. */
+size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, int whole, double *u,
+                                    double *slope);
 
 /* ---- hardness.c: contact with a hardness -------------------------------------------------------------------------- */
 

@@ -173,9 +173,10 @@ class Law:
             raise InputError("a spectrum has rising positive wavenumbers and shares of variance that are not negative")
         return law
 
-    def _asked(self, function: Any, given: ArrayLike, rows: int) -> list[FloatArray]:
-        """Rows of what a function of the core answers of an array."""
-        return answered(lambda *entries: function(self._prepared, *entries), (given,), rows)
+    def _separations(self, force: ArrayLike, whole: bool) -> list[FloatArray]:
+        """Mean separations, and their derivatives by ln F, without end and tail factor unless `whole`."""
+        law = self._prepared
+        return answered(lambda F, *out: core.spectrum_law_separation(law, F, int(whole), *out), (force,), 2)
 
     def energy(self, force: ArrayLike) -> FloatArray:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
@@ -188,12 +189,12 @@ class Law:
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor; 0 at loads that leave no gap."""
-        u, slope = self._asked(core.spectrum_law_persson, force, 2)
+        u, slope = self._separations(force, False)
         return u, slope
 
     def contact(self, u: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Force, area and -dF/du at mean separations u [h_rms]: 0 from h_max on, without bound at u = 0."""
-        force, share, stiffness = self._asked(core.spectrum_law_contact, u, 3)
+        force, share, stiffness = answered(functools.partial(core.spectrum_law_contact, self._prepared), (u,), 3)
         return force, share, stiffness
 
     def force(self, u: ArrayLike) -> FloatArray:
@@ -207,7 +208,7 @@ class Law:
 
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
-        return self._asked(core.spectrum_law_separation, force, 1)[0]
+        return self._separations(force, True)[0]
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""

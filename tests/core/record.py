@@ -89,9 +89,9 @@ def use():
     core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
-    for form, inputs in (("pocket_phi", 2), ("standard_phi", 2), ("long_phi", 2), ("totals", 4)):
-        for ending in ("pressure", "area") if form == "totals" else ("F", "A"):
-            getattr(core, f"{form}_{ending}")(*[surfaces[2]] * inputs, np.empty(20))
+    for form in range(8):
+        more = [surfaces[2] if form > 5 else None] * 2
+        core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
     greenwood_tripp.radius(2.0, 0.5, 1e-6)
     hardness.BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
     u = np.geomspace(2.9, 0.1, 12)

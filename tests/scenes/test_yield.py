@@ -1,7 +1,5 @@
 """The effect `yield` of a scene."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

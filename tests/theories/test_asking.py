@@ -1,7 +1,5 @@
 """`contact` asked by separation, mean separation, pressure or area, of any theory."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 

@@ -302,7 +302,7 @@ class TestMap:
 
 class TestSpectrum:
     @pytest.mark.parametrize("count", [2, 60, 500])
-    def test_of_a_power_law_is_the_table_s(self, count: int):
+    def test_of_a_power_law_is_the_table_s(self, count):
         q = np.geomspace(SURFACE.q0, SURFACE.q1, count)
         surface = Surface.from_spectrum(q, SURFACE.power_spectrum(q), h_max=SURFACE.h_max)
         u = SHARES[1:] * SURFACE.h_max

@@ -199,9 +199,7 @@ class TestLaw:
         assert law.leakage(separation=at + 1e-6) > 0
         apart = np.array([3.5, 4.0, 400.0])
         np.testing.assert_allclose(
-            law.leakage(separation=apart),
-            contact(SEAL, separation=apart, theory="calibrated").leakage.K,
-            rtol=1e-4,
+            law.leakage(separation=apart), contact(SEAL, separation=apart, theory="calibrated").leakage.K, rtol=1e-4
         )
 
     def test_falls_with_pressure_in_units_and_labels(self):

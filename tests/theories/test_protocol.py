@@ -1,7 +1,5 @@
 """Theories behind one protocol: stiffness, energy and inverses against other ways to the same numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from helpers import Springs

@@ -1,7 +1,5 @@
 """Theories with a hardness: limits, bounds, monotony, and the ways to ask."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np
