@@ -1,4 +1,4 @@
-"""`contact`: pressure, area and stiffness of a surface by any theory, asked by what is known of the contact."""
+"""`contact`: pressure, area and stiffness of a surface by any theory, at a given separation, pressure or area."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from mbma_tables.theories import OPTIONS, THEORIES, default_theory, get_theory, 
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 
-KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
+KNOWN = ("separation", "mean_separation", "pressure", "area")  # quantities of which exactly one is given
 
 
 @hinted
@@ -91,18 +91,18 @@ def contact(
         Metals in contact, one of `mbma_tables.materials.METALS` each, or `Metal` objects; in place of `E_star`.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
-        table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
+        table from `open_table`, or a user-defined model with a `name` and ``answer(X, mu)``.
     variant : {"reported", "printed", "fitted"} or Variant
         Which variant of the paper's equations MBMA takes.
     E_star : array_like or str
         Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit, which "100 GPa" names.
     rtol : float
-        Relative error asked of MBMA's force and area, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
+        Requested relative error of MBMA's sums, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
     outside : {"raise", "exact", "nan"}
         For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
     derivatives : bool
-        Whether `pressure_by`, `area_by` and `separation_by` are asked for: MBMA's by its own differentiated sums, other
-        theories' by numerical differentiation, to 1e-6.
+        Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
+        theories by numerical differentiation, to 1e-6.
     quantities : iterable of {"pressure", "area"}
         What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
     workers : int
@@ -118,7 +118,7 @@ def contact(
         For NaN, infinite or empty input, separations below -h_max, islands that no table covers, pressures and areas
         that the branch of first contact does not reach.
     ConvergenceError
-        Where the accuracy was not reached; its `mask` says which entries.
+        Where the accuracy was not reached; `mask` is true for these entries.
 
     See Also
     --------
@@ -178,7 +178,7 @@ def contact(
 
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
-    """The theory asked for, with MBMA's `options`, which others refuse."""
+    """The requested theory, with MBMA's `options`, which other theories refuse."""
     given = [name for name, value in options.items() if value is not OPTIONS[name] and value != OPTIONS[name]]
     named = theory_name(surface, theory, **options) if theory is None else theory
     if isinstance(named, str) and named in THEORIES:
@@ -187,12 +187,12 @@ def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None,
         if named == "mbma":
             return Mbma(**options)
     if given:
-        raise InputError(f"{', '.join(given)}: options of theory 'mbma' alone, asked for by its name")
+        raise InputError(f"{', '.join(given)}: options of theory 'mbma' alone, given by its name")
     return get_theory(named, surface)
 
 
 def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
-    """The quantities asked for, each once, in the order of `QUANTITIES`."""
+    """The requested quantities, each once, in the order of `QUANTITIES`."""
     asked = {quantities} if isinstance(quantities, str) or not isinstance(quantities, Iterable) else set(quantities)
     if not asked or not asked <= set(QUANTITIES):
         raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
@@ -233,7 +233,7 @@ def _contact(
     held = by if by in QUANTITIES else None
     by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}
     if derivatives and held:
-        require(by, value, value > 0, "positive where derivatives are asked for: a gap has no slope there")
+        require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
         wanted = QUANTITIES if derivatives else quantities
         totals = theory.totals(surface, places["separation"], E_star, derivatives, wanted)
@@ -298,7 +298,7 @@ def _places(
 def _refuse_pressures(
     surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: FloatArray, theory: Theory, unit: str | None
 ) -> None:
-    """Refuse pressures beyond the hardness or the theory's end, in the unit in which they were asked for."""
+    """Refuse pressures beyond the hardness or the theory's end, in the unit in which they were given."""
     name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
     limits = [(hardness, "the hardness")]
     with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force

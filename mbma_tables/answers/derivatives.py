@@ -1,8 +1,7 @@
-"""Derivatives of a theory's force and area in the gap and in the surface's parameters.
+"""Derivatives of a theory's force and area by the gap and by the surface's parameters.
 
-Where a theory does not know them they are differences in steps that keep clear of the ends of contact, whose error
-decides whether they are given out. With a hardness the elastic contact is differentiated, and one that is straight in
-the parameters, with these slopes, goes through the law.
+Where a theory has none in closed form they are finite differences, with steps inside the range of contact, refused
+where their estimated error is too large. With a hardness the derivatives of the elastic contact go through its law.
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ class Leakage(Displayed):
     """Flow through the gaps of a contact; arrays of the contact's shape.
 
     Reynolds' equation on the gaps: no flow where bodies touch, small slopes, isotropic roughness, and a fluid whose
-    pressure does not move the solids. It is the mean of a long seal, many longest waves each way; cells of a few waves
-    differ by `scatter`.
+    pressure does not move the solids. It is the mean of a long seal, many of the longest wavelengths each way; cells of
+    a few wavelengths differ by `scatter`.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Leakage(Displayed):
 
     @property
     def blocked(self) -> Any:
-        """Whether contact percolates, A/A0 at or above about 0.41: what then passes no law of gaps tells."""
+        """Whether contact percolates, A/A0 at or above about 0.41; what passes then is not in this model."""
         return self.K == 0
 
     @property
@@ -107,7 +107,7 @@ class Leakage(Displayed):
 
     @functools.cached_property
     def scatter(self) -> Numbers:
-        """Standard deviation of ln K from simulation to simulation, cells of four or more longest waves a side.
+        """Standard deviation of ln K from simulation to simulation, cells of four or more longest wavelengths a side.
 
         NaN where not known, and where blocked.
         """

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mbma_tables.answers.leakage import Leakage
 
 OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
-MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
+MOST_SHOWN = 10_000  # entries up to which the text includes errors, scatter and validity
 
 
 def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers]:
@@ -51,9 +51,9 @@ class Contact(Interface, Displayed):
     mean_separation : ndarray
         u = (h_max + d)/2 (50) [length].
     pressure : ndarray or None
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not asked for.
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not requested.
     area : ndarray or None
-        A/A0, None where not asked for. MBMA does not end at 1 under full compression, and this is not clamped.
+        A/A0, None where not requested. MBMA does not end at 1 under full compression, and this is not clamped.
     error : ndarray
         Bound on the relative numerical error of both against the theory (for "mbma" against its island model),
         NaN where not known. The theory's own distance from simulation is another number, `scatter`.
@@ -134,7 +134,7 @@ class Contact(Interface, Displayed):
         return draw_compression([self.curve()], title, pressure_label(unit))
 
     def curve(self, leakage: bool = False) -> Curve:
-        """A line of pictures, of one surface at several separations; with its leakage where that is asked for."""
+        """A line of pictures, of one surface at several separations; optionally with its leakage."""
         surface = self._source.surface
         if self.pressure is None or self.area is None or np.size(self.pressure) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
@@ -147,7 +147,7 @@ class Contact(Interface, Displayed):
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
-        """The theory's answer at these separations, asked once."""
+        """The theory's answer at these separations, computed once."""
         source = self._source
         if source.answer is not None:
             return source.answer
@@ -156,7 +156,7 @@ class Contact(Interface, Displayed):
 
     @property
     def _touching(self) -> Numbers:
-        """A/A0, whether asked for or not."""
+        """A/A0, whether requested or not."""
         return self._answer.area if self.area is None else self.area
 
     @described
@@ -228,12 +228,12 @@ class Contact(Interface, Displayed):
 
     @described
     def area_scatter(self) -> Any:
-        """Standard deviation of ln A at this pressure, likewise."""
+        """Standard deviation of ln A at this pressure, from simulation to simulation."""
         return self._scatter("area")
 
     @described
     def stiffness_scatter(self) -> Any:
-        """Standard deviation of ln of `unloading_stiffness` at this pressure, likewise: of conductance, too."""
+        """Standard deviation of ln of `unloading_stiffness` at this pressure, and of conductance."""
         return self._scatter("stiffness")
 
     @described

@@ -29,7 +29,7 @@ from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # of the logarithm of a parameter
 NEAR = 0.9  # of a number's end, from which on its steps go down
-MAX_ERROR = 0.05  # of a slope that is told, over itself or 1
+MAX_ERROR = 0.05  # of a slope, over itself or 1, above which it is NaN
 POINTS = 33  # of a range, geometric
 ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
 
@@ -47,7 +47,7 @@ class Sensitivity:
     parameters : dict of float
         The surface's numbers, the modulus where there is one, and what is held.
     answers : dict of float
-        What is asked, at these numbers; stiffness that of loading, conductance over the mean conductivity of the
+        The answers at these numbers; stiffness that of loading, conductance over the mean conductivity of the
         bodies [1/length].
     slopes, errors : dict of dict of float
         d ln(answer)/d ln(parameter) by parameter and answer, the other parameters held, NaN where the answer jumps,
@@ -106,7 +106,7 @@ def sensitivity(
         One surface. Its parameters are its five numbers, or those of the drawing that it was made from
         (`Surface.from_roughness`). Those of one that is its own spectrum are "heights" and "lengths", factors of all
         heights and of all lengths along the plane, which calibrations of an instrument are about; h_max alone; the
-        "shortest" and "longest" wavelengths, cut-offs that only take waves away, and with an extrapolated spectrum
+        "shortest" and "longest" wavelengths, cut-offs that only remove wavelengths, and with an extrapolated spectrum
         its exponent "extrapolate_hurst". Where the calibrated law takes a map's own heights, tops and valleys, h_max
         and cut-offs are left out: they are the map's.
     separation, mean_separation, pressure, area : float or str, one of them
@@ -195,7 +195,7 @@ def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurfa
     steps = {record["step"]: record for record in surface.provenance}
     own: dict[str, Any] = {"heights": 1.0, "lengths": 1.0}
     known: MeasuredSurface = surface
-    # the calibrated law takes measured heights and tops, which have their own highest point and shortest waves
+    # the calibrated law takes measured heights and tops, which have their own highest point and shortest wavelengths
     takes_map = getattr(theory, "name", theory) == Calibrated.name
     if surface.heights.is_gaussian or not takes_map:
         own["h_max"] = float(surface.h_max)
@@ -234,7 +234,7 @@ def _slopes(
         found = answers({name: numbers[name] * np.exp(np.where(k == j, x, 0.0)) for j, name in enumerate(varied)})
         return np.log([found[name] for name in wanted])
 
-    # cut-offs only take wavelengths away; other numbers may be near their end
+    # cut-offs only remove wavelengths; other numbers may be near their end
     cap = numbers.get("hardness", np.inf)
     ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": cap}
     ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}

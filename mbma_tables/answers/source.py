@@ -40,15 +40,15 @@ MEANINGS = {
     "error": "bound on the relative numerical error against the theory",
     "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
-    "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, likewise",
-    "separation_scatter": "standard deviation of the mean separation at this force, likewise",
+    "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, between simulations",
+    "separation_scatter": "standard deviation of the mean separation at this force from simulation to simulation",
     "valid": "whether the theory was tested for contacts such as these",
 }
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
 def named(value: Any, name: str, units: Units) -> Any:
-    """A quantity of a contact; a DataArray of it knows its name, meaning and unit."""
+    """A quantity of a contact; a DataArray gets its name, meaning and unit."""
     if not is_labelled(value):
         return value
     return value.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
@@ -68,7 +68,7 @@ class Source:
     units: Units
     yields: bool  # whether a hardness is given, and not an infinite one
     answer: TheoryAnswer | None = None  # where it is known already
-    loaded: Loaded | None = None  # likewise, with a hardness
+    loaded: Loaded | None = None  # the same with a hardness
     materials: Pair | None = None  # where they are named
     stated: bool = False  # whether the hardness is, infinite or not
 
@@ -84,7 +84,7 @@ class Source:
     def map(
         self,
         function: Callable[..., tuple[Any, ...]],
-        contact: Any,  # whose mean separations it is asked at
+        contact: Any,  # at whose mean separations
         outputs: int,
         more: Mapping[str, Any] | None = None,
     ) -> tuple[Numbers, ...]:

@@ -68,7 +68,7 @@ def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: C
 def yielded_area(
     force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
-    """Yielded part of A/A0, likewise."""
+    """Yielded part of A/A0, from the same numbers."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
     return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
 

@@ -1,4 +1,4 @@
-"""Theories of rough contact behind one protocol: MBMA, Persson, Greenwood-Williamson, or an object of one's own."""
+"""Theories of rough contact behind one protocol: MBMA, Persson, Greenwood-Williamson, or a user-defined object."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = [
 
 THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")  # also their modules
 _NAMED = dict(zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True))
-# a theory's module is imported when it is first asked for
+# a theory's module is imported when first needed
 _HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson", "BoundaryElements": "simulated"}
 _HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by pressing it
@@ -53,7 +53,7 @@ def __getattr__(name: str) -> Any:
 def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory:
     """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
 
-    "simulated" and "corrected" are theories of one `surface`, made from a map, which they press: `BoundaryElements.of`
+    "simulated" and "corrected" are theories of one `surface`, made from a map: `BoundaryElements.of`
     and `Corrected.of` that surface, kept for the last eight of them.
 
     Raises
@@ -91,7 +91,7 @@ def default_theory(name: str) -> Theory:
 
 
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
+    """The theory as given; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
     from mbma_tables.surfaces.surface import Surface
 
     if theory is not None:

@@ -202,7 +202,10 @@ class Calibrated(Theory):
             straight = np.zeros(answer.area.shape, dtype=bool)
             if law.curve is not None:
                 straight |= law.curve.straight(np.asarray(mean_separation) / law.h_rms)
-            text = "the map's tops and valleys contradict each other: one stiffness stands for a range of forces"
+            text = (
+                "the light-load and near-full-contact approximations disagree for this map: one stiffness stands for a "
+                "range of forces"
+            )
             return {text: straight & (answer.area >= TESTED_AREA[0])} | area_reasons(answer.area)
         assert isinstance(surface, Surface)
         heights = np.asarray(surface.h_max / surface.h_rms)

@@ -38,6 +38,7 @@ class SurfaceSpline:
     step: FloatArray  # and their distance, shape (3,)
     covered: FloatArray  # first and last that are answered, shape (3, 2) or (2, 2)
     coefficients: FloatArray  # float32
+    law_constants: tuple[float, float, float]  # of the law beside the spline, for the core
 
     @functools.cached_property
     def cells(self) -> Any:
@@ -48,11 +49,6 @@ class SurfaceSpline:
     def last(self) -> float:
         """Where the last axis ends."""
         return float(self.first[2] + self.cells[2] * self.step[2])
-
-    @property
-    def law_constants(self) -> tuple[float, float, float]:
-        """What the core needs to know of the law beside the spline."""
-        raise NotImplementedError
 
     @functools.cached_property
     def core_table(self) -> tuple[Any, FloatArray, Any]:
@@ -84,11 +80,6 @@ class Table(SurfaceSpline):
     scatter: dict[str, FloatArray]  # by theory: ln of rms of ln(theory/simulation), rows `QUANTITIES`, by
     log_area: FloatArray  # ln of contact fractions
 
-    @property
-    def law_constants(self) -> tuple[float, float, float]:
-        """Of the area."""
-        return self.constants.area_s0, self.constants.area_slope, self.constants.area_t0
-
     def given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
         """The table and surfaces (columns: H, ln zeta_1, h_max/h_rms) as the core takes them, for so many entries."""
         ends = np.empty((surfaces.shape[1], 2))
@@ -109,14 +100,14 @@ class Table(SurfaceSpline):
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""
         if theory not in self.scatter:
             return np.full(np.shape(area), np.nan)
-        return np.asarray(np.exp(at_contact(self.log_area, self.scatter[theory][QUANTITIES.index(quantity)], area)))
+        with np.errstate(divide="ignore"):
+            return np.exp(known_at(self.log_area, self.scatter[theory][QUANTITIES.index(quantity)], np.log(area)))
 
 
-def at_contact(log_area: FloatArray, row: FloatArray, area: FloatArray) -> FloatArray:
-    """Numbers known at some contact fractions at others; NaN above the last one with a number."""
+def known_at(places: FloatArray, row: FloatArray, x: FloatArray) -> FloatArray:
+    """Numbers at some places, NaN where not known, interpolated; NaN above the last one that is known."""
     known = np.isfinite(row)
-    with np.errstate(divide="ignore"):
-        return np.interp(np.log(area), log_area[known], row[known], right=None if known[-1] else np.nan)
+    return np.interp(x, places[known], row[known], right=None if known[-1] else np.nan)
 
 
 def nodes_of(axes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -143,11 +134,13 @@ def _read(path: pathlib.Path, group: str = "") -> tuple[dict[str, FloatArray], d
 def load(path: pathlib.Path) -> Table:
     """Read a table file; one that is damaged, or is another file, is a TableFileError."""
     values, facts, covered = _read(path)
+    constants = Constants(*(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants)))
     return Table(
         *nodes_of([values[name] for name in AXES]),
         np.array([covered[name] for name in AXES]),
         values["spline"],
-        Constants(*(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants))),
+        (constants.area_s0, constants.area_slope, constants.area_t0),
+        constants,
         float(facts["largest_error_force"]),
         dict(zip(facts["theories"].split(), np.log(values["stated_scatter"]), strict=True)),
         np.log(values["contact"]),

@@ -178,7 +178,7 @@ class Mbma(Theory):
         """That of the variant: those with a name were compared with boundary elements, no other was."""
         name = self.variant.name
         if self.variant not in NAMED.values():
-            return f"{self.name}, a variant of one's own"
+            return f"{self.name}, user-defined variant"
         return self.name if name == "reported" else f"{self.name}_{name}"
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """What a theory is: anything that answers a surface and a mean separation with pressure, area and stiffness.
 
 MBMA, Persson's theory, Greenwood and Williamson's and the law calibrated on boundary elements are theories, and so is a
-user's own object with a `name` and an ``answer(surface, mean_separation)``. What a theory does not know in closed form
+user's own object with a `name` and an ``answer(surface, mean_separation)``. What a theory has not in closed form
 (stiffness, energy, the separation at a given load) follows from its forces here.
 """
 
@@ -96,7 +96,7 @@ class Theory(abc.ABC):
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u."""
-        # what needs it is asked for a hardness alone
+        # needed with a hardness alone
         from mbma_tables.laws import hardness
 
         h_rms, heights = np.asarray(surface.h_rms), self.heights(surface)
@@ -132,7 +132,7 @@ class Theory(abc.ABC):
         return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficient [length^3] along both axes, shape (2, ...), of gaps that it knows; None: it knows none."""
+        """Flow coefficient [length^3] along both axes, shape (2, ...), of simulated gaps, if there are any."""
         return None
 
     def flow_trust(
@@ -158,11 +158,12 @@ class Theory(abc.ABC):
             rtol=ENERGY_RTOL,
             minlevel=LEAST_LEVEL,
         )
-        refuse_unfinished(found.success.all(axis=0), "the elastic energy")
+        if not found.success.all():
+            raise unfinished(~found.success.all(axis=0), "the elastic energy")
         return np.asarray(found.integral.sum(axis=0))
 
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
-        """Derivatives of force and of area by "mean_separation" and the surface's parameters, where it knows them."""
+        """Derivatives of force and of area by "mean_separation" and the surface's parameters, if in closed form."""
         return None
 
     def looks(self, surface: AnySurface) -> int:
@@ -193,7 +194,8 @@ class Theory(abc.ABC):
             Where the branch of first contact does not reach it.
         """
         u, missed = self.inverted(surface, quantity, np.asarray(wanted, dtype=float))
-        refuse_unfinished(~missed, f"the separation at this {quantity}")
+        if missed.any():
+            raise unfinished(missed, f"the separation at this {quantity}")
         return u
 
     @np.errstate(all="ignore")
@@ -267,11 +269,9 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurfac
     return surface.with_numbers(*numbers)
 
 
-def refuse_unfinished(success: Any, what: str) -> None:
-    """Say which entries were not found."""
-    failed = ~np.asarray(success)
-    if failed.any():
-        raise ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
+def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:
+    """The error of entries that were not found."""
+    return ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
 
 
 def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
@@ -297,7 +297,7 @@ class Wrapped(Theory):
     """A user's theory, its stiffness by numerical differentiation."""
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """What it is of, its author knows."""
+        """None: its author decides."""
         return ()
 
     def __init__(self, theory: UserTheory) -> None:

@@ -168,7 +168,7 @@ def _sums(
                 np.isin(np.arange(size), left),
             )
         return sums, error, islands
-    # gap by gap, which also says what is wrong with which
+    # gap by gap, with errors for each
     rest = Pairs.of(surface, depth)
     rest = rest if left.size == size else rest.some(left)
     options = how.variant, how.rtol, how.outside

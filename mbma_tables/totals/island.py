@@ -111,7 +111,7 @@ def island(
     E_star : array_like or str
         Effective modulus, perhaps with its unit, "100 GPa"; force is in that unit times length squared.
     rtol : float
-        Relative error asked of force and area.
+        Requested relative error of force and area.
 
     Returns
     -------

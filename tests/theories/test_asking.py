@@ -91,7 +91,7 @@ def test_derivatives_at_a_held_quantity(held, theory):
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_derivatives_at_first_contact_are_refused(theory):
-    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are asked for") as caught:
+    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are requested") as caught:
         contact(SURFACE, pressure=[0.0, 0.001], theory=theory, derivatives=True)
     assert caught.value.mask.tolist() == [True, False]
 

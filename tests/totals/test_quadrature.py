@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from mbma_tables import ConvergenceError, Surface
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.totals.gauss_kronrod import integrate
-from mbma_tables.totals.island_sum import Pairs, totals_of
+from mbma_tables.totals.island_sum import Pairs, integrate, totals_of
 
 
 def run(function, low, high, rtol=1e-10, owner=None):
