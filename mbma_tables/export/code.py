@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import functools
 import importlib.util
 import os
 import pathlib
@@ -21,8 +22,9 @@ from typing import NamedTuple
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
-from mbma_tables.export import CODE, c_code
+from mbma_tables.export import c_code
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
+from mbma_tables.export.targets import Target
 from mbma_tables.export.text import filled, opening, wrapped
 from mbma_tables.models.tables import open_table
 from mbma_tables.models.universal import UniversalModel
@@ -98,8 +100,8 @@ def write_code(
     ...     [path.name for path in write_code("c", folder) if path.name.startswith("mbma_")]
     ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
     """
-    if target not in CODE:
-        raise InputError(f"target must be one of {CODE}, got {target!r}")
+    if target not in LANGUAGES:
+        raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     rule = get_variant(variant)
     model = open_table(table)
     if not isinstance(model, UniversalModel):
@@ -161,8 +163,8 @@ class Replay:
 
 def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
     """Build what `write_code` wrote where its compiler is installed, and replay the points beside it, or others."""
-    if target not in CODE:
-        raise InputError(f"target must be one of {CODE}, got {target!r}")
+    if target not in LANGUAGES:
+        raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     place = pathlib.Path(folder).absolute()
     csv = place / POINTS_FILE if points is None else pathlib.Path(points).absolute()
     if not csv.is_file():
@@ -300,3 +302,7 @@ def _lines(text: str, first: str, later: str | None = None) -> list[str]:
 
 def _text(lines: Iterable[str], indent: int = 0) -> str:
     return textwrap.indent("\n".join(lines), " " * indent)
+
+
+_TAKES = frozenset({"variant", "check"})
+TARGETS = tuple(Target(name, functools.partial(write_code, name), _TAKES) for name in LANGUAGES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import uuid
 import zipfile
@@ -14,6 +15,7 @@ from mbma_tables.common.units import factor
 from mbma_tables.export.joint import Joint
 from mbma_tables.export.law_code import MORE, AskedLaw, asked_law, code_name, text_of
 from mbma_tables.export.law_numbers import LawNumbers
+from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -181,3 +183,6 @@ def _zipped(files: dict[str, bytes]) -> bytes:
             # without the time of writing: the same law is the same file
             archive.writestr(zipfile.ZipInfo(path), content, zipfile.ZIP_DEFLATED)
     return stream.getvalue()
+
+
+TARGETS = tuple(Target(name, functools.partial(fmu, name), CODE, rows=False) for name in STANDARDS)

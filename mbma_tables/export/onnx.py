@@ -11,6 +11,7 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers
+from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import checked_name
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -149,3 +150,6 @@ def _polynomial(graph: _Graph, rows: FloatArray, k: str, t: str) -> str:
     """The polynomial of row k."""
     powers = graph("Pow", graph("Unsqueeze", t, [-1]), np.arange(float(rows.shape[1])))
     return graph("ReduceSum", graph("Mul", graph("Gather", rows.copy(), k), powers), [-1], keepdims=0)
+
+
+TARGETS = (Target("onnx", onnx, CODE, rows=False),)
