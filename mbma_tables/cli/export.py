@@ -55,6 +55,11 @@ class _Export(click.Command):
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )
 @click.option("--name", help="Of the interaction, table, functions or module.")
+@click.option(
+    "--binaries",
+    type=click.Choice(["here", "all", "none"]),
+    help="In an FMU: for this platform, for all by zig, or none.",
+)
 @click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @options.theory_option
 @options.hardness_option

@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from mbma_tables.common.errors import InputError
@@ -138,15 +138,26 @@ def web_assembly(c_texts: dict[str, str], names: Iterable[str], *options: str) -
             "javascript is compiled from C by the package ziglang, which is not installed: "
             "pip install 'mbma_tables[javascript]'"
         )
+    exports = [f"-Wl,--export={name}" for name in names]
+    return built_by([sys.executable, *ZIG, *options, *exports], c_texts, "mbma.wasm")
+
+
+class BuildError(InputError):
+    """A compiler that failed."""
+
+
+def built_by(command: list[str], texts: Mapping[str, str], made: str, *last: str) -> bytes:
+    """What a compiler makes of C sources among texts."""
     with tempfile.TemporaryDirectory() as work:
-        for name, text in c_texts.items():
+        for name, text in texts.items():
             write_file(pathlib.Path(work, name), text.encode())
-        sources = [name for name in c_texts if name.endswith(".c")]
-        exports = [f"-Wl,--export={name}" for name in names]
-        done = _run([sys.executable, *ZIG, *options, *exports, *sources, "-o", "mbma.wasm"], work)
+        sources = [name for name in texts if name.endswith(".c")]
+        done = _run([*command, *sources, "-o", made, *last], work)
         if done.returncode:
-            raise InputError(f"ziglang did not compile {' '.join(sources)}: {done.stderr.strip()[:500]}")
-        return pathlib.Path(work, "mbma.wasm").read_bytes()
+            raise BuildError(
+                f"{' '.join(command[:3])} did not compile {' '.join(sources)}: {done.stderr.strip()[:500]}"
+            )
+        return pathlib.Path(work, made).read_bytes()
 
 
 @dataclasses.dataclass(frozen=True)

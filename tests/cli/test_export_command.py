@@ -158,6 +158,7 @@ ANY = {
     "--leakage": [],
     "--name": ["OTHER"],
     "--exponential": [],
+    "--binaries": ["none"],
     "--theory": ["calibrated"],
     "--hardness": ["2MPa", "--theory", "calibrated"],
     "--variant": ["printed"],
@@ -168,7 +169,7 @@ ANY = {
 @pytest.mark.parametrize("target", names())
 def test_an_option_without_effect_is_refused(target, tmp_path):
     base = [] if target in CODE else BASE
-    for option in {name.replace("_", "-") for name in ROWS} | {"check"}:
+    for option in {name.replace("_", "-") for name in ROWS} | {"check", "binaries"}:
         if f"--{option}" not in ANY or option.replace("-", "_") in targets()[target].takes:
             continue
         result = run(target, "--out", tmp_path / "law.mat", *base, f"--{option}", *ANY[f"--{option}"])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import io
 import json
 import pathlib
 import re
 import subprocess
 import sys
+import zipfile
 from typing import Any
 
 import law_points
@@ -17,8 +19,9 @@ import pytest
 from law_points import needs, points
 from test_solver_runs import blocks
 
-from mbma_tables import Surface, contact, contact_law
-from mbma_tables.export import solvers
+from mbma_tables import InputError, Surface, contact, contact_law
+from mbma_tables.export import FMUS, solvers
+from mbma_tables.export.fmu import fmu
 from mbma_tables.export.law_code import law_files
 from mbma_tables.export.law_rows import LawTable, describe_law
 from mbma_tables.export.onnx import onnx
@@ -291,3 +294,50 @@ def test_gapcon_keeps_its_last_value(target: str, tmp_path: pathlib.Path) -> Non
             "-o gapcon.o, ar r ccx_",
         ):
             assert words in said
+
+
+@needs("cc")
+@pytest.mark.parametrize("target", FMUS)
+def test_an_fmu_runs_as_it_is(target: str, tmp_path: pathlib.Path) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    file = fmu(target, law_points.ROAD, "13.3 MPa", name="road", leakage=True)
+    (tmp_path / "road.fmu").write_bytes(file)
+    law = points("mbma").law
+    for c in (0.5, 2.0):
+        asked = {"start_values": {"overclosure": c}, "output": ["pressure", "tangent", "area", "energy", "leakage"]}
+        found = fmpy.simulate_fmu(str(tmp_path / "road.fmu"), stop_time=1.0, **asked)[-1]
+        known = law.values(3 - c)
+        expected = [known.pressure, known.stiffness, known.area, known.energy, law.leakage(3 - c)]
+        np.testing.assert_allclose(list(found)[1:], expected, rtol=1e-12)
+    said = fmpy.read_model_description(str(tmp_path / "road.fmu")).description
+    folders = {name.split("/")[1] for name in zipfile.ZipFile(tmp_path / "road.fmu").namelist() if "binaries/" in name}
+    assert f"binaries: {', '.join(sorted(folders))}" in said
+    assert len(folders) == 1
+    assert fmu(target, law_points.ROAD, "13.3 MPa", name="road", leakage=True) == file
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_an_fmu_without_a_compiler(fails: bool, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    (tmp_path / "cc").write_text("#!/bin/sh\nexit 1\n")
+    (tmp_path / "cc").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path / ("" if fails else "none")))
+    file = fmu("fmu", law_points.ROAD, "13.3 MPa")
+    archive = zipfile.ZipFile(io.BytesIO(file))
+    assert archive.namelist() == ["modelDescription.xml", "sources/law.c"]
+    assert "binaries: none, sources only" in archive.read("modelDescription.xml").decode()
+    with pytest.raises(InputError, match="compiled by ziglang: pip install"):
+        fmu("fmu", law_points.ROAD, "13.3 MPa", binaries="all")
+    with pytest.raises(InputError, match="binaries must be one of"):
+        fmu("fmu", law_points.ROAD, "13.3 MPa", binaries="linux")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang")
+def test_an_fmu_for_all_platforms() -> None:
+    archive = zipfile.ZipFile(io.BytesIO(fmu("fmu3", law_points.ROAD, "13.3 MPa", binaries="all")))
+    begins = {name.split("/")[1]: archive.read(name)[:4] for name in archive.namelist() if "binaries/" in name}
+    elf, mach, dll = b"\x7fELF", b"\xcf\xfa\xed\xfe", b"MZ"
+    expected = {"x86_64-linux": elf, "aarch64-linux": elf, "x86_64-darwin": mach, "aarch64-darwin": mach}
+    assert {name: begin for name, begin in begins.items() if "windows" not in name} == expected
+    assert begins["x86_64-windows"].startswith(dll)
