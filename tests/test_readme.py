@@ -2,7 +2,7 @@
 
 import re
 
-from generate.pages import formula, readme
+from generate.pages import introduction
 from generate.pages.page import MARKED, ROOT, svg
 
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -17,13 +17,13 @@ def test_it_is_short_and_begins_with_results():
 
 
 def test_measured_parts_are_the_generators():
-    parts, files = readme.measure()
+    parts, files = introduction.readme()
     assert {match[2]: match[0] for match in MARKED.finditer(TEXT)} == {
         name: f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->" for name, part in parts.items()
     }
     for name, figure in files.items():
         assert (ROOT / name).read_bytes()[:5] == svg(figure)[:5] == b"<?xml"
-    assert formula.pocket_laws() in (ROOT / "docs" / "formula.md").read_text(encoding="utf-8")
+    assert introduction.pocket_laws() in (ROOT / "docs" / "formula.md").read_text(encoding="utf-8")
 
 
 def test_pocket_laws_are_printed_as_they_are_computed():
@@ -42,5 +42,5 @@ def test_pocket_laws_are_printed_as_they_are_computed():
             text = re.sub(r"([\d.]) (log|x|\()", r"\1*\2", text).replace("p/1 sqrt", "p*sqrt")
             names[name] = eval(text, {}, names)
             if name == "A/A0":
-                assert abs(names[name] / float(formula.pocket_area(0.04, 30.0)) - 1) < 1e-12
-        assert abs(names["p"] / float(formula.pocket_pressure(1.3, 0.6)) - 1) < 1e-12
+                assert abs(names[name] / float(introduction.pocket_area(0.04, 30.0)) - 1) < 1e-12
+        assert abs(names["p"] / float(introduction.pocket_pressure(1.3, 0.6)) - 1) < 1e-12
