@@ -57,17 +57,8 @@ def c_command(compiler, options, folder):
 def test_c_replays_its_points(c_folder):
     found = check("c", c_folder)
     assert found.reason == ""
-    fixed = {
-        "phi": 64,
-        "slopes": 64,
-        "geometry": 24,
-        "total": 12,
-        "status": 10,
-        "calibrated": 12,
-        "total_by": 12,
-        "calibrated_by": 12,
-        "separation": 12,
-    }
+    fixed = {"phi": 64, "slopes": 64, "geometry": 24, "status": 10}
+    fixed |= dict.fromkeys(("total", "calibrated", "total_by", "calibrated_by", "separation"), 12)
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
 
@@ -178,18 +169,18 @@ INVALID = b"an argument is not finite, or is outside what the model allows"
 @pytest.mark.parametrize(
     ("surface", "gap", "E_star", "rtol", "message"),
     [
-        ((math.nan, *SOUND[1:]), 1.0, 1.0, 1e-8, INVALID),
-        ((1.1, *SOUND[1:]), 1.0, 1.0, 1e-8, INVALID),
-        ((0.8, 0.0, *SOUND[2:]), 1.0, 1.0, 1e-8, INVALID),
-        ((0.8, 1.0, 3.0, 1.0, 3.0), 1.0, 1.0, 1e-8, INVALID),
-        ((0.8, 1.0, 1e9, 1.0, 3.0), 1.0, 1.0, 1e-8, INVALID),
-        ((*SOUND[:4], math.inf), 1.0, 1.0, 1e-8, INVALID),
-        (SOUND, math.nan, 1.0, 1e-8, INVALID),
-        (SOUND, math.inf, 1.0, 1e-8, INVALID),
-        (SOUND, -3.1, 1.0, 1e-8, INVALID),
+        *(
+            (wrong, 1.0, 1.0, 1e-8, INVALID)
+            for wrong in (
+                *((hurst, *SOUND[1:]) for hurst in (math.nan, 1.1)),
+                (0.8, 0.0, *SOUND[2:]),
+                *((0.8, 1.0, q1, 1.0, 3.0) for q1 in (3.0, 1e9)),
+                (*SOUND[:4], math.inf),
+            )
+        ),
+        *((SOUND, gap, 1.0, 1e-8, INVALID) for gap in (math.nan, math.inf, -3.1)),
         (SOUND, 1.0, -1.0, 1e-8, INVALID),
-        (SOUND, 1.0, 1.0, 0.0, INVALID),
-        (SOUND, 1.0, 1.0, math.nan, INVALID),
+        *((SOUND, 1.0, 1.0, rtol, INVALID) for rtol in (0.0, math.nan)),
         ((0.5, 1.0, 1e6, 1.0, 30.0), -30.0, 1.0, 1e-8, b"X is above the range"),
         ((0.1, 1.0, 1e7, 1.0, 3.0), -3.0, 1.0, 1e-8, b"mu is above the range"),
     ],
@@ -246,12 +237,8 @@ INVALIDS = (
     "calibrated(surface, -1)",
 )
 VALID = (
-    "phi(3, 10)",
-    "phiSlopes(3, 10)",
-    "formula(3, 10)",
-    "islandGeometry(1, 0.8, 100)",
-    "total(surface, 1)",
-    "calibrated(surface, 1)",
+    *("phi(3, 10)", "phiSlopes(3, 10)", "formula(3, 10)"),
+    *("islandGeometry(1, 0.8, 100)", "total(surface, 1)", "calibrated(surface, 1)"),
 )
 
 
