@@ -20,6 +20,7 @@ from mbma_tables import (
     greenwood_tripp,
     height_integral,
     island,
+    open_table,
 )
 from mbma_tables.common.arguments import SHOWN, broadcast_shape, finite_array, require
 from mbma_tables.materials import effective_modulus
@@ -110,6 +111,8 @@ CALLS = {
     "height_integral": (functools.partial(height_integral, 1.5), {"x": 1.0}),
     "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
     "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
+    "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),
+    "island4d": (open_table("island4d").lookup, {"delta_over_h_rms": 1.5, "zeta_d": 2.0, "zeta_u": 20.0, "hurst": 0.7}),
     "effective_modulus": (effective_modulus, {"E1": 1.0, "nu1": 0.3, "E2": 2.0, "nu2": 0.3}),
 }
 
