@@ -368,12 +368,6 @@ size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, cons
 /* Contact whose pressure cannot exceed a hardness p_m, from the elastic contact of the same surface. Lengths are in
  * h_rms, forces in A0 E* g with g the rms gradient; eta = p_m/(E* g) is infinite where nothing yields. */
 
-/* Levels d below which Gaussian heights leave a mean gap u: the inverse of u = d Phi(d) + phi(d); -inf below 1e-300. */
-size_t mbma_gaussian_level(size_t n, const double *u, double *level);
-
-/* Share Q of Gaussian heights above the level of mean gap u, and dQ/du; heights end at h_max, which may be infinite. */
-size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope);
-
 /* Force F and -dF/du of F^-n = F_el^-n + (eta Q)^-n, n = light + by_eta eta + by_share Q, from the elastic force and
  * -dF_el/du and from the share Q and dQ/du at a mean gap. */
 size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffness, const double *share,
