@@ -174,7 +174,7 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
     FILLS[slopes][p->floor_d][p->floor_u](p, r, g, &at);
     g->islands += r->count;
     for (int k = 0; k < r->count; k++) {
-        const phi found = phi_at(g->cells, at.X[k], at.mu[k], slopes);
+        const phi found = phi_at(g->cells, at.X[k], at.mu[k]);
         if (found.status != MBMA_OK)
             return found.status;
         g->table_error = mbma_max(g->table_error, found.error);
@@ -250,7 +250,7 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
 /* The integrands of force and area over x = delta/h_rms. */
 static int integrand(double x, const gap *g, double out[2]) {
     const island n = island_at(x, x >= g->s.kink_d, x > g->s.kink_u, &g->s);
-    const phi found = phi_at(g->cells, n.X, n.mu, false);
+    const phi found = phi_at(g->cells, n.X, n.mu);
     const double height = height_of(g->peak - (g->compression - x), &n, &g->s);
     const double weight = n.count * exp(-0.5 * height * height);
     out[0] = n.force * found.value[0] * weight;
