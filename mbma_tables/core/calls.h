@@ -198,8 +198,6 @@ static mbma_spline spline_of(const argument *a) {
     FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4))) \
     /* hardness.c */ \
-    FN(gaussian_level, "Dn wn", true, mbma_gaussian_level(N(0), P(0), P(1))) \
-    FN(bearing_share, "Dn Dn wn wn", true, mbma_bearing_share(N(0), P(0), P(1), P(2), P(3))) \
     FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
        mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9))) \
     FN(gap_start, "i Dm Dm Dm i Dn Dn w6n", \
