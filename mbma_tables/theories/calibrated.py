@@ -66,6 +66,8 @@ class Places:
     def outside(self, mask: Any) -> list[tuple[int, Any]]:
         """Surfaces that have entries under a mask, with these."""
         chosen = np.flatnonzero(mask)
+        if not chosen.size:
+            return []
         return [(row, chosen[mine]) for row, mine in grouped(self.owner[chosen])]
 
     def law(self, row: int) -> Law:
