@@ -59,7 +59,7 @@ def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str,
     u = float(surface.h_max) * GAPS
     found = {}
     for name in DRAWN:
-        theory = get_theory(name)
+        theory = get_theory(name, surface)
         try:
             answer = answer_where_finite(theory, surface, u)
         except MbmaError:
@@ -182,25 +182,27 @@ def _by_pressure(
     axes.grid(True, which="major", alpha=0.3)
 
 
-def table_of_loads(surface: MeasuredSurface, E_star: float = 1.0) -> tuple[dict[str, Any], list[str]]:
-    """Columns by the calibrated law at a few contacts, and lines on what is left out of them or not valid."""
+def table_of_loads(
+    surface: MeasuredSurface, E_star: float = 1.0, theory: str = "calibrated"
+) -> tuple[dict[str, Any], list[str]]:
+    """Columns by a theory at a few contacts, and lines on what is left out of them or not valid."""
     from mbma_tables.answers.contact import contact
 
     areas, told = AREAS, []
     try:
-        found = contact(surface, area=areas, theory="calibrated", E_star=E_star)
+        found = contact(surface, area=areas, theory=theory, E_star=E_star)
     except OutOfRangeError as fault:
         if fault.mask is None or np.all(fault.mask):
             raise
         areas, told = AREAS[~fault.mask], [f"{_contacts(AREAS[fault.mask])} left out: {fault}"]
-        found = contact(surface, area=areas, theory="calibrated", E_star=E_star)
+        found = contact(surface, area=areas, theory=theory, E_star=E_star)
     # curves of odd maps jump over some contacts
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
     if not reached.all():
         told.append(f"{_contacts(areas[~reached])} left out: the map's curve jumps over it")
     names = ("area", "pressure", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
-    reasons, everywhere = found.reasons, surface.departures(by_map=surface.bearing is not None)
+    reasons, everywhere = found.reasons, get_theory(theory, surface).departures(surface)
     told += [
         f"not valid at {_contacts(areas[m])}: {reason}" for reason, m in reasons.items() if reason not in everywhere
     ]

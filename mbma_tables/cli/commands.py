@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -225,16 +226,20 @@ def surfaces_command(output: options.Output) -> None:
 @click.argument("measurement", metavar="MAP", type=click.Path(path_type=Path))
 @options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
 @options.plot_option
+@click.option("--simulate", is_flag=True, help="Press the map by boundary elements; --out OWN.nc keeps them.")
 @options.map_options
 @options.output_options
 def fit_command(
-    measurement: Path, E_star: Any, plot: Path | None, treatment: dict[str, Any], output: options.Output
+    measurement: Path, E_star: Any, plot: Path | None, simulate: bool, treatment: dict[str, Any], output: options.Output
 ) -> None:
     """Read a map or line scan, say what was found in it and done to it, and how it touches a flat.
 
     The table is by the calibrated law, with its distance from boundary elements (scatter: standard deviation of ln A at
     a pressure and of ln F at a separation). The picture has the map, its spectrum, its heights, and area and
     separation against pressure.
+
+    With --simulate the table is by boundary elements on the map itself, and --out OWN.nc writes them, a table of the
+    surface that --map OWN.nc of other commands reads in place of the map.
 
     Example: mbma fit wafer.sur --short-cutoff 2um --plot wafer.png
     """
@@ -243,11 +248,15 @@ def fit_command(
     from mbma_tables.common.plots import to_picture
     from mbma_tables.common.units import Units, unit_of
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
+    from mbma_tables.theories import BoundaryElements
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
     treated, surface = measured(measurement, treatment)
     scale = 1.0 if modulus is None else modulus
-    columns, told = table_of_loads(surface, scale)
+    columns, told = table_of_loads(surface, scale, "simulated" if simulate else "calibrated")
+    if simulate and output.out is not None and output.out.suffix == ".nc":
+        BoundaryElements.of(surface).to_netcdf(output.out)
+        told, output = [*told, f"{output.out} has the simulation"], dataclasses.replace(output, out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
     facts = {
         "length_unit": surface.unit,

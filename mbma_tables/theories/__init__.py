@@ -84,13 +84,18 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
 
 
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
+    """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options.
+
+    A surface opened from a table of its map is "simulated".
+    """
     from mbma_tables.surfaces.surface import Surface
 
     if theory is not None:
         return theory
     asked = any(value != OPTIONS[name] for name, value in options.items())
-    return "mbma" if isinstance(surface, Surface) or asked else "calibrated"
+    if isinstance(surface, Surface) or asked:
+        return "mbma"
+    return "calibrated" if getattr(surface, "table", None) is None else "simulated"
 
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:

@@ -26,7 +26,7 @@ from mbma_tables.surfaces.maps import measured_map
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.theories import simulated
+from mbma_tables.theories import own_map, simulated
 from mbma_tables.theories.calibrated_curves import OwnLaw, own_law
 from mbma_tables.theories.protocol import TheoryAnswer
 from mbma_tables.theories.simulated import BoundaryElements
@@ -47,7 +47,9 @@ class Corrected(BoundaryElements):
 
     def __init__(self, surface: MeasuredSurface, half: Pressed, quarter: FloatArray) -> None:
         pressure, area, u, energy = half.rows
-        super().__init__(surface, pressure, area, u, energy, np.inf, simulated.map_of(surface).heights.size, half)
+        size = own_map.map_of(surface).heights.size
+        super().__init__(surface, pressure, area, u, energy, np.inf, size, half, True)
+        self.origin = f"corrected by {own_map.origin_of(own_map.map_of(surface), TOLERANCE)}"
         law, other = own_law(surface), LoadCurve(quarter)
         x = self._curve.x
         inside = np.clip(x, other.x[0], other.x[-1])
@@ -65,7 +67,7 @@ class Corrected(BoundaryElements):
     @classmethod
     def of(cls, surface: AnySurface, loads: Any = None, tolerance: float = TOLERANCE) -> Corrected:
         """Press half and quarter of the grid of a surface from `mbma_tables.Surface.from_map`."""
-        simulated.map_of(surface)
+        own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
         return cls(surface, _carried(surface, 1, tolerance), _carried(surface, 2, tolerance).rows)
 
@@ -74,29 +76,31 @@ class Corrected(BoundaryElements):
         assert isinstance(self.surface, MeasuredSurface)
         everywhere = np.ones(answer.area.shape, bool)
         odd = dict.fromkeys(self.surface.outside(PRESSED, by_map=True), everywhere)
-        low, high = answer.area < LOWEST, answer.area > HIGHEST
+        low, high = (answer.area < LOWEST) & (answer.area > 0), answer.area > HIGHEST
         return odd | {f"A/A0 is below {LOWEST:g}": low, f"A/A0 is above {HIGHEST:g}": high}
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid, by what the law and the quarter grid differ from the answer."""
         if quantity == "flow":
             with np.errstate(divide="ignore"):
-                return np.interp(np.log(area), np.log(simulated.TESTED_AREAS), OF_FLOW)
-        inside = np.clip(area, *self.rows[1, [0, -1]])
-        a, *slopes = SCATTER[quantity]
-        apart = [np.interp(self._curve.log_force_at(inside), self._curve.x, d) for d in self._apart_by[quantity]]
-        return np.asarray(np.sqrt(a**2 + sum((b * d) ** 2 for b, d in zip(slopes, apart, strict=True))))
+                found = np.interp(np.log(area), np.log(simulated.TESTED_AREAS), OF_FLOW)
+        else:
+            inside = np.clip(area, *self.rows[1, [0, -1]])
+            a, *slopes = SCATTER[quantity]
+            apart = [np.interp(self._curve.log_force_at(inside), self._curve.x, d) for d in self._apart_by[quantity]]
+            found = np.sqrt(a**2 + sum((b * d) ** 2 for b, d in zip(slopes, apart, strict=True)))
+        return np.where(self._beyond(area), np.nan, found)
 
 
 def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Pressed:
     """The map pressed on a coarser grid, and carried to the full one; loads end where the gap no longer falls."""
-    values, sizes = simulated.continued(simulated.map_of(surface))
+    values, sizes = own_map.continued(own_map.map_of(surface))
     coarse = values
     for _ in range(halvings):
         coarse = coarser(coarse, MIN_POINTS)
     steps = tuple(side / count for side, count in zip(sizes, coarse.shape, strict=True))
     law, other = own_law(surface), OwnLaw(MeasuredSurface.of(measured_map(Treated(coarse, steps, True, None), None)))
-    loads = simulated.law_loads(surface, simulated.AREAS)
+    loads = own_map.law_loads(surface, own_map.AREAS)
     found = press(coarse, sizes, loads, MIN_POINTS, law.gradient, None, tolerance)
     pressure, area, u, energy = found.rows
     change = law.separations(pressure) - other.separations(pressure)

@@ -7,7 +7,7 @@ from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact
 from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.theories.corrected import of_map
-from mbma_tables.theories.simulated import law_loads
+from mbma_tables.theories.own_map import law_loads
 
 
 def surface_of(family, number):
