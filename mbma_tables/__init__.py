@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mbma_tables.answers.sensitivity import sensitivity as sensitivity
     from mbma_tables.islands import greenwood_tripp as greenwood_tripp
     from mbma_tables.islands.height_integrals import height_integral as height_integral
+    from mbma_tables.joint import Joint as Joint
     from mbma_tables.law.law import ContactLaw as ContactLaw
     from mbma_tables.law.make import contact_law as contact_law
     from mbma_tables.models.tables import open_table as open_table
@@ -37,6 +38,7 @@ _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
     "Contact": "mbma_tables.answers.result",
     "Island": "mbma_tables.totals.island",
+    "Joint": "mbma_tables.joint",
     "Variant": "mbma_tables.surfaces.variants",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.law.law",

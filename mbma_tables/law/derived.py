@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.interface import Tangential, ratio_of
+from mbma_tables.answers.interface import OF_LAY, OF_YIELDING, Tangential, ratio_of
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
@@ -57,6 +57,7 @@ class Derived:
         friction: float | None = None,
         nu: Any = None,
         E: Any = None,
+        direction: str | None = None,
     ) -> Tangential:
         """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`.
 
@@ -76,11 +77,12 @@ class Derived:
             held = self.pressure(u)
         else:
             u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
-        ratio = ratio_of(nu, E, self.materials)
+        ratio = ratio_of(nu, E, self.materials, direction, self.surface, self.area(u))
+        reason = OF_YIELDING if self.hardness < math.inf else OF_LAY if direction else None
         return Tangential(
             ratio, friction, held, u, self.unloading_stiffness(u) / ratio,
             self.h_max if math.isinf(self.highest) else math.inf, self.units,
-            None if self.hardness < math.inf else (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
+            reason or (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
         )  # fmt: skip
 
     @functools.cached_property

@@ -23,6 +23,7 @@ TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 # h_max/h_rms: simulated up to 5.5, beyond which separation and stiffness change by 0.1% at most from 0.1% contact on
 TESTED_HEIGHTS = (2.5, 8.0)
 NEAREST = 0.95  # of h_max: where the certificate of the table ends
+TAIL = 3.0, 0.9  # u/h_rms from which the table's error grows, and how fast: exp(0.9 (u/h_rms - 3))
 # standard deviations that come on top of what is stated for Gaussian maps, of maps without `departures` and of others;
 # of docs/data/machined.nc, where so many leave 70% within one and 93.5% within two
 MAP_SCATTER = {"area": (0.038, 0.075), "pressure": (0.046, 0.13), "stiffness": (0.13, 0.21)}
@@ -36,11 +37,11 @@ def _own_law(surface: MeasuredSurface) -> OwnLaw:
     return own_law(surface)
 
 
-def _error(stated: float, nearer: float, share: FloatArray) -> FloatArray:
+def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
     """Relative error at shares of h_max; nearer to it than NEAREST force is a small difference, which loses digits."""
     near = (share > NEAREST) & (share < 1)
-    error = np.full(share.shape, stated)
-    error[near] = nearer + ROUNDING / (1 - share[near])
+    error = np.array(np.broadcast_to(stated, share.shape))
+    error[near] = nearer * error[near] + ROUNDING / (1 - share[near])
     return error
 
 
@@ -60,8 +61,8 @@ class Places:
         self.gradient = gradient[self.owner] if hurst.size > 1 else gradient
 
     def covered(self, table: calibrated_table.Table) -> Any:
-        """Whether the table holds each surface."""
-        return table.covers(*self.columns[:2])
+        """Whether the table holds each surface, up to its last contact."""
+        return table.covers(*self.columns[:2]) & (self.columns[2] <= np.exp(table.covered[2, 1]))
 
     def outside(self, mask: Any) -> list[tuple[int, Any]]:
         """Surfaces that have entries under a mask, with these."""
@@ -83,7 +84,8 @@ def area_concerns(area: FloatArray) -> dict[str, Any]:
 class Calibrated(Theory):
     """Persson's energy integral with cover and weight calibrated on boundary elements.
 
-    Self-affine surfaces are answered by its table, those outside of it (H below 0.1, zeta_1 above 1e5) by the law's
+    Self-affine surfaces are answered by its table, those outside of it (H below 0.1, zeta_1 above 1e5,
+    h_max above 8 h_rms) by the law's
     quadrature. A surface that is its own spectrum is answered by that; where its heights were
     measured, they decide the separation, and where they were measured as a map, its tops and valleys the area, too.
     """
@@ -101,7 +103,7 @@ class Calibrated(Theory):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
             (pressure, area, stiffness), own_error = _own_law(surface).answer(gap)
-            error = _error(own_error, own_error, gap / np.asarray(surface.h_max))
+            error = _error(own_error, 1.0, gap / np.asarray(surface.h_max))
             return TheoryAnswer(pressure, area, stiffness, error)
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
@@ -115,7 +117,9 @@ class Calibrated(Theory):
         out[2] /= places.h_rms
         pressure, area, stiffness = out.reshape(3, *places.shape)
         share = (u / places.columns[2][places.owner]).reshape(places.shape)
-        return TheoryAnswer(pressure, area, stiffness, _error(table.error, 2 * table.error, share))
+        start, rate = TAIL
+        stated = table.error * np.exp(rate * np.clip(u - start, 0, TESTED_HEIGHTS[1] - start)).reshape(places.shape)
+        return TheoryAnswer(pressure, area, stiffness, _error(stated, 2.0, share))
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
