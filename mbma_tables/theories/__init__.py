@@ -84,9 +84,10 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
 
 
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options.
+    """The theory as asked; without one "mbma" for five numbers or its options, and for a measured surface the nearest.
 
-    A surface opened from a table of its map is "simulated".
+    That is "simulated" for a surface opened from a table, "corrected" for maps that are fit for it, "calibrated" for
+    others.
     """
     from mbma_tables.surfaces.surface import Surface
 
@@ -95,7 +96,13 @@ def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, *
     asked = any(value != OPTIONS[name] for name, value in options.items())
     if isinstance(surface, Surface) or asked:
         return "mbma"
-    return "calibrated" if getattr(surface, "table", None) is None else "simulated"
+    if getattr(surface, "table", None) is not None:
+        return "simulated"
+    if getattr(surface, "map", None) is None:
+        return "calibrated"
+    from mbma_tables.theories.corrected import applies
+
+    return "corrected" if applies(surface) else "calibrated"
 
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:

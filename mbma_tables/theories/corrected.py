@@ -12,15 +12,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib.util
 from typing import Any
 
 import numpy as np
 from scipy.special import erf, erfinv
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.laws.energy_spline import LARGEST_AREA, LoadCurve
-from mbma_tables.laws.pressing import MIN_POINTS, TOLERANCE, Pressed, coarser, press
+from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, TOLERANCE, Pressed, coarser, press
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map
 from mbma_tables.surfaces.spectral import PRESSED
@@ -34,6 +35,8 @@ from mbma_tables.theories.simulated import BoundaryElements
 LIGHT = 0.01  # contact below which the law's own area counts, too
 FINE = 4000  # loads over which the law's change is integrated
 LOWEST, HIGHEST = 3e-3, 0.8  # A/A0 that was tested
+# points along a side, and of the map with its continuation, between which it is the default
+LEAST_SIDE, MOST_POINTS = 64, 2**18
 # a, b and c of the scatter, root of a^2 + (b D1)^2 + (c D2)^2: D1 is what the law differs by from the answer, D2 what
 # that by the quarter grid does; fitted to the 65 maps of `python -m generate machined`
 SCATTER = {"pressure": (0.019, 0.56, 0.42), "area": (0.0075, 0.34, 0.59), "stiffness": (0.035, 0.41, 0.46)}
@@ -79,16 +82,20 @@ class Corrected(BoundaryElements):
         low, high = (answer.area < LOWEST) & (answer.area > 0), answer.area > HIGHEST
         return odd | {f"A/A0 is below {LOWEST:g}": low, f"A/A0 is above {HIGHEST:g}": high}
 
+    def apart(self, quantity: str, area: FloatArray) -> list[FloatArray]:
+        """What the law, and the quarter grid, differ from the answer at contact areas, as errors of that quantity."""
+        x = self._curve.log_force_at(np.clip(area, *self.rows[1, [0, -1]]))
+        return [np.interp(x, self._curve.x, difference) for difference in self._apart_by[quantity]]
+
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid, by what the law and the quarter grid differ from the answer."""
         if quantity == "flow":
             with np.errstate(divide="ignore"):
                 found = np.interp(np.log(area), np.log(simulated.TESTED_AREAS), OF_FLOW)
         else:
-            inside = np.clip(area, *self.rows[1, [0, -1]])
-            a, *slopes = SCATTER[quantity]
-            apart = [np.interp(self._curve.log_force_at(inside), self._curve.x, d) for d in self._apart_by[quantity]]
-            found = np.sqrt(a**2 + sum((b * d) ** 2 for b, d in zip(slopes, apart, strict=True)))
+            a, b, c = SCATTER[quantity]
+            by_law, by_quarter = self.apart(quantity, area)
+            found = np.sqrt(a**2 + (b * by_law) ** 2 + (c * by_quarter) ** 2)
         return np.where(self._beyond(area), np.nan, found)
 
 
@@ -123,6 +130,23 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
     return dataclasses.replace(
         found, heights=values, rows=rows[:, :kept], coarse_from=kept, gaps=found.gaps[:kept], cut=MIN_POINTS
     )
+
+
+def applies(surface: AnySurface) -> bool:
+    """Whether it is the default for a surface: Tamaas is installed, the map resolved, and pressed within seconds."""
+    if not isinstance(surface, MeasuredSurface) or surface.map is None or surface.bands is None:
+        return False
+    whole = surface.map
+    if whole.heights.ndim != 2 or not importlib.util.find_spec("tamaas"):
+        return False
+    size = whole.heights.size * (1 if whole.periodic else 4)
+    points = 2 * np.pi / float(surface.q1) / max(whole.steps)
+    if size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or points < MIN_POINTS * (1 - ROUNDING):
+        return False
+    try:
+        return of_map(Corrected.name, surface).ends_at_h_max
+    except (ConvergenceError, OutOfRangeError):
+        return False
 
 
 @functools.lru_cache(maxsize=8)

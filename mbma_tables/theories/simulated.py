@@ -210,13 +210,7 @@ class BoundaryElements(Theory):
 
     @classmethod
     def from_netcdf(cls, path: os.PathLike[str] | str) -> BoundaryElements:
-        """Open such a table; `theory="simulated"` is the default for its `.surface`.
-
-        Raises
-        ------
-        TableFileError
-            Where the file is damaged, was edited, or is another one.
-        """
+        """Open such a table, a `TableFileError` if damaged or edited; for its `.surface` "simulated" is the default."""
         return cls.of(read_surface(path))
 
     def _error(self, u: FloatArray, found: FloatArray) -> FloatArray:
@@ -343,7 +337,10 @@ class BoundaryElements(Theory):
         shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
         u = np.broadcast_to(np.asarray(mean_separation, float), shape)
         low, high = map(float, self.interval(self.surface))
+        if self.ends_at_h_max:
+            # bodies are apart beyond h_max
+            require("mean_separation", u, u >= 0, "at least 0")
+            return np.asarray(np.minimum(u, high))
         good = (u >= low * (1 - 1e-12)) & (u <= high * (1 + 1e-12))
-        which = "the ends of contact" if self.ends_at_h_max else "which were simulated"
-        require("mean_separation", u, good, f"between {low:.6g} and {high:.6g}, {which}")
+        require("mean_separation", u, good, f"between {low:.6g} and {high:.6g}, which were simulated")
         return np.asarray(np.clip(u, low, high))

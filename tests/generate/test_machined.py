@@ -8,9 +8,9 @@ import pytest
 import xarray as xr
 
 from generate.machined import campaign
+from generate.machined import errors as page
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
 from generate.machined.solve import STEP, solved, surface_of
-from generate.pages import machined as page
 from mbma_tables.laws.map_curves import MapLaw, PlateauConstants
 
 FILE = pathlib.Path("docs/data/machined.nc")
