@@ -10,6 +10,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.common.plots import new_figure, theory_label
+from mbma_tables.surfaces.areal import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
@@ -34,6 +35,12 @@ def described(surface: MeasuredSurface) -> list[str]:
         f"({float(surface.h_max) / h_rms:.3g} h_rms), rms gradient {float(surface.rms_gradient):.4g}",
         f"waves from {shortest:.4g} to {longest:.4g} {unit}",
     ]
+    if (found := areal(surface)) is not None:
+        shown = {name: f"{name} {number:.4g}" for name, number in found.items()}
+        lines.append(f"ISO 25178 [{unit}]: " + ", ".join(shown[name] for name in ("Sq", "Sa", "Sp", "Sv", "Sz")))
+        lines.append(", ".join(shown[name] for name in ("Ssk", "Sku", "Sdq")) + f"; lay at {found['lay']:.0f} degrees")
+        heights = ", ".join(shown[name] for name in ("Sk", "Spk", "Svk"))
+        lines.append(f"core [{unit}]: {heights}; Smr1 {found['Smr1']:.1%}, Smr2 {found['Smr2']:.1%}")
     try:
         nearest = surface.fit()
         assert nearest.fit is not None
@@ -52,6 +59,14 @@ def described(surface: MeasuredSurface) -> list[str]:
         )
     lines += [f"not valid: {reason}" for reason in surface.departures(by_map=surface.bearing is not None)]
     return lines + [entry["told"] for entry in surface.provenance if "told" in entry]
+
+
+def areal(surface: MeasuredSurface) -> dict[str, float] | None:
+    """Parameters of ISO 25178 of a surface's map; None where it has none."""
+    whole = surface.map
+    if whole is None or whole.heights.ndim != 2:
+        return None
+    return areal_parameters(whole.heights, (whole.steps[0], whole.steps[1]))
 
 
 def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str, FloatArray]]:

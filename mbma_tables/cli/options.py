@@ -162,6 +162,8 @@ _MAP_OPTIONS = (
     _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
     _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
     _option("long_cutoff", "Longest wavelength to keep [length]."),
+    _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
+    _option("l_filter", "and of an L-filter [length]."),
     _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
     _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
     _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
