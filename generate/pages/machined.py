@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from generate.machined.campaign import FORMS
 from generate.machined.coverage import left_out
 from generate.machined.errors import QUANTITIES, coverage, errors, seen
-from generate.machined.makers import FAMILIES
-from generate.pages.page import DATA, Measured, dataset, table
+from generate.machined.makers import FAMILIES, Part, heights
+from generate.pages.page import DATA, Measured, dataset, panels, table
 from mbma_tables.common.arguments import FloatArray
+
+SHOWN, THINNED = 1, 6  # number of the map that is drawn of each family, and of its points one in so many
 
 
 def _by_family(data: xr.Dataset, form: str) -> str:
@@ -30,11 +34,45 @@ def _left_out(data: xr.Dataset, form: str) -> str:
     columns = [left_out(data, form, quantity) for quantity in QUANTITIES]
     pooled = [{"all": np.concatenate([*column.values()]), **column} for column in columns]
     rows = [[name, *(_shares(column[name]) for column in pooled)] for name in pooled[0]]
+    rows = [row for row in rows if any(row[1:])]
     return table("family | area | pressure | stiffness | flow", rows)
 
 
 def _shares(ratio: FloatArray) -> str:
     return f"{np.mean(ratio < 1):.2f}, {np.mean(ratio < 2):.2f} ({ratio.size})" if ratio.size else ""
+
+
+def _figure(data: xr.Dataset) -> Any:
+    """One map of each family, its areas, and their errors."""
+    rows = -(-len(FAMILIES) // 2)
+    figure, axes = panels(rows, 6, (15, 2.2 * rows), gridspec_kw={"width_ratios": 2 * (1, 1.5, 1.5)})
+    places = axes.reshape(-1, 3)
+    for spare in places[len(FAMILIES) :].ravel():
+        spare.set_axis_off()
+    for row, family in zip(places, FAMILIES, strict=False):
+        part = Part(family, SHOWN)
+        own = data.sel(surface=part.name)
+        row[0].imshow(heights(part)[::THINNED, ::THINNED].T, origin="lower", interpolation="none")
+        row[0].set(xticks=(), yticks=(), ylabel=family)
+        row[1].loglog(own.pressure, own.area, "ko", mfc="none", label="full simulation")
+        for form in FORMS:
+            row[1].loglog(own.pressure, own[f"{form}_area"], label=form)
+            row[2].loglog(own.area, np.abs(np.log(own[f"{form}_area"] / own.area)), ".-", label=form)
+        row[1].set(xlim=(3e-5, 0.2), ylim=(2e-3, 1))
+        row[2].set(xlim=(2e-3, 1), ylim=(1e-4, 1))
+        for one in row[1:]:
+            one.minorticks_off()
+            one.tick_params(labelbottom=False, labelleft=False)
+    places[0, 1].legend(fontsize="x-small")
+    places[0, 1].set_title("A/A0")
+    places[0, 2].set_title("error of ln A")
+    for row in places[len(FAMILIES) - 2 : len(FAMILIES)]:
+        for one, label in zip(row[1:], ("pressure  F/(A0 E*)", "A/A0"), strict=True):
+            one.set_xlabel(label)
+            one.tick_params(labelbottom=True)
+    for one in axes[:, 1:3].ravel():
+        one.tick_params(labelleft=True)
+    return figure
 
 
 def measure() -> Measured:
@@ -46,4 +84,5 @@ def measure() -> Measured:
             lines.append([form, name, *(f"{a:.2f}, {b:.2f} ({n})" if n else "" for a, b, n in found)])
     parts = {form: _by_family(data, form) for form in FORMS}
     parts |= {f"left_out_{form}": _left_out(data, form) for form in FORMS}
-    return parts | {"coverage": table("theory | entries | area | pressure | stiffness | flow", lines)}, {}
+    parts["coverage"] = table("theory | entries | area | pressure | stiffness | flow", lines)
+    return parts, {"docs/figures/machined.svg": _figure(data)}

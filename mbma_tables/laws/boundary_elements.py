@@ -46,7 +46,11 @@ class Contact:
     def press(self, force: float) -> dict[str, float]:
         """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map."""
         started = time.process_time()
-        residual = self._solver.solve(force)
+        try:
+            residual = self._solver.solve(force)
+        except (ArithmeticError, RuntimeError) as fault:
+            # of a single element in contact, for instance
+            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}") from None
         if not residual <= self._tolerance:
             raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
         seconds = time.process_time() - started

@@ -8,6 +8,7 @@ Each load, and each flow, is kept in `mbma_tables.common.cache` as soon as it is
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 
 from mbma_tables.common import cache
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.reynolds import flow_conductance
@@ -61,6 +63,7 @@ class Pressed:
     coarse_from: int
     gaps: tuple[FloatArray, ...]
     names: tuple[str, ...]  # under which loads are cached
+    left_out: float = 0.0  # wavelength [length] below which a large map was cut off; 0 if it was not
     cut: float = 0.0  # sampling steps of the coarse grid along its shortest waves, where shorter ones were left out
 
     def flow(self) -> FloatArray:
@@ -107,6 +110,8 @@ class Table:
     ----------
     points, elements : float
         Sampling steps along the shortest wavelength, and elements of the map that do not repeat each other.
+    left_out : float
+        As of `Pressed`.
     origin : str
         What it was found of, and by what.
     """
@@ -116,6 +121,7 @@ class Table:
     coarse_from: int
     points: float
     elements: float
+    left_out: float = 0.0
     origin: str = ""
 
     def flow(self) -> FloatArray:
@@ -125,7 +131,7 @@ class Table:
     def resized(self, up: float, along: float) -> Table:
         """Of the surface with its heights `up` times as large, and its lengths along the plane `along` times."""
         by = np.array([[up / along], [1.0], [up], [up**2 / along]])
-        return dataclasses.replace(self, rows=self.rows * by, flows=self.flows * up**3)
+        return dataclasses.replace(self, rows=self.rows * by, flows=self.flows * up**3, left_out=self.left_out * along)
 
 
 def _digest(*parts: Any) -> str:
@@ -185,8 +191,10 @@ def press(
             add(load, halved and float(area(np.array(load))) > LIGHT)
         for _ in range(MORE if area is not None else 0):
             low, high = min(found), max(found)
+            # where one element touches, the solver may fail
             if found[low][1][0] > LOWEST:
-                add(low * LIGHTER, False)
+                with contextlib.suppress(ConvergenceError):
+                    add(low * LIGHTER, False)
             if found[high][1][0] < HIGHEST:
                 add(high * HEAVIER, halved)
     cache.trim()

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
+from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, coarser
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
@@ -16,6 +17,7 @@ from mbma_tables.theories.calibrated_curves import own_law
 
 # A/A0 by the law of the map at which it is pressed
 AREAS = (7e-4, 0.0015, 0.006, 0.012, 0.05, 0.09, 0.22, 0.3, 0.52, 0.65, 0.88, 0.95)
+MOST_POINTS = 2**20  # of a map that is pressed as it is
 REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
 
 
@@ -24,6 +26,21 @@ def continued(treated: Treated) -> tuple[FloatArray, tuple[float, float]]:
     values = treated.heights if treated.periodic else mirrored(treated.heights)
     sizes = values.shape[0] * treated.steps[0], values.shape[1] * treated.steps[1]
     return values - values.mean(), sizes
+
+
+def reduced(values: FloatArray, points: float) -> tuple[FloatArray, float, float]:
+    """A periodic map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps.
+
+    Every second point is left out until at most `MOST_POINTS` remain; where that leaves fewer than four along the
+    shortest wavelength, shorter ones than four are cut off.
+    """
+    step, cut = 1.0, 0.0
+    while values.size > MOST_POINTS:
+        step *= 2
+        fine = points >= 2 * MIN_POINTS * (1 - ROUNDING)
+        values = coarser(values) if fine else coarser(values, MIN_POINTS)
+        points, cut = (points / 2, cut) if fine else (MIN_POINTS, step * MIN_POINTS)
+    return values, points, cut
 
 
 def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:

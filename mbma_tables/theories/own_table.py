@@ -27,6 +27,7 @@ NUMBERS = {
     "coarse_from": "first load on half of the grid; the number of loads if there is none",
     "points": "sampling steps along the shortest wavelength",
     "elements": "elements of the map that do not repeat each other",
+    "left_out": "wavelength below which a large map was cut off, 0 if it was not",
     "anisotropy": "root of the ratio of the gradient tensor's eigenvalues",
 }
 # parts of the surface, by the names of their fields; `band` of a spectrum tells of the map's own grid
@@ -50,9 +51,9 @@ def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
     for row, (name, (meaning, unit)) in zip(theory.rows, ROWS.items(), strict=True):
         table[name] = ("load",), row, meaning, unit
     table["flow"] = ("load", "axis"), pressed.flow(), "flow coefficient along both axes, 0 where blocked", "{length}^3"
-    numbers = (pressed.coarse_from, theory.points, theory.elements, surface.anisotropy)
+    numbers = (pressed.coarse_from, theory.points, theory.elements, pressed.left_out, surface.anisotropy)
     for (name, meaning), value in zip(NUMBERS.items(), numbers, strict=True):
-        table[name] = (), value, meaning, "1"
+        table[name] = (), value, meaning, "{length}" if name == "left_out" else "1"
     table["q"] = ("wave",), surface.q, "wavenumber", "1/{length}"
     table["C"] = ("wave",), surface.C, "power spectrum, h_rms^2 = 2 pi integral C q dq", "{length}^4"
     table["samples"] = ("wave",), surface.samples, "independent samples of the spectrum", "1"
@@ -96,10 +97,11 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         rows = np.stack([values[name] for name in ROWS])
         if values["flow"].shape != (rows.shape[-1], 2) or rows.ndim != 2:
             raise InputError("has loads and flows that do not fit each other")
-        table = Table(rows, values["flow"], int(numbers[0]), numbers[1], numbers[2], own["source"])
+        points, elements, left_out, anisotropy = numbers[1:]
+        table = Table(rows, values["flow"], int(numbers[0]), points, elements, left_out, own["source"])
         return MeasuredSurface(
             values["q"], values["C"], values["h_max"].item(), **parts, bands=bands, table=table,
-            samples=values["samples"], anisotropy=numbers[3], unit=own.get("length_unit"),
+            samples=values["samples"], anisotropy=anisotropy, unit=own.get("length_unit"),
             provenance=tuple(json.loads(own["provenance"])),
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import os
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from mbma_tables.surfaces.maps import measured_map, prepared
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.calibrated_curves import own_law
-from mbma_tables.theories.own_map import AREAS, continued, law_loads, map_of, origin_of
+from mbma_tables.theories.own_map import AREAS, continued, law_loads, map_of, origin_of, reduced
 from mbma_tables.theories.own_table import read_surface, write_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
@@ -110,9 +111,9 @@ class BoundaryElements(Theory):
         self._apart = split - 1 if split < rows.shape[1] else -1
         # an h_max that was stated may lie below the gap of the first load
         self.ends_at_h_max = own_loads and bool(rows[2, 0] < float(np.asarray(surface.h_max)))
-        self._curve = LoadCurve(rows, self._apart)
+        self.curve = LoadCurve(rows, self._apart)
         if self.ends_at_h_max:
-            self._curve = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
+            self.curve = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
         self._left_out = left_out(rows, self._apart)
 
     @classmethod
@@ -132,9 +133,9 @@ class BoundaryElements(Theory):
             return cls(surface, F, A, u, U, table.points, table.elements, table, True, table.origin)
         whole = map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        assert surface.bearing is not None
         values, sizes = continued(whole)
-        points, gradient = 2 * np.pi / float(surface.q1) / max(whole.steps), surface.bearing.gradient
+        values, points, cut = reduced(values, 2 * np.pi / float(surface.q1) / max(whole.steps))
+        gradient = own_law(surface).gradient
         if loads is None:
             wanted, law_area = law_loads(surface, AREAS), own_law(surface).area
         else:
@@ -142,9 +143,10 @@ class BoundaryElements(Theory):
             require("loads", given, (given > 0) & (np.diff(given, prepend=0) > 0), "positive and rising")
             wanted, law_area = gradient * given, None
         found = press(values, sizes, wanted, points, gradient, law_area, tolerance)
+        found = dataclasses.replace(found, left_out=cut * max(whole.steps))
         pressure, area, u, energy = found.rows
-        size = whole.heights.size
-        return cls(surface, pressure, area, u, energy, points, size, found, loads is None, origin_of(whole, tolerance))
+        size, origin = whole.heights.size, origin_of(whole, tolerance)
+        return cls(surface, pressure, area, u, energy, points, size, found, loads is None, origin)
 
     @classmethod
     def from_map(
@@ -237,8 +239,8 @@ class BoundaryElements(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] of this map, and no other."""
         u = self._within(surface, mean_separation)
-        x = self._curve.log_force(u)
-        area, stiffness = self._curve.area(x), self._curve.stiffness(x)
+        x = self.curve.log_force(u)
+        area, stiffness = self.curve.area(x), self.curve.stiffness(x)
         with np.errstate(all="ignore"):
             return TheoryAnswer(np.exp(x), area, stiffness, self._error(u, np.array([x, np.log(area)])))
 
@@ -253,14 +255,14 @@ class BoundaryElements(Theory):
         elif quantity == "area":
             require(quantity, wanted, wanted < 1, "less than 1")
         with np.errstate(divide="ignore"):
-            x = np.log(known) if quantity == "pressure" else self._curve.log_force_at(known)
-        u = np.asarray(self._curve.separation(x))
+            x = np.log(known) if quantity == "pressure" else self.curve.log_force_at(known)
+        u = np.asarray(self.curve.separation(x))
         require(quantity, wanted, u > np.finfo(float).eps * self.rows[2, 0], "less: the mean separation vanishes")
         return u, np.zeros(np.shape(wanted), bool)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length]."""
-        return self._curve.energy(self._curve.log_force(self._within(surface, mean_separation)))
+        return self.curve.energy(self.curve.log_force(self._within(surface, mean_separation)))
 
     @functools.cached_property
     def _flows(self) -> FloatArray:
@@ -311,10 +313,12 @@ class BoundaryElements(Theory):
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons against grids that are too coarse, and contact areas that were not tested."""
-        coarse = self.points < MIN_POINTS * (1 - ROUNDING)
+        left_out = 0.0 if self.pressed is None else self.pressed.left_out
+        cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         text = f"the map's shortest wave has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
         return {
-            text: np.full(answer.area.shape, coarse),
+            text: np.full(answer.area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
+            cut: np.full(answer.area.shape, left_out > 0),
             f"A/A0 is below {LOWEST:g}": (answer.area < LOWEST) & (answer.area > 0),
             f"A/A0 is above {HIGHEST:g}": answer.area > HIGHEST,
         }

@@ -14,11 +14,11 @@ from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
 from mbma_tables.cli.export import TARGETS
 from mbma_tables.common import cache
-from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
 from mbma_tables.export import CODE, DATA, LAWS, SOLVERS
 from mbma_tables.laws import pressing
 from mbma_tables.laws.energy_spline import Continued
-from mbma_tables.theories import BoundaryElements
+from mbma_tables.theories import BoundaryElements, own_map
 from mbma_tables.theories.corrected import of_map
 
 pytest.importorskip("tamaas")
@@ -288,3 +288,44 @@ class TestCache:
         monkeypatch.delenv(cache.VARIABLE)
         assert isinstance(cache.folder(), pathlib.Path)
         assert cache.folder().name == "mbma_tables"
+
+
+class TestLargeMaps:
+    """Maps of too many points, here of more than 32 x 32."""
+
+    @pytest.fixture(autouse=True)
+    def few(self, monkeypatch):
+        monkeypatch.setattr(own_map, "MOST_POINTS", 32 * 32)
+
+    def test_finely_sampled_ones_lose_nothing(self):
+        part = Part("gaussian", 2, 64)  # eight sampling steps along the shortest wavelength
+        own = BoundaryElements.of(Surface.from_map(heights(part), 1.0, periodic=True))
+        assert own.pressed.heights.shape == (32, 32)
+        assert own.points == pytest.approx(4.0, rel=0.05)
+        found = contact(own.surface, area=0.2, theory=own)
+        assert found.valid
+        own_map.MOST_POINTS = 64 * 64
+        full = BoundaryElements.of(own.surface)
+        assert found.pressure == pytest.approx(contact(own.surface, area=0.2, theory=full).pressure, rel=0.05)
+
+    def test_others_are_cut_and_say_so(self, tmp_path):
+        surface = Surface.from_map(0.5 * heights(Part("gaussian", 0, 64)), 0.5, periodic=True, unit="um")
+        own = BoundaryElements.of(surface)
+        assert own.pressed.left_out == 4.0
+        found = contact(surface, area=0.2, theory=own)
+        assert not found.valid
+        assert next(iter(found.reasons)) == "wavelengths below 4 were left out, since the map has too many points"
+        own.to_netcdf(tmp_path / "own.nc")
+        again = BoundaryElements.from_netcdf(tmp_path / "own.nc")
+        assert again.pressed.left_out == 4.0
+        assert BoundaryElements.of(again.surface.to("nm")).pressed.left_out == pytest.approx(4000.0)
+
+
+def test_a_solver_that_fails_is_no_crash(monkeypatch):
+    # one element that stands out touches alone
+    spike = np.zeros((64, 64))
+    spike[5, 5] = 1.0
+    surface = Surface.from_map(spike + 1e-6 * heights(Part("gaussian", 0, 64)), 1.0, periodic=True)
+    with pytest.raises(ConvergenceError, match="boundary elements at F/"):
+        BoundaryElements.of(surface)
+    assert contact(surface, pressure=1e-3).theory == "calibrated"
