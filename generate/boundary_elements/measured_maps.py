@@ -13,7 +13,7 @@ from generate.boundary_elements.solve import pressed
 from mbma_tables.common.files import write_file
 from mbma_tables.surfaces.maps import prepared
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.theories.simulated import continued
+from mbma_tables.theories.own_map import continued
 
 TARGET = pathlib.Path("docs/data")
 LARGEST = 256  # points a side that are kept, from the middle

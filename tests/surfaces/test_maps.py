@@ -575,3 +575,16 @@ def test_a_periodic_map_of_few_waves_keeps_its_height_and_gradient_or_tells(seed
     assert found.h_rms == pytest.approx(found.heights.h_rms, rel=1e-9)
     told = any("waves are few" in entry.get("told", "") for entry in found.provenance)
     assert told == (abs(found.rms_gradient / found.bearing.gradient - 1) > 0.05)
+
+
+@pytest.mark.parametrize("kind", ["txt", "csv"])
+def test_rows_of_a_matrix_of_text_are_x(tmp_path, kind):
+    pytest.importorskip("SurfaceTopography")
+    values = 0.1 * np.add.outer(np.sin(np.arange(64) / 3), 0.2 * np.cos(np.arange(48) / 7))
+    np.savetxt(tmp_path / f"own.{kind}", values, delimiter="," if kind == "csv" else " ")
+    np.save(tmp_path / "own.npy", values)
+    text, array = (Surface.from_map(tmp_path / name, dx=0.5, dy=0.8, unit="um") for name in (f"own.{kind}", "own.npy"))
+    assert text.map.heights.shape == (64, 48)
+    assert text.map.steps == pytest.approx((0.5, 0.8))
+    np.testing.assert_allclose(text.map.heights, array.map.heights, atol=1e-12)
+    assert text.rms_gradient == pytest.approx(array.rms_gradient)
