@@ -18,6 +18,7 @@ import numpy as np
 from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
+from mbma_tables.export.again import written_by
 from mbma_tables.export.text import core_file, filled, opening
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
@@ -74,6 +75,7 @@ def c_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
     if variant.addition != "sum":
         raise InputError(f"exported code adds the areas of islands: variant {variant.name!r} takes their cover")
     about = about_model(model, variant) + about_theories()
+    about.append(written_by(["c", "--variant", variant.name, "--out", "."]))
     heads = {name: opening(header(f"{name}: {title}", USAGE, about), "/*") for name, title in MODEL.items()}
     return core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
 

@@ -53,7 +53,8 @@ def block_comment(lines: Iterable[str]) -> str:
 
 def opening(paragraphs: Iterable[str], mark: str) -> str:
     """What a source file begins with: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
-    lines = [line for text in paragraphs for line in textwrap.wrap(text, COMMENT_WIDTH, break_long_words=False)]
+    wrap = textwrap.TextWrapper(COMMENT_WIDTH, break_long_words=False, break_on_hyphens=False).wrap
+    lines = [line for text in paragraphs for line in wrap(text)]
     return (block_comment(lines) if mark == "/*" else comment(lines, mark)).rstrip()
 
 
