@@ -45,7 +45,9 @@ def test_fortran_writes_its_c_too(tmp_path):
     assert run("fortran-law", *law, tmp_path / "own.f90").exit_code == 0
     assert run("c-law", *law, tmp_path / "own.c").exit_code == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["own.c", "own.f90", "own.h", "own_c.c"]
-    assert (tmp_path / "own_c.c").read_bytes() == (tmp_path / "own.c").read_bytes()
+    # but for the command in their heads
+    beside, own = ((tmp_path / name).read_text().partition("*/")[2] for name in ("own_c.c", "own.c"))
+    assert beside == own
     result = run("fortran-law", *law, "-")
     assert result.exit_code == 2
     assert "fortran-law is two files: --out must be that of the first" in result.stderr
