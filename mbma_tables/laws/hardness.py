@@ -153,23 +153,10 @@ def closed(
     heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
 ) -> tuple[FloatArray, FloatArray]:
     """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
-    x, elastic, c = u / h_rms, (pressure / gradient, stiffness / gradient), CONSTANTS
-    if isinstance(heights, BearingCurve):
-        share, slope = heights(x)
-        load, steep = force(*elastic, share, slope / h_rms, eta)
-    else:
-        given = x, heights, h_rms, *elastic, eta
-        load, steep = answered(_closed, given, 2, c.force_light, c.force_eta, c.force_share)
+    x, elastic = u / h_rms, (pressure / gradient, stiffness / gradient)
+    share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
+    load, steep = force(*elastic, share, slope / h_rms, eta)
     return load * gradient, steep * gradient
-
-
-def _closed(
-    x: FloatArray, end: FloatArray, h_rms: FloatArray, elastic: FloatArray, stiffness: FloatArray, *more: Any
-) -> None:
-    share, slope = np.empty((2, x.size))
-    core.bearing_share(x, end, share, slope)
-    slope /= h_rms
-    core.capped_force(elastic, stiffness, share, slope, *more)
 
 
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
