@@ -40,7 +40,7 @@ class _Value:
 
 def _operator(name: str, reflected: bool, kind: type | None) -> Any:
     def apply(self: _Value, other: Any) -> _Value:
-        given = other if isinstance(other, _Value) else np.asarray(other, self.kind)
+        given: Any = other if isinstance(other, _Value) else np.asarray(other, self.kind)
         return self.graph(name, *((given, self) if reflected else (self, given)), kind=kind or self.kind)
 
     return apply
