@@ -19,7 +19,7 @@ GROUPS = {
     "coverage": "generate.coverage",
     "leakage_law": "generate.leakage_law",
     "explorer": "generate.explorer",
-    "formulas": "generate.formulas.commands",
+    "formulas": "generate.formulas.fit",
     "grids": "generate.boundary_elements.grids",
     "machined": "generate.machined.campaign",
     "measured_maps": "generate.boundary_elements.measured_maps",
