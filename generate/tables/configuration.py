@@ -8,6 +8,7 @@ import pathlib
 import tomllib
 from typing import Any
 
+from generate.tables.writing import TEXTS
 from mbma_tables.common.arguments import number_in, whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
@@ -165,6 +166,6 @@ def load(kind: str, path: pathlib.Path | None = None, target: float | None = Non
         raise InputError(f"{where}{fault}") from None
 
 
-def make_axis(name: str, long_name: str, transform: str, given: AxisRange, nodes: int) -> Axis:
+def make_axis(kind: str, name: str, given: AxisRange, nodes: int) -> Axis:
     """An axis over the configured range."""
-    return Axis(name, long_name, transform, given.offset, given.low, given.high, nodes)  # type: ignore[arg-type]
+    return Axis(name, TEXTS["axes"][name], dict(AXES[kind])[name], given.offset, given.low, given.high, nodes)  # type: ignore[arg-type]

@@ -20,36 +20,15 @@ from numpy.typing import NDArray
 from generate.tables.build import ConformancePoints, UncertifiedError, evaluate
 from generate.tables.configuration import Configuration, make_axis
 from generate.tables.universal import MAX_DRAWS, visited_surfaces
-from generate.tables.writing import SYMBOLS, numbered
+from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.tablefiles.schema import Axis, TableContent
+from mbma_tables.tablefiles.schema import ISLAND4D, Axis, TableContent
 
-LOOKUP = (
-    "given delta_over_h_rms, zeta_d, zeta_u, hurst; delta_over_h_rms is the approach read at zeta_1 without bound, "
-    "for any other zeta_1 it is (delta - h_d)/s + zeta_d^(-hurst), h_d = s sqrt(zeta_d^(-2 hurst) - zeta_1^(-2 hurst))",
-    "spread = (zeta_u - zeta_d)/zeta_d, w = log1p(spread), P = 4 - 2 hurst, sphere = ({floor}/zeta_d)^P",
-    "g(p) = expm1(p w)/(p w), or 1 where p w = 0",
-    "m0 = 2 hurst w g(-2 hurst), alpha = 1.5 g(-2 hurst) g(P)/g(2 - 2 hurst)^2, sigma = {sigma}",
-    "rate = 0.75 g(P)/g(2 - 2 hurst)/{divisor!r}",
-    "i = zeta_d^(-P), c = 0.75 hurst/P, m4_d = c (1 - i), m4_u = c (exp(P w) - i), R = 3 sqrt(pi)/8",
-    "mu = (8/3) rate sigma R sqrt(2)/(m4_d m4_u)^(1/4)",
-    "X = (delta_over_h_rms zeta_d^hurst - 1)/sigma",
-    "on each axis: p by its position_formula, j = min(floor(p), nodes - 2), u = p - j, w_k(u) of spline_weights; "
-    "for a spread below its first see out_of_range",
-    "g_F = sum over k, l, m, n = 0 ... 3 of w_k(u_X) w_l(u_spread) w_m(u_sphere) w_n(u_hurst) "
-    "spline_F[j_X + k, j_spread + l, j_sphere + m, j_hurst + n]; g_A the same of spline_A",
-    "Phi_F = exp(g_F) pi mu F_5/2(-X)/5 and Phi_A = exp(g_A) pi F_2(-X)/2, F_n as height_integrals says; "
-    "without the exponentials this is the limit of a rigid sphere, mu to 0",
-    "S = sigma zeta_d^(-hurst), D = rate zeta_d^2, R_d = R/sqrt(c expm1(P log(zeta_d))), "
-    "R_u = R/sqrt(c expm1(P (log(zeta_d) + w)))",
-    "F_hat = S sqrt(2 R_d S) Phi_F = force q0/(E* s), A_hat = 2 pi D R_u R_d S^2 Phi_A = contact area q0^2/eta",
-    "error_F and error_A, as error_field says, bound the relative error of F_hat and A_hat",
-)
 VISITED = {"hurst": (0.3, 1.0), "log10_zeta_1": (math.log10(3.001), 4.0), "log10_approach": (-8.0, 1.0)}
 COVER_TRIALS = 4096
 
@@ -69,14 +48,7 @@ class Island4d:
 
     def axes(self, nodes: dict[str, int]) -> tuple[Axis, ...]:
         """X and spread on logarithms, sphere and hurst as they are."""
-        given = self.configuration.axes
-        rows = (
-            ("X", "how deep the island is: (delta - h_d)/sigma", "log"),
-            ("spread", "width of the band of roughness: zeta_u/zeta_d - 1", "log"),
-            ("sphere", f"where the band begins: ({SPHERE_FLOOR}/zeta_d)^(4 - 2 hurst)", "linear"),
-            ("hurst", "Hurst exponent", "linear"),
-        )
-        return tuple(make_axis(name, text, transform, given[name], nodes[name]) for name, text, transform in rows)
+        return tuple(make_axis(ISLAND4D, name, self.configuration.axes[name], count) for name, count in nodes.items())
 
     def arguments(self, *coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """X is a coordinate, mu follows from the other three."""
@@ -127,60 +99,21 @@ class Island4d:
     def auxiliary(self, axes: tuple[Axis, ...]) -> dict[str, Any]:
         """The raw parameters on the grid, and the numbers that turn a ratio into a force."""
         _, spread, sphere, hurst = (axis.values for axis in axes)
-        grid = np.meshgrid(spread, sphere, hurst, indexing="ij")
-        mu, sigma, _, _ = band_fields(*grid, self.variant)
-        zeta_d = from_axes(sphere[:, None], hurst)
-        names = tuple(axis.name for axis in axes)
+        mu, sigma, _, _ = band_fields(*np.meshgrid(spread, sphere, hurst, indexing="ij"), self.variant)
+        names, inverse = tuple(axis.name for axis in axes), 1 / from_axes(sphere[:, None], hurst)
         return {
-            "mu": (
-                names[1:],
-                mu,
-                {"long_name": "stiffness of the roughness: (8/3) D sigma sqrt(2 R_u R_d)", "units": "1"},
-            ),
-            "sigma": (
-                names[1:],
-                sigma,
-                {"long_name": "standard deviation of summit heights over s, times zeta_d^hurst", "units": "1"},
-            ),
-            "inverse_zeta_d": (
-                names[2:],
-                1 / zeta_d,
-                {"long_name": "1/zeta_d; zeta_u = zeta_d (1 + spread)", "units": "1"},
-            ),
+            "mu": (names[1:], mu, label(TEXTS["axes"]["mu"])),
+            "sigma": (names[1:], sigma, label("standard deviation of summit heights over s, times zeta_d^hurst")),
+            "inverse_zeta_d": (names[2:], inverse, label("1/zeta_d; zeta_u = zeta_d (1 + spread)")),
         }
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file."""
-        numbers = {
-            "floor": SPHERE_FLOOR,
-            "divisor": self.variant.density_divisor,
-            "sigma": f"sqrt((1 - {BROADENING}/alpha) m0)" if self.variant.summit_sigma else "sqrt(m0)",
-        }
+        sigma = f"sqrt((1 - {BROADENING}/alpha) m0)" if self.variant.summit_sigma else "sqrt(m0)"
         return {
-            "title": "Contact islands of the MBMA model of rough contact over its four parameters",
-            "history": "made by python -m generate tables island4d",
-            "source": "numerical solution of the integral equation by mbma_tables",
-            "references": (
-                "Guo, Ma, Zhu: A magnification-based multi-asperity (MBMA) model of rough contact, Eqs. 26-40"
-            ),
-            "summary": (
-                "Force F_hat and area A_hat of a contact island by the paper's four parameters: the approach "
-                "delta_over_h_rms of the island, the magnifications zeta_d and zeta_u between which its "
-                "roughness lies, the Hurst exponent. The axes follow the physics: X, how deep; spread, the width of "
-                "the band; sphere, a power of 1/zeta_d; hurst. Variables mu, sigma, inverse_zeta_d are their "
-                "auxiliary coordinates"
-            ),
-            "symbols": SYMBOLS,
-            "hats": "heights in units of s = h_rms/sqrt(1 - zeta_1^(-2 hurst)), lengths in 1/q0, forces in E* s/q0",
-            **numbered("lookup", [line.format(**numbers) for line in LOOKUP]),
-            "delta_over_h_rms": "(1 + X sigma) inverse_zeta_d^hurst, at any node",
-            "zeta_u": "(1 + spread)/inverse_zeta_d, at any node; no bound at sphere = 0, where inverse_zeta_d = 0",
+            **about(ISLAND4D, floor=SPHERE_FLOOR, divisor=self.variant.density_divisor, sigma=sigma),
             "variant": self.variant.name,
             "variant_numbers": json.dumps(self.variant.recorded),
-            "variant_numbers_meaning": (
-                "density divisor n of the summit density m4/(n m2), beta, phi, floor of zeta_d, floor of zeta_u, "
-                "islands stand h_d below the top, sigma is the summits'"
-            ),
             "covers": self._covers(),
         }
 

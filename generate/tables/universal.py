@@ -20,27 +20,16 @@ from generate.tables.build import (
     rtol_for,
 )
 from generate.tables.chunks import ChunkedSolver, phi
-from generate.tables.configuration import Configuration
-from generate.tables.writing import SYMBOLS, labels_of_cells, numbered
+from generate.tables.configuration import Configuration, make_axis
+from generate.tables.writing import about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu
 from mbma_tables.surfaces.variants import VARIANTS
 from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, Axis, TableContent
+from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, UNIVERSAL, X_STEPS, TableContent
 
-LOOKUP = (
-    "X = (delta - h_d)/sigma and mu = (8/3) D sigma sqrt(2 R_u R_d) of the island, in any consistent units",
-    "its cell c has X_low[c] <= X <= X_high[c] and mu_low[c] <= mu <= mu_high[c]; on an edge any of its cells will do",
-    "x = (2 X - X_low - X_high)/(X_high - X_low) of the cell",
-    "y = 2 mu/mu_high - 1 where mu_low = 0; else, with m = sqrt(mu_low mu_high), "
-    "y = (sqrt(mu_high) + sqrt(mu_low))/(sqrt(mu_high) - sqrt(mu_low)) (mu - m)/(mu + m)",
-    "Phi_F = mu sum over i, j = 0 ... 7 of chebyshev_F[c, i, j] T_i(x) T_j(y), T_n(cos t) = cos(n t)",
-    "Phi_A = sum over i, j = 0 ... 7 of chebyshev_A[c, i, j] T_i(x) T_j(y)",
-    "the island's force is E* sigma L Phi_F, its contact area eta pi D R_u sigma L^2 Phi_A, L = sqrt(2 R_d sigma)",
-    "error_F and error_A bound the relative error of Phi_F and Phi_A in each cell",
-)
 VISITED = {"hurst": (0.05, 1.0), "log10_zeta_1": (0.4786, 8.0), "log10_approach": (-7.0, 1.0)}
 MAX_DRAWS = 400  # islands drawn for each that a narrow table covers
 
@@ -195,21 +184,10 @@ class Universal:
         series = np.moveaxis(rows[:, 6:].reshape(-1, 2, TERMS, TERMS), 1, -1)
         content = TableContent(
             kind=configuration.kind,
-            axes=(
-                Axis("X", "how deep the island is: (delta - h_d)/sigma", "linear", 0.0, self.X.low, self.X.high, 2),
-                Axis(
-                    "mu",
-                    "stiffness of the roughness: (8/3) D sigma sqrt(2 R_u R_d)",
-                    "linear",
-                    0.0,
-                    0.0,
-                    self.mu.high,
-                    2,
-                ),
-            ),
+            axes=tuple(make_axis(UNIVERSAL, name, given, 2) for name, given in configuration.axes.items()),
             coefficients=np.ascontiguousarray(series),
             local_error=LOCAL_FACTOR * rows[:, 4:6] + self.rtol,
-            auxiliary=labels_of_cells(rows[:, :4].T),
+            auxiliary={n: (("cell",), r, label(t)) for (n, t), r in zip(CELL_EDGES.items(), rows.T, strict=False)},
             conformance={},
             attributes={},
         )
@@ -270,23 +248,7 @@ class Universal:
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file."""
         return {
-            "title": "Island problem of the MBMA model of rough contact (Greenwood and Tripp 1967)",
-            "history": "made by python -m generate tables universal",
-            "source": "numerical solution of the integral equation by mbma_tables",
-            "references": (
-                "Guo, Ma, Zhu: A magnification-based multi-asperity (MBMA) model of rough contact, Eqs. 34-40; "
-                "Greenwood and Tripp (1967)"
-            ),
-            "summary": (
-                "Force Phi_F and area Phi_A of a contact island, a sphere covered with summits of normally distributed "
-                "heights, as functions of two numbers: X, how deep, and mu, how stiff the roughness is against "
-                "the sphere. With heights in units of sigma and radii rho in units of L: "
-                "d(rho) = rho^2 - X + w(rho), p(rho) = (mu/2) F_3/2(d), w(rho) = (4/pi) integral over t from 0 to "
-                "infinity of t/(t + rho) p(t) K(k) dt, K of modulus k = 2 sqrt(rho t)/(rho + t); "
-                "Phi_F = 2 pi integral of rho p, Phi_A = 2 pi integral of rho F_1(d)"
-            ),
-            "symbols": SYMBOLS,
-            **numbered("lookup", LOOKUP),
+            **about(UNIVERSAL),
             "variant": "any",
             "variant_numbers": "[]",
             "target": self.configuration.target,
