@@ -20,9 +20,10 @@ GROUPS = {
     "leakage_law": "generate.leakage_law",
     "explorer": "generate.explorer",
     "formulas": "generate.formulas.fit",
-    "grids": "generate.boundary_elements.grids",
+    "gaps": "generate.boundary_elements.studies",
+    "grids": "generate.boundary_elements.studies",
     "machined": "generate.machined.campaign",
-    "measured_maps": "generate.boundary_elements.measured_maps",
+    "measured_maps": "generate.boundary_elements.studies",
     "tables": "generate.tables.commands",
     "wheels": "generate.wheels",
 }
