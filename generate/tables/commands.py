@@ -9,7 +9,8 @@ import shutil
 import click
 
 from generate.tables import height_coefficients
-from generate.tables.build import UncertifiedError, build
+from generate.tables.build import build
+from generate.tables.certificate import UncertifiedError
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
 from generate.tables.island4d import Island4d

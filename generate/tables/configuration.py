@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import pathlib
 import tomllib
@@ -77,6 +78,11 @@ class Configuration:
         """SHA-256 of the configuration, the variant's numbers included."""
         numbers = get_variant(self.variant).recorded if self.kind == ISLAND4D else []
         return digest_json([dataclasses.asdict(self), numbers])
+
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a table's file on what was wanted."""
+        text = json.dumps(dataclasses.asdict(self), sort_keys=True)
+        return {"target": self.target, "configuration": text, "configuration_sha256": self.digest()}
 
 
 def _read(path: pathlib.Path) -> dict[str, Any]:
