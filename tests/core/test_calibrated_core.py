@@ -220,24 +220,6 @@ class TestAnyInput:
         with pytest.raises(ValueError, match="sizes"):
             flow(nobody, wrong, half, half)
 
-    def test_sizes_that_do_not_match_are_refused(self, used):
-        rows, u = batch(5)
-        ends, out = np.empty((5, 2)), np.empty(5)
-        coefficients, numbers, cells = TABLE.core_table
-        with pytest.raises(ValueError, match="sizes"):
-            used.calibrated_ends(coefficients[:-1], numbers, cells, *rows, None, None, ends)
-        for axis in range(3):
-            with pytest.raises(ValueError, match="sizes"):
-                used.calibrated_ends(
-                    coefficients, numbers, cells + np.eye(3, dtype=np.int64)[axis], *rows, None, None, ends
-                )
-        with pytest.raises(ValueError, match="sizes"):
-            used.calibrated_ends(coefficients, numbers[:-1], cells, *rows, None, None, ends)
-        with pytest.raises(ValueError, match="sizes"):
-            used.calibrated_contact(*TABLE.core_table, *rows, ends[:4], None, np.arange(5), u, out, out, out)
-        with pytest.raises(ValueError, match="sizes"):
-            used.spline_values(None, numbers, cells, *rows[:2], None, None, None, np.arange(5), u, u, out)
-
 
 @pytest.mark.parametrize(("hurst", "log_zeta_1"), [(0.1, 1.1), (0.37, 5.0), (1.0, 11.5), (1e-9, 2.0), (1 - 1e-12, 3.0)])
 def test_moments_of_self_affine_surfaces(hurst, log_zeta_1):

@@ -8,7 +8,6 @@ import sys
 
 import numpy as np
 import pytest
-from helpers import fresh
 from scipy.integrate import quad
 
 from mbma_tables import Scene, Surface, contact, contact_law, island, open_table
@@ -203,40 +202,11 @@ def test_a_result_names_what_made_it():
     assert found["separation"].attrs["units"] == "mm"
 
 
-WATCHED = {
-    "mbma_tables.answers.contact": {"pressure", "area", "validity", "yield", "leakage"},
-    "mbma_tables.law.make": {"stiffness", "energy", "conductance"},
-    "mbma_tables.answers.leakage": {"leakage"},
-    "mbma_tables.theories.yielding": {"yield"},
-    "mbma_tables.laws.hardness": {"yield"},
-    "mbma_tables.totals.conductance": {"conductance"},
-    "mbma_tables.theories.greenwood_williamson": {"comparison"},
-    "mbma_tables.theories.persson": set(),
-    "mbma_tables.scenes.statistics": {"island_statistics", "pressure_profile"},
-}
 COMBINATIONS = [
     names
     for names in [(name,) for name in OUTPUTS] + list(itertools.combinations(OUTPUTS, 2))
     if not ("yield" in names and set(names) & set(ELASTIC))
 ]
-COUNTED = """
-import json, sys
-import numpy as np
-from mbma_tables import Scene, Surface
-import mbma_tables.models as models
-surface, arguments = Surface.named("concrete"), json.loads(sys.argv[1])
-before = set(sys.modules)
-Scene(surface, **arguments).run()
-print(json.dumps(sorted(set(sys.modules) - before)))
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", OUTPUTS)
-def test_modules_of_an_effect_that_is_off_are_not_imported(name):
-    loaded = fresh(COUNTED, json.dumps(arguments_of([name])))
-    for module, effects in WATCHED.items():
-        assert (module in loaded) == (name in effects), module
 
 
 @pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)

@@ -117,24 +117,6 @@ def own_motion(answer, name):
     return np.max([np.abs(getattr(answer(end), name) / centre - 1) for end in (-WIDE, WIDE)], axis=0) * STEP / WIDE
 
 
-@pytest.mark.parametrize("which", INPUTS)
-@pytest.mark.parametrize("island_model", ["rigid", "island4d", "formula"])
-def test_totals_of_other_island_models_do_not_jump(island_model, which):
-    count = 18 * SCALE
-    numbers = pressed(np.random.default_rng([17, len(island_model), INPUTS.index(which)]), count, REPORTED)
-    numbers["hurst"] = np.clip(numbers["hurst"], 0.31, 1 - 2 * WIDE)
-    depth = np.maximum(numbers["h_max"] - numbers["separation"], 1e-3 * numbers["h_max"])
-    numbers["separation"] = numbers["h_max"] - np.minimum(depth, 2 * numbers["h_max"] * (1 - 10 * WIDE))
-
-    def answer(share):
-        return totals_of(moved_by(numbers, which, share), island_model=island_model, rtol=1e-7, outside="exact")
-
-    one, other = answer(-STEP / 2), answer(STEP / 2)
-    for name in ("pressure", "area"):
-        off = np.abs(getattr(other, name) / getattr(one, name) - 1)
-        assert (off <= one.error + other.error + 2 * own_motion(answer, name)).all()
-
-
 def test_totals_do_not_jump_where_the_solver_takes_over():
     """Surfaces that leave the universal table as they are pressed: gaps on both sides of that, by bisection."""
     count = 3 * SCALE

@@ -10,9 +10,7 @@ from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 from helpers import fresh
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
-from mbma_tables.core import core
 from mbma_tables.surfaces.variants import REPORTED, VARIANTS
-from mbma_tables.totals import island_sum
 
 SHALLOW = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
 OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0)
@@ -182,35 +180,6 @@ print(json.dumps([traced / gaps.nbytes, grown / gaps.nbytes, found.islands / gap
     assert islands > 30
     assert traced < 25
     assert grown < 30
-
-
-class Counted:
-    """The core, whose calls of `totals` are counted and may be interrupted."""
-
-    def __init__(self, interrupted=False):
-        self.calls, self.interrupted = 0, interrupted
-
-    def totals(self, *given):
-        if self.interrupted:
-            raise KeyboardInterrupt
-        self.calls += 1
-        return core.totals(*given)
-
-
-@pytest.mark.parametrize("derivatives", [False, True])
-def test_long_batches_run_in_blocks(monkeypatch, derivatives):
-    """Between two blocks Ctrl-C is honoured; the bits are those of one block."""
-    surfaces = Surface(0.8, 0.3, 60.0, 0.7, np.linspace(2.1, 2.2, 50))
-    whole, counted = contact(surfaces, separation=1.0, derivatives=derivatives), Counted()
-    monkeypatch.setattr(island_sum, "core", counted)
-    monkeypatch.setattr(island_sum, "BLOCK", 16)
-    cut = contact(surfaces, separation=1.0, derivatives=derivatives)
-    assert counted.calls == 4
-    np.testing.assert_array_equal(cut.pressure, whole.pressure)
-    assert cut.islands == whole.islands
-    monkeypatch.setattr(island_sum, "core", Counted(interrupted=True))
-    with pytest.raises(KeyboardInterrupt):
-        contact(surfaces, separation=1.0, derivatives=derivatives)
 
 
 @pytest.mark.parametrize("island_model", ["exact", "universal"])
