@@ -167,32 +167,6 @@ def test_waves_hold_the_moments_of_the_spectrum():
     assert split.alpha == pytest.approx(surface.alpha, rel=1e-13)
 
 
-@pytest.mark.skipif(len(FUSED) < 2, reason="one generation of processor")
-def test_bits_are_those_of_any_generation():
-    found = []
-    for used in FUSED:
-        law = np.empty(used.words_of_spectrum_law())
-        facts, none, given = np.empty(4), np.empty(0), self_affine(0.8, 64.0)
-        count = used.spectrum_waves(*given, none, none, none, facts)
-        spectrum = np.empty((3, count))
-        used.spectrum_waves(*given, *spectrum, facts)
-        constants = np.array([*facts[:2], 0.5, 0.03, 0.34, 0.44, 0.09, 0.43, 0.06, 3.2])
-        assert used.spectrum_law_of(*spectrum, constants, np.empty(3 * count), law) == 0
-        u = np.linspace(1e-3, 3.1, 500)
-        out, more = np.empty((3, 500)), np.empty((3, 500))
-        used.spectrum_law_contact(law, u, *out)
-        used.spectrum_law_persson(law, out[0], *more[:2])
-        used.spectrum_law_separation(law, out[0], more[2])
-        found.append([spectrum, law, out, more])
-        # one by one
-        one = np.empty((3, 1))
-        for k in range(0, 500, 50):
-            used.spectrum_law_contact(law, u[k : k + 1], *one)
-            np.testing.assert_array_equal(one[:, 0], out[:, k])
-    for one, two in zip(*found, strict=True):
-        np.testing.assert_array_equal(one.view(np.int64), two.view(np.int64))
-
-
 @pytest.mark.parametrize("used", CORES)
 class TestAnyInput:
     def test_of_forces_and_separations(self, used):

@@ -90,6 +90,7 @@ def test_check_names_what_is_missing(tmp_path, monkeypatch):
     [
         (("cobol", "code"), "target must be one of"),
         (("c", "code", "guessed"), "variant must be one of"),
+        (("c", "code", "fitted"), "takes their cover"),
         (("c", "a_file"), "a_file"),
         (("c", "code", "reported", "island4d"), "universal"),
     ],

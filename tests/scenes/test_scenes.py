@@ -409,13 +409,6 @@ def test_island_models_as_objects():
     np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2)
 
 
-def test_a_table_as_an_object_is_the_island_model_with_its_name():
-    table = open_table("universal")
-    found, same = scene_with(island_model=table).run(), scene_with(island_model="universal").run()
-    np.testing.assert_array_equal(found["pressure"], same["pressure"])
-    assert found.attrs["table_hashes"] == same.attrs["table_hashes"]
-
-
 def test_no_contact():
     by_area = Scene(CONCRETE, effects=["pressure", "stiffness"], areas=[0.0]).run()
     assert by_area.separation.values == pytest.approx(1.1)

@@ -11,7 +11,7 @@ import xarray as xr
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
-from mbma_tables.theories import THEORIES, Calibrated, Mbma
+from mbma_tables.theories import THEORIES, Mbma
 from mbma_tables.theories.differences import HALVINGS, differences
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
@@ -149,20 +149,6 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
             found.conductance(*bad)
     with pytest.raises(InputError, match="give the surface its unit"):
         contact(SURFACE, area=0.01).conductance("45 W/(m K)")
-
-
-def test_a_theory_is_asked_once(monkeypatch):
-    asked = []
-    own = Calibrated.answer
-
-    def counted(self, surface, mean_separation):
-        asked.append(np.shape(mean_separation))
-        return own(self, surface, mean_separation)
-
-    monkeypatch.setattr(Calibrated, "answer", counted)
-    found = contact(SURFACE, mean_separation=[1.2, 1.9], theory="calibrated")
-    _ = found.stiffness, found.scatter, found.area_scatter, found.valid, found.reasons, found.mean_pressure
-    assert asked == [(2,)]
 
 
 @each

@@ -4,7 +4,6 @@ Pairs a relative 1e-9 apart may differ by the slope between the two, and by the 
 `ISLAND_KINKS` and `TOTAL_KINKS`, one-sided differences are compared. MBMA_GAUNTLET sets how many pairs.
 """
 
-import dataclasses
 import math
 
 import numpy as np
@@ -119,29 +118,6 @@ def own_motion(answer, name):
     """How far an island model's answer moves over a step by itself: by differences a thousand steps wide."""
     centre = getattr(answer(0.0), name)
     return np.max([np.abs(getattr(answer(end), name) / centre - 1) for end in (-WIDE, WIDE)], axis=0) * STEP / WIDE
-
-
-def test_totals_do_not_jump_where_the_solver_takes_over():
-    """Surfaces that leave the universal table as they are pressed: gaps on both sides of that, by bisection."""
-    count = 3 * SCALE
-    rng = np.random.default_rng(8)
-    shallow = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
-    compared = 0
-    for variant, hurst in ((REPORTED, rng.uniform(0.05, 0.08, count)), (shallow, rng.uniform(0.7, 1, count))):
-        surface = Surface(hurst, 1.0, 10 ** rng.uniform(7.5, 8, count), 1.0, 4.5)
-        inside, outside = np.full(count, 4.5 - 1e-9), np.full(count, -4.4)
-        for _ in range(60):
-            middle = (inside + outside) / 2
-            gone = np.isnan(contact(surface, separation=middle, variant=variant, outside="nan").pressure)
-            inside, outside = np.where(gone, inside, middle), np.where(gone, middle, outside)
-        one, other = (contact(surface, separation=gap, variant=variant, outside="exact") for gap in (inside, outside))
-        left = np.isnan(contact(surface, separation=outside, variant=variant, outside="nan").pressure)
-        assert left.any()
-        own = 10 * np.abs(inside - outside) / (4.5 - inside)
-        for name in ("pressure", "area"):
-            off = apart(getattr(one, name), getattr(other, name), 0.0)
-            assert (off <= one.error + other.error + own)[left].all()
-        compared += int(left.sum())
 
 
 @pytest.mark.parametrize("which", ["delta", "hurst", "q0", "q1", "h_rms", "E_star"])

@@ -13,9 +13,8 @@ from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 from helpers import fresh
 
 from mbma_tables import InputError, OutOfRangeError, Scene, Surface, contact, contact_law, greenwood_tripp, island
-from mbma_tables.export.code import write_code
 from mbma_tables.models.tables import open_table, shipped
-from mbma_tables.surfaces.variants import FITTED, REPORTED, VARIANTS
+from mbma_tables.surfaces.variants import REPORTED, VARIANTS
 
 SHALLOW = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
 OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0)
@@ -213,14 +212,6 @@ def test_cover_is_what_islands_at_random_leave_uncovered():
     law = contact_law(COVERED, variant=COVER)
     assert law.area(separation=COVERED_GAPS) == pytest.approx(covered.area, rel=2e-8)
     assert not any("added" in reason for reason in covered.reasons)
-
-
-def test_exported_code_takes_no_cover(tmp_path):
-    with pytest.raises(InputError, match="takes their cover"):
-        write_code("c", tmp_path, variant=FITTED)
-
-
-def test_addition_is_one_of_two():
     with pytest.raises(InputError, match="addition must be"):
         dataclasses.replace(REPORTED, addition="integral")
 
@@ -314,18 +305,13 @@ def test_answers_are_checked():
     with pytest.raises(OutOfRangeError, match="'own' has no answer for") as caught:
         contact(FLAT, separation=[2.5, 1.0], island_model=silent)
     assert caught.value.mask.tolist() == [False, True]
-    assert np.isnan(contact(FLAT, separation=[2.5, 1.0], island_model=silent, outside="nan").pressure).tolist() == [
-        False,
-        True,
-    ]
+    found = contact(FLAT, separation=[2.5, 1.0], island_model=silent, outside="nan").pressure
+    assert np.isnan(found).tolist() == [False, True]
+    with pytest.raises(InputError, match="derivatives come from island model 'universal', 'own' has none"):
+        contact(FLAT, separation=1.0, island_model=Own(), derivatives=True)
     # one number for all islands is enough
     one = contact(FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3)))
     assert 1e-3 <= one.error < 1.1e-3
-
-
-def test_derivatives_that_a_model_does_not_have():
-    with pytest.raises(InputError, match="derivatives come from island model 'universal', 'own' has none"):
-        contact(FLAT, separation=1.0, island_model=Own(), derivatives=True)
 
 
 @pytest.mark.slow

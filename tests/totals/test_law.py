@@ -336,15 +336,6 @@ def test_no_number(bad):
             law.separation(pressure=bad)
 
 
-@pytest.mark.parametrize("below", [-5.0, math.nextafter(-2.1, -9), [1.0, -5.0]])
-def test_below_full_compression(below):
-    law = contact_law(Surface(0.8, 0.3, 30.0, 0.7, 2.1), rtol=1e-4)
-    with pytest.raises(OutOfRangeError, match=r"at least -h_max = -2\.1") as caught:
-        law.pressure(separation=below)
-    assert caught.value.mask.shape == np.shape(below)
-    assert caught.value.mask.sum() == 1
-
-
 @pytest.mark.parametrize(
     ("asked", "match"),
     [

@@ -122,17 +122,6 @@ def test_values_that_no_gap_has_are_nan_and_counted(name, which):
             assert law.separation(**{QUANTITIES[which]: tiny}) == law.h_max
 
 
-def test_a_light_load_has_all_digits_of_its_overclosure():
-    """A power of it, where contact ends: what is left to last contact is found relative to itself."""
-    law = law_of("mbma")
-    inverse = law._inverse_block("pressure")
-    x, side = np.empty((2, 60))
-    wanted = np.geomspace(1e-280, 1e-60, 60)
-    core.inverse_nodes(wanted, law.block, FORCE, inverse[5], x, side)
-    assert (side == -1).all()
-    np.testing.assert_allclose(np.diff(np.log(x)) / np.diff(np.log(wanted)), 1 / 3.5, rtol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["mbma", "calibrated"])
 def test_leakage_apart(name):
     law = law_of(name)
