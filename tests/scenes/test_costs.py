@@ -52,17 +52,13 @@ def test_costs_are_those_of_the_measured_row(tmp_path, asked, cost):
 
 
 def test_shipped_costs_have_what_plans_need():
-    costs = shipped_costs()
-    needed = [
-        (island_model, what)
-        for island_model in ("exact", "universal", "rigid")
-        for what in ("gap", "call", "import", "law")
-    ]
-    needed += [("law", "lookup"), ("law", "invert"), ("exact", "profile"), ("scene", "call")]
-    needed += [(name, what) for name in THEORIES[1:] for what in ("gap", "call", "invert", "energy", "law")]
-    needed += [("island4d", "gap")]
-    for island_model, what in needed:
-        assert 0 < costs.of(island_model, what, 1e-4, "pressure") < 10, (island_model, what)
+    costs, calls = shipped_costs(), ("gap", "call", "import", "law")
+    needed = dict.fromkeys(("exact", "universal", "rigid"), calls) | {"law": ("lookup", "invert")}
+    needed |= dict.fromkeys(THEORIES[1:], ("gap", "call", "invert", "energy", "law"))
+    needed |= {"exact": (*calls, "profile"), "scene": ("call",), "island4d": ("gap",)}
+    for name, whats in needed.items():
+        for what in whats:
+            assert 0 < costs.of(name, what, 1e-4, "pressure") < 10, (name, what)
     errors = [row.error for row in costs.rows if row.island_model == "universal" and row.what == "gap"]
     assert 0 < max(errors) <= 1e-8
     assert costs.of("exact", "gap", 1e-8) > 3 * costs.of("universal", "gap", 1e-8)
@@ -109,13 +105,15 @@ def test_it_tells_what_the_shipped_file_states(effects, prescribed, name, quanti
     assert own == pytest.approx(stated("mbma", quantity, contact), rel=0.1)
 
 
-def test_conductance_is_a_stiffness():
-    scene = Scene(SURFACE, effects=["conductance"], conductivities=(1.0, 1.0), pressures=[1e-4])
-    assert "for conductance theory 'calibrated' is nearer" in advice(scene)
-    assert advice(scene).count("\n") == 1
-
-
-def test_where_there_is_nothing_to_say():
+def test_what_else_is_advised_and_where_there_is_nothing_to_say():
+    # conductance is a stiffness
+    said = advice(Scene(SURFACE, effects=["conductance"], conductivities=(1.0, 1.0), pressures=[1e-4]))
+    assert "for conductance theory 'calibrated' is nearer" in said
+    assert said.count("\n") == 1
+    own = dataclasses.replace(get_variant("printed"), name="own", beta=0.3)
+    said = advice(Scene(SURFACE, effects=["stiffness"], areas=[1e-4], variant=own))
+    assert "instead of an unknown distance at 0.01% contact" in said
+    assert "not tested there: A/A0 is below" in said
     quiet = [
         Scene(SURFACE, theory="persson", pressures=[1e-4]),
         Scene(SURFACE, effects=["area"], mean_separations=[1.0]),
@@ -123,10 +121,3 @@ def test_where_there_is_nothing_to_say():
         Scene(SURFACE, effects=["pressure_profile"], deltas=[0.1]),
     ]
     assert [advice(scene) for scene in quiet] == [""] * 4
-
-
-def test_a_variant_that_was_not_compared_and_a_contact_that_was_not_simulated():
-    own = dataclasses.replace(get_variant("printed"), name="own", beta=0.3)
-    line = advice(Scene(SURFACE, effects=["stiffness"], areas=[1e-4], variant=own))
-    assert "instead of an unknown distance at 0.01% contact" in line
-    assert "not tested there: A/A0 is below" in line

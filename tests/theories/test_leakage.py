@@ -119,17 +119,15 @@ def test_outside_the_table_and_of_a_spectrum():
 
 
 class TestRates:
-    def test_liquid_between_parallel_plates(self):
+    def test_liquid(self):
         # 1 mm wide open gap: h^3 dp/(12 eta L)
-        found = asked(mean_separation="1 mm", E_star="10 MPa")
         plates = 1000.0**3 * 0.1 / (12 * 1e-9 * 1e4)  # um^3 MPa/(MPa s um)
-        assert found.liquid("1e-3 Pa s", "0.1 MPa", "10 mm") == pytest.approx(plates, rel=2e-6)
-
-    def test_units_of_a_liquid(self):
+        wide = asked(mean_separation="1 mm", E_star="10 MPa")
+        assert wide.liquid("1e-3 Pa s", "0.1 MPa", "10 mm") == pytest.approx(plates, rel=2e-6)
         found = asked(area=0.1, E_star="10 MPa")
         plain = found.K * 0.1 / (12 * 1e-9 * 2000)  # MPa, MPa s, um
-        assert found.liquid("1e-3 Pa s", "0.1 MPa", "2 mm") == pytest.approx(plain, rel=1e-12)
-        assert found.liquid(1e-9, 0.1, 2000.0) == pytest.approx(plain, rel=1e-12)
+        for known in (("1e-3 Pa s", "0.1 MPa", "2 mm"), (1e-9, 0.1, 2000.0)):
+            assert found.liquid(*known) == pytest.approx(plain, rel=1e-12)
         assert found.units == {"K": "um^3", "hydraulic_aperture": "um"}
         assert found.hydraulic_aperture**3 == pytest.approx(found.K)
 
