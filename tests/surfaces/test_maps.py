@@ -166,11 +166,7 @@ class TestKnownMaps:
 
 
 @settings(max_examples=15, deadline=None)
-@given(
-    length=st.floats(1e-9, 1e9),
-    height=st.floats(1e-9, 1e9),
-    lift=st.floats(-1e3, 1e3),
-)
+@given(length=st.floats(1e-9, 1e9), height=st.floats(1e-9, 1e9), lift=st.floats(-1e3, 1e3))
 def test_units_do_not_matter(length, height, lift):
     plain = from_map(CUT_OUT, STEP)
     scaled = from_map(height * (CUT_OUT + lift), length * STEP)
