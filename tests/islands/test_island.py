@@ -64,7 +64,7 @@ def test_bad_options(surface, option, value):
 
 def test_a_band_that_ends_at_the_floor_of_zeta_u_is_refused():
     own = dataclasses.replace(PRINTED, name="own", floor_u=3.5)
-    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be above floor_u = 3\.5"):
+    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5"):
         island(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, variant=own)
     assert island(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, variant=own).force > 0
 
