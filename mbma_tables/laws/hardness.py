@@ -72,7 +72,7 @@ def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: C
 def yielded_area(
     force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
-    """Yielded part of A/A0, likewise."""
+    """Yielded part of A/A0, from the same numbers."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
     return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
 
@@ -147,6 +147,16 @@ def force(
     exponent = constants.force_light, constants.force_eta, constants.force_share
     found, steep = answered(core.capped_force, (elastic_force, stiffness, share, slope, eta), 2, *exponent)
     return found, steep
+
+
+def closed(
+    heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
+) -> tuple[FloatArray, FloatArray]:
+    """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
+    x, elastic = u / h_rms, (pressure / gradient, stiffness / gradient)
+    share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
+    load, steep = force(*elastic, share, slope / h_rms, eta)
+    return load * gradient, steep * gradient
 
 
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
