@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shipped_flow
-from mbma_tables.answers.source import Source, untroubled
+from mbma_tables.answers.source import Source
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
@@ -41,8 +41,8 @@ class Leakage(Displayed):
     """Flow through the gaps of a contact; arrays of the contact's shape.
 
     Reynolds' equation on the gaps: no flow where bodies touch, small slopes, isotropic roughness, and a fluid whose
-    pressure does not move the solids. It is the mean of a long seal, many longest waves each way; cells of a few waves
-    differ by `scatter`.
+    pressure does not move the solids. It is the mean of a long seal, many of the longest wavelengths each way; cells of
+    a few wavelengths differ by `scatter`.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Leakage(Displayed):
 
     @property
     def blocked(self) -> Any:
-        """Whether contact percolates, A/A0 at or above about 0.41: what then passes no law of gaps tells."""
+        """Whether contact percolates, A/A0 at or above about 0.41; what passes then is not in this model."""
         return self.K == 0
 
     @property
@@ -107,7 +107,7 @@ class Leakage(Displayed):
 
     @functools.cached_property
     def scatter(self) -> Numbers:
-        """Standard deviation of ln K from simulation to simulation, cells of four or more longest waves a side.
+        """Standard deviation of ln K from simulation to simulation, cells of four or more longest wavelengths a side.
 
         NaN where not known, and where blocked.
         """
@@ -134,18 +134,15 @@ class Leakage(Displayed):
 
     @functools.cached_property
     def valid(self) -> Any:
-        """Whether flow through contacts such as these was simulated; `reasons` says why not."""
-        good = self._map(lambda theory, s, u, E, area: untroubled(concerns(theory, s, u, area)))
-        return self._contact.valid & good.astype(bool)
+        """Whether flow through contacts such as these was simulated; `reasons` has why not."""
+        return self._contact.valid & self._source.valid(self._contact, reasons_against, {"area": self._area})
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
         """What is against entries, each with its mask; of plain arrays."""
-        source = self._source
-        theory, u = source.theory_at(source.E_star, source.hardness), np.asarray(self._contact.mean_separation)
-        own = concerns(theory, source.surface, u, np.asarray(self._area))
-        reasons: dict[str, Any] = self._contact.reasons
-        return reasons | {reason: mask for reason, mask in own.items() if mask.any()}
+        own = self._source.reasons(self._contact, reasons_against, {"area": self._area})
+        reasons: dict[str, Any] = self._contact.reasons | own
+        return reasons
 
     def _map(self, function: Callable[..., FloatArray]) -> Numbers:
         found: Numbers = self._source.map(lambda *given: (function(*given),), self._contact, 1, {"area": self._area})[0]
@@ -285,9 +282,9 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     return out.reshape(shape)
 
 
-def concerns(theory: Theory, surface: Any, mean_separation: FloatArray, area: FloatArray) -> dict[str, Any]:
+def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
     """Reasons against the flow, beside those against the contact."""
-    own = theory.elastic.flow_trust(surface, mean_separation, area)
+    own = theory.elastic.flow_trust(surface, u, area)
     large = np.broadcast_to(np.asarray(surface.zeta_1) > SIMULATED, np.shape(area))
     many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
     far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"

@@ -365,7 +365,7 @@ int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, d
     for (size_t k = 0; k < n; k++) {
         const bool floor_d = x[k] >= s.kink_d;
         const island i = island_at(x[k], floor_d, x[k] > s.kink_u, &s);
-        const phi found = phi_at(cells, i.X, i.mu, false);
+        const phi found = phi_at(cells, i.X, i.mu);
         const double each = (floor_d ? 1.0 : s.jacobian) * i.count;
         out[k] = i.force * each * found.value[0];
         out[n + k] = i.area * each * found.value[1];

@@ -1,4 +1,4 @@
-"""What follows from a law, made when it is asked for: unloading, sliding, softening, leakage, its picture."""
+"""What follows from a law, computed when first read: unloading, sliding, softening, leakage, its picture."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polyno
 
 
 class Derived:
-    """The part of a `ContactLaw` that is made when it is asked for."""
+    """The part of a `ContactLaw` that is computed when first read."""
 
     def unloading_stiffness(
         self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None

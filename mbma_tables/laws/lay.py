@@ -8,7 +8,7 @@ c = 1/2. Fitted to boundary elements, with r the root of the ratio of the gradie
 
 where p = 1/(1 + r^n) is the share along the lay. On surfaces that were not used in the fit (lays of 1 to 8, Hurst
 exponents 0.4 to 0.9, 2% to 42% contact, 150 contacts in both directions) the root mean square error of k_t is 1.6%, the
-largest 4.0% at nu = 0.3 and 8.6% at nu = 0.5; 93% are within 3% (``python -m generate.boundary_elements.tangential``).
+largest 4.0% at nu = 0.3 and 8.6% at nu = 0.5; 93% are within 3% (``python -m generate.machined.tangential``).
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ def stress_shares(
 
     Examples
     --------
+    >>> from mbma_tables.laws.lay import stress_shares
     >>> along, across = stress_shares(4.0, 0.12, 0.3)
     >>> round(float(along), 3), round(float(across), 3)
-    (0.21, 0.825)
+    (0.211, 0.821)
     """
     r, A, poisson = (np.asarray(each, float) for each in (anisotropy, area, nu))
     low, high = TESTED_AREA

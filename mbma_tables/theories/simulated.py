@@ -111,9 +111,9 @@ class BoundaryElements(Theory):
         self._apart = split - 1 if split < rows.shape[1] else -1
         # an h_max that was stated may lie below the gap of the first load
         self.ends_at_h_max = own_loads and bool(rows[2, 0] < float(np.asarray(surface.h_max)))
-        self.curve = LoadCurve(rows, self._apart)
+        self.spline = LoadCurve(rows, self._apart)
         if self.ends_at_h_max:
-            self.curve = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
+            self.spline = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
         self._left_out = left_out(rows, self._apart)
 
     @classmethod
@@ -239,8 +239,8 @@ class BoundaryElements(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] of this map, and no other."""
         u = self._within(surface, mean_separation)
-        x = self.curve.log_force(u)
-        area, stiffness = self.curve.area(x), self.curve.stiffness(x)
+        x = self.spline.log_force(u)
+        area, stiffness = self.spline.area(x), self.spline.stiffness(x)
         with np.errstate(all="ignore"):
             return TheoryAnswer(np.exp(x), area, stiffness, self._error(u, np.array([x, np.log(area)])))
 
@@ -255,14 +255,14 @@ class BoundaryElements(Theory):
         elif quantity == "area":
             require(quantity, wanted, wanted < 1, "less than 1")
         with np.errstate(divide="ignore"):
-            x = np.log(known) if quantity == "pressure" else self.curve.log_force_at(known)
-        u = np.asarray(self.curve.separation(x))
+            x = np.log(known) if quantity == "pressure" else self.spline.log_force_at(known)
+        u = np.asarray(self.spline.separation(x))
         require(quantity, wanted, u > np.finfo(float).eps * self.rows[2, 0], "less: the mean separation vanishes")
         return u, np.zeros(np.shape(wanted), bool)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length]."""
-        return self.curve.energy(self.curve.log_force(self._within(surface, mean_separation)))
+        return self.spline.energy(self.spline.log_force(self._within(surface, mean_separation)))
 
     @functools.cached_property
     def _flows(self) -> FloatArray:
@@ -307,11 +307,11 @@ class BoundaryElements(Theory):
         }
         return self.scatter(surface, "flow", area), reasons
 
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Share of the map's heights above the level whose mean gap is u, and its derivative, for a hardness."""
-        return Calibrated().bearing_share(surface, mean_separation)
+    def heights(self, surface: AnySurface) -> Any:
+        """The map's own bearing curve, for a hardness."""
+        return Calibrated().heights(surface)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons against grids that are too coarse, and contact areas that were not tested."""
         left_out = 0.0 if self.pressed is None else self.pressed.left_out
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"

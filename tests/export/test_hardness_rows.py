@@ -1,7 +1,5 @@
 """Laws with a hardness as rows for other codes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

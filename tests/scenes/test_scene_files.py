@@ -76,10 +76,7 @@ MISTAKES = {
     "below the model's end": (SURFACE + ON + "[prescribed]\nseparations = [-2.0]\n", "at least -h_max"),
     "negative mean separation": (SURFACE + ON + "[prescribed]\nmean_separations = [-0.1]\n", "at least 0"),
     "negative pressure": (SURFACE + ON + "[prescribed]\npressures = [-1.0]\n", "at least 0"),
-    "pressure over h_rms": (
-        SURFACE + ON + "[prescribed]\npressures = [0.01]\nover_h_rms = true\n",
-        "leave it out",
-    ),
+    "pressure over h_rms": (SURFACE + ON + "[prescribed]\npressures = [0.01]\nover_h_rms = true\n", "leave it out"),
     "pressure without an end": (
         SURFACE + '[effects]\non = ["pressure"]\noff = ["finite_height"]\n[prescribed]\npressures = [0.01]\n',
         "leave finite_height on, or give separations",

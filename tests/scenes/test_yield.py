@@ -1,14 +1,11 @@
 """The effect `yield` of a scene."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
 import pytest
 
 from mbma_tables import InputError, Scene, Surface, contact
-from mbma_tables.theories.yielding import Yielding
 from mbma_tables.totals.conductance import conductance, mean_conductivity
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
@@ -47,27 +44,14 @@ def test_theories_compared_yield_too():
     asked = {"mean_separations": [0.5, 1.5], "E_star": 100e3, "hardness": 1500.0}
     effects, others = ["pressure", "area", "comparison", "yield"], ["persson", "calibrated"]
     found = Scene(SURFACE, effects, theories=others, **asked).run()
+    elastic = Scene(**KNOWN, effects=["area"], theory="calibrated").run()
+    known = contact(SURFACE, pressure=1.0, E_star=100e3, theory="calibrated")
+    assert elastic.attrs["elastic_hardness"] == pytest.approx(known.elastic_hardness)
+    assert f"elastic_hardness {float(known.elastic_hardness):.4g}" in repr(known)
     for name in others:
         known = contact(SURFACE, mean_separation=[0.5, 1.5], E_star=100e3, hardness=1500.0, theory=name)
         for quantity in ("pressure", "area"):
             assert found[f"{name}_{quantity}"].values == pytest.approx(getattr(known, quantity), rel=1e-9)
-
-
-def test_off_it_is_never_asked(monkeypatch):
-    def refuse(*given):
-        raise AssertionError("yielding was asked")
-
-    monkeypatch.setattr(Yielding, "__init__", refuse)
-    for theory in ("mbma", "calibrated"):
-        assert "yielded" not in Scene(**KNOWN, effects=["pressure", "area"], theory=theory).run()
-        contact(SURFACE, pressure=1.0, theory=theory, E_star=100e3)
-
-
-def test_an_elastic_scene_says_from_which_hardness_on_it_holds():
-    found = Scene(**KNOWN, effects=["area"], theory="calibrated").run()
-    known = contact(SURFACE, pressure=1.0, E_star=100e3, theory="calibrated")
-    assert found.attrs["elastic_hardness"] == pytest.approx(known.elastic_hardness)
-    assert f"elastic_hardness {float(known.elastic_hardness):.4g}" in repr(known)
 
 
 def test_a_file_may_call_for_it():
@@ -102,13 +86,6 @@ def test_a_file_may_call_for_it():
 def test_what_contradicts(more, match):
     with pytest.raises(InputError, match=match):
         Scene(**KNOWN, **more)
-
-
-def test_prescribed_gaps():
-    u = np.array([0.5, 1.5])
-    scene = Scene(SURFACE, ["pressure", "yield"], mean_separations=u, E_star=100e3, hardness=1500.0, theory="persson")
-    known = contact(SURFACE, mean_separation=u, E_star=100e3, hardness=1500.0, theory="persson")
-    assert scene.run().pressure.values == pytest.approx(known.pressure)
 
 
 def test_older_conductances_beside():

@@ -158,16 +158,12 @@ def test_softening_of_mbma_is_where_its_stiffness_is_largest(surface):
 
 def test_mbma_by_object_and_by_mean_separation():
     law = contact_law(SURFACE, rtol=1e-6, island_model="rigid", variant="printed")
-    same = contact_law(SURFACE, rtol=1e-6, theory=Mbma("rigid", "printed"))
-    d = np.array([0.5, 2.0])
-    assert (
-        law.pressure(separation=d).tolist()
-        == same.pressure(separation=d).tolist()
-        == law.pressure((law.h_max + d) / 2).tolist()
-    )
-    point = law.at_pressure(law.pressure(separation=d))
-    assert point.pressure.tolist() == law.pressure(separation=d).tolist()
-    assert point.mean_pressure == pytest.approx(law.pressure(separation=d) / law.area(separation=d), rel=1e-9)
+    same, d = contact_law(SURFACE, rtol=1e-6, theory=Mbma("rigid", "printed")), np.array([0.5, 2.0])
+    pressure = law.pressure(separation=d)
+    assert pressure.tolist() == same.pressure(separation=d).tolist() == law.pressure((law.h_max + d) / 2).tolist()
+    point = law.at_pressure(pressure)
+    assert point.pressure.tolist() == pressure.tolist()
+    assert point.mean_pressure == pytest.approx(pressure / law.area(separation=d), rel=1e-9)
     assert point.separation == pytest.approx(d, rel=1e-12)
     assert point.stiffness == pytest.approx(law.stiffness(separation=d), rel=1e-9)
     with pytest.raises(InputError, match="one of them"):
@@ -201,6 +197,8 @@ def test_a_law_is_the_contact():
         for field in ("separation", "mean_separation", "area", "stiffness"):
             near = close.get(field, max(1e-5, float(found.error.max())))
             assert getattr(point, field) == pytest.approx(getattr(found, field), rel=near), field
+        near = 1e-7 if name == "mbma" else close["stiffness"]
+        assert law.energy(separation=found.separation) == pytest.approx(found.energy, rel=near)
 
 
 class Noisy(Cones):

@@ -41,12 +41,7 @@ def errors(example):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("example", "lightest", "bar"),
-    [
-        (BARS[0], 0.1, 0.10),
-        (BARS[0], 0.01, 0.30),
-        (BARS[1], 0.1, 0.10),
-        (BARS[1], 0.01, 0.30),
-    ],
+    [(BARS[0], 0.1, 0.10), (BARS[0], 0.01, 0.30), (BARS[1], 0.1, 0.10), (BARS[1], 0.01, 0.30)],
     ids=lambda value: getattr(value, "name", str(value)),
 )
 def test_force_at_equal_separation(example, lightest, bar):

@@ -1,7 +1,5 @@
 """Variants that add areas of islands as a cover, and the one that is fitted to boundary elements."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import pathlib

@@ -1,4 +1,4 @@
-"""Stiffness ratios of stuck contacts by boundary elements: ``python -m generate.boundary_elements.tangential``.
+"""Stiffness ratios of stuck contacts by boundary elements: ``python -m generate.machined.tangential``.
 
 Normal and tangential stiffness are of one contact area, kept fixed: a uniform displacement of the contact normal to it,
 along and across the lay, by conjugate gradients. In Fourier space the compliances are (1 - nu)/(G q) and
