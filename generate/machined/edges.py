@@ -47,14 +47,14 @@ WAYS: dict[str, Callable[[FloatArray], Any]] = {
 def errors(part: Part) -> tuple[FloatArray, FloatArray]:
     """Errors by way, quantity and area, and seconds by way."""
     whole = heights(part)
-    truth = BoundaryElements.of(Surface.from_map(whole, 1.0, periodic=True)).spline
+    truth = BoundaryElements.of(Surface.from_map(whole, 1.0, periodic=True)).fit
     x = truth.log_force_at(AREAS)
     u, stiffness, force = truth.separation(x), truth.stiffness(x), np.exp(x)
     patch = whole[tuple(slice(start, start + POINTS) for start in CORNER)]
     found, seconds = [], []
     for way in WAYS.values():
         start = time.process_time()
-        curve = BoundaryElements.of(way(patch - patch.mean())).spline
+        curve = BoundaryElements.of(way(patch - patch.mean())).fit
         seconds.append(time.process_time() - start)
         by_force = np.log(curve.area(x) / AREAS), np.log(curve.stiffness(x) / stiffness)
         found.append([by_force[0], (curve.separation(x) - u) * stiffness / force, by_force[1]])

@@ -119,7 +119,7 @@ def batch_command(
 def _lines(file: Path) -> Any:
     """Number and filled cells of each line below the header."""
     text = read_file(file, MAX_BYTES).decode("utf-8-sig", "replace")
-    rows = csv.DictReader(line for line in io.StringIO(text, newline=""))
+    rows = csv.DictReader(io.StringIO(text, newline=""))
     known = {"name", "surface", "map", *OF_MAPS, *NUMBERS, *MATERIAL, *LOADS}
     names = [name.strip() for name in rows.fieldnames or ()]
     if repeated := sorted({name for name in names if names.count(name) > 1}):

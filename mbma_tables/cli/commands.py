@@ -31,6 +31,7 @@ EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
 MIN_POINTS = 5
 DRAWN = ("calibrated", "persson")  # theories beside the chosen one in a picture, where they are there
 COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
+MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotropy")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
@@ -80,7 +81,7 @@ def contact_command(
     model = model.of(specimen.surface)
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
-    (name, numbers), *_ = loads.items()
+    ((name, numbers),) = loads.items()
     if over_h_rms and name in ("pressure", "area"):
         raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
     from mbma_tables.answers.contact import contact
@@ -252,8 +253,8 @@ def fit_command(
     """
     options.check_plot(plot, output.out)
     from mbma_tables.answers.measurement import areal, curves, described, draw, table_of_loads
-    from mbma_tables.common.plots import to_picture
-    from mbma_tables.common.units import Units, unit_of
+    from mbma_tables.common.plots import pressure_label, to_picture
+    from mbma_tables.common.units import Units
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
     from mbma_tables.theories import BoundaryElements
@@ -268,25 +269,15 @@ def fit_command(
         BoundaryElements.of(surface).to_netcdf(output.out)
         told, output = [*told, f"{output.out} has the simulation"], dataclasses.replace(output, out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
-    facts = {
-        "length_unit": surface.unit,
-        "stress_unit": stress_unit,
-        "h_rms": float(surface.h_rms),
-        "h_max": float(surface.h_max),
-        "rms_gradient": float(surface.rms_gradient),
-        "skewness": surface.skewness,
-        "kurtosis": surface.kurtosis,
-        "anisotropy": surface.anisotropy,
-        "areal": areal(surface),
-        "provenance": list(surface.provenance),
-        "notes": told,
-    }
+    facts: dict[str, Any] = {"length_unit": surface.unit, "stress_unit": stress_unit}
+    facts |= {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
+    facts |= {"provenance": surface.provenance, "notes": told}
     title = ", ".join(path.name for path in measurements)
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
     report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
     picture = b""
     if plot is not None:
-        label = "pressure  F/(A0 E*)" if modulus is None else f"pressure [{stress_unit or 'stress'}]"
+        label = pressure_label(unit_of("pressure", units))
         picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
     report.write(output, plot, picture)
 

@@ -278,7 +278,7 @@ class Surface(SelfAffine):
         Raises
         ------
         InputError, OutOfRangeError
-            For input that is no line scan, holds too few waves, or is flat.
+            For input that is no line scan, holds too few wavelengths, or is flat.
 
         Examples
         --------

@@ -26,7 +26,7 @@ MIN_GRID = 32  # points along each side: 16 wavenumbers, of which a window spoil
 FREE_HOLES = 0.05  # share of undefined points that is filled unasked
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
-MIN_POWER = 1e-24  # of the strongest wave: below it rounding, not a measured wave
+MIN_POWER = 1e-24  # of the strongest wavelength: below it rounding, not a measured wavelength
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter")  # options that are lengths
 FORM = 0.5  # share of the height variance in a tilt or a bow from which on it is told
 USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier, and share of the points up to which they are told
@@ -51,14 +51,14 @@ class Treatment:
         Mode of `detrend`: mean, median, height (or plane), mad-tilt, slope, curvature (or quadratic), mad-curvature.
         By default the mean of periodic data, the plane of any other.
     short_cutoff, long_cutoff : float, optional
-        Wavelengths [length]: shorter waves are below the instrument's resolution, longer ones form, and left out
+        Wavelengths [length]: shorter ones, below the instrument's resolution, and longer ones, form, are left out
         (`shortcut`, `longcut`). Data that are not periodic are continued by their mirror images for that.
     s_filter, l_filter : float, optional
         Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve waves of this length: an
         S-filter takes out shorter ones, those below 0.39 times it wholly, an L-filter longer ones.
     tip_radius : float, optional
         Of a scanning probe or stylus [length]: sets `short_cutoff` where `scanning_probe_reliability_cutoff` finds
-        waves that such a tip cannot follow.
+        wavelengths that such a tip cannot follow.
     reliable : bool, optional
         Whether a resolution or tip radius that the file states counts as given, the default.
     window : str, optional
@@ -97,7 +97,7 @@ class Treated:
     steps: tuple[float, ...]  # sampling step along each axis [length]
     periodic: bool  # else they continue by their mirror images where that is needed
     unit: str | None  # of length, that the file names
-    waves: tuple[float, float] = (0.0, math.inf)  # wavenumbers between which the waves are that were kept
+    waves: tuple[float, float] = (0.0, math.inf)  # wavenumbers between which the wavelengths are that were kept
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
     window: str | None = None
     uncut: Any = None  # heights before the short cut-off, where there is one
@@ -136,9 +136,10 @@ class Treated:
         if self.window is None:
             windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
         else:
-            ones = (wrapped(np.ones(count), (1.0,), False) for count in self.heights.shape)
+            from scipy.signal import get_window
+
             try:
-                windows = [np.asarray(one.window(self.window).heights()) for one in ones]
+                windows = [get_window(self.window, count) for count in self.heights.shape]
             except ValueError:
                 raise InputError(f"window must be one of scipy.signal.get_window, got {self.window!r}") from None
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
@@ -265,21 +266,21 @@ def _resolution(known: Treated, treatment: Treatment, info: Mapping[str, Any]) -
     except (ValueError, KeyError, TypeError) as fault:
         raise InputError(f"the reliability cut-off by {origin} cannot be found: {fault}") from None
     if limit is None or limit <= 2 * max(known.steps):
-        known = known.after(known.heights, "reliability", f"{origin} follows every wave that was sampled")
+        known = known.after(known.heights, "reliability", f"{origin} follows every wavelength that was sampled")
     else:
-        told = f"{origin} follows no wave below {limit:.4g} {known.unit or ''}".rstrip()
+        told = f"{origin} follows no wavelength below {limit:.4g} {known.unit or ''}".rstrip()
         known = known.after(known.heights, "reliability", told, wavelength=float(limit))
         found.append((float(limit), origin))
     return known, max(found)[0] if found else None
 
 
 def _within(known: Treated, short: float | None, treatment: Treatment) -> Treated:
-    """Heights whose waves lie between both cut-offs, or filters."""
+    """Heights whose wavelengths lie between both cut-offs, or filters."""
     long = treatment.long_cutoff
     if short is not None and not short > 2 * min(known.steps):
         raise InputError(
-            f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wave that "
-            f"was sampled, got {short:g}"
+            f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wavelength "
+            f"sampled, got {short:g}"
         )
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
@@ -298,7 +299,7 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
             values = gaussian(values, known.steps, name, wavelength)
         after = squares(values, known.steps)
         if not after[0] > MIN_POWER * before[0]:
-            raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
+            raise InputError(f"{name} {wavelength:g} leaves no wavelength of the measurement")
         of_variance, of_gradient = (max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True))
         length = f"{wavelength:.4g} {known.unit or ''}".rstrip()
         told = f"{CALLED[name]} at {length} removes {of_gradient:.0%} of the squared gradient"
@@ -319,7 +320,7 @@ def mirrored(values: FloatArray) -> FloatArray:
 def squares(
     values: FloatArray, steps: tuple[float, ...], band: tuple[float, float] = (0.0, math.inf)
 ) -> tuple[float, float]:
-    """Mean squares of periodic heights and of their gradient, of the waves between two wavenumbers."""
+    """Mean squares of periodic heights and of their gradient, of the wavelengths between two wavenumbers."""
     power = np.abs(np.fft.fftn(values) / values.size) ** 2
     power.flat[0] = 0.0
     waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(values.shape, steps, strict=True)]

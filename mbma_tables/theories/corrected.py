@@ -54,12 +54,12 @@ class Corrected(BoundaryElements):
         super().__init__(surface, pressure, area, u, energy, np.inf, size, half, True)
         self.origin = f"corrected by {own_map.origin_of(own_map.map_of(surface), TOLERANCE)}"
         law, other = own_law(surface), LoadCurve(quarter)
-        x = self.spline.x
+        x = self.fit.x
         inside = np.clip(x, other.x[0], other.x[-1])
         gaps = np.array([law.separations(pressure), other.separation(inside)])
         areas = np.array([law.area(pressure), other.area(inside)])
         stiff = np.array([-pressure / np.gradient(gaps[0], x), other.stiffness(inside)])
-        own = self.spline.stiffness(x)
+        own = self.fit.stiffness(x)
         # by quantity, law or quarter grid, and load
         self._apart_by = {
             "pressure": np.abs(gaps - u) * own / pressure,
@@ -84,8 +84,8 @@ class Corrected(BoundaryElements):
 
     def apart(self, quantity: str, area: FloatArray) -> list[FloatArray]:
         """What the law, and the quarter grid, differ from the answer at contact areas, as errors of that quantity."""
-        x = self.spline.log_force_at(np.clip(area, *self.rows[1, [0, -1]]))
-        return [np.interp(x, self.spline.x, difference) for difference in self._apart_by[quantity]]
+        x = self.fit.log_force_at(np.clip(area, *self.rows[1, [0, -1]]))
+        return [np.interp(x, self.fit.x, difference) for difference in self._apart_by[quantity]]
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid, by what the law and the quarter grid differ from the answer."""

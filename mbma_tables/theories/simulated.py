@@ -111,9 +111,9 @@ class BoundaryElements(Theory):
         self._apart = split - 1 if split < rows.shape[1] else -1
         # an h_max that was stated may lie below the gap of the first load
         self.ends_at_h_max = own_loads and bool(rows[2, 0] < float(np.asarray(surface.h_max)))
-        self.spline = LoadCurve(rows, self._apart)
+        self.fit = LoadCurve(rows, self._apart)
         if self.ends_at_h_max:
-            self.spline = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
+            self.fit = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
         self._left_out = left_out(rows, self._apart)
 
     @classmethod
@@ -239,8 +239,8 @@ class BoundaryElements(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] of this map, and no other."""
         u = self._within(surface, mean_separation)
-        x = self.spline.log_force(u)
-        area, stiffness = self.spline.area(x), self.spline.stiffness(x)
+        x = self.fit.log_force(u)
+        area, stiffness = self.fit.area(x), self.fit.stiffness(x)
         with np.errstate(all="ignore"):
             return TheoryAnswer(np.exp(x), area, stiffness, self._error(u, np.array([x, np.log(area)])))
 
@@ -255,14 +255,14 @@ class BoundaryElements(Theory):
         elif quantity == "area":
             require(quantity, wanted, wanted < 1, "less than 1")
         with np.errstate(divide="ignore"):
-            x = np.log(known) if quantity == "pressure" else self.spline.log_force_at(known)
-        u = np.asarray(self.spline.separation(x))
+            x = np.log(known) if quantity == "pressure" else self.fit.log_force_at(known)
+        u = np.asarray(self.fit.separation(x))
         require(quantity, wanted, u > np.finfo(float).eps * self.rows[2, 0], "less: the mean separation vanishes")
         return u, np.zeros(np.shape(wanted), bool)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length]."""
-        return self.spline.energy(self.spline.log_force(self._within(surface, mean_separation)))
+        return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
 
     @functools.cached_property
     def _flows(self) -> FloatArray:

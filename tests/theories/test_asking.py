@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from benchmarks.request import traced
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
@@ -279,3 +280,11 @@ def test_energies_hold_where_the_force_bends():
         expected = law.energy(u[:, 0])
         assert found[:, k] == pytest.approx(expected, rel=1e-8)
         assert contact(law.surface, mean_separation=u[:, 0]).energy == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("options", [{}, {"theory": "calibrated", "hardness": "1.5 GPa"}], ids=["mbma", "hardness"])
+def test_a_request_takes_few_calls_in_few_files(options):
+    """Checks stand at the door, and inversions call what is bound to the surface."""
+    calls, _, places = traced(lambda: contact(SURFACE, pressure="10 MPa", E_star="100 GPa", **options))
+    assert calls <= 90
+    assert len({place.partition(":")[0] for place in places}) <= 9

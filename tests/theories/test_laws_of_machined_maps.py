@@ -33,7 +33,7 @@ def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
     found = contact(surface_of(family, number), area=[0.01, 0.1, 0.5], theory="calibrated")
     assert not found.valid.any()
     (reason,) = (text for text in found.reasons if text.startswith(statistic))
-    assert "theory='simulated' presses the map itself" in reason
+    assert "theory='simulated' simulates the map" in reason
     assert (found.scatter > 0.13).all()
     assert (found.area_scatter > 0.07).all()
     assert (found.stiffness_scatter > 0.2).all()

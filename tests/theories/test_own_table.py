@@ -12,10 +12,10 @@ from scipy.special import erf
 
 from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
-from mbma_tables.cli.export import TARGETS
 from mbma_tables.common import cache
 from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
 from mbma_tables.export import CODE, DATA, LAWS, SOLVERS
+from mbma_tables.export.targets import targets
 from mbma_tables.laws import pressing
 from mbma_tables.laws.energy_spline import Continued
 from mbma_tables.theories import BoundaryElements, own_map
@@ -133,7 +133,7 @@ def test_on_the_command_line(tmp_path):
     assert "not the map" in refused("fit", table)
 
 
-@pytest.mark.parametrize("target", [t for t in TARGETS if t not in CODE])
+@pytest.mark.parametrize("target", [t for t in targets() if t not in CODE])
 def test_every_target_of_laws(target, file, tmp_path):
     out = tmp_path / {"matlab": "own.mat", "onnx": "own.onnx"}.get(target, "own.txt")
     words = ["export", target, "--map", str(file), "--E-star", "1 GPa", "--out", str(out)]
