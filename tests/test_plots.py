@@ -59,9 +59,6 @@ def test_drawings_repeat_with_letters_as_asked(outlines):
 def test_bad_curves_are_refused(arrays, message):
     with pytest.raises(InputError, match=message):
         Curve("name", *arrays)
-
-
-def test_no_curves_are_refused():
     with pytest.raises(InputError, match="at least one"):
         draw_compression([])
 

@@ -26,7 +26,7 @@ from mbma_tables.laws.bearing_curve import bearing
 from mbma_tables.laws.gas import mean_inverse
 from mbma_tables.surfaces.maps import prepared as treated_map
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.theories.simulated import continued
+from mbma_tables.theories.own_map import continued
 
 DATA = pathlib.Path("docs/data")
 CHOSEN = ((0.3, 12.0), (0.9, 12.0))  # H and zeta_1 of held-out spectra, their first surfaces

@@ -63,7 +63,4 @@ def test_named_surfaces_loads_in_columns_and_other_kinds_of_numbers():
 def test_what_is_refused(tmp_path, lines, message):
     (tmp_path / "bad.csv").write_text(lines)
     assert message in refused("batch", "bad.csv", "-d", "0.1")
-
-
-def test_one_load_is_needed():
     assert "one of --separation" in refused("batch", "s.csv")

@@ -1,7 +1,6 @@
 """`Surface`: its properties against the spectrum itself, units, batches, bad input."""
 
 import dataclasses
-import inspect
 import math
 
 import numpy as np
@@ -31,12 +30,13 @@ def integral(surface, order):
 @pytest.mark.parametrize(("hurst", "zeta_1"), [(0.1, 1e5), (0.5, 3.01), (0.8, 216.0), (1.0, 1e3)])
 def test_moments_are_those_of_the_power_spectrum(hurst, zeta_1):
     surface = Surface(hurst, 0.37, 0.37 * zeta_1, 0.21, 0.7)
-    assert integral(surface, 0) == pytest.approx(surface.h_rms**2, rel=1e-10, abs=0)
-    assert integral(surface, 0) == pytest.approx(surface.m0, rel=1e-10, abs=0)
-    assert integral(surface, 2) == pytest.approx(surface.m2, rel=1e-10, abs=0)
-    assert integral(surface, 4) == pytest.approx(surface.m4, rel=1e-10, abs=0)
-    # the gradient's two components
-    assert math.sqrt(2 * integral(surface, 2)) == pytest.approx(surface.rms_gradient, rel=1e-10, abs=0)
+    m0, m2, m4 = (integral(surface, order) for order in (0, 2, 4))
+    # the gradient has two components
+    found = (surface.h_rms**2, surface.m0, surface.m2, surface.m4, surface.rms_gradient**2)
+    assert found == pytest.approx((m0, m0, m2, m4, 2 * m2), rel=1e-10, abs=0)
+    assert surface.s == pytest.approx(0.21 / math.sqrt(1 - zeta_1 ** (-2 * hurst)), rel=1e-15, abs=0)
+    assert surface.shape == ()
+    assert all(isinstance(getattr(surface, name), float) for name in ("hurst", "q0", "h_max", "m2", "summit_density"))
 
 
 def test_summits_are_nayaks():
@@ -49,12 +49,6 @@ def test_summits_are_nayaks():
     assert surface.summit_sigma == pytest.approx(math.sqrt((1 - 0.8968 / alpha) * m0), rel=1e-9, abs=0)
 
 
-def test_unit_of_height():
-    surface = Surface(**GOOD)
-    assert surface.zeta_1 == 200
-    assert surface.s == pytest.approx(0.2 / math.sqrt(1 - 200**-1.6), rel=1e-15, abs=0)
-
-
 def test_power_spectrum_ends_with_the_band():
     surface = Surface(**GOOD)
     assert surface.power_spectrum([0.499, 100.1]).tolist() == [0.0, 0.0]
@@ -63,13 +57,6 @@ def test_power_spectrum_ends_with_the_band():
     assert ratio == pytest.approx(2**3.6, rel=1e-14, abs=0)
     batch = Surface([0.5, 0.8], 0.5, 100.0, 0.2, 0.6)
     assert batch.power_spectrum([[1.0], [2.0], [3.0]]).shape == (3, 2)
-
-
-def test_one_surface_has_scalars():
-    surface = Surface(**GOOD)
-    assert surface.shape == ()
-    for name in ("hurst", "q0", "h_max", "m2", "summit_density"):
-        assert isinstance(getattr(surface, name), float)
 
 
 def test_a_surface_does_not_change():
@@ -90,11 +77,6 @@ def test_prints_plain_numbers():
     assert repr(labelled).startswith("Surface(hurst=<DataArray {'site': 2}>, q0=0.5,")
 
 
-def test_constructors_show_their_options():
-    assert {"periodic", "detrend", "h_max", "band"} <= set(inspect.signature(Surface.from_map).parameters)
-    assert list(inspect.signature(Surface).parameters) == [*GOOD, "unit", "fit", "provenance", "nominal_area"]
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [("hurst", 0.0), ("hurst", -0.1), ("hurst", 1.01)]
@@ -108,11 +90,7 @@ def test_out_of_range(name, value):
 
 @pytest.mark.parametrize("zeta_1", [0.5, 1.0, 3.0, 1.0001e8])
 def test_band_out_of_range(zeta_1):
+    assert Surface(1.0, 1.0, [math.nextafter(3, 4), 1e8], 0.2, 0.6).zeta_1[1] == 1e8
     with pytest.raises(OutOfRangeError, match=r"^q1/q0 must be") as caught:
         Surface(0.8, 1.0, [200.0, zeta_1], 0.2, 0.6)
     assert caught.value.mask.tolist() == [False, True]
-
-
-def test_ends_of_the_range():
-    assert Surface(1.0, 1.0, 1e8, 0.2, 0.6).zeta_1 == 1e8
-    assert Surface(1e-3, 1.0, math.nextafter(3, 4), 0.2, 0.6).zeta_1 > 3
