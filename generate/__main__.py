@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from generate.pages.page import PAGES, ROOT, write
+from generate.pages.page import PAGES, ROOT, measured, write
 from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
@@ -71,8 +71,7 @@ def main() -> None:
 def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
     """Write the measured tables and the figures of pages of the documentation."""
     for name in PAGES if "all" in names else names:
-        parts, files = importlib.import_module(f"generate.pages.{name}").measure()
-        for path in write(name, parts, files, out):
+        for path in write(name, *measured(name), out):
             click.echo(path)
 
 

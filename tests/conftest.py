@@ -40,3 +40,20 @@ def generations():
 
     names = [name for name, least in GENERATIONS.items() if 0 < least <= core.generation]
     return [importlib.import_module(f"mbma_tables.core._{name}") for name in names] or [core]
+
+
+@pytest.fixture(scope="session")
+def table_files(tmp_path_factory):
+    """One small table file of each kind."""
+    from small_tables import KINDS, small_table
+
+    from generate.tables.writing import write_table
+
+    folder = tmp_path_factory.mktemp("tables")
+    return {kind: write_table(folder / f"{kind}.nc", small_table(kind)) for kind in KINDS}
+
+
+@pytest.fixture(scope="session")
+def sources(table_files):
+    """The bytes of one good table file of each kind."""
+    return {kind: path.read_bytes() for kind, path in table_files.items()}

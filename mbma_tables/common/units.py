@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import re
 import reprlib
 from collections.abc import Iterator, Mapping
@@ -95,6 +96,7 @@ def known(unit: Any, kind: str = "length") -> str:
     return plain
 
 
+@functools.lru_cache(1024)
 def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
     """By what a number in one unit is multiplied to be in another, rounded once.
 
@@ -107,6 +109,7 @@ def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
     return float((SIZES[kind][known(have, kind)] / SIZES[kind][known(want, kind)]) ** power)
 
 
+@functools.lru_cache(1024)
 def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none.
 
@@ -150,8 +153,9 @@ class Units:
     def __post_init__(self) -> None:
         for kind in ("length", "stress"):
             unit = getattr(self, kind)
-            if unit is not None and (kind, unit) != ("stress", "1"):
-                object.__setattr__(self, kind, known(unit, kind))
+            if unit is None or (kind == "stress" and unit == "1") or (isinstance(unit, str) and unit in SIZES[kind]):
+                continue
+            object.__setattr__(self, kind, known(unit, kind))
 
     def number(self, name: str, value: Any) -> Any:
         """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry.
@@ -263,10 +267,11 @@ def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tu
     if not hasattr(surface, "unit"):
         hint = "; a named one is Surface.named(...)" if isinstance(surface, str) else ""
         raise InputError(f"surface must be a Surface, got {reprlib.repr(surface)}{hint}")
-    given, stress = resolve({"E_star": E_star}, asked, "stress")
+    stress = known(asked, "stress") if asked else _named("E_star", E_star, "stress")
     # without a modulus, stresses are over it
     absent = stress is None and isinstance(E_star, int | float) and E_star == 1.0
-    return given["E_star"], Units(surface.unit, "1" if absent else stress)
+    units = Units(surface.unit, "1" if absent else stress)
+    return units.number("E_star", E_star), units
 
 
 def unit_of(name: str, units: Units) -> str:

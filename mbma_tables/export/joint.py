@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.answers.contact import contact
+from mbma_tables.answers.contact import chosen_theory, contact
 from mbma_tables.answers.result import Contact
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
@@ -19,7 +19,6 @@ from mbma_tables.law.make import contact_law
 from mbma_tables.materials import ELASTIC_PSI, hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import chosen_theory
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 

@@ -11,6 +11,7 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers
+from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import checked_name
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -39,7 +40,8 @@ class _Graph:
 def onnx(surface: AnySurface, E_star: float | str, *, name: str = "law", **asked: Any) -> bytes:
     """A contact law as a file of ONNX: overclosure of shape (n,) in; pressure, tangent, area and energy out.
 
-    Outside the range answers are NaN. Everything is float64.
+    Outside the range answers are NaN. Everything is float64. Runtimes refuse float32 and other shapes, which the
+    checker of ONNX does not let a graph leave open: convert arrays, and ravel them, before.
 
     Parameters
     ----------
@@ -74,7 +76,7 @@ def onnx(surface: AnySurface, E_star: float | str, *, name: str = "law", **asked
         [helper.make_tensor_value_info("overclosure", double, ["n"])],
         [helper.make_tensor_value_info(output, double, ["n"]) for output in outputs],
         [library.numpy_helper.from_array(value, key) for key, value in graph.constants.items()],
-        doc_string="\n".join(found.said),
+        doc_string="\n".join((*found.said, "in and out: float64 of shape (n,); convert float32 and ravel before")),
     )
     known = {"opset_imports": [helper.make_opsetid("", OPSET)], "ir_version": IR}
     model = helper.make_model(made, producer_name="mbma_tables", producer_version=__version__, **known)
@@ -149,3 +151,6 @@ def _polynomial(graph: _Graph, rows: FloatArray, k: str, t: str) -> str:
     """The polynomial of row k."""
     powers = graph("Pow", graph("Unsqueeze", t, [-1]), np.arange(float(rows.shape[1])))
     return graph("ReduceSum", graph("Mul", graph("Gather", rows.copy(), k), powers), [-1], keepdims=0)
+
+
+TARGETS = (Target("onnx", onnx, CODE, rows=False),)

@@ -1,4 +1,4 @@
-"""What follows from a law, made when it is asked for: unloading, sliding, softening, leakage, its picture."""
+"""What follows from a law, computed when first read: unloading, sliding, softening, leakage, its picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.interface import Tangential, ratio_of
+from mbma_tables.answers.interface import OF_LAY, OF_YIELDING, Tangential, ratio_of
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
@@ -26,7 +26,7 @@ DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polyno
 
 
 class Derived:
-    """The part of a `ContactLaw` that is made when it is asked for."""
+    """The part of a `ContactLaw` that is computed when first read."""
 
     def unloading_stiffness(
         self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
@@ -57,6 +57,7 @@ class Derived:
         friction: float | None = None,
         nu: Any = None,
         E: Any = None,
+        direction: str | None = None,
     ) -> Tangential:
         """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`.
 
@@ -76,11 +77,12 @@ class Derived:
             held = self.pressure(u)
         else:
             u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
-        ratio = ratio_of(nu, E, self.materials)
+        ratio = ratio_of(nu, E, self.materials, direction, self.surface, self.area(u))
+        reason = OF_YIELDING if self.hardness < math.inf else OF_LAY if direction else None
         return Tangential(
             ratio, friction, held, u, self.unloading_stiffness(u) / ratio,
             self.h_max if math.isinf(self.highest) else math.inf, self.units,
-            None if self.hardness < math.inf else (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
+            reason or (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
         )  # fmt: skip
 
     @functools.cached_property

@@ -1,4 +1,4 @@
-"""What a contact law answers, whatever theory it is of: values, slopes, energy and inverses against the gap.
+"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses.
 
 All of them come from one record of polynomials, found from the bits of the gap (`core/law.c`).
 """
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 else:
     Law = core.Law
 
-BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
+BLOCK = 1 << 16  # gaps between two checks for interrupts
 SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
 SPACED = (1e-3, 0.2)  # of the way down: geometric up to here, then even
 ROUNDING = 4 * float(np.finfo(float).eps)
@@ -153,7 +153,7 @@ class ContactLaw(Law, Derived, Displayed):
     def _ask(
         self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]
     ) -> tuple[Any, ...]:
-        """What `fill` writes of checked input, in blocks, where it says that all is in range; else `check` refuses."""
+        """What `fill` writes, in blocks, where it returns that all is in range; else `check` raises."""
         if is_labelled(given):
             from mbma_tables.surfaces.labels import apply
 
@@ -207,7 +207,7 @@ class ContactLaw(Law, Derived, Displayed):
         Raises
         ------
         OutOfRangeError
-            Where the branch does not reach the value; the message says how far it goes.
+            Where the branch does not reach the value; the message has its end.
         """
         if (pressure is None) == (area is None):
             raise InputError("give pressure or area, one of them")
@@ -248,7 +248,7 @@ class ContactLaw(Law, Derived, Displayed):
         return self._ask(given, count, check, fill)
 
     def _inverse_block(self, name: str) -> FloatArray:
-        """Polynomials of x over force or area, made when first asked for."""
+        """Polynomials of x over force or area, made when first needed."""
         made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
         if name not in made:
             turn = self.turning_point if name == "pressure" else self.area_turning_point

@@ -69,7 +69,7 @@ class Corrected(BoundaryElements):
         assert isinstance(surface, MeasuredSurface)
         return cls(surface, _carried(surface, 1, tolerance), _carried(surface, 2, tolerance).rows)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons against maps unlike those tested, and contact areas that were not tested."""
         assert isinstance(self.surface, MeasuredSurface)
         everywhere = np.ones(answer.area.shape, bool)

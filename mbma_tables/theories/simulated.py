@@ -297,11 +297,11 @@ class BoundaryElements(Theory):
         }
         return self.scatter(surface, "flow", area), reasons
 
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Share of the map's heights above the level whose mean gap is u, and its derivative, for a hardness."""
-        return Calibrated().bearing_share(surface, mean_separation)
+    def heights(self, surface: AnySurface) -> Any:
+        """The map's own bearing curve, for a hardness."""
+        return Calibrated().heights(surface)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons against grids that are too coarse, and contact areas that were not tested."""
         coarse = self.points < MIN_POINTS * (1 - ROUNDING)
         text = f"the map's shortest wave has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from mbma_tables.cli import export, main
-from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS, code, data
+from mbma_tables.cli import main
+from mbma_tables.export import CODE, SOLVERS, code, data
+from mbma_tables.export.targets import ROWS, names, targets
 
 LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
 NUMBERS = ["--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3"]
@@ -43,7 +44,7 @@ def test_fortran_writes_its_c_too(tmp_path):
     law = [*LAW[:-2], "--name", "road", "--theory", "calibrated", "--out"]
     assert run("fortran-law", *law, tmp_path / "own.f90").exit_code == 0
     assert run("c-law", *law, tmp_path / "own.c").exit_code == 0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["own.c", "own.f90", "own_c.c"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["own.c", "own.f90", "own.h", "own_c.c"]
     assert (tmp_path / "own_c.c").read_bytes() == (tmp_path / "own.c").read_bytes()
     result = run("fortran-law", *law, "-")
     assert result.exit_code == 2
@@ -157,6 +158,7 @@ ANY = {
     "--leakage": [],
     "--name": ["OTHER"],
     "--exponential": [],
+    "--binaries": ["none"],
     "--theory": ["calibrated"],
     "--hardness": ["2MPa", "--theory", "calibrated"],
     "--variant": ["printed"],
@@ -164,14 +166,11 @@ ANY = {
 }
 
 
-EVERY = [*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE]
-
-
-@pytest.mark.parametrize("target", EVERY)
+@pytest.mark.parametrize("target", names())
 def test_an_option_without_effect_is_refused(target, tmp_path):
     base = [] if target in CODE else BASE
-    for option in {name.replace("_", "-") for name in (*export.LAW_OPTIONS, *export.ROW_OPTIONS)} | {"check"}:
-        if f"--{option}" not in ANY or option.replace("-", "_") in export.OPTIONS[target]:
+    for option in {name.replace("_", "-") for name in ROWS} | {"check", "binaries"}:
+        if f"--{option}" not in ANY or option.replace("-", "_") in targets()[target].takes:
             continue
         result = run(target, "--out", tmp_path / "law.mat", *base, f"--{option}", *ANY[f"--{option}"])
         assert result.exit_code == 2, option
@@ -187,7 +186,7 @@ KINDS.remove(("abaqus", "--leakage"))  # refused by its interaction
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("target", "option"), [pair for pair in KINDS if pair[1].strip("-").replace("-", "_") in export.OPTIONS[pair[0]]]
+    ("target", "option"), [pair for pair in KINDS if pair[1].strip("-").replace("-", "_") in targets()[pair[0]].takes]
 )
 def test_an_option_has_an_effect(target, option, tmp_path, monkeypatch):
     monkeypatch.setattr(code, "check", lambda target, folder: code.Replay("cc", {"phi": 7}, {"phi": 0.0}, 0, ""))

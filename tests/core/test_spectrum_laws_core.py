@@ -174,10 +174,10 @@ class TestAnyInput:
         for h_max in (None, 3.0):
             law = Law(Spectrum.self_affine(0.8, 64.0), h_max)._prepared
             u, slope, back = np.empty((3, x.size))
-            assert used.spectrum_law_persson(law, x, u, slope) == np.isnan(u).sum() == np.isnan(slope).sum()
+            assert used.spectrum_law_separation(law, x, 0, u, slope) == np.isnan(u).sum() == np.isnan(slope).sum()
             assert np.isfinite(u).tolist() == (x > 0).tolist()
             assert u[[1, 8, 9]].tolist() == [0, 0, 0]
-            assert used.spectrum_law_separation(law, x, back) == np.isnan(back).sum() == 5
+            assert used.spectrum_law_separation(law, x, 1, back, slope) == np.isnan(back).sum() == 5
             out = np.empty((3, x.size))
             assert used.spectrum_law_contact(law, x, *out) == np.isnan(out[0]).sum()
             np.testing.assert_array_equal(out[:, [1, 8, 9]], 0.0)
@@ -187,8 +187,8 @@ class TestAnyInput:
         one, out = np.ones(1), np.empty((3, 1))
         for fill in (0.0, math.nan, 1e300, -1.0, 5e-324 * 120):
             law = np.full(used.words_of_spectrum_law(), fill)
-            used.spectrum_law_persson(law, one, *out[:2])
-            used.spectrum_law_separation(law, one, out[0])
+            for whole in (0, 1):
+                used.spectrum_law_separation(law, one, whole, *out[:2])
             used.spectrum_law_contact(law, one, *out)
         with pytest.raises(ValueError, match="sizes"):
             used.spectrum_law_contact(law[:-1], one, *out)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from fuzzing import finite
 from helpers import SCALE
-from small_tables import edited, small_table
+from small_tables import edited
 
-from generate.tables.writing import write_table
 from mbma_tables.models.island4d import Island4dModel
 from mbma_tables.models.tables import verify
 from mbma_tables.models.universal import UniversalModel
@@ -15,13 +14,6 @@ from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 
 SPECIAL = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e300, 700.1, 5e-324)
 ODD = ("", "x" * 5000, -1, 0, 2**40, 5e-324, 1e308, np.nan, -np.inf, [1.5, 2.5], "1", "log", "a\nb")
-
-
-@pytest.fixture(scope="module")
-def sources(tmp_path_factory):
-    """The bytes of one good file of each kind."""
-    folder = tmp_path_factory.mktemp("good")
-    return {kind: write_table(folder / f"{kind}.nc", small_table(kind)).read_bytes() for kind in KINDS}
 
 
 def forge(dataset, rng):

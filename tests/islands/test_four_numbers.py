@@ -1,7 +1,6 @@
 """Bands of the paper's four numbers against plain formulas at fifty digits, and from numbers that are none."""
 
 import dataclasses
-import importlib
 
 import mpmath
 import numpy as np
@@ -59,20 +58,3 @@ def test_what_is_no_band_is_nan(bad, position):
     out = band_fields(*given, REPORTED)
     assert np.isnan(out[:, 1]).all()
     assert np.isfinite(out[:, ::2]).all()
-
-
-def test_generations_of_processor_give_the_same_bits():
-    try:
-        cores = [importlib.import_module(f"mbma_tables.core._x86_64_v{n}") for n in (3, 4)]
-    except ImportError:
-        pytest.skip("one generation")
-    if cores[0].generation < 4:
-        pytest.skip("this processor has not the newest")
-    rng = np.random.default_rng(8)
-    coefs = rng.normal(size=(9, 8, 7, 6, 2))
-    places = rng.uniform(0, 1, (4, 1000)) * np.array([[6.0], [5.0], [4.0], [3.0]])
-    for slopes in (False, True):
-        found = [np.empty((10 if slopes else 2, 1000)) for _ in cores]
-        for one, out in zip(cores, found, strict=True):
-            one.spline4(places, coefs, np.array([7, 6, 5, 4]), slopes, out)
-        np.testing.assert_array_equal(*found)

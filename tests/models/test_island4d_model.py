@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from small_tables import small_table
 
-from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
+from mbma_tables import OutOfRangeError, greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, to_axes
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import tables as tabulated
 from mbma_tables.models.island4d import Island4dModel
+from mbma_tables.models.tables import open_table
 from mbma_tables.surfaces.variants import REPORTED
-from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D
 
 
@@ -21,25 +19,8 @@ def small():
     return Island4dModel(small_table(ISLAND4D))
 
 
-def shipped_model():
-    return Island4dModel(read_table(tabulated.shipped(ISLAND4D), ISLAND4D))
-
-
-def visited(count, seed):
-    """Islands that random surfaces visit: (delta/h_rms at zeta_1 without bound, zeta_d, zeta_u, H), F_hat, A_hat."""
-    rng = np.random.default_rng(seed)
-    hurst = rng.uniform(0.3, 1.0, count)
-    zeta_1 = 10 ** rng.uniform(math.log10(3.001), 4, count)
-    g = geometry(10 ** rng.uniform(-6, 1, count), hurst, zeta_1, REPORTED)
-    delta = g["X"] * g["sigma"] + g["zeta_d"] ** -hurst
-    solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-11)
-    force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"]) * solved.phi_F
-    area = 2 * math.pi * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2 * solved.phi_A
-    return (delta, g["zeta_d"], g["zeta_u"], hurst), force, area
-
-
 def test_the_shipped_table_over_the_whole_box():
-    model = shipped_model()
+    model = open_table("island4d")
     rng = np.random.default_rng(31)
     hurst = rng.uniform(0.3, 1.0, 600)
     zeta_d = SPHERE_FLOOR * 10 ** rng.uniform(0, 4, 600)
@@ -109,16 +90,6 @@ def test_edges_to_the_last_bit(small):
             small.lookup(delta, 2.0, top, 0.7)
 
 
-@pytest.mark.parametrize("position", range(4))
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_no_numbers_are_refused(small, position, bad):
-    raw = [1.5, 2.0, 20.0, 0.7]
-    raw[position] = [raw[position], bad]
-    name = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")[position]
-    with pytest.raises(InputError, match=f"{name} must be finite, got .* at \\(1,\\)"):
-        small.lookup(*raw)
-
-
 @pytest.mark.parametrize(
     ("position", "bad"), [(0, 0.1), (0, 1e3), (0, -1.0), (1, 1.0), (1, -3.0), (2, 1e6), (2, 1.0), (3, 0.1), (3, 1.2)]
 )
@@ -128,10 +99,3 @@ def test_what_is_out_of_range_is_marked(small, position, bad):
     with pytest.raises(OutOfRangeError) as caught:
         small.lookup(*raw)
     np.testing.assert_array_equal(caught.value.mask, [[False, True], [False, True]])
-
-
-def test_empty_and_unlike_shapes(small):
-    with pytest.raises(InputError, match="zeta_d is empty"):
-        small.lookup(1.5, [], 20.0, 0.7)
-    with pytest.raises(InputError, match="do not broadcast"):
-        small.lookup([1.5, 1.6], [2.0, 2.1, 2.2], 20.0, 0.7)

@@ -64,7 +64,8 @@ def test_a_budget_needs_a_measured_cost():
 @each
 def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
     u = np.linspace(0.3, 1.0, 200_000)
-    own = float(contact(CONCRETE, mean_separation=0.5, theory=theory).error)
+    # a law states the error of its worst gap
+    own = contact(CONCRETE, mean_separation=[0.5, 0.99 * CONCRETE.h_max], theory=theory).error.max()
     rtol = max(1e-5, 3 * own)
     some = slice(None, None, 3700)
     truth = contact(CONCRETE, mean_separation=u[some], E_star=MODULUS, theory=theory)

@@ -24,8 +24,8 @@ def with_points(kind, **changes):
 
 
 @pytest.fixture(params=KINDS)
-def path(request, tmp_path):
-    return write_table(tmp_path / f"{request.param}.nc", small_table(request.param))
+def path(request, table_files):
+    return table_files[request.param]
 
 
 def test_a_sound_table(path):

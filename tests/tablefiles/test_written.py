@@ -13,11 +13,9 @@ from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 
 
-@pytest.fixture(scope="module", params=KINDS)
-def written(request, tmp_path_factory):
-    path = tmp_path_factory.mktemp("written") / f"{request.param}.nc"
-    assert write_table(path, small_table(request.param)) == path
-    return path
+@pytest.fixture(params=KINDS)
+def written(request, table_files):
+    return table_files[request.param]
 
 
 def test_what_is_written_is_read(written):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from benchmarks.request import traced
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
@@ -70,7 +71,7 @@ def test_derivatives_at_a_held_quantity(held, theory):
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_derivatives_at_first_contact_are_refused(theory):
-    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are asked for") as caught:
+    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are requested") as caught:
         contact(SURFACE, pressure=[0.0, 0.001], theory=theory, derivatives=True)
     assert caught.value.mask.tolist() == [True, False]
 
@@ -322,3 +323,11 @@ def test_forces_that_no_gap_resolves_are_refused(cap):
     assert caught.value.mask.tolist() == [True, False]
     found = contact(surface, **asked, theory="greenwood_williamson")
     assert found.pressure == pytest.approx([1e-150, 1e-3], rel=1e-10)
+
+
+@pytest.mark.parametrize("options", [{}, {"theory": "calibrated", "hardness": "1.5 GPa"}], ids=["mbma", "hardness"])
+def test_a_request_takes_few_calls_in_few_files(options):
+    """Checks stand at the door, and inversions call what is bound to the surface."""
+    calls, _, places = traced(lambda: contact(SURFACE, pressure="10 MPa", E_star="100 GPa", **options))
+    assert calls <= 90
+    assert len({place.partition(":")[0] for place in places}) <= 9

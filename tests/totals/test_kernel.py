@@ -16,8 +16,7 @@ from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
 from mbma_tables.totals import island_sum
-from mbma_tables.totals.gauss_kronrod import integrate
-from mbma_tables.totals.island_sum import Pairs, kinks, totals_of
+from mbma_tables.totals.island_sum import Pairs, integrate, kinks, totals_of
 
 
 @pytest.mark.parametrize("points", [21, 31])

@@ -167,7 +167,9 @@ def test_options_go_through():
 
 
 @pytest.mark.parametrize(
-    "theory", [theories.Persson(), theories.Persson("simplified"), "greenwood_williamson"], ids=str
+    "theory",
+    [theories.Persson(), theories.Persson("simplified"), "greenwood_williamson"],
+    ids=["persson", "simplified", "greenwood_williamson"],
 )
 def test_theories_of_labelled_surfaces_are_lazy(theory):
     h_rms = xr.DataArray([1.0, 1.5, 2.0], dims="sample").chunk(sample=2)

@@ -1,4 +1,4 @@
-"""docs/yield.md: when a contact is elastic, how accurate the law is, metals."""
+"""docs/yield.md: when a contact is elastic, how accurate the law with a hardness is, metals."""
 
 from __future__ import annotations
 
@@ -20,15 +20,14 @@ from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories.calibrated_table import shipped_part
 from mbma_tables.totals.conductance import conductance
 
-EVIDENCE = DATA / "hardness.nc"
 BINS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # A/A0 by which stiffness is compared, at these hardnesses
 HARDNESSES = (0.05, 0.2, 0.8)
 CONTACT = (0.01, 0.1)  # A/A0 at which elastic answers are compared
 GRADIENT = 0.1  # rms gradient of a ground face
-SHOWN = ("steel 1020", "steel 4140", "steel 52100", "stainless steel 304", "aluminium 6061", "copper C11000", "gold")
+METALS = ("steel 1020", "steel 4140", "steel 52100", "stainless steel 304", "aluminium 6061", "copper C11000", "gold")
 SURFACE = Surface(hurst=0.8, q0=1.0, q1=32.0, h_rms=1e-3, h_max=3.5e-3)
 INDICES = np.geomspace(0.4, 40, 60)
-SETS = {
+HELD_OUT = {
     "held_out_surface": "new surfaces of known spectra",
     "held_out_spectrum": "new spectra",
     "three_waves": "of both, three longest wavelengths a side or more",
@@ -37,9 +36,27 @@ SETS = {
 RATIOS = ("elastic area over true", "elastic force over true")
 
 
+def measure() -> Measured:
+    """When a contact is elastic, how accurate the law with a hardness is, metals."""
+    ratios = simulated()
+    rows = [[psi, *((v.mean(), v.std()) for v in ratios[1:, ratios[0] == psi])] for psi in np.unique(ratios[0])]
+    header = f"psi | {RATIOS[0]}, equal force | {RATIOS[1]}, equal u | yielded share"
+    stored = {name: json.loads(shipped_part("hardness")[1][name]) for name in ("drift", "coverage")}
+    drift = [[zeta_1, *(100 * error for error in row)] for zeta_1, row in stored["drift"].items()]
+    of_drift = "zeta_1 | area [%] | yielded share [%] | force [%] | frozen stiffness [%]"
+    shares: dict[str, list[Any]] = {}
+    for name, share in stored["coverage"].items():
+        shares.setdefault(name.split()[0], [f"`{name.split()[0]}`"]).append(tuple(share))
+    covered = "theory | area at equal force | force at equal u | frozen stiffness"
+    parts = {"when": table(header, rows, "{:.3g} | {:.2f} ± {:.2f}"), "held_out": held_out(), "frozen": frozen()}
+    parts |= {"coverage": table(covered, shares.values(), "{} | {:.0%} / {:.0%}")}
+    parts |= {"drift": table(of_drift, drift, "{} | {:+.1f}"), "metals": metals(), "cost": cost()}
+    return parts, {"docs/figures/yield.svg": draw(ratios)}
+
+
 def simulated() -> FloatArray:
     """psi of every simulation, and means over contacts of A_el/A at equal force, F_el/F at equal gap, yielded share."""
-    data, rows = dataset(EVIDENCE), []
+    data, rows = dataset(DATA / "hardness.nc"), []
     stretched = data.kind.attrs["flag_meanings"].split().index("stretched")
     for one in (data.isel(surface=k) for k in np.flatnonzero(data.kind.values != stretched)):
         every = (one[name].values.astype(float) for name in ("force", "area", "mean_separation", "area_yielded"))
@@ -55,31 +72,13 @@ def simulated() -> FloatArray:
     return np.array(rows).T
 
 
-def by_law() -> tuple[FloatArray, FloatArray]:
-    """The same ratios of area and force by the law, on a surface of 32 magnifications, at 3% contact."""
-    hardness = float(SURFACE.rms_gradient) / INDICES
-    found = contact(SURFACE, area=0.03, theory="calibrated", hardness=hardness)
-    elastic = contact(SURFACE, pressure=found.pressure, theory="calibrated")
-    closer = contact(SURFACE, mean_separation=found.mean_separation, theory="calibrated")
-    return np.asarray(elastic.area / found.area), np.asarray(closer.pressure / found.pressure)
-
-
-def when() -> str:
-    """Simulated ratios by psi."""
-    psi, *found = simulated()
-    rows = []
-    for index in np.unique(psi):
-        own = [values[psi == index] for values in found]
-        rows.append([index, *((values.mean(), values.std()) for values in own)])
-    header = f"psi | {RATIOS[0]}, equal force | {RATIOS[1]}, equal u | yielded share"
-    return table(header, rows, "{:.3g} | {:.2f} ± {:.2f}")
-
-
 def held_out() -> str:
-    """Errors of the law on held-out surfaces."""
+    """Errors of the law with a hardness on held-out surfaces."""
     variables, attributes = shipped_part("hardness")
     sets, rows = attributes["sets"].split(), list[list[Any]]()
-    for (name, words), (form, known) in itertools.product(SETS.items(), enumerate(("`h_max`", "the map's heights"))):
+    for (name, words), (form, known) in itertools.product(
+        HELD_OUT.items(), enumerate(("`h_max`", "the map's heights"))
+    ):
         found = variables["accuracy"][sets.index(name), form]
         rows.append([words, known, *(tuple(100 * row[:4]) for row in found)])
     errors = {name: blind()[name] for name in attributes["quantities"].split()}
@@ -102,40 +101,15 @@ def frozen() -> str:
             by = contact(one.surface, pressure=one.force[kept] * g, theory=theory, hardness=one.eta * g)
         return np.stack([one.area[kept], np.log(by.unloading_stiffness / (one.frozen[kept] * g)), by.stiffness_scatter])
 
-    seen, rows = [one for one in capped(dataset(EVIDENCE)) if one.kind == "self_affine"], []
+    seen, rows = [one for one in capped(dataset(DATA / "hardness.nc")) if one.kind == "self_affine"], []
     for theory, eta in itertools.product(("mbma", "calibrated"), HARDNESSES):
-        found = np.concatenate([deviations(theory, one) for one in seen if one.eta == eta], axis=1)
-        area, error, stated = found
-        bins = binned(area, 100 * error, BINS)
+        area, error, stated = np.concatenate([deviations(theory, one) for one in seen if one.eta == eta], axis=1)
         sizes = (np.abs(error) / stated)[np.isfinite(stated)]
         within = f"{np.mean(sizes < 1):.0%} / {np.mean(sizes < 2):.0%}"
-        rows.append([f"`{theory}`", f"{eta:g}", *((own.mean(), own.std()) for own in bins), within])
-    return table(
-        f"theory | eta | {spans(BINS)} | within one / two of `stiffness_scatter`", rows, "{} | {} | {:+.0f} ± {:.0f}"
-    )
-
-
-def stored(name: str) -> Any:
-    """A summary that the fit stored with the law."""
-    return json.loads(shipped_part("hardness")[1][name])
-
-
-def coverage() -> str:
-    """Shares of held-out errors within one and two stated standard deviations."""
-    rows: dict[str, list[Any]] = {}
-    for name, shares in stored("coverage").items():
-        theory = name.split()[0]
-        rows.setdefault(theory, [f"`{theory}`"]).append(tuple(shares))
-    return table(
-        "theory | area at equal force | force at equal u | frozen stiffness", rows.values(), "{} | {:.0%} / {:.0%}"
-    )
-
-
-def drift() -> str:
-    """Mean errors of the parts by zeta_1."""
-    rows = [[zeta_1, *(100 * error for error in row)] for zeta_1, row in stored("drift").items()]
-    header = "zeta_1 | area [%] | yielded share [%] | force [%] | frozen stiffness [%]"
-    return table(header, rows, "{} | {:+.1f}")
+        cells = ((own.mean(), own.std()) for own in binned(area, 100 * error, BINS))
+        rows.append([f"`{theory}`", f"{eta:g}", *cells, within])
+    header = f"theory | eta | {spans(BINS)} | within one / two of `stiffness_scatter`"
+    return table(header, rows, "{} | {} | {:+.0f} ± {:.0f}")
 
 
 def psi_of(metal: Any) -> list[float]:
@@ -147,13 +121,12 @@ def psi_of(metal: Any) -> list[float]:
 def metals() -> str:
     """psi of metals pressed on themselves, and the gradient up to which they stay elastic."""
     rows = []
-    for name in materials.METALS:
-        metal = materials.get(name)
+    for metal in map(materials.get, materials.METALS):
         psi = psi_of(metal)
         limit = [materials.ELASTIC_PSI * GRADIENT / p for p in psi]
         ends = (metal.hardness, "g"), (metal.conductivity, "g"), (psi[::-1], ".1f"), (limit, ".3f")
         cells = (" to ".join(dict.fromkeys(format(number, form) for number in pair)) for pair, form in ends)
-        rows.append([f"`{name}`", f"{metal.E:g}", *cells])
+        rows.append([f"`{metal.name}`", f"{metal.E:g}", *cells])
     header = f"metal | E [GPa] | hardness [GPa] | conductivity [W/(m K)] | psi at gradient {GRADIENT:g}"
     return table(f"{header} | elastic up to gradient", rows)
 
@@ -173,12 +146,16 @@ def cost() -> str:
     return table("pressures in a call | time with a hardness over elastic", rows, "{} | {:.1f}")
 
 
-def draw() -> Any:
+def draw(ratios: FloatArray) -> Any:
     """Area and force of elastic answers over the simulated ones against psi, with metals below."""
-    psi, *points, _ = simulated()
+    found = contact(SURFACE, area=0.03, theory="calibrated", hardness=float(SURFACE.rms_gradient) / INDICES)
+    elastic = contact(SURFACE, pressure=found.pressure, theory="calibrated")
+    closer = contact(SURFACE, mean_separation=found.mean_separation, theory="calibrated")
+    by_law = elastic.area / found.area, closer.pressure / found.pressure
+    psi, *points, _ = ratios
     figure, axes = panels(3, 1, (7, 8), sharex=True, height_ratios=(3, 3, 2))
     labels = (f"{RATIOS[0]},\nequal force", f"{RATIOS[1]},\nequal mean gap")
-    for axis, dots, line, label in zip(axes, points, by_law(), labels, strict=False):
+    for axis, dots, line, label in zip(axes, points, by_law, labels, strict=False):
         axis.axhspan(0.95, 1.05, color="tab:green", alpha=0.2, label="within 5%")
         axis.semilogx(psi, dots, ".", color="grey", alpha=0.6, label="boundary elements, 1% to 10% contact")
         axis.semilogx(INDICES, line, label="law at 3% contact")
@@ -187,15 +164,9 @@ def draw() -> Any:
         axis.grid(True, alpha=0.3)
     axes[1].set_yscale("log")
     axes[0].legend(fontsize=8, loc="lower left")
-    for place, metal in enumerate(map(materials.get, SHOWN)):
+    for place, metal in enumerate(map(materials.get, METALS)):
         axes[2].plot(psi_of(metal), [place, place], linewidth=6)
     axes[2].axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
-    axes[2].set_yticks(range(len(SHOWN)), [f"{name} on itself" for name in SHOWN], fontsize=8)
+    axes[2].set_yticks(range(len(METALS)), [f"{name} on itself" for name in METALS], fontsize=8)
     axes[2].set_xlabel(f"psi = E* g/p_m; metals at rms gradient {GRADIENT:g}, hard to soft")
     return figure
-
-
-def measure() -> Measured:
-    """The measured blocks of the page, and its figure."""
-    parts = (when, held_out, frozen, coverage, drift, metals, cost)
-    return {part.__name__: part() for part in parts}, {"docs/figures/yield.svg": draw()}
