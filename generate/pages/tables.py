@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from generate.pages.page import Measured, panels, table
-from generate.tables.build import evaluate
+from generate.tables.island4d import evaluate
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.islands.height_integrals import height_integral

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import pathlib
 import tomllib
 from typing import Any
 
+from generate.tables.writing import TEXTS
 from mbma_tables.common.arguments import number_in, whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
@@ -76,6 +78,11 @@ class Configuration:
         """SHA-256 of the configuration, the variant's numbers included."""
         numbers = get_variant(self.variant).recorded if self.kind == ISLAND4D else []
         return digest_json([dataclasses.asdict(self), numbers])
+
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a table's file on what was wanted."""
+        text = json.dumps(dataclasses.asdict(self), sort_keys=True)
+        return {"target": self.target, "configuration": text, "configuration_sha256": self.digest()}
 
 
 def _read(path: pathlib.Path) -> dict[str, Any]:
@@ -165,6 +172,6 @@ def load(kind: str, path: pathlib.Path | None = None, target: float | None = Non
         raise InputError(f"{where}{fault}") from None
 
 
-def make_axis(name: str, long_name: str, transform: str, given: AxisRange, nodes: int) -> Axis:
+def make_axis(kind: str, name: str, given: AxisRange, nodes: int) -> Axis:
     """An axis over the configured range."""
-    return Axis(name, long_name, transform, given.offset, given.low, given.high, nodes)  # type: ignore[arg-type]
+    return Axis(name, TEXTS["axes"][name], dict(AXES[kind])[name], given.offset, given.low, given.high, nodes)  # type: ignore[arg-type]
