@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from generate.pages.page import PAGES, ROOT, write
+from generate.pages.page import PAGES, ROOT, measured, write
 from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
@@ -19,10 +19,11 @@ GROUPS = {
     "coverage": "generate.coverage",
     "leakage_law": "generate.leakage_law",
     "explorer": "generate.explorer",
-    "formulas": "generate.formulas.commands",
-    "grids": "generate.boundary_elements.grids",
+    "formulas": "generate.formulas.fit",
+    "gaps": "generate.boundary_elements.studies",
+    "grids": "generate.boundary_elements.studies",
     "machined": "generate.machined.campaign",
-    "measured_maps": "generate.boundary_elements.measured_maps",
+    "measured_maps": "generate.boundary_elements.studies",
     "tables": "generate.tables.commands",
     "wheels": "generate.wheels",
 }
@@ -71,8 +72,7 @@ def main() -> None:
 def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
     """Write the measured tables and the figures of pages of the documentation."""
     for name in PAGES if "all" in names else names:
-        parts, files = importlib.import_module(f"generate.pages.{name}").measure()
-        for path in write(name, parts, files, out):
+        for path in write(name, *measured(name), out):
             click.echo(path)
 
 

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import pathlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
 import numpy as np
+import pandas as pd
 import xarray as xr
 from scipy.interpolate import CubicSpline
 
 from generate import calibrated_hardness
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
+from generate.boundary_elements.design import SPLITS, TRAINING
+from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, TheoryCurve, cases
 from generate.calibrated_bars import measure
-from generate.calibrated_file import QUANTITIES, binned, fitted
+from generate.calibrated_file import QUANTITIES, by_bin, cross_validated, fitted, within
 from generate.calibrated_table import write as write_table
 from generate.leakage_law import write as write_leakage
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum
-from mbma_tables.laws.map_curves import MAP_CONSTANTS, MapConstants, MapLaw
+from mbma_tables.laws.map_curves import MAP_CONSTANTS, MapConstants
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.persson import Persson
 
 EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, MAX_AREA)  # contact fractions between which errors are told
-FOLDS = 5
 DIGITS = 4  # of constants
 GRID = np.linspace(-21.0, 1.6, 227)[::-1]  # ln F of curves while they are fitted
 LEAST = 1e-6  # ratio of forces that a law above its h_max counts as
@@ -33,9 +38,9 @@ NOISE = {"area": (0.015, 0.15), "force": (0.02, 0.25), "map": (0.03, 0.1)}
 LIGHT = 0.01
 CLOSE = 1e-4  # relative changes of cost or constants that end a fit
 STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
-
-
 OPTIONS = {"x_scale": "jac", "diff_step": STEP, "ftol": CLOSE, "xtol": CLOSE}
+LABELS = ("1 wave", "2-3 waves", "4 waves", "stretched", "transformed")
+Make = Callable[[Case], Any]
 
 
 def _rounded(constants: Any) -> Any:
@@ -49,25 +54,17 @@ def noise(one: Case, name: str) -> FloatArray:
     return np.asarray(floor + scatter * np.exp(-one.area / LIGHT))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
 class Parts:
-    """u_P of a spectrum, which is linear in the coefficients of W, on a grid of ln F."""
+    """u_P of a spectrum on a grid of ln F, linear in the coefficients of W: of P^16, and what P and P^3 add."""
 
-    spectrum: Spectrum
-    plain: FloatArray
-    first: FloatArray
-    cubic: FloatArray
-
-    @classmethod
-    def of(cls, spectrum: Spectrum) -> Parts:
-        """The parts of P^16, and what P and P^3 add in its place."""
+    def __init__(self, spectrum: Spectrum) -> None:
         plain, first, cubic = (
             Law(spectrum, None, dataclasses.replace(CONSTANTS, weight=a, cubic=b, weight_slope=0.0)).separation_persson(
                 np.exp(GRID)
             )[0]
             for a, b in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
         )
-        return cls(spectrum, plain, first - plain, cubic - plain)
+        self.spectrum, self.plain, self.first, self.cubic = spectrum, plain, first - plain, cubic - plain
 
     def errors(self, one: Case, trial: Constants) -> FloatArray:
         """Errors of ln F at equal u, as `errors` has them, without the law's own quadrature for every trial."""
@@ -82,13 +79,13 @@ class Parts:
 def fit(training: Sequence[Case]) -> Constants:
     """The spectrum's law: area at equal force, then force at equal u."""
     seen = [one for one in training if one.gaussian]
-    parts = [Parts.of(one.spectrum) for one in seen]
+    pairs = [(one, Parts(one.spectrum)) for one in seen]
 
     def areas(trial: Constants) -> list[FloatArray]:
         return [errors(one, one.law(trial), "area") / noise(one, "area") for one in seen]
 
     def forces(trial: Constants) -> list[FloatArray]:
-        return [part.errors(one, trial) / noise(one, "force") for one, part in zip(seen, parts, strict=True)]
+        return [part.errors(one, trial) / noise(one, "force") for one, part in pairs]
 
     constants = fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas, **OPTIONS)
     return fitted(constants, ("weight", "weight_slope", "cubic", "tail"), forces, **OPTIONS)
@@ -97,19 +94,16 @@ def fit(training: Sequence[Case]) -> Constants:
 def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
     """The map's law: area of stretched surfaces, then force at equal u of all kinds."""
 
-    def areas(trial: MapConstants) -> list[FloatArray]:
-        seen = [one for one in training if one.kind == "stretched"]
-        return [errors(one, one.map_law(constants, trial), "area") / noise(one, "map") for one in seen]
+    def residuals(seen: list[Case], quantity: str) -> Callable[[MapConstants], list[FloatArray]]:
+        return lambda trial: [errors(o, o.map_law(constants, trial), quantity) / noise(o, "map") for o in seen]
 
-    def forces(trial: MapConstants) -> list[FloatArray]:
-        seen = [one for one in training if one.waves >= MIN_WAVES]
-        return [errors(one, one.map_law(constants, trial), "force") / noise(one, "map") for one in seen]
-
+    areas = residuals([one for one in training if one.kind == "stretched"], "area")
+    forces = residuals([one for one in training if one.waves >= MIN_WAVES], "force")
     names = [name for name in dataclasses.asdict(MAP_CONSTANTS) if name not in ("elliptic", "tension_area")]
     return fitted(fitted(MAP_CONSTANTS, ("elliptic",), areas, **OPTIONS), names, forces, **OPTIONS)
 
 
-def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
+def errors(one: Case, law: Any, quantity: str) -> FloatArray:
     """ln of law over simulation: "area" at equal force, "force" at equal u, "stiffness" at equal force."""
     log_force = np.log(one.force)
     if quantity == "area":
@@ -123,63 +117,65 @@ def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
         return np.asarray(np.log(slopes[1] / slopes[0]))
 
 
-def summary(seen: Sequence[Case], make: Callable[[Case], Law | MapLaw]) -> dict[str, list[list[float]]]:
-    """By contact fraction: mean, standard deviation, 90% quantile of the magnitude and number of errors."""
-    area = np.concatenate([one.area for one in seen])
-    told, laws = {}, [make(one) for one in seen]
-    for quantity in QUANTITIES:
-        values = np.concatenate([errors(one, law, quantity) for one, law in zip(seen, laws, strict=True)])
-        told[quantity] = [
-            [float(p.mean()), float(p.std()), float(np.quantile(np.abs(p), 0.9)), len(p)] if len(p) else []
-            for p in binned(area, values, EDGES)
-        ]
-    return told
+def told(seen: Sequence[Case], make: Make) -> pd.DataFrame:
+    """Errors of a law on surfaces: a row a load, with contact fractions and what the surface is."""
+    parts = []
+    for one in seen:
+        label = one.kind if one.kind == "stretched" else "transformed"
+        if one.kind in GAUSSIAN:
+            label = "1 wave" if one.waves < MIN_WAVES else "2-3 waves" if one.waves < 4 else "4 waves"
+        known = {name: getattr(one, name) for name in ("kind", "split", "waves", "points", "gaussian")}
+        known |= {
+            "contact": one.area,
+            "node": str(one.node),
+            "load": np.arange(one.area.size),
+            "label": label,
+            "surface": id(one),
+        }
+        law = make(one)
+        parts.append(pd.DataFrame(known | {quantity: errors(one, law, quantity) for quantity in QUANTITIES}))
+    return pd.concat(parts, ignore_index=True)
 
 
-def cross_validate(training: Sequence[Case]) -> dict[str, list[list[float]]]:
+def summary(frame: pd.DataFrame) -> FloatArray:
+    """By quantity and contact: mean, standard deviation, 90% quantile of the magnitude and number of errors."""
+    of = (np.mean, np.std, lambda part: np.quantile(np.abs(part), 0.9), np.size)
+    return np.array([by_bin(frame["contact"], frame[quantity], EDGES, *of) for quantity in QUANTITIES])
+
+
+def cross_validate(training: Sequence[Case]) -> FloatArray:
     """Errors on spectra that were left out, a fifth of them at a time."""
     seen = [one for one in training if one.gaussian]
-    order = sorted({one.node for one in seen})
-    own: dict[tuple[float | str, ...], Constants] = {}
-    for fold in range(FOLDS):
-        out = set(order[fold::FOLDS])
-        own |= dict.fromkeys(out, fit([one for one in seen if one.node not in out]))
-    return summary(seen, lambda one: one.law(own[one.node]))
+    own = cross_validated(seen, fit)
+    return summary(told(seen, lambda one: one.law(own[one.node])))
 
 
-def coverage(
-    seen: Sequence[Case], make: Callable[[Case], Law | MapLaw], stated: dict[str, Any]
-) -> dict[str, list[float]]:
+def coverage(frame: pd.DataFrame, stated: FloatArray) -> dict[str, list[float]]:
     """Shares of held-out errors within one and two of the stated root mean squares."""
     middles = np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1])))
-    told, laws = {}, [make(one) for one in seen]
-    for quantity in QUANTITIES:
-        log_sigma = np.log([np.hypot(*part[:2]) for part in stated[quantity]])
-        sizes = np.concatenate(
-            [
-                np.abs(errors(one, law, quantity)) / np.exp(np.interp(np.log(one.area), middles, log_sigma))
-                for one, law in zip(seen, laws, strict=True)
-            ]
-        )
-        told[quantity] = [float(np.mean(sizes < limit)) for limit in (1, 2)]
-    return told
+    log_sigma = np.log(np.hypot(stated[..., 0], stated[..., 1]))
+    return {
+        quantity: within(frame[quantity] / np.exp(np.interp(np.log(frame["contact"]), middles, row)))
+        for quantity, row in zip(QUANTITIES, log_sigma, strict=True)
+    }
 
 
-def report(evidence: Sequence[Case], forms: dict[str, Callable[[Case], Law | MapLaw]]) -> dict[str, Any]:
-    """Errors by set of surfaces and by form of the law."""
-    groups: dict[str, Callable[[Case], bool]] = {
-        "1 wave": lambda one: one.kind in GAUSSIAN and one.waves < MIN_WAVES,
-        "2-3 waves": lambda one: one.gaussian and one.waves < 4,
-        "4 waves": lambda one: one.gaussian and one.waves >= 4,
-        "stretched": lambda one: one.kind == "stretched",
-        "transformed": lambda one: one.kind not in (*GAUSSIAN, "stretched"),
-    }
-    sets = {
-        f"{split}, {label}": [one for one in evidence if one.split == split and member(one)]
-        for split in (TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM)
-        for label, member in groups.items()
-    }
-    return {name: {form: summary(own, make) for form, make in forms.items()} for name, own in sets.items() if own}
+def others(found: Sequence[Case]) -> dict[str, FloatArray]:
+    """Errors of theories that nothing was fitted for, on all self-affine surfaces of two or more waves a side."""
+    plain, summed = [one for one in found if one.kind == "self_affine" and one.gaussian], {}
+    variants = [Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")]
+    for theory in (*variants, Persson(), Persson("simplified"), GreenwoodWilliamson()):
+        reached, curves = [], dict[int, TheoryCurve]()
+        for one in plain:
+            curve = TheoryCurve(theory, one)
+            kept = np.isfinite(curve.separation(one.force))
+            if kept.sum() > 3:
+                reached.append(one.at(kept))
+                curves[id(reached[-1])] = curve
+        # theories' scatter has one name on all surfaces of this kind
+        name = theory.scatter_name(Surface(0.8, 1.0, 100.0, 1.0, 3.0))
+        summed[name] = summary(told(reached, lambda one, curves=curves: curves[id(one)]))  # type: ignore[misc]
+    return summed
 
 
 @click.command()
@@ -188,42 +184,43 @@ def report(evidence: Sequence[Case], forms: dict[str, Callable[[Case], Law | Map
 @click.option("--hardness", is_flag=True, help="EVIDENCE has capped pressures: fit what a hardness adds.")
 def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, hardness: bool) -> None:
     """Fit the calibrated law to the training set of EVIDENCE; its errors there and elsewhere go into the table."""
+    data, said = xr.load_dataset(evidence), "held-out errors within one and two standard deviations:"
     if hardness:
-        with xr.open_dataset(evidence) as data:
-            of_hardness, written = calibrated_hardness.write(data.load(), table)
-        click.echo(
-            f"{of_hardness}\nheld-out errors within one and two standard deviations: {written.attrs['coverage']}"
-        )
+        of_hardness, written = calibrated_hardness.write(data, table)
+        click.echo(f"{of_hardness}\n{said} {written.attrs['coverage']}")
         return
-    with xr.open_dataset(evidence) as data:
-        found = cases(data.load())
-        source = data.attrs.get("code_sha256", "")
+    found = cases(data)
     training = [one for one in found if one.split == TRAINING]
     constants = _rounded(fit(training))
     map_constants = _rounded(fit_map(training, constants))
-    checked = cross_validate(training)
-    forms: dict[str, Callable[[Case], Law | MapLaw]] = {
-        "spectrum": lambda one: one.law(constants),
-        "map": lambda one: one.map_law(constants, map_constants),
+    forms = {
+        "spectrum": told(found, lambda one: one.law(constants)),
+        "map": told(found, lambda one: one.map_law(constants, map_constants)),
     }
-    by_map = summary([one for one in training if one.gaussian], forms["map"])
-    held_out = [one for one in found if one.split != TRAINING and one.gaussian]
-    told: dict[str, Any] = {
-        "constants": dataclasses.asdict(constants),
-        "map_constants": dataclasses.asdict(map_constants),
-        "cross_validation": checked,
-        "by_map": by_map,
-        "coverage": coverage(held_out, forms["spectrum"], checked)
-        | {f"{name} (map)": shares for name, shares in coverage(held_out, forms["map"], by_map).items()},
-        "contact_edges": EDGES,
-        "errors": report(found, forms),
-        "bars": measure(found, forms, errors),
-        "evidence": {"code_sha256": source, "training": len(training), "surfaces": len(found)},
+    by_map = forms["map"][forms["map"]["gaussian"]]
+    stated = {
+        "calibrated": cross_validate(training),
+        "calibrated_map": summary(by_map[by_map["split"] == TRAINING]),
     }
-    for name in ("constants", "map_constants"):
-        click.echo(f"{name}: " + ", ".join(f"{k} {v:.4g}" for k, v in told[name].items()))
-    click.echo(f"held-out errors within one and two standard deviations: {told['coverage']}")
+    covered = dict[str, list[float]]()
+    for frame, scatter, suffix in zip(forms.values(), stated.values(), ("", " (map)"), strict=True):
+        held_out = frame[frame["gaussian"] & (frame["split"] != TRAINING)]
+        covered |= {f"{name}{suffix}": shares for name, shares in coverage(held_out, scatter).items()}
+    for name, values in {"constants": constants, "map_constants": map_constants}.items():
+        click.echo(f"{name}: " + ", ".join(f"{k} {v:.4g}" for k, v in dataclasses.asdict(values).items()))
+    click.echo(f"{said} {covered}")
     if table is not None:
-        click.echo(f"{table}: {write_table(table, told, found, summary)}")
+        facts = {"code_sha256": data.attrs.get("code_sha256", ""), "training": len(training), "surfaces": len(found)}
+        attributes = {"coverage": covered, "bars": measure(forms), "evidence": facts}
+        sets = {
+            f"{split}, {label}, {form}": summary(own)
+            for split, label in itertools.product(SPLITS[:3], LABELS)
+            for form, frame in forms.items()
+            if len(own := frame[(frame["split"] == split) & (frame["label"] == label)])
+        }
+        known = others(found)
+        sets |= {f"self-affine, {name}": values for name, values in known.items()}
+        certified = write_table(table, constants, map_constants, EDGES, stated | known, sets, attributes)
+        click.echo(f"{table}: {certified}")
         # its gaps have changed with the constants
         click.echo(f"leakage: {write_leakage(table).attrs['coverage']}")

@@ -22,6 +22,7 @@ from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, read_sealed
 
 QUANTITIES = ("area", "force", "stiffness")  # as the file names them: the library's "pressure" is "force" there
+FOLDS = 5
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass of constants
 Variable = tuple[Any, Any, dict[str, Any]]
 
@@ -39,10 +40,35 @@ def fitted(
     return trial(found.x)
 
 
+def cross_validated(seen: Sequence[Any], fit: Callable[[list[Any]], Fitted]) -> dict[Any, Fitted]:
+    """For the node of each surface, constants from other nodes: a fifth of them is left out at a time."""
+    order, own = sorted({one.node for one in seen}), dict[Any, Fitted]()
+    for fold in range(FOLDS):
+        out = set(order[fold::FOLDS])
+        own |= dict.fromkeys(out, fit([one for one in seen if one.node not in out]))
+    return own
+
+
 def binned(area: FloatArray, values: FloatArray, edges: Sequence[float]) -> list[FloatArray]:
     """Finite values at contacts between edges, bin by bin."""
     known = np.isfinite(values)
     return [values[(area >= low) & (area < high) & known] for low, high in itertools.pairwise(edges)]
+
+
+def by_bin(area: Any, values: Any, edges: Sequence[float], *statistics: Callable[[FloatArray], Any]) -> FloatArray:
+    """Statistics of finite values at contacts between edges, (bins, statistics); NaN in an empty bin."""
+    parts = binned(np.asarray(area), np.asarray(values), edges)
+    return np.array([[f(part) if part.size else np.nan for f in statistics] for part in parts], float)
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def within(sizes: FloatArray) -> list[float]:
+    """Shares of errors, over their stated standard deviation, within one and two."""
+    return [float(np.mean(np.abs(sizes) < limit)) for limit in (1, 2)]
 
 
 def variable(dimensions: str | Sequence[str], values: Any, meaning: str, **attributes: Any) -> Variable:
@@ -50,14 +76,11 @@ def variable(dimensions: str | Sequence[str], values: Any, meaning: str, **attri
     return dimensions, values, {"long_name": meaning, "units": "1", **attributes}
 
 
-def nodes_of(nodes: dict[str, FloatArray], meanings: dict[str, str], covered: dict[str, Any]) -> dict[str, Variable]:
-    """Coordinates of a table's nodes, with what of them is answered."""
-    return {name: variable(name, values, meanings[name], covered=covered[name]) for name, values in nodes.items()}
-
-
-def bins_of(edges: FloatArray, middles: FloatArray) -> dict[str, Variable]:
-    """Coordinates of bins of contact."""
-    return {
+def coordinates(
+    nodes: dict[str, FloatArray], meanings: dict[str, str], covered: dict[str, Any], edges: FloatArray, middles: Any
+) -> dict[str, Variable]:
+    """Coordinates of a table's nodes, with the range that is answered, and of bins of contact."""
+    return {name: variable(name, values, meanings[name], covered=covered[name]) for name, values in nodes.items()} | {
         "contact": variable("contact", middles, "A/A0, middle of a bin"),
         "contact_low": variable("contact", edges[:-1], "A/A0, low end of a bin"),
         "contact_high": variable("contact", edges[1:], "A/A0, high end of a bin"),
@@ -98,20 +121,17 @@ def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "") 
         Name of the group, such as "hardness"; the root without it.
     """
     parts = read_parts(path) | {group: data}
+    packed = {"zlib": True, "complevel": 9, "shuffle": True, "_FillValue": None}
 
     def store(name: str) -> None:
         with HDF5_LOCK:
             for k, (own, part) in enumerate(sorted(parts.items())):
-                encoding = {
-                    str(n): {"zlib": True, "complevel": 9, "shuffle": True, "_FillValue": None} | _kept(v)
-                    for n, v in part.variables.items()
+                # of a variable's encoding, how its numbers are stored
+                kinds = {
+                    n: v.encoding.get("dtype", v.dtype) for n, v in part.variables.items() if v.dtype.kind in "fiu"
                 }
+                encoding = {n: packed | ({"dtype": kinds[n]} if n in kinds else {}) for n in part.variables}
                 part.to_netcdf(name, "a" if k else "w", engine="netcdf4", group=own or None, encoding=encoding)
 
     body = written_bytes(pathlib.Path(path).name, store)
     write_file(path, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n", make_folders=True)
-
-
-def _kept(variable: xr.Variable) -> dict[str, object]:
-    """Of a variable's encoding, how its numbers are stored."""
-    return {key: value for key, value in variable.encoding.items() if key == "dtype" and variable.dtype.kind in "fiu"}

@@ -8,15 +8,16 @@ import functools
 import json
 import os
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
-from generate.calibrated_file import binned, fitted, made_by, variable, write_part
+from generate.calibrated_file import by_bin, cross_validated, fitted, made_by, rms, variable, within, write_part
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness as cap
@@ -43,7 +44,6 @@ ELASTIC = "elastic"  # the simulated elastic contact and h_max, for what a hardn
 OTHERS = ("mbma", "persson")  # theories of which what is said of their errors is tested
 LEAST = 1e-9  # mean separation at which theories end [h_rms]
 TURN = 0.01  # of ln A_el, for derivatives
-FOLDS = 5
 REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
 MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_file", "generate.calibrated_hardness")
@@ -62,7 +62,7 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
     return cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
 
 
-def between(one: Capped) -> Any:
+def fitted_to(one: Capped) -> Any:
     """Loads that constants are fitted to."""
     return (one.area > LIGHTEST) & (one.area < HEAVIEST)
 
@@ -71,23 +71,13 @@ def fit(seen: Sequence[Capped]) -> cap.Constants:
     """Constants from these surfaces, one part after the other."""
 
     def residuals(part: str, noise: float, trial: cap.Constants) -> list[FloatArray]:
-        return [errors(one, part, trial)[between(one)] / noise for one in seen]
+        return [errors(one, part, trial)[fitted_to(one)] / noise for one in seen]
 
     found = cap.CONSTANTS
     for part, (own, noise) in PARTS.items():
         best = fitted(cap.CONSTANTS, own, functools.partial(residuals, part, noise), x_scale="jac")
         found = dataclasses.replace(found, **{name: float(f"{getattr(best, name):.{DIGITS}g}") for name in own})
     return found
-
-
-def cross_validated(seen: Sequence[Capped]) -> list[cap.Constants]:
-    """For each surface, constants from spectra other than its own."""
-    order = sorted({one.node for one in seen})
-    own: dict[tuple[float | str, ...], cap.Constants] = {}
-    for fold in range(FOLDS):
-        out = set(order[fold::FOLDS])
-        own |= dict.fromkeys(out, fit([one for one in seen if one.node not in out]))
-    return [own[one.node] for one in seen]
 
 
 @functools.cache
@@ -128,36 +118,35 @@ def elastic_curve(node: tuple[float | str, ...], zeta_1: float, h_max: float, na
     return found.pressure / g, found.stiffness / g, get_theory(name).bearing_share(surface, u)[0]
 
 
-def accuracy(groups: dict[str, list[Capped]], constants: cap.Constants) -> FloatArray:
-    """Statistics by set, form and quantity from 1% to 95% contact."""
-    table = np.full((len(groups), len(FORMS), len(QUANTITIES), len(STATISTICS)), np.nan)
-    for row, own in enumerate(groups.values()):
-        kept = np.concatenate([(one.area > LIGHTEST) & (one.area < EDGES[-1]) for one in own])
-        for column, form in enumerate(FORMS):
-            for k, quantity in enumerate(QUANTITIES):
-                e = np.concatenate([errors_of_law(one, form, constants)[quantity] for one in own])[kept]
-                size = np.abs(e)
-                table[row, column, k] = e.mean(), e.std(), np.mean(size < BARS[quantity]), size.max(), e.size
-    return table
+def told(seen: Sequence[Capped], name: str, constants: Callable[[Capped], cap.Constants]) -> pd.DataFrame:
+    """Errors of a theory on surfaces, a row a load, with what the surface is; `own` is the theory's own area."""
+    parts = []
+    for one in seen:
+        found = told_errors(one, name, constants(one))
+        known = {key: getattr(one, key) for key in ("kind", "split", "waves", "zeta_1", "eta")}
+        parts.append(pd.DataFrame(known | {"contact": one.area} | found | {"own": one.area * np.exp(found["area"])}))
+    return pd.concat(parts, ignore_index=True)
 
 
-def by_contact(
-    seen: Sequence[Capped],
-    values: Sequence[FloatArray],
-    etas: Sequence[float],
-    areas: Sequence[FloatArray] | None = None,
-) -> FloatArray:
-    """Root mean squares of values at simulated contacts, by hardness and contact fraction, the simulated if not given.
+def between(contact: Any) -> Any:
+    """Loads whose errors are summed up."""
+    return (contact > LIGHTEST) & (contact < EDGES[-1])
 
-    NaN where there is none.
-    """
-    areas = [one.area for one in seen] if areas is None else areas
-    rms = np.full((len(etas), len(EDGES) - 1), np.nan)
-    for row, eta in enumerate(etas):
-        own = [k for k, one in enumerate(seen) if one.eta == eta]
-        parts = binned(np.concatenate([areas[k] for k in own]), np.concatenate([values[k] for k in own]), EDGES)
-        rms[row] = [np.sqrt(np.mean(part**2)) if part.size else np.nan for part in parts]
-    return rms
+
+def statistics(frame: pd.DataFrame) -> FloatArray:
+    """`STATISTICS` of each quantity from 1% to 95% contact."""
+    errors = frame[between(frame["contact"])]
+    return np.array(
+        [
+            (np.mean(e), np.std(e), np.mean(np.abs(e) < bar), np.abs(e).max(), e.size)
+            for e, bar in ((errors[quantity].to_numpy(), BARS[quantity]) for quantity in QUANTITIES)
+        ]
+    )
+
+
+def by_contact(frame: pd.DataFrame, quantity: str, area: str = "contact") -> FloatArray:
+    """Root mean squares by hardness and contact fraction, NaN where there are none."""
+    return np.array([by_bin(own[area], own[quantity], EDGES, rms)[:, 0] for _, own in frame.groupby("eta")])
 
 
 def weight_of_elastic(one: Capped, quantity: str, constants: cap.Constants) -> FloatArray:
@@ -172,25 +161,24 @@ def weight_of_elastic(one: Capped, quantity: str, constants: cap.Constants) -> F
 
 def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[str, list[float]]:
     """Mean errors of the parts by zeta_1, the elastic contact simulated, at the hardness where they are largest."""
-    told = {}
-    for zeta_1 in sorted({one.zeta_1 for one in seen}):
-        own = [one for one in seen if one.zeta_1 == zeta_1]
-        means = [
-            [
-                np.concatenate([errors(one, q, constants)[between(one)] for one in own if one.eta == eta]).mean()
-                for eta in sorted({one.eta for one in own})
-            ]
-            for q in QUANTITIES
-        ]
-        told[f"{zeta_1:g}"] = [float(max(row, key=abs)) for row in means]
-    return told
+    parts = []
+    for one in seen:
+        kept = fitted_to(one)
+        found = {quantity: errors(one, quantity, constants)[kept] for quantity in QUANTITIES}
+        parts.append(pd.DataFrame({"zeta_1": one.zeta_1, "eta": one.eta} | found))
+    means = pd.concat(parts).groupby(["zeta_1", "eta"]).mean()
+    return {
+        f"{zeta_1:g}": [float(max(own[quantity], key=abs)) for quantity in QUANTITIES]
+        for zeta_1, own in means.groupby("zeta_1")
+    }
 
 
 def blind() -> dict[str, FloatArray]:
     """Errors of `contact` on surfaces of another code, which no fit or choice of a form saw."""
-    with open(REFERENCE, encoding="utf-8") as stream:
-        table = np.genfromtxt((line for line in stream if not line.startswith("#")), delimiter=",", names=True)
-    own = table[np.isfinite(table["eta"]) & (table["area"] > LIGHTEST) & (table["area"] < EDGES[-1])]
+    table = pd.read_csv(REFERENCE, comment="#")
+    own = {
+        name: column.to_numpy() for name, column in table[np.isfinite(table["eta"]) & between(table["area"])].items()
+    }
     surface = Surface(own["hurst"], 1.0, own["zeta_1"], 1.0, own["h_max_over_h_rms"])
     g = surface.rms_gradient
     options: dict[str, Any] = {"theory": "calibrated", "hardness": own["eta"] * g}
@@ -224,68 +212,55 @@ def told_errors(one: Capped, name: str, constants: cap.Constants) -> dict[str, F
 
 def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter) -> dict[str, list[float]]:
     """Shares of errors from 1% contact within one and two of the stated standard deviations, by theory and quantity."""
-    told: dict[str, list[float]] = {}
+    shares: dict[str, list[float]] = {}
     for name in (*FORMS, *OTHERS):
-        own = [one for one in seen if name in FORMS or one.kind == "self_affine"]
+        frame = told([one for one in seen if name in FORMS or one.kind == "self_affine"], name, lambda _: constants)
+        frame = frame[between(frame["contact"])]
         for quantity, named in LIBRARY.items():
-            sizes = []
-            for one in own:
-                kept = (one.area > LIGHTEST) & (one.area < EDGES[-1])
-                told_here = told_errors(one, name, constants)
-                # of stiffness by the own area, as stated
-                area = one.area * np.exp(told_here["area"]) if quantity == "stiffness" else one.area
-                known = calibrated_table.shipped().standard_deviation(name, named, area)
-                sigma = scatter.standard_deviation(name, named, np.array(one.eta), area, known)
-                sizes.append((np.abs(told_here[quantity]) / sigma)[kept])
-            size = np.concatenate(sizes)
-            told[f"{name} {quantity}"] = [float(np.mean(size[np.isfinite(size)] < limit)) for limit in (1, 2)]
-    return told
+            # of stiffness by the own area, as stated
+            area = frame["own" if quantity == "stiffness" else "contact"].to_numpy()
+            known = calibrated_table.shipped().standard_deviation(name, named, area)
+            sizes = frame[quantity] / scatter.standard_deviation(name, named, frame["eta"].to_numpy(), area, known)
+            shares[f"{name} {quantity}"] = within(sizes[np.isfinite(sizes)].to_numpy())
+    return shares
 
 
 def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
     """Root mean squares of errors by constants from other spectra, and how much of an elastic error is passed on."""
-    etas = sorted({one.eta for one in training})
-    left_out = list(zip(training, cross_validated(training), strict=True))
-    rms = {
-        form: np.array(
-            [
-                by_contact(training, [errors_of_law(one, form, own)[q] for one, own in left_out], etas)
-                for q in QUANTITIES
-            ]
-        )
-        for form in (*FORMS, ELASTIC)
-    }
-    # what they lack is what the elastic theories' become
-    alike = [pair for pair in left_out if pair[0].kind == "self_affine"]
+    others = cross_validated(training, fit)
+    frames = {name: told(training, name, lambda one: others[one.node]) for name in (*FORMS, ELASTIC)}
+    found = {name: np.array([by_contact(frame, q) for q in QUANTITIES]) for name, frame in frames.items()}
+    alike = [one for one in training if one.kind == "self_affine"]
     for name in OTHERS:
-        found = [told_errors(one, name, own) for one, own in alike]
-        # by the theory's own area, which is what a user has
-        areas = [one.area * np.exp(e["area"]) for (one, _), e in zip(alike, found, strict=True)]
-        rms[name] = np.full_like(rms[ELASTIC], np.nan)
-        rms[name][QUANTITIES.index("stiffness")] = by_contact(
-            [one for one, _ in alike], [e["stiffness"] for e in found], etas, areas
+        # what they lack is what the elastic theories' become; by the theory's own area, which is what a user has
+        found[name] = np.full_like(found[ELASTIC], np.nan)
+        frame = told(alike, name, lambda one: others[one.node])
+        found[name][QUANTITIES.index("stiffness")] = by_contact(frame, "stiffness", "own")
+    frame = pd.concat(
+        pd.DataFrame(
+            {"eta": one.eta, "contact": one.area} | {q: weight_of_elastic(one, q, constants) for q in ("area", "force")}
         )
-    weights = {
-        LIBRARY[q]: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
-        for q in ("area", "force")
-    }
-    return Scatter(np.array(etas), np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1]))), rms, weights)
+        for one in training
+    )
+    weights = {LIBRARY[q]: by_contact(frame, q) for q in ("area", "force")}
+    log_area = np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1])))
+    return Scatter(np.array(sorted({one.eta for one in training})), log_area, found, weights)
 
 
-def dataset(scatter: Scatter, told: FloatArray) -> xr.Dataset:
+def dataset(scatter: Scatter, accuracy: FloatArray) -> xr.Dataset:
     """Variables of the library's file."""
-    known = "statistics of ln(law/simulation), of the difference for the yielded share"
-    stated = (
+    of_accuracy = "statistics of ln(law/simulation), of the difference for the yielded share"
+    of_scatter = (
         "root mean square of ln(law/simulation) on the training set, by constants from other spectra; of the theory "
         "elastic with the simulated elastic contact; NaN: not measured"
     )
-    passed_on = "root mean square of d ln(area, force) by d ln of the elastic one"
-    rms, weights = np.array([*scatter.rms.values()]), np.array([*scatter.weight.values()])
+    of_weights = "root mean square of d ln(area, force) by d ln of the elastic one"
+    rows, weights = np.array([*scatter.rms.values()]), np.array([*scatter.weight.values()])
     return xr.Dataset(
         {
-            "accuracy": variable(("set", "form", "quantity", "statistic"), told, known),
-            "stated_scatter": variable(("theory", "quantity", "hardness", "contact"), rms, stated),
-            "elastic_weight": variable(("force_or_area", "hardness", "contact"), weights, passed_on),
+            "accuracy": variable(("set", "form", "quantity", "statistic"), accuracy, of_accuracy),
+            "stated_scatter": variable(("theory", "quantity", "hardness", "contact"), rows, of_scatter),
+            "elastic_weight": variable(("force_or_area", "hardness", "contact"), weights, of_weights),
             "eta": variable("hardness", scatter.eta, "p_m/(E* g)"),
             "contact": variable("contact", np.exp(scatter.log_area), "A/A0, middle of a bin"),
         }
@@ -298,13 +273,14 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
     plain = [one for one in found if one.kind in GAUSSIAN]
     training = [one for one in plain if one.split == TRAINING]
     constants = fit(training)
-    groups = {split: [one for one in plain if one.split == split] for split in SPLITS[:3]}
-    groups["three_waves"] = [one for one in plain if one.split != TRAINING and one.waves >= WAVES]
-    groups["stretched"] = [one for one in found if one.kind == "stretched"]
-    groups = {name: own for name, own in groups.items() if own}
     scatter = stated(training, constants)
     covered = coverage([one for one in plain if one.split != TRAINING], constants, scatter)
-    data = dataset(scatter, accuracy(groups, constants))
+    frames = [told(found, form, lambda _: constants) for form in FORMS]
+    gaussian, late = frames[0]["kind"].isin(GAUSSIAN), frames[0]["split"] != TRAINING
+    sets = {split: gaussian & (frames[0]["split"] == split) for split in SPLITS[:3]}
+    sets |= {"three_waves": gaussian & late & (frames[0]["waves"] >= WAVES)}
+    sets |= {"stretched": frames[0]["kind"] == "stretched"}
+    data = dataset(scatter, np.array([[statistics(frame[kept]) for frame in frames] for kept in sets.values()]))
     data.attrs = {
         "title": "Contact with a hardness: constants of mbma_tables.laws.hardness, and errors against BEM",
         "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated --hardness",
@@ -316,7 +292,7 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
         "drift": json.dumps(by_magnification([one for one in plain if one.kind == "self_affine"], constants)),
         "quantities": " ".join(QUANTITIES),
         "statistics": " ".join(STATISTICS),
-        "sets": " ".join(groups),
+        "sets": " ".join(sets),
         **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
         "evidence": json.dumps({"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(found)}),
         **made_by(MODULES),

@@ -16,7 +16,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import TheoryCurve
-from generate.calibrated_file import binned, bins_of, fitted, made_by, nodes_of, variable, write_part
+from generate.calibrated_file import FOLDS, by_bin, coordinates, fitted, made_by, rms, variable, within, write_part
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
@@ -34,7 +34,6 @@ COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_o
 HURST, LOG_ZETA = np.linspace(0.04, 1.06, 14), np.linspace(np.log(2.0), np.log(2e5), 14)
 LOG_ODDS = np.linspace(-14.6, 6.2, 53)  # ln A/(Ac - A)
 CERTIFICATE = 100  # held-out surfaces, each at its own odds
-FOLDS = 5  # of whole surfaces, for the stated scatter
 STATISTICS = ("bias", "root_mean_square", "number")
 GROUP = "leakage"
 DEFAULT = FlowConstants()
@@ -62,12 +61,9 @@ def fit(training: Sequence[Flow], first: FlowConstants = DEFAULT) -> FlowConstan
     seen = [(flow, flow.one.area < leakage.LARGEST_AREA) for flow in training if flow.one.isotropic]
 
     def residuals(form: Callable[[Flow, FlowConstants], FloatArray], constants: FlowConstants) -> list[FloatArray]:
-        parts = []
-        for flow, kept in seen:
-            miss = (form(flow, constants) - flow.one.log_k) / (NOISE[0] + NOISE[1] * flow.one.area**2)
-            # the law may block what was open
-            parts.append(np.maximum(miss[kept], BLOCKED))
-        return parts
+        misses = ((form(f, constants) - f.one.log_k) / (NOISE[0] + NOISE[1] * f.one.area**2) for f, _ in seen)
+        # the law may block what was open
+        return [np.maximum(miss[kept], BLOCKED) for miss, (_, kept) in zip(misses, seen, strict=True)]
 
     def found(start: FlowConstants, names: tuple[str, ...], form: Any, **options: Any) -> FlowConstants:
         best = fitted(start, names, functools.partial(residuals, form), diff_step=0.01, **options)
@@ -118,26 +114,21 @@ def errors(flow: Flow, log_k: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def summary(parts: Sequence[tuple[FloatArray, FloatArray]], edges: Sequence[float] = EDGES) -> FloatArray:
     """Bias, root mean square and number of errors between contact fractions."""
-    told = np.full((len(edges) - 1, 3), np.nan)
-    if parts:
-        area, miss = (np.concatenate(each) for each in zip(*parts, strict=True))
-        for k, own in enumerate(binned(area, miss, edges)):
-            if own.size:
-                told[k] = own.mean(), np.sqrt(np.mean(own**2)), own.size
-    return told
+    area, miss = np.concatenate([*parts, np.empty((2, 0))], axis=1)
+    return by_bin(area, miss, edges, np.mean, rms, np.size)
 
 
 def noise_floor(found: Sequence[Case], edges: Sequence[float] = EDGES) -> FloatArray:
     """Standard deviation of ln k between cells of one spectrum at equal load, between contact fractions."""
-    areas, variances = [], []
-    for node in sorted({one.node for one in found if one.isotropic}, key=str):
+    parts = []
+    for node in {one.node for one in found if one.isotropic}:
         own = [one for one in found if one.node == node]
         size = min(one.log_k.size for one in own)
+        area, log_k = np.array([(one.area[:size], one.log_k[:size]) for one in own]).swapaxes(0, 1)
         if len(own) > 1:
-            areas.append(np.mean([one.area[:size] for one in own], axis=0))
-            variances.append(np.var([one.log_k[:size] for one in own], axis=0, ddof=1))
-    area, variance = np.concatenate(areas), np.concatenate(variances)
-    return np.sqrt([part.mean() for part in binned(area, variance, edges)])
+            parts.append((area.mean(axis=0), log_k.var(axis=0, ddof=1)))
+    area, variance = np.concatenate(parts, axis=1)
+    return np.asarray(np.sqrt(by_bin(area, variance, edges, np.mean)[:, 0]))
 
 
 def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, FloatArray]:
@@ -173,47 +164,42 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     with ProcessPoolExecutor(PROCESSES) as pool:
         values = np.array(list(pool.map(functools.partial(_row, constants, contact), map(float, HURST))))
     misses = {label: [errors(f, law(f, constants)) for f in flows] for label, law in LAWS.items()}
-    told = {
-        name: {label: summary([misses[label][k] for k in own]) for label in LAWS}
-        for name, member in SETS.items()
-        if (own := [k for k, f in enumerate(flows) if member(f.one)])
-    }
+    sets = {name: [k for k, f in enumerate(flows) if member(f.one)] for name, member in SETS.items()}
+    sets = {name: own for name, own in sets.items() if own}
+    accuracy = np.array([[summary([misses[label][k] for k in own]) for label in LAWS] for own in sets.values()])
     stated = {"calibrated": left_out(flows, constants), **of_theories(flows, constants)}
-    certified = certificate(values, constants, contact)
-    blocked = np.concatenate([one.blocked for one in found if one.isotropic], axis=1)
-    edges = np.array(EDGES)
-    shares = [part.mean() for part in binned(blocked[0], blocked[1], EDGES)]
-    accuracy = np.array([list(laws.values()) for laws in told.values()])
-    spline = coefficients(values, DEGREE, 3).astype("f4")
+    area, blocked = np.concatenate([one.blocked for one in found if one.isotropic], axis=1)
+    shares = by_bin(area, blocked, EDGES, np.mean)[:, 0]
     splined = "coefficients of cardinal quintic B-splines of ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R"
-    scatter, differ = np.array([rows[:, 1] for rows in stated.values()]), "standard deviation of ln k between cells"
+    known = "bias, root mean square and number of ln(law/simulation)"
+    scatter, edges = np.array([rows[:, 1] for rows in stated.values()]), np.array(EDGES)
+    differ = "standard deviation of ln k between cells of one spectrum"
+    nodes = dict(zip(AXES, (HURST, LOG_ZETA, LOG_ODDS), strict=True))
     data = xr.Dataset(
         {
-            "spline": variable([f"{name}_knot" for name in AXES], spline, splined),
-            "accuracy": variable(
-                ("set", "law", "contact", "statistic"),
-                accuracy,
-                "bias, root mean square and number of ln(law/simulation)",
+            "spline": variable(
+                [f"{name}_knot" for name in AXES], coefficients(values, DEGREE, 3).astype("f4"), splined
             ),
+            "accuracy": variable(("set", "law", "contact", "statistic"), accuracy, known),
             "stated_scatter": variable(("theory", "contact"), scatter, "root mean square of ln(k/simulation)"),
-            "noise": variable("contact", noise_floor(found), f"{differ} of one spectrum"),
+            "noise": variable("contact", noise_floor(found), differ),
             "share_blocked": variable("contact", shares, "share of directions that are blocked"),
         },
-        nodes_of(dict(zip(AXES, (HURST, LOG_ZETA, LOG_ODDS), strict=True)), LONG_NAMES, COVERED)
-        | bins_of(edges, (edges[1:] + edges[:-1]) / 2),
+        coordinates(nodes, LONG_NAMES, COVERED, edges, (edges[1:] + edges[:-1]) / 2),
     )
+    simulated, beyond = certificate(values, constants, contact)
     data.attrs = {
         "title": "Flow coefficient of gaps: contact factor of an effective medium, and its errors against simulation",
         "source": "mbma_tables.laws.effective_medium, its constants fitted to the training set of docs/data/leakage.nc",
         "references": "docs/leakage.md",
         "theories": " ".join(stated),
         "laws": "; ".join(LAWS),
-        "sets": "; ".join(told),
+        "sets": "; ".join(sets),
         "statistics": " ".join(STATISTICS),
         **{f"flow_{name}": value for name, value in dataclasses.asdict(constants).items()},
         **{f"law_{name}": value for name, value in dataclasses.asdict(contact).items()},
-        "largest_error_simulated": certified[0],
-        "largest_error_log_factor": certified[1],
+        "largest_error_simulated": simulated,
+        "largest_error_log_factor": beyond,
         "coverage": np.array(coverage(flows, constants, stated["calibrated"])),
         **made_by(MODULES),
     }
@@ -224,19 +210,15 @@ def certificate(values: FloatArray, constants: FlowConstants, contact: Constants
     """Largest errors of ln R at held-out surfaces to `LARGE` and beyond, below `leakage.LARGEST_AREA`."""
     table = RegularGridInterpolator((HURST, LOG_ZETA, LOG_ODDS), values, method="quintic")
     rng, largest = np.random.default_rng(21), [0.0, 0.0]
-    odds = np.sort(
-        rng.uniform(COVERED["log_odds"][0], log_odds(np.array(leakage.LARGEST_AREA), constants.threshold), 12)
-    )
+    last = log_odds(np.array(leakage.LARGEST_AREA), constants.threshold)
+    odds = np.sort(rng.uniform(COVERED["log_odds"][0], last, 12))
+    area = constants.threshold / (1 + np.exp(-odds))
     for _ in range(CERTIFICATE):
         # a tenth of them at the ends of an axis
         ends = (COVERED[name] for name in AXES[:2])
         hurst, log_zeta = (low + (high - low) * np.clip(rng.uniform(-0.05, 1.05), 0, 1) for low, high in ends)
-        exact = leakage.contact_factor(
-            Spectrum.self_affine(hurst, float(np.exp(log_zeta))),
-            constants.threshold / (1 + np.exp(-odds)),
-            constants,
-            contact,
-        )
+        spectrum = Spectrum.self_affine(hurst, float(np.exp(log_zeta)))
+        exact = leakage.contact_factor(spectrum, area, constants, contact)
         points = np.stack([np.full(odds.size, hurst), np.full(odds.size, log_zeta), odds], axis=1)
         error = float(np.abs(table(points) - exact).max())
         largest = [max(largest[0], error * (log_zeta <= np.log(LARGE))), max(largest[1], error)]
@@ -247,16 +229,13 @@ def coverage(flows: Sequence[Flow], constants: FlowConstants, stated: FloatArray
     """Shares of held-out errors up to the largest area of a valid answer within one and two of the stated scatter."""
     middle = (np.array(EDGES[1:]) + np.array(EDGES[:-1])) / 2
     parts = [errors(f, f.medium(constants)) for f in flows if SETS["held out"](f.one)]
-    sizes = np.concatenate([np.abs(miss) / np.interp(area, middle, stated[:, 1]) for area, miss in parts])
-    area = np.concatenate([area for area, _ in parts])
-    return [float(np.mean(sizes[area < leakage.LARGEST_AREA] < limit)) for limit in (1, 2)]
+    area, miss = np.concatenate(parts, axis=1)
+    return within((miss / np.interp(area, middle, stated[:, 1]))[area < leakage.LARGEST_AREA])
 
 
 def write(path: pathlib.Path, evidence: pathlib.Path = EVIDENCE) -> xr.Dataset:
     """Fit, and write the group into the calibrated law's file; what it holds."""
-    with xr.open_dataset(evidence) as data:
-        found = cases(data.load())
-    made = dataset(found, load(path).constants)
+    made = dataset(cases(xr.load_dataset(evidence)), load(path).constants)
     write_part(path, made, GROUP)
     return made
 

@@ -18,10 +18,13 @@ from mbma_tables.common.errors import TableFileError as TableFileError
 if TYPE_CHECKING:
     from mbma_tables import theories as theories
     from mbma_tables.answers.contact import contact as contact
+    from mbma_tables.answers.film import FlowFactors as FlowFactors
+    from mbma_tables.answers.film import flow_factors as flow_factors
     from mbma_tables.answers.result import Contact as Contact
     from mbma_tables.answers.sensitivity import sensitivity as sensitivity
     from mbma_tables.islands import greenwood_tripp as greenwood_tripp
     from mbma_tables.islands.height_integrals import height_integral as height_integral
+    from mbma_tables.joint import Joint as Joint
     from mbma_tables.law.law import ContactLaw as ContactLaw
     from mbma_tables.law.make import contact_law as contact_law
     from mbma_tables.models.tables import open_table as open_table
@@ -36,13 +39,16 @@ __version__ = "0.1.0"
 _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
     "Contact": "mbma_tables.answers.result",
+    "FlowFactors": "mbma_tables.answers.film",
     "Island": "mbma_tables.totals.island",
+    "Joint": "mbma_tables.joint",
     "Variant": "mbma_tables.surfaces.variants",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.law.law",
     "Scene": "mbma_tables.scenes.scene",
     "contact": "mbma_tables.answers.contact",
     "contact_law": "mbma_tables.law.make",
+    "flow_factors": "mbma_tables.answers.film",
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.totals.island",
     "open_table": "mbma_tables.models.tables",

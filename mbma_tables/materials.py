@@ -12,7 +12,7 @@ import dataclasses
 import difflib
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -283,8 +283,10 @@ def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair |
     return known.E_star, known.hardness if hardness is None else hardness, known
 
 
-def tangential_ratio(nu: ArrayLike, E: Sequence[Any] | None = None) -> Any:
-    """kappa, normal over tangential stiffness of a stuck isotropic contact (Mindlin 1949).
+def tangential_ratio(
+    nu: ArrayLike, E: Sequence[Any] | None = None, share: Callable[[FloatArray], Any] = lambda nu: 0.5
+) -> Any:
+    """kappa, normal over tangential stiffness of a stuck contact (Mindlin 1949).
 
     Parameters
     ----------
@@ -292,11 +294,14 @@ def tangential_ratio(nu: ArrayLike, E: Sequence[Any] | None = None) -> Any:
         Poisson's ratio of both bodies, or of the one that is not rigid; with `E` one of each body.
     E : pair of float or str, optional
         Young's moduli of the bodies.
+    share : callable, optional
+        c of Poisson's ratios, 1/2 for isotropic surfaces (`mbma_tables.laws.lay`).
 
     Returns
     -------
     float or ndarray
-        (2 - nu)/(2 (1 - nu)); of two bodies their compliances (2 - nu)/G over 2 (1 - nu)/G, both added.
+        (1 - nu c)/(1 - nu), (2 - nu)/(2 (1 - nu)) if isotropic; of two bodies their compliances (1 - nu c)/G over
+        (1 - nu)/G, both added.
 
     Examples
     --------
@@ -307,9 +312,9 @@ def tangential_ratio(nu: ArrayLike, E: Sequence[Any] | None = None) -> Any:
     ratio = _poisson("nu", nu)
     if (E is None) == (ratio.shape == (2,)) or (E is not None and len(E) != 2):
         raise InputError("nu is one number, or two with E=(E1, E2), the moduli of the bodies")
-    above, below = 2 - ratio, 2 * (1 - ratio)
+    above, below = 1 - ratio * share(ratio), 1 - ratio
     if E is None:
-        return (above / below)[()]
+        return np.asarray(above / below)[()]
     modulus = positive_array("E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values()))
     compliance = (1 + ratio) / modulus  # 1/(2 G)
-    return (above * compliance).sum() / (below * compliance).sum()
+    return (above * compliance).sum(axis=-1) / (below * compliance).sum()

@@ -12,6 +12,8 @@ settings.load_profile("untimed")
 
 # parallel workers share the cores, and threads of BLAS that wait for each other cost more than the work itself
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# simulations are not kept between tests
+os.environ["MBMA_TABLES_CACHE"] = "off"
 
 
 @pytest.fixture
@@ -40,3 +42,20 @@ def generations():
 
     names = [name for name, least in GENERATIONS.items() if 0 < least <= core.generation]
     return [importlib.import_module(f"mbma_tables.core._{name}") for name in names] or [core]
+
+
+@pytest.fixture(scope="session")
+def table_files(tmp_path_factory):
+    """One small table file of each kind."""
+    from small_tables import KINDS, small_table
+
+    from generate.tables.writing import write_table
+
+    folder = tmp_path_factory.mktemp("tables")
+    return {kind: write_table(folder / f"{kind}.nc", small_table(kind)) for kind in KINDS}
+
+
+@pytest.fixture(scope="session")
+def sources(table_files):
+    """The bytes of one good table file of each kind."""
+    return {kind: path.read_bytes() for kind, path in table_files.items()}

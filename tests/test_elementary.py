@@ -40,11 +40,3 @@ def test_exponentials_beyond_their_range_are_those_at_its_end():
     # NaN is not passed on: an index that is made from it stays inside
     assert none == least
     assert of_core("expm1", [-1e300]) == -1
-
-
-def test_bits_are_those_of_every_generation_with_an_fma(generations):
-    for number, x in enumerate(CASES.values()):
-        found = [np.empty_like(x) for _ in generations]
-        for one, out in zip(generations, found, strict=True):
-            one.elementary(number, x, out)
-            assert out.tobytes() == found[0].tobytes()

@@ -1,8 +1,5 @@
 """Sixteen threads on one model, one law and one surface: the bits of one thread."""
 
-import os
-import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
@@ -44,12 +41,8 @@ def questions():
 
     def law_values(seed):
         d = gaps(seed, ENTRIES)
-        return [
-            law.pressure(separation=d),
-            law.area(separation=d),
-            law.stiffness(separation=d),
-            law.pressure(separation=float(d[0])),
-        ]
+        every = law.pressure, law.area, law.stiffness
+        return [*(value(separation=d) for value in every), law.pressure(separation=float(d[0]))]
 
     def inverses(seed):
         return [law.separation(pressure=law.pressure(separation=gaps(seed, 200)))]
@@ -69,51 +62,21 @@ def questions():
 
 
 def test_sixteen_threads_give_the_bits_of_one(questions):
-    alone = {
-        (question, seed): questions[question](seed) for question in range(len(questions)) for seed in range(ROUNDS)
-    }
-    barrier = Barrier(THREADS)
+    alone = {(question, seed): question(seed) for question in questions for seed in range(ROUNDS)}
+    barrier, keys = Barrier(THREADS), list(alone)
 
     def work(thread):
         barrier.wait()
         # every thread in an order of its own, so that unlike questions meet
-        order = np.random.default_rng(1000 + thread).permutation(len(alone))
-        keys = list(alone)
-        differing = []
-        for place in order:
-            question, seed = keys[place]
-            found = questions[question](seed)
-            if not all(np.array_equal(a, b) for a, b in zip(found, alone[keys[place]], strict=True)):
-                differing.append(keys[place])
-        return differing
+        order = [keys[place] for place in np.random.default_rng(1000 + thread).permutation(len(keys))]
+        return [
+            (question.__name__, seed)
+            for question, seed in order
+            if not all(np.array_equal(a, b) for a, b in zip(question(seed), alone[question, seed], strict=True))
+        ]
 
     with ThreadPoolExecutor(THREADS) as pool:
-        differing = list(pool.map(work, range(THREADS)))
-    assert differing == [[]] * THREADS
-
-
-@pytest.mark.slow
-def test_ten_million_mixed_lookups_by_sixteen_threads_have_the_bits_of_one():
-    """Whole, in blocks of other sizes, one by one, and with slopes."""
-    model, each = universal_model(), 312_500
-    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
-    rng = np.random.default_rng(9)
-    X, mu, gaps = rng.uniform(-6, 40, each), 10 ** rng.uniform(-12, 6, each), rng.uniform(-3, 3, each)
-
-    def answers(size):
-        blocks = [slice(k, k + size) for k in range(0, each, size)]
-        found = [model.answer(X[block], mu[block]) for block in blocks]
-        phi = [np.concatenate([getattr(part, name) for part in found]) for name in ("phi_F", "phi_A", "error")]
-        return [*phi, np.concatenate([law.pressure(separation=gaps[block]) for block in blocks])]
-
-    whole = answers(each)
-    for k in range(0, each, each // 50):
-        one = model.answer(X[k], mu[k])
-        assert [one.phi_F, one.phi_A, one.error, law.pressure(separation=gaps[k])] == [column[k] for column in whole]
-    with ThreadPoolExecutor(THREADS) as pool:
-        for found in pool.map(answers, 4 * [997, 8192, 50_000, each]):
-            for column, expected in zip(found, whole, strict=True):
-                np.testing.assert_array_equal(column, expected)
+        assert list(pool.map(work, range(THREADS))) == [[]] * THREADS
 
 
 def test_laws_made_by_many_threads_are_one_law():
@@ -132,46 +95,21 @@ def test_laws_made_by_many_threads_are_one_law():
         np.testing.assert_array_equal(law.errors, alone[thread % 4].errors)
 
 
-FORK = """
-import os
-import numpy as np
-from mbma_tables import open_table
-X, mu = np.linspace(-5, 40, 400_000), np.full(400_000, 0.1)
-table, four = open_table("universal"), open_table("island4d")
-numbers = np.linspace(1.0, 2.0, 100_000), 3.0, 20.0, 0.8
-known = table.answer(X, mu, parallel=True).phi_F, four.lookup(*numbers, parallel=True).F_hat
-child = os.fork()
-found = table.answer(X, mu, parallel=True).phi_F, four.lookup(*numbers, parallel=True).F_hat
-same = all((a == b).all() for a, b in zip(found, known))
-if child == 0:
-    os._exit(0 if same else 1)
-print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), same)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_fork_after_parallel_answers_goes_on():
-    done = subprocess.run([sys.executable, "-c", FORK], capture_output=True, text=True, check=True)
-    assert done.stdout == "0 True\n"
-
-
 @pytest.mark.parametrize("derivatives", [False, True])
 def test_workers_change_no_bit(derivatives):
     rng, n = np.random.default_rng(5), 2000
-    surfaces = Surface(rng.uniform(0.4, 1, n), 1.0, 10 ** rng.uniform(1, 4, n), 1.0, rng.uniform(2.5, 5, n))
-    depth = surfaces.h_max * rng.uniform(0.3, 0.99, n)
-    one, two = (
-        contact(surfaces, separation=depth, rtol=1e-6, derivatives=derivatives, workers=workers) for workers in (1, 2)
-    )
-    np.testing.assert_array_equal([two.pressure, two.area, two.error], [one.pressure, one.area, one.error])
-    gaps = np.linspace(-2.9, 2.9, 40_000)
-    one, two = (
-        contact(Surface(0.7, 0.2, 60.0, 1.0, 3.0), separation=gaps, rtol=1e-6, workers=workers) for workers in (1, 2)
-    )
-    np.testing.assert_array_equal([two.pressure, two.area], [one.pressure, one.area])
+    many = Surface(rng.uniform(0.4, 1, n), 1.0, 10 ** rng.uniform(1, 4, n), 1.0, rng.uniform(2.5, 5, n))
+    one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
+    for surface, gaps in ((many, many.h_max * rng.uniform(0.3, 0.99, n)), (one, np.linspace(-2.9, 2.9, 40_000))):
+        single, double = (
+            contact(surface, separation=gaps, rtol=1e-6, derivatives=derivatives and surface is many, workers=workers)
+            for workers in (1, 2)
+        )
+        np.testing.assert_array_equal(
+            [double.pressure, double.area, double.error], [single.pressure, single.area, single.error]
+        )
     with pytest.raises(InputError, match="workers must be a whole number"):
-        contact(surfaces, separation=depth, workers=0)
+        contact(one, separation=1.0, workers=0)
 
 
 def test_workers_stop_at_an_interrupt():

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
-import pathlib
 import platform
-import tempfile
-from collections.abc import Iterable, Sequence
 from importlib import metadata
 from typing import Any
+
+import pandas as pd
 
 from generate import timing
 from generate.pages import cost_distances, cost_rows
 from generate.pages.distances import HUES
 from generate.pages.page import Measured, duration, panels, percent, table, to_csv
-from mbma_tables.scenes.costs import UNIT, Costs, Distance, Row, read_costs, read_distances
+from mbma_tables.scenes.costs import UNIT, Row
 from mbma_tables.theories import THEORIES
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
@@ -26,6 +26,7 @@ HEAD = """\
 # fixed piece of work in the same run; the row of island model unit has its seconds.
 """
 SHAPES = {"MBMA": "o", "calibrated": "s", "Persson": "^", "G-W": "v"}
+DEVIATIONS = ["area_light", "area_deep", "force_light", "force_deep"]
 
 
 def study() -> bytes:
@@ -37,121 +38,101 @@ def study() -> bytes:
     facts = {"machine": platform.machine()} | {name: metadata.version(name) for name in ("numpy", "scipy")}
     head = f"{HEAD}# {json.dumps(facts | {'python': platform.python_version()})}\n"
     # the least: other processes can only add
-    return records(head, [Row(UNIT, "seconds", "both", None, min(seconds)), *rows])
+    return to_csv(head, pd.DataFrame([Row(UNIT, "seconds", "both", None, min(seconds)), *rows]), "%.4g")
 
 
-def records(head: str, rows: Sequence[Any]) -> bytes:
-    """Named tuples as a CSV file."""
-    cells = (["" if v is None else v if isinstance(v, str) else f"{v:.4g}" for v in row] for row in rows)
-    return to_csv(head, rows[0]._fields, cells)
+def read(content: bytes) -> pd.DataFrame:
+    """Rows of a file of costs, with what was measured and what the page calls the method."""
+    rows = pd.read_csv(io.BytesIO(content), comment="#")
+    rows["what"] = rows["variant"].str.partition(" rtol=")[0]
+    rows["method"] = rows["island_model"].replace(METHODS)
+    return rows
 
 
-def pareto_front(rows: Sequence[Row]) -> list[Row]:
+def pareto_front(rows: pd.DataFrame) -> pd.DataFrame:
     """The rows that none is better than in both cost and error, cheapest first."""
-    front: list[Row] = []
-    for row in sorted(rows, key=lambda row: (row.cost, row.error or 0.0)):
-        if not front or (row.error or 0.0) < (front[-1].error or 0.0):
-            front.append(row)
-    return front
+    rows = rows.sort_values(["cost", "error"])
+    return rows[rows["error"] < rows["error"].cummin().shift(fill_value=math.inf)]
 
 
-def groups(costs: Costs) -> dict[str, list[Row]]:
+def groups(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Rows of one island and of one gap, with an error to go with the cost."""
-    known = [row for row in costs.rows if row.error is not None]
-    own = [row for row in known if row.what.startswith(("island", "nodes=", "rings="))]
-    gaps = [row for row in known if row.quantity == "both" and row.what == "gap"]
+    known = rows[rows["error"].notna()]
+    laws = known[(known["island_model"] == "universal") & (known["what"] == "law")].copy()
     # a law's errors go with the price of evaluating it
-    lookup = costs.of("law", "lookup") / costs.seconds
-    laws = [row for row in known if row.island_model == "universal" and row.what == "law"]
-    gaps += [Row("law", row.variant.replace("law", "lookup"), "both", row.error, lookup, 0) for row in laws]
-    return {"one island": own, "one gap of a surface": gaps}
+    lookup = rows[(rows["variant"] == "lookup") & (rows["quantity"] == "both")]["cost"].iloc[0]
+    laws[["method", "cost", "evaluations"]] = "law", lookup, 0.0
+    laws["variant"] = laws["variant"].str.replace("law", "lookup")
+    gaps = known[(known["quantity"] == "both") & (known["what"] == "gap")]
+    own = known[known["what"].str.startswith(("island", "nodes=", "rings="))]
+    return {"one island": own, "one gap of a surface": pd.concat([gaps, laws])}
 
 
-def method(row: Row) -> str:
-    """What a row is called on the page."""
-    return METHODS.get(row.island_model, row.island_model)
-
-
-def family(row: Row) -> str:
-    """The series that a point of the figure belongs to."""
-    return f"{method(row)}, by nodes" if row.island_model == "exact" and row.what.startswith("nodes=") else method(row)
-
-
-def rows_table(rows: Iterable[Row], front: Sequence[Row] = ()) -> str:
+def rows_table(rows: pd.DataFrame, front: Any = ()) -> str:
     """Rows with their errors, costs and counts; those of the front are marked."""
-    cells = (
-        [method(row), row.variant, row.error, row.cost, row.evaluations, "front" if row in front else ""]
-        for row in rows
-    )
-    return table("method | variant | largest error | cost | evaluations | ", cells, "{} | {} | {:.1e} | {:.3g}")
+    columns = ["method", "variant", "error", "cost", "evaluations"]
+    lines = [
+        [name, variant, *(None if math.isnan(v) else v for v in values), "front" if index in front else ""]
+        for index, name, variant, *values in rows[columns].itertuples()
+    ]
+    return table("method | variant | largest error | cost | evaluations | ", lines, "{} | {} | {:.1e} | {:.3g}")
 
 
-def ranked(rows: Sequence[Row]) -> str:
+def ranked(rows: pd.DataFrame) -> str:
     """Decades that rows span, and a table of the front and a few tolerances; the file has all."""
-    pairs = [[getattr(row, name) for row in rows] for name in ("cost", "error")]
-    time, error = (math.log10(max(values) / min(values)) for values in pairs)
-    front = pareto_front(rows)
-    shown = [row for row in rows if row in front or "rtol=" not in row.variant or row.variant[-5:] in SHOWN_RTOLS]
-    return f"They span {time:.1f} decades of time and {error:.1f} of error.\n\n{rows_table(shown, front)}"
+    time, error = (math.log10(rows[name].max() / rows[name].min()) for name in ("cost", "error"))
+    front, named = pareto_front(rows).index, rows["variant"]
+    shown = rows.index.isin(front) | ~named.str.contains("rtol=") | named.str.endswith(SHOWN_RTOLS)
+    return f"They span {time:.1f} decades of time and {error:.1f} of error.\n\n{rows_table(rows[shown], front)}"
 
 
-def alone(costs: Costs) -> str:
-    """Time of force or area alone over that of both, by island model, over all tolerances."""
-    both = {(row.island_model, row.variant): row.cost for row in costs.rows if row.quantity == "both"}
-    ratios: dict[str, dict[str, list[float]]] = {}
-    for row in costs.rows:
-        if row.quantity != "both" and row.what == "gap":
-            own = ratios.setdefault(method(row), {"pressure": [], "area": []})
-            own[row.quantity].append(row.cost / both[row.island_model, row.variant])
-    cells = ([name, *((min(own), max(own)) for own in found.values())] for name, found in ratios.items())
-    return table("method | pressure alone | area alone", cells, "{} | {:.2f} to {:.2f}")
-
-
-def deviations(rows: Iterable[Distance], seconds: float) -> str:
-    """Deviations from boundary elements, and times."""
+def parts_of(rows: pd.DataFrame, distances: pd.DataFrame) -> dict[str, str]:
+    """The measured blocks of the page."""
+    seconds = rows["cost"][rows["island_model"] == UNIT].iloc[0]
+    both = rows["quantity"] == "both"
+    listed = (rows["what"].isin(ONCE) & both) | (rows["what"] == "invert") | rows["island_model"].isin(THEORIES)
+    keys = ["island_model", "what"]
+    # of several tolerances the tightest, which is listed last, where the first stands
+    once = rows[listed].groupby(keys, sort=False).tail(1).set_index(keys)
+    once = once.loc[list(rows[listed].drop_duplicates(keys)[keys].itertuples(index=False, name=None))]
+    alone = rows[~both & (rows["what"] == "gap")].merge(rows[both], on=["island_model", "variant"])
+    alone["cost_x"] /= alone["cost_y"]
+    found = alone.groupby(["method_x", "quantity_x"], sort=False)["cost_x"].agg(["min", "max"])
+    cells = [
+        [name, *(tuple(found.loc[name, what]) for what in ("pressure", "area"))] for name in alone["method_x"].unique()
+    ]
     lines = [
         [row.theory, row.way, duration(row.cost * seconds), duration(row.once * seconds) if row.once else ""]
-        + [percent(v, "%") for v in (row.area_light, row.area_deep, row.force_light, row.force_deep)]
+        + [percent(getattr(row, name), "%") for name in DEVIATIONS]
         + ["" if row.reached_deep > 0.995 else f"{row.reached_light:.0%}, {row.reached_deep:.0%}"]
-        for row in rows
+        for row in distances.itertuples()
     ]
     kinds = " | ".join(f"{what}, {ends}" for what in ("area", "force") for ends in ("1-10%", "10-97%"))
-    return table(f"theory | method | time per point | time per surface | {kinds} | reached", lines)
-
-
-def parts_of(costs: Costs, distances: Sequence[Distance]) -> dict[str, str]:
-    """The measured blocks of the page."""
-    # of several tolerances the tightest, which is listed last
-    once = {
-        (row.island_model, row.what): row
-        for row in costs.rows
-        if (row.what in ONCE and row.quantity == "both") or row.what == "invert" or row.island_model in THEORIES
-    }
     return {
-        "unit": f"Here the fixed work took {1e6 * costs.seconds:.0f} us, on one core.",
-        **{name: ranked(rows) for name, rows in zip(("islands", "totals"), groups(costs).values(), strict=True)},
-        "once": rows_table(once.values()),
-        "alone": alone(costs),
-        "distances": deviations(distances, costs.seconds),
+        "unit": f"Here the fixed work took {1e6 * seconds:.0f} us, on one core.",
+        **{name: ranked(own) for name, own in zip(("islands", "totals"), groups(rows).values(), strict=True)},
+        "once": rows_table(once.reset_index()),
+        "alone": table("method | pressure alone | area alone", cells, "{} | {:.2f} to {:.2f}"),
+        "distances": table(f"theory | method | time per point | time per surface | {kinds} | reached", lines),
     }
 
 
-def draw(costs: Costs) -> Any:
+def draw(costs: pd.DataFrame) -> Any:
     """Error against cost, of islands and of totals."""
-    own = groups(costs)
-    names = list(dict.fromkeys(family(row) for rows in own.values() for row in rows))
-    handles: dict[str, Any] = {}
+    own, handles = groups(costs), dict[str, Any]()
+    for rows in own.values():
+        by_nodes = (rows["island_model"] == "exact") & rows["what"].str.startswith("nodes=")
+        rows["family"] = rows["method"].where(~by_nodes, rows["method"] + ", by nodes")
+    names = pd.concat(own.values())["family"].unique()
     figure, axes = panels(1, 2, (9, 4.8), sharey=True)
     for panel, (title, rows) in zip(axes, own.items(), strict=True):
         for k, name in enumerate(names):
-            chosen = [row for row in rows if family(row) == name]
-            if chosen:
-                x, y = [row.cost for row in chosen], [row.error for row in chosen]
+            chosen = rows[rows["family"] == name]
+            if len(chosen):
                 style: dict[str, Any] = {"color": f"C{k % 10}", "marker": "osD^vP*Xh<>d"[k % 12], "ls": "none", "ms": 5}
-                (handles[name],) = panel.loglog(x, y, **style)
+                (handles[name],) = panel.loglog(chosen["cost"], chosen["error"], **style)
         front = pareto_front(rows)
-        x, y = [row.cost for row in front], [row.error for row in front]
-        (handles["Pareto front"],) = panel.step(x, y, "k-", lw=1, where="post", zorder=0)
+        (handles["Pareto front"],) = panel.step(front["cost"], front["error"], "k-", lw=1, where="post", zorder=0)
         panel.set(xlabel="time / fixed piece of work", title=title)
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("largest relative error")
@@ -159,19 +140,18 @@ def draw(costs: Costs) -> Any:
     return figure
 
 
-def draw_distances(rows: Sequence[Distance], seconds: float) -> Any:
+def draw_distances(rows: pd.DataFrame, seconds: float) -> Any:
     """Deviation against time: area above, force below, light contact left, deep contact right."""
     figure, axes = panels(2, 2, (9, 7.4), sharex=True, sharey=True)
-    names = ("area_light", "area_deep", "force_light", "force_deep")
-    for panel, name in zip(axes.flat, names, strict=True):
+    for panel, name in zip(axes.flat, DEVIATIONS, strict=True):
         for theory, colour in (HUES | {cost_distances.SIMULATED: "C5"}).items():
             marker = next((shape for start, shape in SHAPES.items() if theory.startswith(start)), "*")
-            own = [row for row in rows if row.theory == theory]
-            x, y = [row.cost * seconds for row in own], [100 * getattr(row, name) for row in own]
+            own = rows[rows["theory"] == theory]
+            x, y = own["cost"] * seconds, 100 * own[name]
             panel.loglog(x, y, marker, color=colour, ls="none", ms=6, label=theory)
-            for row, a, b in zip(own, x, y, strict=True):
-                if theory == cost_distances.SIMULATED and row.way.endswith("cold"):
-                    panel.annotate(row.way.split()[0], (a, b), (4, 3), textcoords="offset points", fontsize=7)
+            for way, a, b in zip(own["way"], x, y, strict=True):
+                if theory == cost_distances.SIMULATED and way.endswith("cold"):
+                    panel.annotate(way.split()[0], (a, b), (4, 3), textcoords="offset points", fontsize=7)
         panel.grid(alpha=0.3)
     for panel, title in zip(axes[0], ("1-10% contact", "10-97% contact"), strict=True):
         panel.set_title(title)
@@ -183,15 +163,17 @@ def draw_distances(rows: Sequence[Distance], seconds: float) -> Any:
     return figure
 
 
+def page_of(costs: bytes, distances: bytes) -> Measured:
+    """The measured blocks and the figures from the content of both files, rounded as it is there."""
+    rows, others = read(costs), pd.read_csv(io.BytesIO(distances), comment="#")
+    seconds = rows["cost"][rows["island_model"] == UNIT].iloc[0]
+    figures = {"cost": draw(rows), "distance": draw_distances(others, seconds)}
+    return parts_of(rows, others), {f"docs/figures/{name}.svg": figure for name, figure in figures.items()}
+
+
 def measure() -> Measured:
     """The measured blocks of the page, and its files."""
-    data = {"cost.csv": study(), "distance.csv": records(cost_distances.HEAD, cost_distances.study())}
-    # the page shows what the files hold, rounded as it is there
-    with tempfile.TemporaryDirectory() as folder:
-        for name, content in data.items():
-            pathlib.Path(folder, name).write_bytes(content)
-        costs = read_costs(pathlib.Path(folder, "cost.csv"))
-        distances = read_distances(pathlib.Path(folder, "distance.csv"))
-    figures = {"cost": draw(costs), "distance": draw_distances(distances, costs.seconds)}
-    files = {f"docs/figures/{name}.svg": figure for name, figure in figures.items()}
-    return parts_of(costs, distances), files | {f"tables/{name}": content for name, content in data.items()}
+    files = {"tables/cost.csv": study()}
+    files["tables/distance.csv"] = to_csv(cost_distances.HEAD, pd.DataFrame(cost_distances.study()), "%.4g")
+    parts, figures = page_of(*files.values())
+    return parts, figures | files

@@ -6,7 +6,7 @@ import functools
 import itertools
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,12 +41,8 @@ FORMS = ("pocket", "standard", "long")
 SURFACES = tuple(
     Surface(hurst, 1.0, zeta_1, rough, top * rough)
     for hurst, zeta_1, rough, top in (
-        (0.35, 40.0, 0.05, 3.1),
-        (0.52, 1300.0, 0.02, 3.4),
-        (0.63, 14.0, 0.30, 2.7),
-        (0.74, 330.0, 0.10, 3.0),
-        (0.86, 6100.0, 0.18, 3.6),
-        (0.97, 90.0, 0.08, 3.8),
+        *((0.35, 40.0, 0.05, 3.1), (0.52, 1300.0, 0.02, 3.4), (0.63, 14.0, 0.30, 2.7)),
+        *((0.74, 330.0, 0.10, 3.0), (0.86, 6100.0, 0.18, 3.6), (0.97, 90.0, 0.08, 3.8)),
     )
 )
 GAPS, EVERY = 50, 5  # of each surface, and which of them are compared with the reference
@@ -57,7 +53,7 @@ LAW_RTOLS, SLOW_LAW_RTOLS, THEORY_LAW_RTOLS = RTOLS[1:], (1e-2, 1e-4), (1e-3, 1e
 THEORY_GAPS = {"calibrated": 20_000, "greenwood_williamson": 20_000, "persson": 100}
 FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); t = time.process_time(); "
-    "mbma_tables.contact(s, separation=0.1, island_model={island_model!r}, rtol=1e-2); print(time.process_time() - t)"
+    "mbma_tables.contact(s, separation=0.1, island_model={!r}, rtol=1e-2); print(time.process_time() - t)"
 )
 QUANTITIES = {"both": ("pressure", "area"), "pressure": ("pressure",), "area": ("area",)}
 
@@ -80,30 +76,17 @@ def island_error(phi_F: FloatArray, phi_A: FloatArray, truth: FloatArray) -> flo
     return float(np.abs(np.stack([phi_F, phi_A]) / truth - 1).max())
 
 
-def classical(places: Sequence[tuple[float, float]], matrix: FloatArray, tolerance: float) -> FloatArray:
-    """Steps, converged, Phi_F and Phi_A (4, islands); the matrix is made beforehand, and not timed."""
-    w, p = np.empty(len(matrix)), np.empty(len(matrix))
-    rows = [iterate(X, mu, radius(X, mu, tolerance), matrix, DAMPING, tolerance, MAX_STEPS, w, p) for X, mu in places]
-    return np.array(rows).T
-
-
-def classical_rows() -> Iterator[Row]:
-    """The damped iteration at several meshes and tolerances."""
+def island_rows() -> Iterator[Row]:
+    """Models that do not solve, Newton by tolerance and by nodes and with p(r) kept, and the classical iteration."""
     islands, truth = held_out()
-    chosen = np.linspace(0, ISLANDS - 1, HARD).astype(int)
-    places = list(zip(islands["X"][chosen], islands["mu"][chosen], strict=True))
-    for rings, tolerance in MESHES:
-        run = functools.partial(classical, places, ring_matrix(rings), tolerance)
-        steps, converged, force, area = run()
-        if not converged.all():
-            raise ConvergenceError(f"the classical iteration on {rings} rings did not converge", converged == 0)
-        error, pressures = island_error(force, area, truth[:, chosen]), rings * (float(steps.mean()) + 1)
-        yield Row("classical", at(f"rings={rings}", tolerance), "both", error, measure(run)[0] / HARD, pressures)
+    named = [name for name in ISLAND_MODELS if name != "exact"]
+    models: list[Any] = [(name, "island", get_model(name, 1e-8, get_variant("reported"))) for name in named]
+    models += [("formula", f"island form={name}", FormulaModel(name)) for name in FORMS]
+    for island_model, name, model in models:
+        run: Any = functools.partial(answer_islands, model, islands)
+        answer, (cost, _) = run(), measure(run)
+        yield Row(island_model, name, "both", island_error(answer.phi_F, answer.phi_A, truth), cost / ISLANDS, 2)
 
-
-def newton_rows() -> Iterator[Row]:
-    """Newton to several tolerances, on several numbers of nodes, and with p(r) kept."""
-    islands, truth = held_out()
     X, mu = islands["X"][::4], islands["mu"][::4]
     least = greenwood_tripp.MIN_SOLVER_RTOL
     ways: dict[str, dict[str, Any]] = {at("island", rtol): {"rtol": max(0.1 * rtol, least)} for rtol in NEWTON_RTOLS}
@@ -113,25 +96,27 @@ def newton_rows() -> Iterator[Row]:
         solved, (cost, _) = run(), measure(run)
         error = island_error(solved.phi_F, solved.phi_A, truth[:, ::4])
         yield Row("exact", name, "both", error, cost / X.size, float((solved.nodes * (solved.iterations + 1)).mean()))
-
-    def profiles(rtol: float) -> FloatArray:
-        return np.asarray(greenwood_tripp.solve(X[:PROFILES], mu[:PROFILES], rtol=rtol).pressure)
-
     for rtol in (1e-4, 1e-8):
-        cost, _ = measure(functools.partial(profiles, rtol))
+        cost, _ = measure(lambda rtol=rtol: greenwood_tripp.solve(X[:PROFILES], mu[:PROFILES], rtol=rtol).pressure)  # type: ignore[misc]
         yield Row("exact", at("profile", rtol), "both", None, cost / PROFILES)
 
+    chosen = np.linspace(0, ISLANDS - 1, HARD).astype(int)
+    places = list(zip(islands["X"][chosen], islands["mu"][chosen], strict=True))
+    for rings, tolerance in MESHES:
+        # the matrix is made beforehand, and not timed
+        run = functools.partial(classical, places, ring_matrix(rings), tolerance)
+        steps, converged, force, area = run()
+        if not converged.all():
+            raise ConvergenceError(f"the classical iteration on {rings} rings did not converge", converged == 0)
+        error, pressures = island_error(force, area, truth[:, chosen]), rings * (float(steps.mean()) + 1)
+        yield Row("classical", at(f"rings={rings}", tolerance), "both", error, measure(run)[0] / HARD, pressures)
 
-def model_rows() -> Iterator[Row]:
-    """Models that do not solve: the shipped ones and each closed form."""
-    islands, truth = held_out()
-    named = [name for name in ISLAND_MODELS if name != "exact"]
-    models: list[Any] = [(name, "island", get_model(name, 1e-8, get_variant("reported"))) for name in named]
-    models += [("formula", f"island form={name}", FormulaModel(name)) for name in FORMS]
-    for island_model, name, model in models:
-        run = functools.partial(answer_islands, model, islands)
-        answer, (cost, _) = run(), measure(run)
-        yield Row(island_model, name, "both", island_error(answer.phi_F, answer.phi_A, truth), cost / ISLANDS, 2)
+
+def classical(places: Sequence[tuple[float, float]], matrix: FloatArray, tolerance: float) -> FloatArray:
+    """Steps, converged, Phi_F and Phi_A (4, islands) by the damped iteration."""
+    w, p = np.empty(len(matrix)), np.empty(len(matrix))
+    rows = [iterate(X, mu, radius(X, mu, tolerance), matrix, DAMPING, tolerance, MAX_STEPS, w, p) for X, mu in places]
+    return np.array(rows).T
 
 
 class Doubled:
@@ -150,6 +135,11 @@ def gaps_of(surface: Surface, count: int = GAPS) -> FloatArray:
     return np.linspace(-0.5, 1.0, count, endpoint=False) * float(surface.h_max)
 
 
+def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
+    """Totals at `count` gaps of each surface, or at some of them, one call a surface."""
+    return [contact(surface, separation=gaps_of(surface, count)[::every], **options) for surface in SURFACES]
+
+
 @functools.cache
 def reference() -> tuple[dict[str, FloatArray], ...]:
     """Force and area of every surface at every fifth of its gaps."""
@@ -158,7 +148,7 @@ def reference() -> tuple[dict[str, FloatArray], ...]:
 
 
 def largest_error(answers: Sequence[dict[str, FloatArray]]) -> float:
-    """Of what is answered, surface by surface, at the reference's gaps."""
+    """Largest error of answers to some quantities, surface by surface, at the reference's gaps."""
     pairs = zip(answers, reference(), strict=True)
     return max(float(np.abs(own[name] / truth[name] - 1).max()) for own, truth in pairs for name in own)
 
@@ -170,11 +160,6 @@ def scene_rows() -> Iterator[Row]:
     whole = measure(Scene(surface, effects=["pressure"], separations=gap, rtol=1e-4).run)[0]
     step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["pressure"]))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
-
-
-def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
-    """Totals at `count` gaps of each surface, or at some of them, one call a surface."""
-    return [contact(surface, separation=gaps_of(surface, count)[::every], **options) for surface in SURFACES]
 
 
 def gap_rows() -> Iterator[Row]:
@@ -189,8 +174,7 @@ def gap_rows() -> Iterator[Row]:
             run = functools.partial(ask, GAPS, rtol=rtol)
             islands = sum(answer.islands for answer in run()) / (len(SURFACES) * GAPS)
             cost = max(measure(run)[0] / len(SURFACES) - fixed, 1e-9) / GAPS
-            answers = [{name: getattr(answer, name) for name in names} for answer in run(every=EVERY)]
-            error = largest_error(answers)
+            error = largest_error([{name: getattr(answer, name) for name in names} for answer in run(every=EVERY)])
             yield Row(island_model, at("gap", rtol), quantity, error, cost, islands)
 
 
@@ -203,23 +187,18 @@ def law_rows() -> Iterator[Row]:
     for island_model in ISLAND_MODELS:
         timed = SURFACES[:2] if island_model == "exact" else SURFACES
         for rtol in LAW_RTOLS if island_model == "universal" else SLOW_LAW_RTOLS:
-            laws = make(island_model, rtol)
-            places = [gaps_of(surface)[::EVERY] for surface in SURFACES]
-            answers = [
-                {"pressure": law.pressure(separation=d), "area": law.area(separation=d)}
-                for law, d in zip(laws, places, strict=True)
-            ]
+            pairs = zip(make(island_model, rtol), (gaps_of(surface)[::EVERY] for surface in SURFACES), strict=True)
+            answers = [{"pressure": law.pressure(separation=d), "area": law.area(separation=d)} for law, d in pairs]
             cost, _ = measure(functools.partial(make, island_model, rtol, timed))
             yield Row(island_model, at("law", rtol), "both", largest_error(answers), cost / len(timed))
     law, gaps = contact_law(SURFACES[3]), gaps_of(SURFACES[3], 10_000)
     loads = law.pressure(separation=gaps)
-    ways: dict[tuple[str, str], Callable[[], Any]] = {
-        ("lookup", "pressure"): lambda: law.pressure(separation=gaps),
-        ("lookup", "area"): lambda: law.area(separation=gaps),
-        ("lookup", "both"): lambda: (law.pressure(separation=gaps), law.area(separation=gaps)),
-        ("invert", "pressure"): lambda: law.separation(pressure=loads),
-    }
-    for (name, quantity), run in ways.items():
+    for name, quantity, run in (
+        ("lookup", "pressure", lambda: law.pressure(separation=gaps)),
+        ("lookup", "area", lambda: law.area(separation=gaps)),
+        ("lookup", "both", lambda: (law.pressure(separation=gaps), law.area(separation=gaps))),
+        ("invert", "pressure", lambda: law.separation(pressure=loads)),
+    ):
         yield Row("law", name, quantity, None, measure(run)[0] / gaps.size)
 
 
@@ -227,12 +206,13 @@ def theory_rows() -> Iterator[Row]:
     """Theories other than MBMA: a call, each further gap by separation or by pressure, energies, and laws."""
     for name in theories.THEORIES[1:]:
         u = np.linspace(0.1, 0.9, THEORY_GAPS[name]) * float(SURFACES[3].h_max)
-        ask = functools.partial(contact, SURFACES[3], theory=name)
-        given: dict[str, Any] = {"pressure": ask(mean_separation=u).pressure}
-        one = measure(functools.partial(ask, mean_separation=u[:1]))[0]
-        gap = measure(functools.partial(ask, mean_separation=u))[0]
+        ask: Any = functools.partial(contact, SURFACES[3], theory=name)
+        given = ask(mean_separation=u).pressure
+        one, gap, inverse = (
+            measure(functools.partial(ask, **options))[0]
+            for options in ({"mean_separation": u[:1]}, {"mean_separation": u}, {"pressure": given})
+        )
         fixed = max((u.size * one - gap) / (u.size - 1), 1e-3 * one)
-        inverse = measure(functools.partial(ask, **given))[0]
         energy = measure(lambda ask=ask, u=u: ask(mean_separation=u).energy)[0]  # type: ignore[misc]
         yield Row(name, "call", "both", None, fixed)
         for what, cost in {"gap": gap - fixed, "invert": inverse - fixed, "energy": energy - gap}.items():
@@ -246,17 +226,12 @@ def first_use_rows() -> Iterator[Row]:
     """First use in a new process."""
     seconds = measure(lambda: None)[1]
     for island_model in ISLAND_MODELS:
-        command = [sys.executable, "-c", FIRST_USE.format(island_model=island_model)]
+        command = [sys.executable, "-c", FIRST_USE.format(island_model)]
         taken = [float(subprocess.run(command, check=True, capture_output=True).stdout) for _ in range(4)]
         # the first fills the caches of the system
         yield Row(island_model, "import", "both", None, min(taken[1:]) / seconds)
 
 
-def island_rows() -> list[Row]:
-    """Everything that answers an island."""
-    return [*model_rows(), *newton_rows(), *classical_rows()]
-
-
-def total_rows() -> list[Row]:
-    """Everything that answers a gap."""
-    return [*scene_rows(), *gap_rows(), *law_rows(), *theory_rows(), *first_use_rows()]
+def total_rows() -> Iterator[Row]:
+    """Every way to answer a gap."""
+    yield from itertools.chain(scene_rows(), gap_rows(), law_rows(), theory_rows(), first_use_rows())

@@ -15,7 +15,7 @@ import numpy as np
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve
 from generate.calibrated import errors
-from generate.calibrated_file import QUANTITIES
+from generate.calibrated_file import QUANTITIES, rms
 from generate.pages.page import DATA, evidence, read_csv
 from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
@@ -28,6 +28,12 @@ LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are su
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
 MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
 ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps
+# file, zeta_1, rms gradient and h_max of sets that nothing was fitted to
+OLDER = {
+    "bem": ("bem_hurst0.8_zeta64.csv", 64.0, 1.0, 3.3973),
+    "gfmd": ("gfmd_hurst0.8_zeta100.csv", 100.0, 0.2766, 3.4),
+    "challenge": ("challenge.csv", 200.0, 1.0, 3.45),
+}
 
 
 def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[Case], Any]:
@@ -70,9 +76,7 @@ class DataSet:
 
 def distances(seen: Sequence[Case], theory: Callable[[Case], Any]) -> dict[str, FloatArray]:
     """ln(theory/simulation) at every load of every surface, NaN where the theory does not reach it."""
-    parts: dict[str, list[FloatArray]] = {
-        name: [np.full(one.force.shape, np.nan) for one in seen] for name in QUANTITIES
-    }
+    parts = {name: [np.full(one.force.shape, np.nan) for one in seen] for name in QUANTITIES}
     for number, one in enumerate(seen):
         with np.errstate(all="ignore"):
             try:
@@ -97,29 +101,22 @@ def _simulated(kind: str, rows: Any, h_max: float, spectrum: Spectrum | None = N
     hurst, zeta_1 = more.pop("hurst", 0.8), more.pop("zeta_1", 0.0)
     spectrum = spectrum or Spectrum.self_affine(hurst, zeta_1)
     force, area, u = (np.asarray(row, dtype=float) for row in rows)
-    node = (kind, hurst, zeta_1, 0, 0.0)
-    return Case(kind, "", node, MIN_WAVES, 0, spectrum, spectrum, h_max, more, force, area, u)
+    return Case(kind, "", (kind, hurst, zeta_1, 0, 0.0), MIN_WAVES, 0, spectrum, spectrum, h_max, more, force, area, u)
 
 
 def earlier() -> list[Case]:
     """The 105 surfaces of docs/data/boundary_elements.csv, to which the variant `fitted` was fitted."""
-    table, keys = read_csv("boundary_elements.csv"), ["hurst", "L_over_lambda0", "zeta_1", "seed", "n"]
-    found = []
-    for node in np.unique(table[keys]):
-        own = table[table[keys] == node]
+    keys, found = ["hurst", "L_over_lambda0", "zeta_1", "seed", "n"], []
+    for (hurst, _, zeta_1, *_), own in read_csv("boundary_elements.csv").groupby(keys):
         rows = [own[name] for name in ("force", "area", "u_over_h_rms")]
-        known: dict[str, Any] = {"hurst": float(node["hurst"]), "zeta_1": float(node["zeta_1"])}
-        found.append(_simulated("self_affine", rows, float(own["h_max_over_h_rms"][0]), **known))
+        h_max = float(own["h_max_over_h_rms"].iloc[0])
+        found.append(_simulated("self_affine", rows, h_max, hurst=float(hurst), zeta_1=float(zeta_1)))
     return found
 
 
 def older(name: str) -> Case:
-    """One of the sets that nothing was ever fitted to: "bem", "gfmd" or "challenge"."""
-    file, zeta_1, gradient, h_max = {
-        "bem": ("bem_hurst0.8_zeta64.csv", 64.0, 1.0, 3.3973),
-        "gfmd": ("gfmd_hurst0.8_zeta100.csv", 100.0, 0.2766, 3.4),
-        "challenge": ("challenge.csv", 200.0, 1.0, 3.45),
-    }[name]
+    """One of `OLDER`."""
+    file, zeta_1, gradient, h_max = OLDER[name]
     table = read_csv(file)
     rows = [table["force"] / gradient, table["area"], table["mean_separation_over_h_rms"]]
     if name != "challenge":
@@ -134,9 +131,8 @@ def older(name: str) -> Case:
 def rolloff(number: int) -> Case:
     """A surface with a plateau by its map's own spectrum."""
     force, area, _, u = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",").T[:4]
-    table = read_csv("rolloff_spectra.csv")
-    own = table[table["map"] == number]
-    spectrum, h_rms = Spectrum.from_shares(own["q"], own["variance"]), np.sqrt(own["variance"].sum())
+    own = read_csv("rolloff_spectra.csv").query("map == @number")
+    spectrum, h_rms = Spectrum.from_shares(*own[["q", "variance"]].to_numpy().T), np.sqrt(own["variance"].sum())
     # wavenumbers over h_rms: their unit cancels
     rows = [force / (spectrum.gradient * h_rms), area, u / h_rms]
     return _simulated("plateau", rows, ROLLOFF[number] / h_rms, spectrum)
@@ -183,4 +179,4 @@ def summed_up(seen: Sequence[Case], found: FloatArray, low: float = LOW, high: f
     area = np.concatenate([one.area for one in seen])
     values = found[(area >= low) & (area <= high)]
     known = values[np.isfinite(values)]
-    return (float(np.sqrt(np.mean(known**2))), known.size / values.size) if known.size else (np.nan, 0.0)
+    return (rms(known), known.size / values.size) if known.size else (np.nan, 0.0)

@@ -27,7 +27,7 @@ STEP = """async (place) => {
 
 
 def processor(tab: Any) -> Callable[[], float]:
-    """Milliseconds of the processor since a tab began, of its main thread, whatever other programs do."""
+    """Milliseconds of processor time of a tab's main thread since it began, other programs excluded."""
     session = tab.context.new_cdp_session(tab)
     session.send("Performance.enable", {"timeDomain": "threadTicks"})
 
@@ -49,7 +49,7 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        # as root, which CI often is, it runs without a sandbox alone
+        # as root, as often in CI, it only runs without a sandbox
         opened = playwright.chromium.launch(executable_path=program(), args=["--no-sandbox"])
         yield opened
         opened.close()

@@ -42,35 +42,16 @@ def law(name: str, rows: int, evenly: bool = False) -> LawTable:
     return describe_law(Surface.named(name), E_STAR, stress_unit="MPa", rows=rows, evenly=evenly)
 
 
-def errors() -> str:
-    """Largest errors of linear interpolation by surface and rows."""
-    lines = []
-    for name, rows in itertools.product(NAMES, (20, 50, 200)):
-        chosen, even = (law(name, rows, evenly).largest_error for evenly in (False, True))
-        lines.append([name, rows, chosen, even, even / chosen])
-    return table("surface | rows | chosen | equally spaced | ratio", lines, "{} | {} | {:.1e} | {:.1e} | {:.1f}")
-
-
-def sizes() -> str:
-    """Characters of laws as code, in thousands."""
-    heat: dict[str, Any] = {"conductivity": 1.0, "conductivity_unit": "W/(m K)", "stress_unit": "MPa"}
-    road = Surface.named(NAMES[0])
-    lines = [
-        [target, *(len(law_text(target, road, E_STAR, theory=t, **heat)) / 1e3 for t in THEORIES)] for target in LAWS
-    ]
-    return table(f"target | {' [kB] | '.join(THEORIES)} [kB]", lines, "{} | {:.1f}")
-
-
 def compiled() -> str:
     """Laws in C, by gcc -O2: largest differences from the library's law, and the time of a value with its tangent."""
     lines, pairs = [], {name: name for name in ("pressure", "area", "energy")} | {"tangent": "stiffness"}
+    road = Surface.named(NAMES[0])
     for theory in THEORIES:
-        own, rng = contact_law(Surface.named(NAMES[0]), E_star=E_STAR, theory=theory), np.random.default_rng(18)
-        depths = (1 - 10 ** rng.uniform(-12, -0.3, 5000), rng.uniform(-0.99, 1, 5000))
-        d = own.h_max * np.concatenate(depths)
+        own, rng = contact_law(road, E_star=E_STAR, theory=theory), np.random.default_rng(18)
+        d = own.h_max * np.concatenate([1 - 10 ** rng.uniform(-12, -0.3, 5000), rng.uniform(-0.99, 1, 5000)])
         c = (own.h_max - d) / 2
         with tempfile.TemporaryDirectory() as folder:
-            source = law_text("c-law", Surface.named(NAMES[0]), E_STAR, theory=theory, stress_unit="MPa") + LOOP
+            source = law_text("c-law", road, E_STAR, theory=theory, stress_unit="MPa") + LOOP
             pathlib.Path(folder, "law.c").write_text(source, encoding="utf-8")
             command = ["gcc", "-std=c99", "-O2", "-shared", "-fPIC", "law.c", "-lm", "-o", "law.so"]
             subprocess.run(command, cwd=folder, check=True)
@@ -79,8 +60,7 @@ def compiled() -> str:
         for name, field in pairs.items():
             function = getattr(library, f"law_{name}")
             function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
-            ratios = [abs(function(x) / y - 1) for x, y in zip(c, getattr(known, field), strict=True)]
-            cells.append(max(ratios))
+            cells.append(np.abs(np.array([*map(function, c)]) / getattr(known, field) - 1).max())
         library.law_loop.restype = ctypes.c_double
         even = c[5000:].copy()
         address, total = even.ctypes.data_as(ctypes.c_void_p), ctypes.byref(ctypes.c_double())
@@ -90,20 +70,25 @@ def compiled() -> str:
     return table(header, lines, f"{{}} | {'{:.1e} | ' * len(pairs)}{{:.0f}} ns")
 
 
-def draw() -> Any:
-    """Rows of the concrete road, chosen by error and equally spaced, on the curve."""
+def measure() -> Measured:
+    """The measured blocks, and rows of the concrete road, chosen by error and equally spaced, on the curve."""
+    errors = []
+    for name, rows in itertools.product(NAMES, (20, 50, 200)):
+        chosen, even = (law(name, rows, evenly).largest_error for evenly in (False, True))
+        errors.append([name, rows, chosen, even, even / chosen])
+    heat: dict[str, Any] = {"conductivity": 1.0, "conductivity_unit": "W/(m K)", "stress_unit": "MPa"}
+    road = Surface.named(NAMES[0])
+    sizes = [[to, *(len(law_text(to, road, E_STAR, theory=t, **heat)) / 1e3 for t in THEORIES)] for to in LAWS]
+    header = "surface | rows | chosen | equally spaced | ratio"
+    parts = {"errors": table(header, errors, "{} | {} | {:.1e} | {:.1e} | {:.1f}"), "compiled": compiled()}
+    parts["sizes"] = table(f"target | {' [kB] | '.join(THEORIES)} [kB]", sizes, "{} | {:.1f}")
     figure, axes = panels(size=(6, 4))
     fine = law("concrete", 500)
     axes.semilogy(fine.x[1:], fine.y[1:], "k-", lw=0.8, label="model")
     for evenly, mark, label in ((False, "o", "chosen"), (True, "x", "equally spaced")):
-        rows = law("concrete", 20, evenly)
-        axes.semilogy(rows.x[1:], rows.y[1:], mark, label=f"20 rows, {label}: error {rows.largest_error:.1%}")
+        own = law("concrete", 20, evenly)
+        axes.semilogy(own.x[1:], own.y[1:], mark, label=f"20 rows, {label}: error {own.largest_error:.1%}")
     axes.set(xlabel="overclosure [mm]", ylabel="pressure [MPa]", ylim=(1e-4, 5))
     axes.grid(True, alpha=0.3)
     axes.legend()
-    return figure
-
-
-def measure() -> Measured:
-    """The measured blocks of the page, and its figure."""
-    return {"errors": errors(), "sizes": sizes(), "compiled": compiled()}, {"docs/figures/export.svg": draw()}
+    return parts, {"docs/figures/export.svg": figure}

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
-from generate.calibrated_file import QUANTITIES, binned
+from generate.calibrated_file import QUANTITIES, by_bin
 from generate.pages import distances
 from generate.pages.page import Measured, panels, percent, table
 from mbma_tables import Surface, contact, theories
@@ -56,13 +57,6 @@ def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
     return answer_where_finite(THEORIES[theory], surface, np.atleast_1d(ratio) * surface.h_rms).pressure
 
 
-def show(value: Any, quoted: float | None = None) -> str:
-    """Three digits, and in brackets the ratio to what is quoted; a dash where there is no number."""
-    if not np.isfinite(value):
-        return "—"
-    return f"{value:.3g}" + (f" ({value / quoted:.2g})" if quoted else "")
-
-
 @functools.cache
 def forces(name: str, ratio: float, unit: float = 1.0) -> Values:
     """F/(A0 E*) of every theory at u = ratio * h_rms of a named surface, in a unit."""
@@ -79,12 +73,13 @@ def kappa(surface: Surface, area: float) -> Values:
 def quoted_numbers() -> Iterable[Quoted]:
     """Numbers that the paper quotes, beside every theory's."""
     case = "yang-persson"
-    for ratio, name, quoted, subject in (
-        (2.5, "MBMA", 2.2e-4, VARIANTS),
-        (2.0, "MBMA", 2.9e-3, VARIANTS),
-        (3.0, "Persson", 3.5e-4, PERSSON),
-        (2.5, "Persson", 1e-3, PERSSON),
+    for ratio, name, quoted in (
+        (2.5, "MBMA", 2.2e-4),
+        (2.0, "MBMA", 2.9e-3),
+        (3.0, "Persson", 3.5e-4),
+        (2.5, "Persson", 1e-3),
     ):
+        subject = VARIANTS if name == "MBMA" else PERSSON
         yield case, f"F/(A0 E*), u = {ratio:g} h_rms: {name}", quoted, subject, forces(case, ratio)
     yield case, "F/A0 in MPa, steel, u = 3 h_rms: Persson", 70.0, PERSSON, forces(case, 3.0, 1 / STEEL)
     meets = forces(case, 0.0, forces(case, 0.0)["Persson simplified"])
@@ -94,8 +89,8 @@ def quoted_numbers() -> Iterable[Quoted]:
     case, bem = "papangelo", distances.older("bem")
     for u, force in zip(bem.u, bem.force, strict=True):
         if 0.01 < u < 0.05:
-            what = f"F over boundary elements, u = {u:.4g} h_rms: MBMA"
-            yield case, what, "within 2x", (), forces(case, u, force * float(Surface.named(case).rms_gradient))
+            what, unit = f"F over boundary elements, u = {u:.4g} h_rms: MBMA", float(Surface.named(case).rms_gradient)
+            yield case, what, "within 2x", (), forces(case, u, force * unit)
 
     for name, top, slope in (("concrete", 4.1, 1.98), ("asphalt", 4.5, 1.75)):
         road = Surface.named(name)
@@ -114,12 +109,15 @@ def quoted_numbers() -> Iterable[Quoted]:
 
 
 def quoted_table() -> str:
-    """What the paper quotes beside what every theory gives."""
+    """What the paper quotes beside what every theory gives, in brackets their ratio."""
     rows = []
     for case, what, quoted, subject, values in quoted_numbers():
-        unit = {t: quoted for t in subject if isinstance(quoted, float)}
-        cells = [show(values.get(t, np.nan), unit.get(t)) for t in THEORIES]
-        rows.append([case, what, quoted if isinstance(quoted, str) else show(quoted), *cells])
+        known = [values.get(t, np.nan) for t in THEORIES]
+        cells = [f"{v:.3g}" if np.isfinite(v) else "—" for v in known]
+        if isinstance(quoted, float):
+            pairs = zip(cells, known, THEORIES, strict=True)
+            cells = [f"{c} ({v / quoted:.2g})" if t in subject and c != "—" else c for c, v, t in pairs]
+        rows.append([case, what, quoted if isinstance(quoted, str) else f"{quoted:.3g}", *cells])
     return table(f"case | quantity | paper | {' | '.join(THEORIES)}", rows)
 
 
@@ -171,16 +169,16 @@ def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = tuple(T
     ax.set(xlabel=r"$u/h_{rms}$", ylabel=r"$F/(A_0 E^*)$", ylim=(low, None), xlim=(0, 1.1 * top))
 
 
-def by_force(ax: Any, surface: Surface, ratio: Callable[[Any, Any], Any] | None = None, **style: Any) -> None:
-    """Area, or a ratio of area and force, against force; (18) is Persson's area in full and simplified."""
+def by_force(ax: Any, surface: Surface, gradient: Any = None, **style: Any) -> None:
+    """Area, or kappa where the rms gradient is given, against force; (18) is Persson's area in full and simplified."""
     for name in (*VARIANTS, "G-W", "Persson full"):
         force, area = curve(surface, name)
         shown = (area > 1e-5) & (area < 1.2)
         force, area = force[shown], area[shown]
-        values = ratio(force, area) if ratio else area
+        values = area if gradient is None else area / force * gradient
         ax.plot(force, values, color=COLOURS[name], **{"label": name.removesuffix(" full"), **style})
     ax.set(xscale="log", xlabel=r"$F/(A_0 E^*)$")
-    if ratio is None:
+    if gradient is None:
         ax.set(yscale="log", ylabel=r"$A/A_0$")
 
 
@@ -195,7 +193,6 @@ def simulations() -> Figures:
         ax.plot([2.5, 3.0], [1e-3, 3.5e-4], "k+", label="quoted: Persson")
     axes[0].legend(fontsize="small")
     yield "fig11", figure
-
     for name, key, title in (("papangelo", "bem", "fig12"), ("challenge", "challenge", "fig15")):
         surface, data = Surface.named(name), distances.older(key)
         figure, axes = panels(1, 2 if key == "challenge" else 1, squeeze=False)
@@ -209,96 +206,82 @@ def simulations() -> Figures:
         yield title, figure
 
 
-def roads() -> Figures:
-    """Figures 13 and 14."""
-    (gap_figure, gap_axes), (area_figure, area_axes) = panels(1, 2), panels(1, 2)
-    for gap_ax, ax, name in zip(gap_axes, area_axes, ROADS, strict=True):
+def by_surface() -> Figures:
+    """Figures 13 and 14 of two roads, 16 and 17 of resolutions."""
+    pairs = [panels(1, 2), panels(1, 2)]
+    for gap_ax, ax, name in zip(pairs[0][1], pairs[1][1], ROADS, strict=True):
         surface = Surface.named(name)
         by_gap(gap_ax, surface, 1e-6)
-        gap_ax.set_title(name)
         by_force(ax, surface)
         force = np.geomspace(1e-5, 0.3, 2) * surface.rms_gradient
         ax.plot(force, 2 * force / surface.rms_gradient, "k:", label="kappa = 2")
-        ax.set(title=name)
-    for figure, axes, title in ((gap_figure, gap_axes, "fig13"), (area_figure, area_axes, "fig14")):
-        axes[0].legend(fontsize="small")
-        yield title, figure
-
-
-def resolution() -> Figures:
-    """Figures 16 and 17."""
+        for each in (gap_ax, ax):
+            each.set_title(name)
     (gap_figure, ax), (area_figure, pair) = panels(), panels(1, 2)
     for zeta_1, dashes in zip(RESOLUTIONS, ("-", "--", "-.", ":"), strict=True):
         surface = Surface.named(f"resolution-{zeta_1}")
         style: dict[str, Any] = {"ls": dashes, "lw": 1} | ({} if zeta_1 == RESOLUTIONS[0] else {"label": "_"})
         by_gap(ax, surface, 1e-7, (*VARIANTS, "G-W", "Persson simplified"), **style)
         by_force(pair[0], surface, **style)
-        gradient = surface.rms_gradient
-        by_force(pair[1], surface, lambda force, area, g=gradient: area / force * g, **style)  # type: ignore[misc]
+        by_force(pair[1], surface, surface.rms_gradient, **style)
         for panel in (ax, pair[0]):
             panel.plot([], [], "k", ls=dashes, label=f"zeta_1 = {zeta_1}")
     pair[1].set(ylabel=r"$\kappa = A\sqrt{2 m_2} E^*/F$", ylim=(0, 3))
-    for panel, figure, title in ((ax, gap_figure, "fig16"), (pair[0], area_figure, "fig17")):
+    drawn = (*((figure, axes[0]) for figure, axes in pairs), (gap_figure, ax), (area_figure, pair[0]))
+    for title, (figure, panel) in zip(("fig13", "fig14", "fig16", "fig17"), drawn, strict=True):
         panel.legend(fontsize="small")
         yield title, figure
 
 
-def _ratio_axes(figure: Any, axes: Any, titles: Iterable[str]) -> None:
-    """Labels of panels, one row for each quantity, and a legend below, where it hides no curve."""
-    for line, quantity in zip(axes, QUANTITIES, strict=True):
-        for ax in line:
-            ax.axhline(1, color="k", lw=0.5)
-            ax.set(xscale="log", xlim=(2e-4, 1.1), yscale="linear" if quantity == "area" else "log")
-            ax.set_ylim((0.4, 1.6) if quantity == "area" else (0.1, 10))
-            ax.grid(alpha=0.3)
-        line[0].set_ylabel(f"{quantity}, theory / simulation")
-    for ax, title in zip(axes[0], titles, strict=True):
-        ax.set_title(title, fontsize="small")
-    for ax in axes[-1]:
-        ax.set_xlabel(r"$A/A_0$ simulated")
-    if axes.shape[1] > 1:
-        for ax in axes.flat:
-            ax.minorticks_off()
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
-
-
-def held_out() -> Figures:
-    """Geometric mean of ratios on held-out surfaces by contact fraction, one standard deviation as a band."""
-    seen = distances.held_out()
-    area = np.concatenate([one.area for one in seen])
-    figure, axes = panels(3, 1, (9, 9), sharex=True, squeeze=False)
-    for name, theory in distances.THEORIES.items():
-        for ax, values in zip(axes[:, 0], distances.distances(seen, theory).values(), strict=True):
-            parts = binned(area, values, BINS)
-            known = [k for k, part in enumerate(parts) if len(part) > 4]
-            x = [np.sqrt(BINS[k] * BINS[k + 1]) for k in known]
-            mean, spread = (np.array([measure(parts[k]) for k in known]) for measure in (np.mean, np.std))
-            ax.plot(x, np.exp(mean), ".-", color=distances.HUES[name], label=name)
-            if name in BANDED:
-                band = np.exp(mean - spread), np.exp(mean + spread)
-                ax.fill_between(x, *band, color=distances.HUES[name], alpha=0.15, lw=0)
-    _ratio_axes(figure, axes, [f"{len(seen)} held-out self-affine surfaces"])
-    yield "fidelity", figure
-
-
 def by_data_set() -> Figures:
-    """Ratios to the data of others, and to measured maps."""
-    sets = distances.data_sets()
-    for name, keys in (("reference", ("bem", "gfmd", "challenge", "rolloff")), ("maps", tuple(distances.MEASURED))):
-        figure, axes = panels(3, len(keys), (9, 7.5), sharex=True, sharey="row")
-        for column, key in zip(axes.T, keys, strict=True):
-            for theory, make in distances.THEORIES.items():
-                for k, one in enumerate(sets[key].seen):
-                    style = {"color": distances.HUES[theory], "label": "_" if k else theory, "lw": 1, "ms": 4}
-                    for ax, values in zip(column, distances.distances([one], make).values(), strict=True):
-                        ax.plot(one.area, np.exp(values), ".-", **style)
-        _ratio_axes(figure, axes, [sets[key].title for key in keys])
+    """Ratios to the data of others and to measured maps, and means with a standard deviation on held-out surfaces."""
+    sets, seen = distances.data_sets(), distances.held_out()
+    area, title = np.concatenate([one.area for one in seen]), f"{len(seen)} held-out self-affine surfaces"
+    groups = {
+        "fidelity": [title],
+        "reference": ["bem", "gfmd", "challenge", "rolloff"],
+        "maps": list(distances.MEASURED),
+    }
+    for name, keys in groups.items():
+        figure, axes = panels(
+            3, len(keys), (9, 9 if name == "fidelity" else 7.5), sharex=True, sharey="row", squeeze=False
+        )
+        for (theory, make), (column, key) in itertools.product(
+            distances.THEORIES.items(), zip(axes.T, keys, strict=True)
+        ):
+            style: dict[str, Any] = {"color": distances.HUES[theory], "label": theory}
+            if key == title:
+                for ax, values in zip(column, distances.distances(seen, make).values(), strict=True):
+                    known = by_bin(area, values, BINS, np.mean, np.std, np.size)
+                    kept = known[:, 2] > 4
+                    x, (mean, spread, _) = np.sqrt(np.multiply(BINS[1:], BINS[:-1]))[kept], known[kept].T
+                    ax.plot(x, np.exp(mean), ".-", **style)
+                    if theory in BANDED:
+                        band = np.exp(mean - spread), np.exp(mean + spread)
+                        ax.fill_between(x, *band, color=distances.HUES[theory], alpha=0.15, lw=0)
+            for k, one in enumerate(sets[key].seen if key in sets else ()):
+                for ax, values in zip(column, distances.distances([one], make).values(), strict=True):
+                    ax.plot(one.area, np.exp(values), ".-", **style | {"label": "_" if k else theory, "lw": 1, "ms": 4})
+        for line, quantity in zip(axes, QUANTITIES, strict=True):
+            for ax in line:
+                ax.axhline(1, color="k", lw=0.5)
+                ax.set(xscale="log", xlim=(2e-4, 1.1), yscale="linear" if quantity == "area" else "log")
+                ax.set_ylim((0.4, 1.6) if quantity == "area" else (0.1, 10))
+                ax.grid(alpha=0.3)
+                if len(keys) > 1:
+                    ax.minorticks_off()
+            line[0].set_ylabel(f"{quantity}, theory / simulation")
+        for (top, *_, bottom), key in zip(axes.T, keys, strict=True):
+            top.set_title(sets[key].title if key in sets else key, fontsize="small")
+            bottom.set_xlabel(r"$A/A_0$ simulated")
+        # below, where it hides no curve
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
         yield name, figure
 
 
 def drawn() -> Figures:
     """All figures by name."""
-    for part in (held_out, by_data_set, simulations, roads, resolution):
+    for part in (by_data_set, simulations, by_surface):
         yield from part()
 
 

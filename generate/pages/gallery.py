@@ -10,6 +10,7 @@ import time
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.signal import resample
 
 from generate.pages.page import ROOT, Measured, read_csv, table, to_csv
@@ -22,13 +23,14 @@ from mbma_tables.laws.boundary_elements import LOADS
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import BoundaryElements, get_theory
+from mbma_tables.theories.own_map import continued
 from mbma_tables.theories.protocol import Theory, answer_where_finite
-from mbma_tables.theories.simulated import continued
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"
+VARIABLE = "MBMA_REFERENCE_MAPS"
 LAWS = ("mbma", "calibrated", "persson")
-COLUMNS = ("force", "area", "mean_separation", "energy")
+COLUMNS = ["force", "area", "mean_separation", "energy"]
 HEAD = """\
 # boundary elements on measured maps (Tamaas), plane removed, continued by mirror images, waves below
 # four sampling steps removed; force over A0 E*, lengths in the map's unit
@@ -39,17 +41,10 @@ GAPS = np.append(np.geomspace(1e-6, 0.1, 90)[:-1], np.linspace(0.1, 0.995, 300))
 
 @dataclasses.dataclass(frozen=True)
 class Example:
-    """A measurement, its options on the command line, and what it is."""
+    """A measurement and its options on the command line."""
 
     name: str
     options: dict[str, Any]
-    about: str
-
-    @property
-    def command(self) -> str:
-        """As it is typed."""
-        words = [f"--{name.replace('_', '-')} {value}" for name, value in self.options.items()]
-        return " ".join(["mbma fit", f"{FOLDER}/{self.name}", *words])
 
     def path(self) -> pathlib.Path | None:
         """The file, in the repository or in the folder that MBMA_REFERENCE_MAPS names; None if in neither."""
@@ -57,23 +52,16 @@ class Example:
         return next((place / self.name for place in places if (place / self.name).is_file()), None)
 
 
-VARIABLE = "MBMA_REFERENCE_MAPS"
 EXAMPLES = (
-    Example("top-1.top", {"short_cutoff": "9.4nm"}, "An AFM map of 600 nm x 600 nm, 256 x 256 points."),
-    Example(
-        "frt-2.frt",
-        {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"},
-        "A map by an optical sensor of 30 mm x 60 mm, 150 x 300 points, of which 28% are undefined.",
-    ),
-    Example(
-        "dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus profile of 1.5 mm length, 9600 points."
-    ),
+    Example("top-1.top", {"short_cutoff": "9.4nm"}),
+    Example("frt-2.frt", {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"}),
+    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}),
 )
 REFINED, REFINED_LOADS = "di-1.di", 4  # whose light contacts are solved on a finer grid too
 # too large to be shipped; their boundary elements are
 BARS = (
-    Example("al3d-1.al3d", {"short_cutoff": f"{4 * 4.38027e-07 * (1 - 1e-9)}m"}, ""),
-    Example("di-1.di", {"short_cutoff": f"{4 * 500 / 512 * (1 - 1e-9)}nm"}, ""),
+    Example("al3d-1.al3d", {"short_cutoff": f"{4 * 4.38027e-07 * (1 - 1e-9)}m"}),
+    Example("di-1.di", {"short_cutoff": f"{4 * 500 / 512 * (1 - 1e-9)}nm"}),
 )
 
 
@@ -81,15 +69,13 @@ def read_rows() -> dict[str, FloatArray]:
     """Boundary elements by map: `COLUMNS`, shape (4, n), lengths in the file's unit."""
     if not (ROOT / ROWS).is_file():
         return {}
-    rows = read_csv("maps/boundary_elements.csv")
-    numbers = np.stack([rows[name] for name in COLUMNS])
-    return {str(name): numbers[:, rows["map"] == name] for name in np.unique(rows["map"])}
+    return {str(name): own[COLUMNS].to_numpy().T for name, own in read_csv(ROOT / ROWS).groupby("map")}
 
 
 def written(rows: dict[str, FloatArray]) -> bytes:
     """The same as a file."""
-    lines = ([name, *(f"{x:.9g}" for x in row)] for name, columns in sorted(rows.items()) for row in columns.T)
-    return to_csv(HEAD, ["map", *COLUMNS], lines)
+    frames = [pd.DataFrame(own.T, columns=COLUMNS).assign(map=name) for name, own in sorted(rows.items())]
+    return to_csv(HEAD, pd.concat(frames)[["map", *COLUMNS]], "%.9g")
 
 
 def refined(path: pathlib.Path, options: dict[str, Any]) -> FloatArray:
@@ -122,7 +108,7 @@ def ratios(
     loads, areas = fine.pressure[u.size :], fine.area[u.size :]
     order = np.argsort(np.where(np.isfinite(loads), loads, np.inf))[: np.isfinite(loads).sum()]
     loads, areas = loads[order], np.maximum.accumulate(areas[order])
-    # of a force that vanishes nothing is to be read between the gaps
+    # between gaps, a force that vanishes cannot be interpolated
     held = loads > 0
     own = np.interp(np.log(force), np.log(loads[held]), np.log(areas[held]), np.nan, np.nan)
     return np.exp(own) / area, fine.pressure[: u.size] / force
@@ -138,16 +124,8 @@ def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
         except MbmaError:
             columns += [np.full(u.size, np.nan)] * 2
     header = "contact | calibrated: area at given pressure | calibrated: force at given separation"
-    return table(f"{header} | MBMA: area | MBMA: force", zip(*columns, strict=True), "{:.2%} | {:.2f}").replace(
-        "—", "-"
-    )
-
-
-def scattered() -> MeasuredSurface:
-    """A plateau and a power law in 2,000 samples that scatter, as single waves of a periodogram do."""
-    q = np.geomspace(0.2, 60, 2000)
-    C = np.minimum(1, q**-3.5) * np.random.default_rng(1).uniform(0.7, 1.4, q.size)
-    return MeasuredSurface(q, 1e-4 * C, h_max=0.07)
+    text = table(f"{header} | MBMA: area | MBMA: force", zip(*columns, strict=True), "{:.2%} | {:.2f}")
+    return text.replace("—", "-")
 
 
 def laws(surfaces: dict[str, MeasuredSurface]) -> str:
@@ -167,26 +145,31 @@ def laws(surfaces: dict[str, MeasuredSurface]) -> str:
 
 
 def measure() -> Measured:
-    """The block of the page, and its figures and data."""
+    """The blocks of the page, and its figures and data."""
     rows, surfaces = read_rows(), {}
-    text, files = [], {}
+    parts, files = {}, dict[str, Any]()
     for example in EXAMPLES:
         path, found = example.path(), simulated(example, rows)
         assert path is not None
         treated, surface = measured(path, example.options)
-        surfaces[example.name], stem = surface, example.name.split(".")[0]
-        points = None if found is None else dict(zip(("pressure", *COLUMNS[1:]), found, strict=True))
+        surfaces[example.name] = surface
+        stem, points = path.stem, None if found is None else dict(zip(["pressure", *COLUMNS[1:]], found, strict=True))
         picture = draw(treated, surface, curves(surface), example.name, "pressure  F/(A0 E*)", points)
         files[f"docs/figures/gallery_{stem}.svg"] = picture
-        printed = "\n".join(described(surface))
-        text += [f"## {example.name}", example.about, f"```\n$ {example.command} --plot {stem}.png\n{printed}\n```"]
-        text += [f"![{example.name}](figures/gallery_{stem}.svg)"]
+        options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in example.options.items())
+        command = f"mbma fit {FOLDER}/{example.name} {options} --plot {stem}.png"
+        text = "\n".join(["```", f"$ {command}", *described(surface), "```"])
         if found is not None:
-            text += ["Ratios to boundary elements on this map:", compared(surface, found)]
+            text += f"\n\nRatios to boundary elements on this map:\n\n{compared(surface, found)}"
+        parts[stem.replace("-", "_")] = text
     for example in BARS:
         simulated(example, rows)
         path = example.path()
         if example.name == REFINED and path is not None and f"{REFINED} refined" not in rows:
             rows[f"{REFINED} refined"] = refined(path, example.options)
-    text += ["## Their contact laws", laws(surfaces | {"2,000 scattered samples": scattered()})]
-    return {"maps": "\n\n".join(text)}, files | {ROWS: written(rows)}
+    # a plateau and a power law in 2,000 samples that scatter, as single waves of a periodogram do
+    q = np.geomspace(0.2, 60, 2000)
+    C = np.minimum(1, q**-3.5) * np.random.default_rng(1).uniform(0.7, 1.4, q.size)
+    scattered = MeasuredSurface(q, 1e-4 * C, h_max=0.07)
+    parts["laws"] = laws(surfaces | {"2,000 scattered samples": scattered})
+    return parts, files | {ROWS: written(rows)}

@@ -19,7 +19,7 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import get_theory
 
 KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")
-GRADIENT = 0.1  # that surfaces are given: theories ask for a small one
+GRADIENT = 0.1  # that surfaces are given: theories are for small ones
 # contacts that are summed up: as far as islands do not lie on one another, and all
 RANGES = {"mbma": (0.01, 0.1), "calibrated": (0.01, 0.97)}
 EXTRAPOLATED = {"extrapolate_to": "2nm", "extrapolate_hurst": 0.8}
@@ -32,18 +32,15 @@ def simulated() -> Iterator[Seen]:
     data = dataset(DATA / "boundary_elements.nc")
     kinds = data.kind.attrs["flag_meanings"].split()
     order = [KINDS.index(kinds[k]) if kinds[k] in KINDS else -1 for k in data.kind.values]
-    for number in np.lexsort((data["shape"].values, np.array(order))):
-        one = data.isel(surface=number)
-        kind, shape = kinds[int(one.kind)], float(one["shape"])
+    for one in (data.isel(surface=number) for number in np.lexsort((data["shape"].values, np.array(order)))):
+        kind, shape, points = kinds[int(one.kind)], float(one["shape"]), int(one.points)
         if kind not in KINDS or SPLITS[int(one.split)] not in (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM):
             continue
-        points = int(one.points)
         recipe = Recipe(kind, float(one.hurst), float(one.zeta_1), int(one.waves), int(one.seed), points, shape)
-        steps = [side / points for side in recipe.sizes]
-        values = heights(recipe)
         # of the map as it is, whose h_rms is 1
         scale = GRADIENT * float(one.q0_h_rms) / recipe.q0
-        surface = Surface.from_map(scale * values, *steps, periodic=True)
+        steps = [side / points for side in recipe.sizes]
+        surface = Surface.from_map(scale * heights(recipe), *steps, periodic=True)
         assert isinstance(surface, MeasuredSurface)
         rows = np.stack([one.force * GRADIENT, one.area, one.mean_separation * scale])
         name = f"stretched 1:{shape:g}" if kind == "stretched" else f"{kind} {shape:g}"

@@ -1,15 +1,14 @@
 """Pages of the documentation: hand-written Markdown, with blocks and figures that programs fill.
 
-The function `measure` of the module `generate.pages.NAME` returns what stands in the blocks between
+`PAGES` has for each page the function that measures it, as "module:function". It returns the text of the blocks between
 ``<!-- measured: BLOCK -->`` and ``<!-- end -->`` of the page, and figures and data by their path in the checkout.
 ``python -m generate pages NAME`` writes them.
 """
 
 from __future__ import annotations
 
-import csv
 import functools
-import io
+import importlib
 import itertools
 import math
 import pathlib
@@ -18,7 +17,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from mbma_tables.common.files import write_file
 
@@ -27,12 +25,21 @@ if TYPE_CHECKING:
 
 ROOT = pathlib.Path(__file__).parents[2]
 DATA = ROOT / "docs" / "data"
-PAGES = (
-    *("calibrated", "cost", "explorer", "export", "fidelity", "formula", "gallery", "leakage", "machined", "maps"),
-    *("readme", "stability", "tables", "ten_minutes", "theories", "yield"),
-)
-Measured = tuple[dict[str, str], dict[str, Any]]  # what `measure` returns: blocks and files
+_OWN = ("cost", "explorer", "export", "fidelity", "gallery", "machined", "maps", "stability", "tables")
+PAGES = {
+    **{name: f"{name}:measure" for name in _OWN},
+    **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
+    **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
+}
+Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def measured(name: str) -> Measured:
+    """Measure a page."""
+    module, _, function = PAGES[name].partition(":")
+    found: Measured = getattr(importlib.import_module(f"generate.pages.{module}"), function)()
+    return found
 
 
 def fill(text: str, parts: Mapping[str, str]) -> str:
@@ -60,7 +67,7 @@ def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> st
     header : str
         Names of the columns, with bars between them.
     rows : iterable of iterables
-        Cells. A text stands as it is, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple
+        Cells. Strings are copied, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple
         fills a format of several fields.
     formats : str
         Formats of the columns, likewise; the last one holds for all that follow.
@@ -75,9 +82,8 @@ def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> st
             return "—"
         return known[min(column, len(known) - 1)].format(*values)
 
-    names = header.split(" | ")
-    lines = ["| " + " | ".join(names) + " |", "|" + " --- |" * len(names)]
-    return "\n".join([*lines, *("| " + " | ".join(itertools.starmap(cell, enumerate(row))) + " |" for row in rows)])
+    lines = [header.split(" | "), ["---"] * (header.count(" | ") + 1), *(map(cell, itertools.count(), r) for r in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def percent(value: float, sign: str = "") -> str:
@@ -96,20 +102,17 @@ def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
     return " | ".join(form.format(100 * a, 100 * b) for a, b in itertools.pairwise(edges))
 
 
-def to_csv(head: str, names: Sequence[str], rows: Iterable[Iterable[Any]]) -> bytes:
-    """A CSV file with a head of comments."""
-    text = io.StringIO()
-    text.write(head)
-    lines = csv.writer(text, lineterminator="\n")
-    lines.writerow(names)
-    lines.writerows(rows)
-    return text.getvalue().encode()
+def to_csv(head: str, frame: Any, form: str | None = None) -> bytes:
+    """A data frame as a CSV file with a head of comments."""
+    text: str = head + frame.to_csv(index=False, float_format=form, lineterminator="\n")
+    return text.encode()
 
 
-def read_csv(name: str) -> Any:
-    """A CSV file of docs/data with comments and a line of names, as a structured array."""
-    lines = [line for line in (DATA / name).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    return np.genfromtxt(lines, delimiter=",", names=True, dtype=None, encoding=None)
+def read_csv(name: str | pathlib.Path) -> Any:
+    """A CSV file of docs/data with comments and a line of names, as a data frame."""
+    import pandas as pd
+
+    return pd.read_csv(DATA / name, comment="#")
 
 
 @functools.cache
@@ -117,8 +120,7 @@ def dataset(path: str | pathlib.Path) -> Any:
     """A netCDF file in memory."""
     import xarray as xr
 
-    with xr.open_dataset(path) as opened:
-        return opened.load()
+    return xr.load_dataset(path)
 
 
 @functools.cache

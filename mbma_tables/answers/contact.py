@@ -1,25 +1,27 @@
-"""`contact`: pressure, area and stiffness of a surface by any theory, asked by what is known of the contact."""
+"""`contact`: pressure, area and stiffness of a surface by any theory, at a given separation, pressure or area."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
 from collections.abc import Iterable, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.derivatives import differentiate
+from mbma_tables.answers.derivatives import at_fixed, differentiate
 from mbma_tables.answers.result import Contact
 from mbma_tables.answers.source import Source, named
 from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
     broadcast_shape,
+    checked_hardness,
     describe_entries,
     finite_array,
     hinted,
+    is_labelled,
     positive_array,
     require,
     require_flag,
@@ -32,11 +34,11 @@ from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import chosen_theory
+from mbma_tables.theories import OPTIONS, THEORIES, default_theory, get_theory, theory_name
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 
-KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
+KNOWN = ("separation", "mean_separation", "pressure", "area")  # quantities of which exactly one is given
 
 
 @hinted
@@ -77,8 +79,9 @@ def contact(
         A/A0, likewise.
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
-        `name` and ``answer(surface, u)``. Default: "calibrated" for a surface given by a spectrum or a map, unless
-        an option of MBMA is given, and "mbma" for one given by its five numbers.
+        `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or
+        where an option of MBMA is given; "corrected" for one given by a map, where Tamaas is installed (the extra
+        `maps`), and "calibrated" otherwise.
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1), or a
         text that `mbma_tables.materials.hardness` reads: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
@@ -89,18 +92,18 @@ def contact(
         Metals in contact, one of `mbma_tables.materials.METALS` each, or `Metal` objects; in place of `E_star`.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
-        table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
+        table from `open_table`, or a user-defined model with a `name` and ``answer(X, mu)``.
     variant : {"reported", "printed", "fitted"} or Variant
         Which variant of the paper's equations MBMA takes.
     E_star : array_like or str
         Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit, which "100 GPa" names.
     rtol : float
-        Relative error asked of MBMA's force and area, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
+        Requested relative error of MBMA's sums, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
     outside : {"raise", "exact", "nan"}
         For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
     derivatives : bool
-        Whether `pressure_by`, `area_by` and `separation_by` are asked for: MBMA's by its own differentiated sums, other
-        theories' by numerical differentiation, to 1e-6.
+        Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
+        theories by numerical differentiation, to 1e-6.
     quantities : iterable of {"pressure", "area"}
         What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
     workers : int
@@ -116,7 +119,7 @@ def contact(
         For NaN, infinite or empty input, separations below -h_max, islands that no table covers, pressures and areas
         that the branch of first contact does not reach.
     ConvergenceError
-        Where the accuracy was not reached; its `mask` says which entries.
+        Where the accuracy was not reached; `mask` is true for these entries.
 
     See Also
     --------
@@ -152,7 +155,9 @@ def contact(
     '1.642e-03 mm, 471.9 MPa/mm'
     """
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
-    E_star, hardness, pair = bodies(materials, E_star, hardness)
+    pair = None
+    if materials is not None:
+        E_star, hardness, pair = bodies(materials, E_star, hardness)
     E_star, units = modulus_and_units(E_star, surface)
     value, stated = units.number(by, value), hardness is not None
     hardness = hardness_in(units, hardness) if stated else np.inf
@@ -160,19 +165,30 @@ def contact(
     chosen = chosen_theory(
         surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside, workers=workers
     )
-    options: dict[str, Any] = {
-        "by": by,
-        "source": Source(chosen, surface, E_star, hardness, units, materials=pair, stated=stated),
-        "derivatives": derivatives,
-        "quantities": wanted_quantities(quantities),
-    }
-    if any_labelled(surface, value, E_star, hardness):
-        return _of_labelled(surface, value, E_star, hardness, options)
-    return _contact(surface, value, E_star, hardness, **options)
+    # an empty hardness is refused where it is checked
+    yields = stated and (is_labelled(hardness) or not np.size(hardness) or not np.equal(hardness, np.inf).all())
+    source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
+    wanted = quantities if quantities is QUANTITIES else wanted_quantities(quantities)
+    make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
+    return make(surface, value, E_star, hardness, by, source, derivatives, wanted)
+
+
+def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
+    """The requested theory, with MBMA's `options`, which other theories refuse."""
+    given = [name for name, value in options.items() if value is not OPTIONS[name] and value != OPTIONS[name]]
+    named = theory_name(surface, theory, **options) if theory is None else theory
+    if isinstance(named, str) and named in THEORIES:
+        if not given and options.get("workers") is not True:
+            return default_theory(named)
+        if named == "mbma":
+            return Mbma(**options)
+    if given:
+        raise InputError(f"{', '.join(given)}: options of theory 'mbma' alone, given by its name")
+    return get_theory(named, surface)
 
 
 def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
-    """The quantities asked for, each once, in the order of `QUANTITIES`."""
+    """The requested quantities, each once, in the order of `QUANTITIES`."""
     asked = {quantities} if isinstance(quantities, str) or not isinstance(quantities, Iterable) else set(quantities)
     if not asked or not asked <= set(QUANTITIES):
         raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
@@ -188,36 +204,36 @@ def one_known(**given: Any) -> tuple[str, Any]:
 
 
 def _contact(
-    surface: AnySurface,
-    value: Any,
-    E_star: Any,
-    hardness: Any,
-    *,
-    by: str,
-    source: Source,
-    derivatives: bool,
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
     quantities: tuple[str, ...],
-) -> Contact:
+) -> Contact:  # fmt: skip
     """`contact` of plain arrays."""
-    theory = source.theory_at(E_star, hardness)
-    value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, source.units.stress)
+    asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
+    cap = checked_hardness(hardness) if source.yields else np.asarray(np.inf)
+    shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": cap})
+    value, E_star = spread(asked, shape), spread(modulus, shape)
+    theory: Any = source.theory
+    if source.yields:
+        # what it needs of scipy takes long to import
+        from mbma_tables.theories.yielding import Yielding
+
+        theory = Yielding(theory, cap / modulus)
+    places, lighter = _places(surface, value, E_star, cap, by, theory, source)
     held = by if by in QUANTITIES else None
-    capped: Any = theory
     by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}
     if derivatives and held:
-        require(by, value, np.asarray(value) > 0, "positive where derivatives are asked for: a gap has no slope there")
+        require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
         wanted = QUANTITIES if derivatives else quantities
         totals = theory.totals(surface, places["separation"], E_star, derivatives, wanted)
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])
-        loaded = None if theory is source.theory else capped.loaded(surface, u, lighter)
+        loaded = theory.loaded(surface, u, lighter) if source.yields else None
         found = theory.answer(surface, u) if loaded is None else loaded.answer
         source = dataclasses.replace(source, answer=found, loaded=loaded)
-        error = spread(found.error, np.shape(found.pressure))[()]
-        fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "error": error} | places
-        fields["islands"] = None
+        fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "islands": None} | places
+        fields["error"] = spread(found.error, np.shape(found.pressure))[()]
         if derivatives:
             pressure_by, area_by = differentiate(theory, surface, u, lighter)
             by_log_modulus = {"pressure": pressure_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
@@ -227,7 +243,7 @@ def _contact(
         slopes = {"pressure": fields["pressure_by"], "area": fields["area_by"]}
         by_modulus = {"pressure": fields["pressure"] / E_star + by_log_modulus["pressure"]}
         by_modulus["area"] = by_log_modulus["area"] / E_star
-        fields |= _at_fixed(held, by, slopes, by_modulus)
+        fields |= at_fixed(held, by, slopes, by_modulus)
     for name in QUANTITIES:
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}
@@ -241,13 +257,10 @@ def _made(source: Source, fields: dict[str, Any]) -> Contact:
 
 
 def _places(
-    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, theory: Theory, unit: str | None
-) -> tuple[FloatArray, FloatArray, dict[str, Any], Any]:
-    """What is known, the modulus, and both separations, all of the broadcast shape; `lighter` of `Yielding.loaded`."""
-    asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
-    shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": hardness})
-    asked, modulus = spread(asked, shape), spread(modulus, shape)
-    h_max, lighter, capped = np.asarray(surface.h_max), None, cast(Any, theory)
+    surface: AnySurface, asked: FloatArray, modulus: FloatArray, cap: FloatArray, by: str, theory: Any, source: Source
+) -> tuple[dict[str, Any], Any]:
+    """Both separations of what is known, and with a hardness `lighter` of `Yielding.loaded`."""
+    h_max, lighter = np.asarray(surface.h_max), None
     if by != "separation":
         require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
@@ -256,25 +269,24 @@ def _places(
     elif by == "mean_separation":
         average = asked
     else:
-        quantity, wanted = ("pressure", asked / modulus) if by == "pressure" else ("area", asked)
+        wanted = asked / modulus if by == "pressure" else asked
         try:
-            if by == "pressure" and theory is not theory.elastic:
-                average, lighter = capped.pressed(surface, wanted)
+            if by == "pressure" and source.yields:
+                average, lighter = theory.pressed(surface, wanted)
             else:
-                average = theory.mean_separation_at(surface, quantity, wanted)
+                average = theory.mean_separation_at(surface, by, wanted)
         except OutOfRangeError:
             if by == "pressure":
-                _refuse_pressures(surface, asked, modulus, hardness, theory, unit)
+                _refuse_pressures(surface, asked, modulus, cap, theory, source.units.stress)
             raise
     gap = asked if by == "separation" else 2 * average - h_max
-    both = {"separation": gap, "mean_separation": average}
-    return asked, modulus, {name: spread(place, shape)[()] for name, place in both.items()}, lighter
+    return {"separation": gap[()], "mean_separation": average[()]}, lighter
 
 
 def _refuse_pressures(
-    surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: ArrayLike, theory: Theory, unit: str | None
+    surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: FloatArray, theory: Theory, unit: str | None
 ) -> None:
-    """Refuse pressures beyond the hardness or the theory's end, in the unit in which they were asked for."""
+    """Refuse pressures beyond the hardness or the theory's end, in the unit in which they were given."""
     name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
     limits = [(hardness, "the hardness")]
     with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
@@ -286,35 +298,22 @@ def _refuse_pressures(
         require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
 
 
-def _at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
-    """Derivatives where pressure or area is held: of the separation, and of the quantity that is not held."""
-    other = "area" if held == "pressure" else "pressure"
-    steep, follows = slopes[held]["separation"], slopes[other]["separation"]
-    names = [name for name in slopes[held] if name != "separation"]
-    gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
-    free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
-    if held == "pressure":
-        gap["E_star"] = -by_modulus["pressure"] / steep
-        free["E_star"] = by_modulus["area"] + follows * gap["E_star"]
-    return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
-
-
-def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, options: dict[str, Any]) -> Contact:
+def _of_labelled(
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
+    wanted: tuple[str, ...],
+) -> Contact:  # fmt: skip
     """`contact` of DataArrays, lazily where they are."""
-    by, wanted, units = options["by"], options["quantities"], options["source"].units
-    names: tuple[str, ...] = (*wanted, "error")
+    units, held = source.units, by if by in QUANTITIES else None
+    names = (*(("separation", "mean_separation") if held else ()), *wanted, "error")
     fields: dict[str, Any] = {"pressure": None, "area": None, "islands": None}
-    if by not in ("separation", "mean_separation"):
-        names = ("separation", "mean_separation", *names)
     slopes: list[tuple[str, str]] = []
-    if options["derivatives"]:
-        held = by if by in QUANTITIES else None
+    if derivatives:
         kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
         free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, cap, **options)
+        found = _contact(block, asked, modulus, cap, by, source, derivatives, wanted)
         return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
 
     arrays = {by: value, "E_star": E_star, "hardness": hardness}
@@ -328,4 +327,4 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
     elif by == "mean_separation":
         fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
-    return _made(options["source"], fields)
+    return _made(source, fields)

@@ -1,8 +1,7 @@
-"""Derivatives of a theory's force and area in the gap and in the surface's parameters.
+"""Derivatives of a theory's force and area by the gap and by the surface's parameters.
 
-Where a theory does not know them they are differences in steps that keep clear of the ends of contact, whose error
-decides whether they are given out. With a hardness the elastic contact is differentiated, and one that is straight in
-the parameters, with these slopes, goes through the law.
+Where a theory has none in closed form they are finite differences, with steps inside the range of contact, refused
+where their estimated error is too large. With a hardness the derivatives of the elastic contact go through its law.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ RTOL = 1e-6  # of a derivative that is given out, or of the quantity over the pa
 GAP, MODULUS = "mean_separation", "E_star"
 KINDS = ("pressure", "area")
 
+Answers = tuple[FloatArray, FloatArray]  # force and area
 Slopes = tuple[dict[str, FloatArray], ...]  # of force and of area, by names
 
 
@@ -54,34 +54,18 @@ def _elastic(theory: Theory, surface: AnySurface, u: FloatArray) -> Slopes:
         return known
     whole, names = theory.answer(surface, u), (GAP, *surface.parameters)
 
-    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> TheoryAnswer:
-        return theory.at(np.shape(whole.pressure), entry[1]).answer(moved, own[GAP])
+    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> Answers:
+        found = theory.answer(moved, own[GAP])
+        return found.pressure, found.area
 
     return _numerical(theory, surface, u, names, whole, answer)
 
 
-class _Straight(Theory):
-    """An elastic contact that is straight in the parameters, at some of them: for `Yielding` to go through its law."""
-
-    def __init__(self, elastic: Theory, answer: TheoryAnswer, line: tuple[FloatArray, ...] | None) -> None:
-        self._elastic, self._answer, self._line = elastic, answer, line
-        self.name, self.ends_at_h_max = elastic.name, elastic.ends_at_h_max
-
-    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        return self._answer
-
-    def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
-        if self._line is None:
-            return self._elastic.area_at(surface, pressure)
-        area, slope, at = self._line
-        return area + slope * (pressure - at)
-
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return self._elastic.bearing_share(surface, mean_separation)
-
-
 @np.errstate(all="ignore")
 def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArray | None) -> Slopes:
+    # what needs scipy is imported for a hardness alone
+    from mbma_tables.laws import hardness as law
+
     elastic, names = capped.elastic, (GAP, *surface.parameters, MODULUS)
     if lighter is None and not capped.knows_areas:
         lighter = capped.lighter(surface, u)
@@ -99,16 +83,19 @@ def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArr
         rise = np.nan_to_num(area[0, 1] / pressure[0, 1])
         tilt = area[:, 1] - pressure[:, 1] * rise
 
-    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> TheoryAnswer:
+    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> Answers:
         name, place = entry
         known = zip(whole.elastic[:2], (pressure, area), strict=True)
-        ends = (np.ravel(part)[place] + slope[name, 0, place] * x for part, slope in known)
-        line = None
-        if lighter is not None:
-            line = at_force[place] + tilt[name, place] * x, rise[place], np.ravel(whole.answer.pressure)[place]
-        straight = _Straight(elastic, TheoryAnswer(*ends, *np.zeros((2, x.size))), line)
-        stiffer = capped.at(shape, place).stiffer(own[MODULUS])
-        return stiffer.changed(_elastic=straight).answer(moved, own[GAP])  # type: ignore[no-any-return]
+        force, share = (np.ravel(part)[place] + slope[name, 0, place] * x for part, slope in known)
+        hardness = np.broadcast_to(capped.hardness, shape).ravel()[place] / own[MODULUS]
+        sizes = np.asarray(moved.h_rms), np.asarray(moved.rms_gradient)
+        eta, endless = hardness / sizes[1], np.isinf(hardness)
+        load, _ = law.closed(elastic.heights(moved), *sizes, eta, own[GAP], force, np.zeros_like(force))
+        if lighter is None:
+            at = elastic.area_at(moved, load)
+        else:
+            at = at_force[place] + tilt[name, place] * x + rise[place] * (load - np.ravel(whole.answer.pressure)[place])
+        return np.where(endless, force, load), np.where(endless, share, law.area(load / sizes[1], at, eta))
 
     return _numerical(capped, surface, u, names, whole.answer, answer)
 
@@ -119,7 +106,7 @@ def _numerical(
     u: FloatArray,
     names: tuple[str, ...],
     whole: TheoryAnswer,
-    answer: Callable[..., TheoryAnswer],
+    answer: Callable[..., Answers],
 ) -> Slopes:
     """By differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, and what was moved by x."""
     shape = np.shape(whole.pressure)
@@ -135,8 +122,8 @@ def _numerical(
         own = {name: value[place] for name, value in at.items()}
         for j, name in enumerate(names):
             own[name] = own[name] + np.where(number == j, x, 0.0)
-        found = answer(surface.with_numbers(*(own[name] for name in surface.parameters)), own, (number, place), x)
-        return np.stack([found.pressure, found.area])
+        others = surface.with_numbers(*(own[name] for name in surface.parameters))
+        return np.stack(answer(others, own, (number, place), x))
 
     with np.errstate(all="ignore"):
         slopes, error = (each.reshape(2, len(names), *shape) for each in differences(moved, step, side, scale))
@@ -168,3 +155,16 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
         up = 1.0 if name == "q1" else -1.0
         side = np.where(ratio * (1 - STEP) <= MIN_ZETA_1, up, np.where(ratio > MAX_ZETA_1 * (1 - STEP), -up, side))
     return step, side
+
+
+def at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
+    """Derivatives where pressure or area is held: of the separation, and of the quantity that is not held."""
+    other = "area" if held == "pressure" else "pressure"
+    steep, follows = slopes[held]["separation"], slopes[other]["separation"]
+    names = [name for name in slopes[held] if name != "separation"]
+    gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
+    free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
+    if held == "pressure":
+        gap["E_star"] = -by_modulus["pressure"] / steep
+        free["E_star"] = by_modulus["area"] + follows * gap["E_star"]
+    return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}

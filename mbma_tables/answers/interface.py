@@ -9,8 +9,9 @@ Shear is that under constant normal pressure, from the normal law. With kappa th
     energy of a cycle 8 times the integral of tau to its amplitude, less 4 tau delta (Masing 1926)
 
 Partial slip is the difference of two normal contacts (M. Ciavarella, J. Mech. Phys. Solids 46 (1998) 2391; J. Jaeger),
-for bodies whose normal pressures do not move them tangentially: nu = 0, or alike bodies nearly so. docs/joints.md has
-the distance from boundary elements, and how far surfaces with a lay differ.
+for isotropic bodies whose normal pressures do not move them tangentially: nu = 0, or alike bodies nearly so. Surfaces
+with a lay have a full stick along and across it (`mbma_tables.laws.lay`). docs/joints.md has the distance from boundary
+elements.
 """
 
 from __future__ import annotations
@@ -25,12 +26,16 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled, number_in, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
+from mbma_tables.laws.lay import stress_shares
 from mbma_tables.materials import Pair, tangential_ratio
 from mbma_tables.surfaces.any_surface import AnySurface
 
 OF_YIELDING = (
     "slip of a contact that yields is not known: its normal law is of loading alone; `stiffness` of full stick is"
 )
+OF_LAY = "slip of a surface with a lay was not compared with simulations; `stiffness` of full stick is known"
+DIRECTIONS = ("along", "across")
+ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,8 +49,8 @@ class Tangential:
     stiffness: Numbers  # k_t of full stick, d(tau)/d(delta) [stress/length]
     last: Any  # mean separation of last contact, infinite where the theory has none
     units: Units
-    # pressure and energy at mean separations, these at pressures; None where it yields
-    _normal: tuple[Callable[[Any], Any], Callable[[Any], Any], Callable[[Any], Any]] | None
+    # pressure and energy at mean separations, these at pressures; or why slip is not known
+    _normal: tuple[Callable[[Any], Any], Callable[[Any], Any], Callable[[Any], Any]] | str
 
     def __post_init__(self) -> None:
         if self.friction is not None:
@@ -103,20 +108,33 @@ class Tangential:
 
     def _known(self) -> tuple[Any, ...]:
         """The normal law and f kappa, tangential over normal displacement."""
-        if self._normal is None:
-            raise InputError(OF_YIELDING)
+        if isinstance(self._normal, str):
+            raise InputError(self._normal)
         if self.friction is None:
             raise InputError("slip needs friction, the coefficient of friction: tangential(friction=...)")
         return *self._normal, self.friction * self.ratio
 
 
-def ratio_of(nu: Any, E: Any, pair: Pair | None) -> Any:
+def ratio_of(nu: Any, E: Any, pair: Pair | None, direction: str | None, surface: Any, area: Any) -> Any:
     """kappa of Poisson's ratios and moduli as given, or of the materials that are named."""
-    if nu is not None:
-        return tangential_ratio(nu, E)
-    if pair is None:
+    if nu is None and pair is None:
         raise InputError("tangential stiffness needs nu, Poisson's ratio of the bodies, where no materials are named")
-    return tangential_ratio(*zip(*((metal.nu, metal.E) for metal in pair.metals), strict=True))
+    if nu is None:
+        nu, E = zip(*((metal.nu, metal.E) for metal in pair.metals), strict=True)  # type: ignore[union-attr]
+    lay = getattr(surface, "anisotropy", None)
+    if direction is None:
+        if lay is not None and lay > ISOTROPIC:
+            raise InputError(f"the surface has a lay (anisotropy {lay:.3g}): give direction, 'along' or 'across' it")
+        return tangential_ratio(nu, E)
+    if direction not in DIRECTIONS:
+        raise InputError(f"direction must be one of {DIRECTIONS}, relative to the lay, got {direction!r}")
+    if lay is None:
+        raise InputError("direction needs a surface whose anisotropy is known, such as that of a map")
+
+    def share(poisson: FloatArray) -> Any:
+        return stress_shares(lay, np.asarray(area)[(..., *[None] * poisson.ndim)], poisson)[DIRECTIONS.index(direction)]
+
+    return tangential_ratio(nu, E, share)
 
 
 class Interface:
@@ -206,8 +224,10 @@ class Interface:
         found: Numbers = source.map(mean, self, 1, {"area": self._touching})[0]
         return found
 
-    def tangential(self: Any, friction: float | None = None, nu: Any = None, E: Any = None) -> Tangential:
-        """Tangential stiffness of full stick, partial and gross slip, of isotropic surfaces; computed when called for.
+    def tangential(
+        self: Any, friction: float | None = None, nu: Any = None, E: Any = None, direction: str | None = None
+    ) -> Tangential:
+        """Tangential stiffness of full stick, partial and gross slip; computed when called for.
 
         Parameters
         ----------
@@ -215,6 +235,8 @@ class Interface:
             Coefficient of friction, for slip. With a hardness only full stick is known.
         nu, E : optional
             As for `materials.tangential_ratio`; by default those of the `materials` named.
+        direction : {"along", "across"}, optional
+            Of the shear relative to the lay, for surfaces whose anisotropy is known and above 1.4: full stick alone.
 
         Examples
         --------
@@ -225,7 +247,8 @@ class Interface:
         >>> f"{sheared.stiffness:.3g} GPa/um, {sheared.shear('0.05 um'):.3g} GPa; slip from {sheared.gross_slip:.2g} um"
         '0.0222 GPa/um, 0.000882 GPa; slip from 0.22 um'
         """
-        source, ratio = self._source, ratio_of(nu, E, self._source.materials)
+        source = self._source
+        ratio = ratio_of(nu, E, source.materials, direction, source.surface, self._touching)
         last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
 
         def at(function: Any) -> Any:
@@ -240,5 +263,5 @@ class Interface:
         return Tangential(
             ratio, friction, self.mean_pressure * self._touching if self.pressure is None else self.pressure,
             self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
-            None if source.yields else (normal, energy, inverse),
+            OF_YIELDING if source.yields else OF_LAY if direction else (normal, energy, inverse),
         )  # fmt: skip

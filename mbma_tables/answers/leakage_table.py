@@ -18,7 +18,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.core import core, in_blocks
 from mbma_tables.laws.calibrated import Spectrum
 from mbma_tables.laws.effective_medium import FlowConstants, contact_factor, wide_gap
-from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, nodes_of, shipped_part
+from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, known_at, nodes_of, shipped_part
 
 GROUP = "leakage"
 AXES = ("hurst", "log_zeta_1", "log_odds")
@@ -38,11 +38,6 @@ class FlowTable(SurfaceSpline):
     scatter: dict[str, FloatArray]  # by theory: root mean squares of ln(k/simulation)
     contact: FloatArray  # at these contact fractions
 
-    @property
-    def law_constants(self) -> tuple[float, float, float]:
-        """Of contact that obstructs."""
-        return self.constants.threshold, self.constants.obstruction, 0.0
-
     def flow(self, surfaces: FloatArray, owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
         """k of mean gaps [h_rms] and contact fractions; 0 where blocked. Columns of `surfaces`: H, ln zeta_1."""
         given = *self.core_table, *surfaces, None, None, self.shared(surfaces, u.size)
@@ -53,21 +48,20 @@ class FlowTable(SurfaceSpline):
         row = self.scatter.get(theory)
         if row is None or not np.isfinite(row).any():
             return np.full(np.shape(area), np.nan)
-        known = np.isfinite(row)
-        beyond = None if known[-1] else np.nan
-        found = np.interp(area, self.contact[known], row[known], right=beyond)
-        return np.where(np.asarray(area) < self.constants.threshold, found, np.nan)
+        return np.where(np.asarray(area) < self.constants.threshold, known_at(self.contact, row, area), np.nan)
 
 
 @functools.cache
 def shipped_flow() -> FlowTable:
     """The shipped table, read once."""
     values, facts = shipped_part(GROUP)
+    constants = FlowConstants(*(float(facts[f"flow_{f.name}"]) for f in dataclasses.fields(FlowConstants)))
     return FlowTable(
         *nodes_of([values[name] for name in AXES]),
         COVERED,
         values["spline"],
-        FlowConstants(*(float(facts[f"flow_{f.name}"]) for f in dataclasses.fields(FlowConstants))),
+        (constants.threshold, constants.obstruction, 0.0),
+        constants,
         float(facts["largest_error_log_factor"]),
         dict(zip(facts["theories"].split(), values["stated_scatter"], strict=True)),
         values["contact"],
@@ -112,12 +106,6 @@ def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
     numbers[5] = 1 / step
     anything = np.zeros(1)
     return None, numbers, np.array([1, 1, OWN_NODES - 1]), anything, anything, None, None, pieces
-
-
-@functools.lru_cache(KEPT)
-def self_affine(hurst: float, log_zeta_1: float) -> Spectrum:
-    """The spectrum of a self-affine surface outside the table."""
-    return Spectrum.self_affine(hurst, math.exp(log_zeta_1))
 
 
 def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> FloatArray:

@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbma_tables.answers.interface import Interface
-from mbma_tables.answers.source import MEANINGS, Source, concerns, named, untroubled
-from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
+from mbma_tables.answers.source import MEANINGS, Source, named, reasons_against
+from mbma_tables.common.arguments import Numbers, any_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.protocol import TheoryAnswer
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mbma_tables.answers.contact_map import ContactMap
     from mbma_tables.answers.leakage import Leakage
 
 OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
-MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
+MOST_SHOWN = 10_000  # entries up to which the text includes errors, scatter and validity
 
 
 def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers]:
@@ -51,9 +51,9 @@ class Contact(Interface, Displayed):
     mean_separation : ndarray
         u = (h_max + d)/2 (50) [length].
     pressure : ndarray or None
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not asked for.
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not requested.
     area : ndarray or None
-        A/A0, None where not asked for. MBMA does not end at 1 under full compression, and this is not clamped.
+        A/A0, None where not requested. MBMA does not end at 1 under full compression, and this is not clamped.
     error : ndarray
         Bound on the relative numerical error of both against the theory (for "mbma" against its island model),
         NaN where not known. The theory's own distance from simulation is another number, `scatter`.
@@ -115,14 +115,8 @@ class Contact(Interface, Displayed):
 
     def _variables(self) -> dict[str, Variable]:
         source = self._source
-        names = [name for name in MEANINGS if name not in OF_HARDNESS or source.yields]
-        names = [name for name in names if name != "energy" or not source.yields]
-        known = {name: getattr(self, name) for name in names}
-        return {
-            name: Variable(value, unit_of(name, source.units), MEANINGS[name])
-            for name, value in known.items()
-            if value is not None
-        }
+        known = {n: getattr(self, n) for n in MEANINGS if n not in (("energy",) if source.yields else OF_HARDNESS)}
+        return {n: Variable(v, unit_of(n, source.units), MEANINGS[n]) for n, v in known.items() if v is not None}
 
     def _origin(self) -> dict[str, str]:
         source = self._source
@@ -134,7 +128,7 @@ class Contact(Interface, Displayed):
         return draw_compression([self.curve()], title, pressure_label(unit))
 
     def curve(self, leakage: bool = False) -> Curve:
-        """A line of pictures, of one surface at several separations; with its leakage where that is asked for."""
+        """A line of pictures, of one surface at several separations; optionally with its leakage."""
         surface = self._source.surface
         if self.pressure is None or self.area is None or np.size(self.pressure) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
@@ -145,9 +139,36 @@ class Contact(Interface, Displayed):
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
         return Curve(label, *(np.ravel(field)[order] for field in fields))
 
+    def map(self) -> ContactMap:
+        """Pressure, gap and contact at every point of the surface's map at this pressure, simulated by Tamaas.
+
+        The map is pressed on its full grid, with the contact's pressure, whatever the theory that answered.
+
+        Raises
+        ------
+        InputError
+            For several contacts, one with a hardness, and surfaces without a map.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface, contact
+        >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
+        >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+        >>> heights = 0.1 * np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
+        >>> surface = Surface.from_map(heights, dx=1.0, periodic=True, unit="um")
+        >>> pressed = contact(surface, pressure="10 MPa", E_star="1 GPa").map()
+        >>> data = pressed.to_dataset()
+        >>> f"{float(data.pressure.mean()):.3f} {data.pressure.units} on {float(data.contact.mean()):.0%} of the points"
+        '0.010 GPa on 45% of the points'
+        """
+        from mbma_tables.answers.contact_map import contact_map
+
+        return contact_map(self)
+
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
-        """The theory's answer at these separations, asked once."""
+        """The theory's answer at these separations, computed once."""
         source = self._source
         if source.answer is not None:
             return source.answer
@@ -156,7 +177,7 @@ class Contact(Interface, Displayed):
 
     @property
     def _touching(self) -> Numbers:
-        """A/A0, whether asked for or not."""
+        """A/A0, whether requested or not."""
         return self._answer.area if self.area is None else self.area
 
     @described
@@ -175,14 +196,12 @@ class Contact(Interface, Displayed):
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
 
-    def _of_loading(self, name: str) -> Numbers:
+    def _of_loading(self, name: str) -> Any:
         """A number of `Loaded`, over E*."""
-
-        def number(theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray) -> tuple[Any, ...]:
-            return (getattr(theory.loaded(surface, u), name),)
-
         known = self._source.loaded
-        return self._source.map(number, self, 1)[0] if known is None else getattr(known, name)[()]
+        if known is not None:
+            return getattr(known, name)[()]
+        return self._source.map(lambda theory, s, u, E: (getattr(theory.loaded(s, u), name),), self, 1)[0]
 
     @described
     def yielded(self) -> Any:
@@ -202,17 +221,15 @@ class Contact(Interface, Displayed):
         return self._of_loading("plane_separation") if self._source.yields else self.mean_separation
 
     @property
-    def psi(self) -> Numbers:
+    def psi(self) -> Any:
         """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
         source = self._source
-        found: Numbers = (source.E_star * source.surface.rms_gradient / source.hardness)[()]
-        return found
+        return (source.E_star * source.surface.rms_gradient / source.hardness)[()]
 
     @property
-    def elastic_hardness(self) -> Numbers:
+    def elastic_hardness(self) -> Any:
         """Hardness from which the elastic area is within 5%, E* g/1.1 [stress]."""
-        found: Numbers = (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
-        return found
+        return (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
 
     @described
     def mean_pressure(self) -> Any:
@@ -228,12 +245,12 @@ class Contact(Interface, Displayed):
 
     @described
     def area_scatter(self) -> Any:
-        """Standard deviation of ln A at this pressure, likewise."""
+        """Standard deviation of ln A at this pressure, from simulation to simulation."""
         return self._scatter("area")
 
     @described
     def stiffness_scatter(self) -> Any:
-        """Standard deviation of ln of `unloading_stiffness` at this pressure, likewise: of conductance, too."""
+        """Standard deviation of ln of `unloading_stiffness` at this pressure, and of conductance."""
         return self._scatter("stiffness")
 
     @described
@@ -250,30 +267,19 @@ class Contact(Interface, Displayed):
         """Flow through the gaps of the contact, `theories.leakage.Leakage`; computed when first read."""
         from mbma_tables.answers.leakage import leakage_of
 
-        return leakage_of(self._source, self, self._touching)
+        return leakage_of(self)
+
+    @property
+    def _against(self) -> tuple[Any, ...]:
+        """What `Source.valid` and `Source.reasons` need."""
+        return self, functools.partial(reasons_against, self._source), self._answer._asdict()
 
     @described
     def valid(self) -> Any:
-        """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
-
-        def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
-            return (untroubled(concerns(source, theory, s, u, E, TheoryAnswer(*answer))),)
-
-        source = self._source
-        return source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
+        """Whether the theory was tested for contacts such as these; `reasons` has where and why not."""
+        return self._source.valid(*self._against)
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
         """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
-        source, answer = self._source, self._answer
-        surface = source.surface
-        own: list[Any] = [getattr(surface, name) for name in surface.parameters]
-        fields: list[Any] = [*answer, self.mean_separation, source.E_star, source.hardness, *own]
-        if is_labelled(answer.pressure):
-            import xarray as xr
-
-            fields = list(xr.broadcast(*map(xr.DataArray, fields)))
-            surface = surface.with_numbers(*map(np.asarray, fields[7:]))
-        *known, u, E_star, hardness = map(np.asarray, fields[:7])
-        found = concerns(source, source.theory_at(E_star, hardness), surface, u, E_star, TheoryAnswer(*known))
-        return {reason: mask for reason, mask in found.items() if mask.any()}
+        return self._source.reasons(*self._against)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -12,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.contact import contact, one_known
-from mbma_tables.answers.result import Contact
+from mbma_tables.answers.contact import chosen_theory, contact, one_known
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, unit_of
@@ -25,14 +23,14 @@ from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import chosen_theory
+from mbma_tables.theories import OF_MAPS, theory_name
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # of the logarithm of a parameter
-MAX_HURST = 0.9  # from which its steps go down: two of them, and 1 is the end
-MAX_ERROR = 0.05  # of a slope that is told, over itself or 1
+NEAR = 0.9  # of a number's end, from which on its steps go down
+MAX_ERROR = 0.05  # of a slope, over itself or 1, above which it is NaN
 POINTS = 33  # of a range, geometric
 ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
 
@@ -50,7 +48,7 @@ class Sensitivity:
     parameters : dict of float
         The surface's numbers, the modulus where there is one, and what is held.
     answers : dict of float
-        What is asked, at these numbers; stiffness that of loading, conductance over the mean conductivity of the
+        The answers at these numbers; stiffness that of loading, conductance over the mean conductivity of the
         bodies [1/length].
     slopes, errors : dict of dict of float
         d ln(answer)/d ln(parameter) by parameter and answer, the other parameters held, NaN where the answer jumps,
@@ -109,7 +107,7 @@ def sensitivity(
         One surface. Its parameters are its five numbers, or those of the drawing that it was made from
         (`Surface.from_roughness`). Those of one that is its own spectrum are "heights" and "lengths", factors of all
         heights and of all lengths along the plane, which calibrations of an instrument are about; h_max alone; the
-        "shortest" and "longest" wavelengths, cut-offs that only take waves away, and with an extrapolated spectrum
+        "shortest" and "longest" wavelengths, cut-offs that only remove wavelengths, and with an extrapolated spectrum
         its exponent "extrapolate_hurst". Where the calibrated law takes a map's own heights, tops and valleys, h_max
         and cut-offs are left out: they are the map's.
     separation, mean_separation, pressure, area : float or str, one of them
@@ -119,7 +117,8 @@ def sensitivity(
     ranges : mapping of pairs, optional
         Between what a parameter may lie: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
     theory, island_model, variant, rtol, hardness, materials : optional
-        As for `contact`; a hardness is one of the parameters.
+        As for `contact`, but for maps "calibrated" by default, as simulations know one surface; a hardness is one of
+        the parameters.
 
     Returns
     -------
@@ -144,7 +143,10 @@ def sensitivity(
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.69'
     """
-    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
+    named = theory_name(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
+    # a simulation knows no surface but its own
+    named = "calibrated" if theory is None and named in OF_MAPS else named
+    chosen = chosen_theory(surface, named, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, hardness, _ = bodies(materials, E_star, hardness)
     modulus, units = modulus_and_units(E_star, surface)
@@ -156,30 +158,27 @@ def sensitivity(
     same = "mean_separation" if by == "separation" else by
     wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
 
-    def found_at(**own: Any) -> Contact:
-        modulus, place, cap = own.pop("E_star"), own.pop(by), own.pop("hardness", np.inf)
-        return contact(make(**own), **{by: place}, E_star=modulus, hardness=cap, theory=chosen)
+    asked: Callable[..., Any] = contact
 
     def answers(moved: Mapping[str, Any]) -> Answers:
-        own = {name: moved.get(name, number) for name, number in numbers.items()}
-        places = np.broadcast(*own.values())
+        given = {name: moved.get(name, number) for name, number in numbers.items()}
+        places = np.broadcast(*given.values())
         # there are no batches of spectra
-        single = [dict(zip(own, map(float, entry), strict=True)) for entry in places]
-        found = [_answers(found_at(**one), one["E_star"]) for one in ([own] if batches else single)]
-        return {name: np.reshape([one[name] for one in found], places.shape) for name in ANSWERS}
+        single = [dict(zip(given, map(float, entry), strict=True)) for entry in places]
+        rows = []
+        for own in [given] if batches else single:
+            modulus, cap, held = own.pop("E_star"), own.pop("hardness", np.inf), {by: own.pop(by)}
+            found: Any = asked(make(**own), **held, E_star=modulus, hardness=cap, theory=chosen)
+            rows.append([*(getattr(found, name) for name in ANSWERS[:-1]), found.unloading_stiffness / modulus])
+        return {name: np.reshape(row, places.shape) for name, row in zip(ANSWERS, zip(*rows, strict=True), strict=True)}
 
-    known = found_at(**numbers)
-    here = {name: float(number) for name, number in _answers(known, numbers["E_star"]).items() if name in wanted}
+    here = {name: float(number[()]) for name, number in answers({}).items() if name in wanted}
     if not all(number > 0 for number in here.values()):
         raise InputError(f"there is no contact at this {by}, or full contact: nothing to take a logarithm of")
     varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
-    slopes, errors = _slopes(known, make, numbers, varied, by, wanted)
+    slopes, errors = _slopes(answers, numbers, varied, wanted, 3 if batches else 1)
     ends = _ranges(answers, numbers, ranges or {}, units, wanted)
     return Sensitivity(by, {name: numbers[name] for name in varied}, here, slopes, errors, ends, units)
-
-
-def _answers(found: Any, modulus: Any) -> Answers:
-    return {name: getattr(found, name) for name in ANSWERS[:-1]} | {"conductance": found.unloading_stiffness / modulus}
 
 
 def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
@@ -201,7 +200,7 @@ def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurfa
     steps = {record["step"]: record for record in surface.provenance}
     own: dict[str, Any] = {"heights": 1.0, "lengths": 1.0}
     known: MeasuredSurface = surface
-    # the calibrated law takes measured heights and tops, which have their own highest point and shortest waves
+    # the calibrated law takes measured heights and tops, which have their own highest point and shortest wavelengths
     takes_map = getattr(theory, "name", theory) == Calibrated.name
     if surface.heights.is_gaussian or not takes_map:
         own["h_max"] = float(surface.h_max)
@@ -228,61 +227,31 @@ def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurfa
 
 @np.errstate(all="ignore")
 def _slopes(
-    known: Contact,
-    make: Callable[..., Any],
+    answers: Callable[[Mapping[str, Any]], Answers],
     numbers: Mapping[str, float],
     varied: list[str],
-    by: str,
     wanted: list[str],
-) -> tuple[dict[str, dict[str, float]], ...]:
-    """Logarithmic derivatives and their errors, by differences at held gaps, and what is held in place of the gap."""
-    source, batches = known._source, isinstance(known._source.surface, Surface)
-    u, depth = float(known.mean_separation), 1 - float(known.mean_separation / known._source.surface.h_max)
-    # at a held pressure or area, the gap moves in place of that: next to last contact what is left to it
-    inverted, near = by in ("pressure", "area"), source.theory.ends_at_h_max and depth < 0.5
-    moving = [name for name in varied if name != by or not inverted] + ["gap"] * inverted
-    made = functools.cache(make)
+    halvings: int,
+) -> list[dict[str, dict[str, float]]]:
+    """Logarithmic derivatives by parameter and answer, and their errors."""
 
     def logarithms(k: Any, x: FloatArray) -> FloatArray:
-        shift = [np.exp(np.where(k == place, x, 0.0)) for place in range(len(moving))]
-        own = {name: np.full(x.size, number) for name, number in numbers.items()}
-        own |= {name: numbers[name] * times for name, times in zip(moving, shift, strict=True) if name != "gap"}
-        modulus, held, cap = own.pop("E_star"), own.pop(by), own.pop("hardness", np.full(x.size, np.inf))
-        rows = [slice(None)] if batches else [np.array([row]) for row in range(x.size)]
-        found = np.empty((len(ANSWERS), x.size))
-        for row in rows:
-            surface = make(**own) if batches else made(**{name: float(value[row][0]) for name, value in own.items()})
-            gap = (surface.h_max + held[row]) / 2 if by == "separation" else held[row]
-            if inverted:
-                gap = surface.h_max * (1 - depth * shift[-1][row]) if near else u * shift[-1][row]
-            theory: Any = source.theory_at(modulus[row], cap[row])
-            loaded = theory.loaded(surface, gap) if source.yields else None
-            answer = theory.answer(surface, gap) if loaded is None else loaded.answer
-            stress = np.stack([answer.pressure, answer.stiffness]) * modulus[row]
-            unloading = answer.stiffness if loaded is None else loaded.unloading_stiffness
-            found[:, row] = gap, stress[0], answer.area, stress[1], unloading
-        return np.log(found)
+        found = answers({name: numbers[name] * np.exp(np.where(k == j, x, 0.0)) for j, name in enumerate(varied)})
+        return np.log([found[name] for name in wanted])
 
-    # exponents near their end, and cut-offs, which only take waves away
-    ways = {name: -1.0 for name in ("hurst", "extrapolate_hurst") if numbers.get(name, 0.0) > MAX_HURST}
-    ways |= {"shortest": 1.0, "longest": -1.0}
-    sides = np.array([ways.get(name, 0.0) for name in moving])
-    scale = np.ones((len(ANSWERS), len(moving)))
-    df, error = differences(logarithms, np.full(len(moving), STEP), sides, scale, 3 if batches else 1)
-    if inverted:
-        row, place = ANSWERS.index("pressure" if by == "pressure" else "area"), varied.index(by)
-        steep, follows = df[row, -1], df[:, -1:] / df[row, -1]
-        rough = (error[:, -1:] + np.abs(follows) * error[row, -1]) / np.abs(steep)
-        error = error + np.abs(follows) * error[row] + rough * np.abs(df[row])
-        df = np.insert((df - follows * df[row])[:, :-1], place, follows[:, 0], axis=1)
-        error = np.insert(error[:, :-1], place, rough[:, 0], axis=1)
+    # cut-offs only remove wavelengths; other numbers may be near their end
+    cap = numbers.get("hardness", np.inf)
+    ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": cap}
+    ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
+    ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
+    sides, shape = np.array([ways.get(name, 0.0) for name in varied]), (len(wanted), len(varied))
+    slopes, errors = differences(logarithms, np.full(len(varied), STEP), sides, np.ones(shape), halvings)
     # an answer that jumps has no slope
-    df = np.where(error <= MAX_ERROR * np.maximum(1, np.abs(df)), df, np.nan)
-    chosen = [ANSWERS.index(name) for name in wanted]
-    return tuple(
-        {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table[chosen].T.tolist(), strict=True)}
-        for table in (df, error)
-    )
+    slopes = np.where(errors <= MAX_ERROR * np.maximum(1, np.abs(slopes)), slopes, np.nan)
+    return [
+        {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.T.tolist(), strict=True)}
+        for table in (slopes, errors)
+    ]
 
 
 def _ranges(

@@ -40,18 +40,21 @@ MEANINGS = {
     "error": "bound on the relative numerical error against the theory",
     "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
-    "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, likewise",
-    "separation_scatter": "standard deviation of the mean separation at this force, likewise",
+    "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, between simulations",
+    "separation_scatter": "standard deviation of the mean separation at this force from simulation to simulation",
     "valid": "whether the theory was tested for contacts such as these",
 }
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
 def named(value: Any, name: str, units: Units) -> Any:
-    """A quantity of a contact; a DataArray of it knows its name, meaning and unit."""
+    """A quantity of a contact; a DataArray gets its name, meaning and unit."""
     if not is_labelled(value):
         return value
     return value.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
+
+
+Against = Callable[..., dict[str, Any]]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,16 +66,11 @@ class Source:
     E_star: Any
     hardness: Any
     units: Units
+    yields: bool  # whether a hardness is given, and not an infinite one
     answer: TheoryAnswer | None = None  # where it is known already
-    loaded: Loaded | None = None  # likewise, with a hardness
+    loaded: Loaded | None = None  # the same with a hardness
     materials: Pair | None = None  # where they are named
     stated: bool = False  # whether the hardness is, infinite or not
-
-    @property
-    def yields(self) -> bool:
-        """Whether a hardness is given."""
-        # an empty one is refused where it is checked
-        return is_labelled(self.hardness) or not np.size(self.hardness) or not np.equal(self.hardness, np.inf).all()
 
     def theory_at(self, E_star: Any, hardness: Any) -> Theory:
         """The theory, with the hardness where there is one."""
@@ -86,7 +84,7 @@ class Source:
     def map(
         self,
         function: Callable[..., tuple[Any, ...]],
-        contact: Any,  # whose mean separations it is asked at
+        contact: Any,  # at whose mean separations
         outputs: int,
         more: Mapping[str, Any] | None = None,
     ) -> tuple[Numbers, ...]:
@@ -102,21 +100,39 @@ class Source:
             return found
         return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
 
+    def valid(self, contact: Any, against: Against, more: Mapping[str, Any]) -> Numbers:
+        """Where no reason of ``against(theory, surface, u, E_star, *more)``, masks by their texts, holds."""
 
-def concerns(
-    source: Source, theory: Theory, surface: AnySurface, u: FloatArray, E_star: FloatArray, answer: TheoryAnswer
+        def none(*given: Any) -> tuple[FloatArray]:
+            return (np.asarray(~np.logical_or.reduce(list(against(*given).values())), dtype=float),)
+
+        return self.map(none, contact, 1, more)[0].astype(bool)
+
+    def reasons(self, contact: Any, against: Against, more: Mapping[str, Any]) -> dict[str, Any]:
+        """The same reasons with their masks, plain arrays, where any entry has them."""
+        surface = self.surface
+        fields = [contact.mean_separation, self.E_star, self.hardness, *more.values()]
+        if any_labelled(surface, *fields):
+            import xarray as xr
+
+            own = [getattr(surface, name) for name in surface.parameters]
+            fields = list(map(np.asarray, xr.broadcast(*map(xr.DataArray, [*fields, *own]))))
+            surface = surface.with_numbers(*fields[3 + len(more) :]) if own else surface
+        u, E_star, hardness, *known = map(np.asarray, fields[: 3 + len(more)])
+        found = against(self.theory_at(E_star, hardness), surface, u, E_star, *known)
+        return {reason: mask for reason, mask in found.items() if mask.any()}
+
+
+def reasons_against(
+    source: Source, theory: Theory, surface: AnySurface, u: FloatArray, E_star: FloatArray, *known: FloatArray
 ) -> dict[str, Any]:
     """Every reason against answers of a source's theory, perhaps with a hardness, with its mask."""
+    answer = TheoryAnswer(*known)
     steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
     measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.pressure), dtype=bool))
     beyond = _beyond_metals(source, theory, surface, E_star, answer)
-    return {text: steep, **measured, **theory.concerns(surface, answer, u), **beyond}
-
-
-def untroubled(against: Mapping[str, Any]) -> FloatArray:
-    """1 where no reason holds, 0 elsewhere."""
-    return np.asarray(~np.logical_or.reduce(list(against.values())), dtype=float)
+    return {text: steep, **measured, **theory.reasons(surface, answer, u), **beyond}
 
 
 def _beyond_metals(

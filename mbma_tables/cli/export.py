@@ -8,44 +8,54 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbma_tables import __version__
 from mbma_tables.cli import options
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
-from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS, SUBROUTINES
+from mbma_tables.export.again import again, made_by
+from mbma_tables.export.targets import Target, group, names, targets
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.export.law_rows import LawTable
 
-LAW_OPTIONS = frozenset({"specimen", "theory", "variant", "hardness", "conductivity", "conductivity_unit"})
-ROW_OPTIONS = {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
-OPTIONS = {
-    **dict.fromkeys((*SOLVERS, *DATA), LAW_OPTIONS | ROW_OPTIONS),
-    **dict.fromkeys(("calculix", "abaqus", "modelica"), LAW_OPTIONS | ROW_OPTIONS | {"name"}),
-    **dict.fromkeys((*LAWS, *FMUS, *GRAPHS), LAW_OPTIONS | {"name", "leakage"}),
-    **dict.fromkeys(SUBROUTINES, LAW_OPTIONS | {"name"}),
-    **dict.fromkeys(CODE, frozenset({"variant", "check"})),
-    "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
-}
-TARGETS = (*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE)
 DEFAULTS = {"variant": "reported", "exponential": False, "leakage": False, "check": False}
 
 
-class _Target(click.Choice[str]):
+class _Target(click.ParamType[str]):
     """One of the targets; of a mistaken one the nearest is told."""
 
+    name = "target"
+
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        if value not in self.choices:
-            self.fail(f"no target is called {value!r}: {nearest(value, self.choices)}", param, ctx)
+        if value not in names():
+            self.fail(f"no target is called {value!r}: {nearest(value, names())}", param, ctx)
         return value
 
 
-@click.command(
-    "export", short_help="A contact law, or the whole model, for other codes.", epilog=f"Targets: {', '.join(TARGETS)}."
-)
-@click.argument("target", metavar="TARGET", type=_Target(TARGETS))
+class _Export(click.Command):
+    """The command, whose help lists the targets, and which knows its words."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if "--again" in args:
+            if len(args) != 2:
+                raise click.UsageError("--again FILE stands alone: leave the rest out", ctx)
+            version, args = again(Path(args[1]))
+            if version != __version__:
+                echo(f"{ctx.command_path} --again: was written by version {version}, this is {__version__}", err=True)
+        ctx.meta["words"] = tuple(args)
+        return super().parse_args(ctx, args)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        formatter.write_paragraph()
+        formatter.write_text(f"Targets: {', '.join(names())}.")
+
+
+@click.command("export", cls=_Export, short_help="A contact law, or the whole model, for other codes.")
+@click.argument("target", metavar="TARGET", type=_Target())
+@click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @options.optional_specimen_options
 @click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")
@@ -58,6 +68,11 @@ class _Target(click.Choice[str]):
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )
 @click.option("--name", help="Of the interaction, table, functions or module.")
+@click.option(
+    "--binaries",
+    type=click.Choice(["here", "all", "none"]),
+    help="In an FMU: for this platform, for all by zig, or none.",
+)
 @click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @options.theory_option
 @options.hardness_option
@@ -73,8 +88,11 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
     given = {name: value for name, value in values.items() if value is not None and value != DEFAULTS.get(name)}
-    _refuse_unused(target, given)
-    if target in CODE:
+    special = f"{target} --exponential" if "exponential" in given else target
+    kind = targets().get(special) or targets()[target]
+    _refuse_unused(kind, given)
+    given.pop("exponential", None)
+    if target in group("CODE"):
         _export_code(target, out, values["variant"], "check" in given)
         return
     specimen: Specimen | None = given.pop("specimen", None)
@@ -83,7 +101,9 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
     joint = {"surface": specimen.surface, "E_star": specimen.E_star, "stress_unit": specimen.stress_unit}
-    _write(_law_files(target, out, joint, given))
+    ctx = click.get_current_context()
+    joint["made_by"] = made_by(ctx.meta["words"], out, [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
+    _write(_law_files(kind, out, joint, given))
 
 
 def _write(files: Mapping[Path, bytes]) -> None:
@@ -93,47 +113,42 @@ def _write(files: Mapping[Path, bytes]) -> None:
             echo(path)
 
 
-def _refuse_unused(target: str, given: Mapping[str, Any]) -> None:
+def _refuse_unused(target: Target, given: Mapping[str, Any]) -> None:
     """Refuse options that would be without effect."""
-    kind = f"{target} --exponential" if "exponential" in given else target
-    taken = OPTIONS.get(kind, OPTIONS[target])
+    taken = target.takes if target.name in group("CODE") else target.takes | {"specimen"}
     unused = [
         "the surface" if name == "specimen" else f"--{name.replace('_', '-')}" for name in given if name not in taken
     ]
     if unused:
-        raise InputError(f"without effect on {kind if kind in OPTIONS else target}: leave {' and '.join(unused)} out")
+        raise InputError(f"without effect on {target.name}: leave {' and '.join(unused)} out")
 
 
-def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
+def _law_files(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
     """What is written of one surface's law, by its files."""
-    from mbma_tables.export import fmu, law_code, law_languages, onnx, solvers
+    if target.end and out.suffix != target.end:
+        raise InputError(f"--out of {target.name} must be NAME{target.end}, got {out.name!r}")
+    if str(out) == "-" and not target.alone:
+        raise InputError(f"{target.name} is two files: --out must be that of the first")
+    files = target.files(*_rows(target, out, joint, given), **given) if target.rows else target.files(**joint, **given)
+    if str(out) == "-":
+        return {out: files[""]}
+    # what the first file needs is written before it
+    return {out.with_name(f"{out.stem}{end}") if end else out: files[end] for end in sorted(files, reverse=True)}
+
+
+def _rows(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> tuple[Any, ...]:
+    """Rows of a law, and what is named in their file; taken out of `given`."""
     from mbma_tables.export.law_rows import describe_law
 
-    if target in LAWS:
-        files = {out: law_code.law_text(target, **joint, **given).encode()}
-        beside = law_languages.LANGUAGES[target].beside
-        if beside and str(out) == "-":
-            raise InputError(f"{target} is two files: --out must be that of the first")
-        if beside:
-            files[out.with_name(f"{out.stem}_c.c")] = law_code.law_text(beside, **joint, **given).encode()
-        return files
-    if target in FMUS:
-        return {out: fmu.fmu(target, **joint, **given)}
-    if target in GRAPHS:
-        return {out: onnx.onnx(**joint, **given)}
-    named = {"name": given.pop("name")} if "name" in given else {}
-    if given.pop("exponential", False):
-        return {out: solvers.exponential(**joint, **named).encode()}
-    if "pressures" in given:
-        given["pressures"] = _pressures(given["pressures"])
-    heat = "conductance" if given.keys() & {"conductivity", "conductivity_unit"} else "pressure"
-    quantity = "leakage" if given.pop("leakage", False) else heat
-    law = describe_law(**joint, quantity=quantity, **given)
-    if "pressures" in given:
+    name = (out.stem,) if target.end else (given.pop("name"),) if "name" in given else ()
+    asked = {option: given.pop(option) for option in (*given,)}
+    if "pressures" in asked:
+        asked["pressures"] = _pressures(asked["pressures"])
+    heat = "conductance" if asked.keys() & {"conductivity", "conductivity_unit"} else "pressure"
+    law = describe_law(**joint, quantity="leakage" if asked.pop("leakage", False) else heat, **asked)
+    if "pressures" in asked:
         _warn(law)
-    if target in SOLVERS:
-        return {out: getattr(solvers, target)(law, **named).encode()}
-    return _data_files(target, out, law)
+    return law, *name
 
 
 def _warn(law: LawTable) -> None:
@@ -153,16 +168,6 @@ def _pressures(text: str) -> tuple[float | str, ...]:
     return tuple(ends)
 
 
-def _data_files(target: str, out: Path, law: LawTable) -> dict[Path, bytes]:
-    from mbma_tables.export import data
-
-    if target == "matlab":
-        if out.suffix != ".mat":
-            raise InputError(f"--out of matlab must be NAME.mat, got {out.name!r}")
-        return {out.with_suffix(".m"): data.matlab_reader(law, out.stem), out: data.to_matlab(law)}
-    return {out: getattr(data, f"to_{target}")(law)}
-
-
 def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
     from mbma_tables.export import code
 
@@ -179,6 +184,7 @@ def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
 
 
 @click.command("explore", short_help="A page to explore a surface in a browser.")
+@click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
 @options.specimen_options
 @click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")

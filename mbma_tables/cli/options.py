@@ -163,6 +163,8 @@ _MAP_OPTIONS = (
     _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
     _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
     _option("long_cutoff", "Longest wavelength to keep [length]."),
+    _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
+    _option("l_filter", "and of an L-filter [length]."),
     _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
     _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
     _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
@@ -252,7 +254,8 @@ _MODEL_OPTIONS = (
 )
 theory_option = _option(
     "theory",
-    "Theory; only mbma has an island model, variant and rtol. Default: calibrated for a spectrum or a map, else mbma.",
+    "Theory; only mbma has an island model, variant and rtol. Default: mbma for numbers, else calibrated, of maps "
+    "corrected where Tamaas is installed.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
 # of islands, which MBMA alone has

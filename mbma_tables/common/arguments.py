@@ -6,9 +6,10 @@ import difflib
 import functools
 import importlib
 import inspect
+import itertools
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
@@ -65,7 +66,9 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def checked(*given: P.args, **named: P.kwargs) -> R:
-        for name in (name for name in named if name not in parameters):
+        for name in named:
+            if name in parameters:
+                continue
             if name in ("E1", "nu1", "E2", "nu2") and "E_star" in names:
                 raise TypeError(
                     f"{called} has no argument {name!r}: E_star=materials.effective_modulus(E1, nu1, E2, nu2)"
@@ -105,7 +108,8 @@ def is_labelled(value: Any) -> bool:
 
 def any_labelled(surface: Any, *values: Any) -> bool:
     """Whether a surface or any value is of DataArrays."""
-    return "xarray" in sys.modules and (surface.labelled or any(map(is_labelled, values)))
+    xarray: Any = sys.modules.get("xarray")
+    return xarray is not None and (surface.labelled or any(map(isinstance, values, itertools.repeat(xarray.DataArray))))
 
 
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
@@ -149,20 +153,32 @@ def spread(array: Any, shape: tuple[int, ...]) -> Any:
 
 def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     """What is given, broadcast and flat, and the shape."""
-    arrays = [np.asarray(value, float) for value in given]
-    shape = np.broadcast(*arrays).shape
-    table = np.empty((len(arrays), *shape))
-    for k, array in enumerate(arrays):
-        table[k] = array
-    return table.reshape(len(arrays), -1), shape
+    shape = np.broadcast(*given).shape
+    table = np.empty((len(given), *shape))
+    for k, value in enumerate(given):
+        table[k] = value
+    return table.reshape(len(given), -1), shape
+
+
+def filled(fill: Callable[..., Any], columns: Sequence[Any], outputs: int, *more: Any) -> FloatArray:
+    """Rows that a loop of the core, ``fill(*columns, *more, *rows)``, makes of flat columns of one length."""
+    size = columns[0].size
+    out = np.empty((outputs, size))
+    if size <= BLOCK:
+        fill(*columns, *more, *out)
+    else:
+        in_blocks(lambda some: fill(*(each[some] for each in columns), *more, *out[:, some]), size, BLOCK)
+    return out
 
 
 def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> list[FloatArray]:
-    """Rows that a loop of the core, ``fill(*given, *more, *rows)``, makes of what is given, of its broadcast shape."""
+    """Rows that a loop of the core makes of what is given, of its broadcast shape."""
     known, shape = rows(*given)
-    out = np.empty((outputs, known.shape[1]))
-    in_blocks(lambda some: fill(*known[:, some], *more, *out[:, some]), known.shape[1], BLOCK)
-    return list(out.reshape(outputs, *shape))
+    if known.shape[1] > BLOCK:
+        return list(filled(fill, list(known), outputs, *more).reshape(outputs, *shape))
+    out = np.empty((outputs, *shape))
+    fill(*known, *more, *out.reshape(outputs, -1))
+    return list(out)
 
 
 def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:
@@ -224,10 +240,8 @@ def whole_number_in(name: str, value: Any, low: int, high: int) -> int:
 
 def broadcast_shape(**arguments: Any) -> tuple[int, ...]:
     """The common shape of named arrays, or one message that lists theirs."""
-    shapes = {name: np.shape(value) for name, value in arguments.items()}
-    extended = {shape for shape in shapes.values() if shape}
     try:
-        return np.broadcast_shapes(*extended) if len(extended) > 1 else next(iter(extended), ())
+        return np.broadcast(*arguments.values()).shape
     except ValueError:
-        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        listed = ", ".join(f"{name} {np.shape(value)}" for name, value in arguments.items())
         raise InputError(f"arguments do not broadcast: {listed}") from None

@@ -91,6 +91,22 @@ def draw_lines(lines: Mapping[str, tuple[Any, Any]], x_label: str, y_label: str,
     return figure
 
 
+def draw_panels(
+    x: FloatArray, panels: Mapping[str, Sequence[tuple[str, FloatArray, FloatArray | None]]], x_label: str
+) -> Figure:
+    """Panels by the label of their ordinate, of lines: name, values, and standard deviation of ln or None."""
+    figure = new_figure(5 * (len(panels) + 1) // 2, 8)
+    for axes, (label, lines) in zip(figure.subplots(2, -(-len(panels) // 2)).flat, panels.items(), strict=False):
+        for name, y, scatter in lines:
+            axes.loglog(x, y, label=name)
+            _band(axes, x, y, scatter)
+        axes.set(xlabel=x_label, ylabel=label)
+        axes.grid(True, which="major", alpha=0.3)
+        if len(lines) > 1:
+            axes.legend()
+    return figure
+
+
 def draw_compression(
     curves: Sequence[Curve],
     title: str = "",

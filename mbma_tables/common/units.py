@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import re
 import reprlib
 from collections.abc import Iterator, Mapping
@@ -52,7 +53,9 @@ DIMENSIONS = {
     **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest"), (1, 0)),
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
-    **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "extrapolate_to"), (1, 0)),
+    **dict.fromkeys(
+        ("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter", "extrapolate_to"), (1, 0)
+    ),
     **dict.fromkeys(("width", "mean_free_path", "displacement"), (1, 0)),
     **dict.fromkeys(("viscosity", "pressure_drop", "pressure_in", "pressure_out"), (0, 1)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
@@ -88,11 +91,13 @@ def known(unit: Any, kind: str = "length") -> str:
     return plain
 
 
+@functools.lru_cache(1024)
 def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
     """By what a number in one unit is multiplied to be in another, rounded once."""
     return float((SIZES[kind][known(have, kind)] / SIZES[kind][known(want, kind)]) ** power)
 
 
+@functools.lru_cache(1024)
 def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none."""
     found = _NUMBER.fullmatch(text)
@@ -129,8 +134,9 @@ class Units:
     def __post_init__(self) -> None:
         for kind in ("length", "stress"):
             unit = getattr(self, kind)
-            if unit is not None and (kind, unit) != ("stress", "1"):
-                object.__setattr__(self, kind, known(unit, kind))
+            if unit is None or (kind == "stress" and unit == "1") or (isinstance(unit, str) and unit in SIZES[kind]):
+                continue
+            object.__setattr__(self, kind, known(unit, kind))
 
     def number(self, name: str, value: Any) -> Any:
         """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry."""
@@ -221,10 +227,11 @@ def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tu
     if not hasattr(surface, "unit"):
         hint = "; a named one is Surface.named(...)" if isinstance(surface, str) else ""
         raise InputError(f"surface must be a Surface, got {reprlib.repr(surface)}{hint}")
-    given, stress = resolve({"E_star": E_star}, asked, "stress")
+    stress = known(asked, "stress") if asked else _named("E_star", E_star, "stress")
     # without a modulus, stresses are over it
     absent = stress is None and isinstance(E_star, int | float) and E_star == 1.0
-    return given["E_star"], Units(surface.unit, "1" if absent else stress)
+    units = Units(surface.unit, "1" if absent else stress)
+    return units.number("E_star", E_star), units
 
 
 def unit_of(name: str, units: Units) -> str:

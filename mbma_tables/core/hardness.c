@@ -8,111 +8,11 @@
 #include "elementary.h"
 #include "mbma.h"
 
-#define SQRT1_2 0.70710678118654752440
-#define SQRT_1_2PI 0.39894228040143267794
-#define LOG_SQRT_2PI 0.91893853320467274178
-
-#define STRAIGHT_GAP 8.3 /* mean gap from which the level is the gap itself, */
-#define NEAR_GAP 3.0     /* from which it is nearly, */
-#define DEEP_GAP 3.8e-4  /* below which Mills' ratio is needed, */
-#define LEAST_GAP 1e-300 /* and below which all heights lie above it */
-
 static size_t count_missing(size_t n, const double *x) {
     size_t missing = 0;
     for (size_t k = 0; k < n; k++)
         missing += x[k] != x[k];
     return missing;
-}
-
-/* A plane at level d over Gaussian heights: their density there, and their shares below and above. */
-typedef struct {
-    double d, density, below, above;
-} plane;
-
-/* Mills' ratio R(x) = Phi(-x)/phi(x) of x >= 2.9, and 1 - x R(x), by the continued fraction without divisions. */
-static void mills(double x, double *ratio, double *rest) {
-    double p = 0.0, q = 1.0;
-    /* rounding is reached by so many terms */
-    for (int k = (int)(6.0 + 540.0 / (x * x)); k > 0; k--) {
-        const double before = p;
-        p = k * q;
-        q = mbma_fma(x, q, before);
-    }
-    *ratio = q / mbma_fma(x, q, p);
-    *rest = *ratio * (p / q);
-}
-
-/* The plane whose mean gap d Phi(d) + phi(d) is u, where both terms nearly cancel: the gap is phi (1 - x R), x = -d. */
-static plane deep_plane(double u) {
-    /* a fit in ln z, z the level of that density, leaves 1e-3 */
-    const double log_u = log(u), z = sqrt(-2.0 * (log_u + LOG_SQRT_2PI)), t = log(z);
-    double x = z + mbma_horner(0.01149149, t, -0.1315785, 0.508909, -0.5419618, -0.6321294);
-    double ratio = 0.0, rest = 1.0, move = 1.0;
-    for (int step = 0; step < 4 && fabs(move) > 1e-7; step++) {
-        mills(x, &ratio, &rest);
-        /* derivatives of ln u by -x: rate, q - rate^2, -d q - 3 q rate + 2 rate^3 */
-        const double rate = ratio / rest, q = 1.0 / rest, bend = q - rate * rate;
-        const double turn = x * q - 3.0 * q * rate + 2.0 * rate * rate * rate;
-        const double first = (log_u - (log(rest) - 0.5 * x * x - LOG_SQRT_2PI)) / rate, a = bend / (2.0 * rate);
-        move = first * (1.0 - first * (a - first * (2.0 * a * a - turn / (6.0 * rate))));
-        x -= move;
-    }
-    /* R' = -(1 - x R) */
-    const double moved = mbma_fma(rest, move, ratio);
-    rest += (ratio - (x + move) * rest) * move;
-    const double density = u / rest, below = density * moved;
-    const plane found = {-x, density, below, 1.0 - below};
-    return found;
-}
-
-/* The plane whose mean gap is u: a fit to 3e-4, then one step of fourth order, which leaves rounding. */
-static plane plane_at(double u) {
-    const plane closed = {-INFINITY, 0.0, 0.0, 1.0};
-    if (u < DEEP_GAP)
-        return u > LEAST_GAP ? deep_plane(u) : closed;
-    double d = u;
-    if (u < NEAR_GAP) {
-        const double v = sqrt(sqrt(u)), high = mbma_horner(9.929421, v, -75.30938, 245.7741, -452.8998, 521.9537);
-        d = mbma_fma(mbma_horner(high, v, -393.3206, 198.2552, -67.49275, 18.72423), v, -4.71472);
-    }
-    for (bool moved = u >= STRAIGHT_GAP;; moved = true) {
-        const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
-        const double below = d > 0.0 ? 1.0 - tail : tail;
-        const plane found = {d, density, below, d > 0.0 ? tail : 1.0 - tail};
-        if (moved)
-            return found;
-        /* what is missing of u; of positive d the large part goes first */
-        const double missing = d > 0.0 ? (u - d) + (d * tail - density) : (u - density) - d * tail;
-        const double r = missing / below, square = mbma_fma(d, d, -1.0);
-        const double a = density / (2.0 * below), b = -a * d / 3.0, c = a * square / 12.0;
-        const double third = 2.0 * a * a - b, fourth = 5.0 * a * (b - a * a) - c;
-        d += r * mbma_fma(r, mbma_fma(r, mbma_fma(r, fourth, third), -a), 1.0);
-    }
-}
-
-size_t mbma_gaussian_level(size_t n, const double *u, double *level) {
-    for (size_t k = 0; k < n; k++)
-        level[k] = plane_at(u[k]).d;
-    return count_missing(n, level);
-}
-
-size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope) {
-    double last = NAN;
-    plane end = plane_at(NAN);
-    for (size_t k = 0; k < n; k++) {
-        if (h_max[k] != last) {
-            last = h_max[k];
-            end = plane_at(last);
-        }
-        share[k] = slope[k] = u[k] == u[k] && last > LEAST_GAP ? 0.0 : NAN;
-        if (share[k] == 0.0 && u[k] < last) {
-            const plane at = plane_at(u[k]);
-            const double between = end.d > 0.0 ? at.above - end.above : end.below - at.below;
-            share[k] = mbma_max(between, 0.0) / end.below;
-            slope[k] = at.below > 0.0 ? -at.density / at.below / end.below : -INFINITY;
-        }
-    }
-    return count_missing(n, share);
 }
 
 #define MOST_ETA 1e100 /* what is larger leaves the same force */

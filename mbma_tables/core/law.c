@@ -132,7 +132,7 @@ MBMA_INLINE double quantity_at(mbma_quantity what, place p, double power) {
     return what == MBMA_STIFFNESS ? 2.0 * slope : slope;
 }
 
-MBMA_INLINE double at(const mbma_law *law, mbma_quantity what, double x, double d) {
+static double at_place(const mbma_law *law, mbma_quantity what, double x, double d) {
     const mbma_law_head *const head = law->head;
     if (!(head->lowest <= d && d <= head->highest))
         return (double)NAN;
@@ -140,19 +140,6 @@ MBMA_INLINE double at(const mbma_law *law, mbma_quantity what, double x, double 
         return quantity_at(what, place_of(law, x, d), 0.0);
     const double power = of_area(what) ? head->power_area : head->power_force;
     return x <= 0.0 && head->ends ? 0.0 : quantity_at(what, place_in(head, law->records, x, head->plus), power);
-}
-
-/* each with its own constants to the compiler */
-static double at_place(const mbma_law *law, mbma_quantity what, double x, double d) {
-    switch (what) {
-    case MBMA_FORCE: return at(law, MBMA_FORCE, x, d);
-    case MBMA_AREA: return at(law, MBMA_AREA, x, d);
-    case MBMA_STIFFNESS: return at(law, MBMA_STIFFNESS, x, d);
-    case MBMA_AREA_SLOPE: return at(law, MBMA_AREA_SLOPE, x, d);
-    case MBMA_ENERGY: return at(law, MBMA_ENERGY, x, d);
-    case MBMA_CURVATURE: return at(law, MBMA_CURVATURE, x, d);
-    }
-    return (double)NAN;
 }
 
 double mbma_law_at(const mbma_law *law, mbma_quantity what, double d) {
@@ -170,19 +157,9 @@ double mbma_law_at_overclosure(const mbma_law *law, mbma_quantity what, double c
 }
 
 double mbma_law_and_slope(const mbma_law *law, mbma_quantity which, double c, double *by_c) {
-    const mbma_law_head *const head = law->head;
-    const double d = head->h_max - 2.0 * c, x = depth_of_overclosure(head, c, d);
-    *by_c = 0.0;
-    if (head->ends && c <= 0.0)
-        return 0.0;
-    if (!(head->low <= x && head->lowest <= d && d <= head->highest)) {
-        *by_c = which == MBMA_AREA ? 2.0 * at_place(law, MBMA_AREA_SLOPE, x, d) : at_place(law, MBMA_STIFFNESS, x, d);
-        return at_place(law, which, x, d);
-    }
-    const place p = place_of(law, x, d);
-    const taylor found = taylor_of(which, p.record, p.t);
-    *by_c = 2.0 * (found.slope * p.q);
-    return found.value;
+    const bool area = which == MBMA_AREA;
+    *by_c = mbma_law_at_overclosure(law, area ? MBMA_AREA_SLOPE : MBMA_STIFFNESS, c) * (area ? 2.0 : 1.0);
+    return mbma_law_at_overclosure(law, which, c);
 }
 
 /* Places of a chunk of gaps, by member. */

@@ -35,10 +35,11 @@ typedef struct {
     double force[8][8], area[8][8];
 } mbma_cell;
 
-/* The table. The cell of (X, mu) is places[places[(X - X_low) X_rate] + (bits of mu >> 49) - first_bucket]. */
+/* The table. The cell of (X, mu) is places[places[(X - X_low) X_rate] + (bits of mu >> 49) - first_bucket]: first are
+ * the places where the buckets of strips, equal steps of X, begin. */
 typedef struct {
     const mbma_cell *cells;
-    const int32_t *places; /* where a strip's buckets begin, by equal steps of X; then the cells of the buckets */
+    const int32_t *places;
     double X_low, X_high, X_rate, mu_high;
     int64_t first_bucket, buckets;
 } mbma_cells;
@@ -71,10 +72,9 @@ int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbm
 
 enum { MBMA_TOTALS_COLUMNS = 5 };
 
-/* F/(A0 E* q0 s) and A/A0 of pairs of a surface and a gap: hurst in (0, 1], zeta_1 = q1/q0, the compression
- * (h_max - d)/h_rms and the peak h_max/h_rms. With `slopes` each is followed by its derivatives by hurst, ln(zeta_1),
- * compression and peak, MBMA_TOTALS_COLUMNS numbers in all. `error` bounds the relative error, of quadrature to `rtol`
- * and of the table; `islands` counts those looked up. */
+/* F/(A0 E* q0 s) and A/A0 of surfaces and gaps: hurst in (0, 1], zeta_1 = q1/q0, compression (h_max - d)/h_rms and peak
+ * h_max/h_rms. With `slopes` each is followed by its derivatives by hurst, ln(zeta_1), compression and peak. `error`
+ * bounds the relative error, of quadrature to `rtol` and of the table; `islands` counts those looked up. */
 size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
                    double rtol, const mbma_variant *variant, const mbma_cells *cells, int slopes, double *out,
                    double *error, uint8_t *status, int64_t *islands);
@@ -86,21 +86,15 @@ int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss);
 
 enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };
 
-/* Of panels of the approach with `count` nodes at places in [0, 1]: from the low to the high end delta rises like
- * place^power. Matrices take values at the nodes, their rows, to those at other places: checks between the nodes, nodes of
- * both halves, nodes of the part below each of `gaps` gaps, the gaps themselves; and values and slopes at the gaps to a
- * Chebyshev series, by both, or by the slopes and the mean of the values. */
+/* Of panels of the approach with `count` nodes at places in [0, 1], over which delta rises like place^power. Matrices
+ * take values at the nodes, their rows, to those at checks between the nodes, nodes of both halves, nodes of the part
+ * below each of `gaps` gaps, and the gaps; and values and slopes at the gaps to a Chebyshev series, by both, or by the
+ * slopes and the mean of the values. There are rules for the panel from 0, for others, and for narrow ones. */
 typedef struct {
     double power, count, gaps; /* whole numbers */
     double nodes[16], weights[16], reach[11];
     double checks[16][3], halves[16][32], inside[16][176], ends[16][10], series[20][20], integrated[20][20];
 } mbma_panel_rule;
-
-/* The rules of the panel from 0, of others, and of narrow ones; Chebyshev points, and values there to a series. */
-typedef struct {
-    mbma_panel_rule of[3];
-    double far_points[8], far_series[8][8];
-} mbma_rules;
 
 /* Islands as they count in sums: weights (rows, size), shift and rate of heights. */
 typedef struct {
@@ -116,12 +110,12 @@ int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, d
 /* Bounds on the relative error of panels [low, high] by rules `kind` up to the compression `last`. `fields` holds weights
  * of force, area and perhaps number of islands and Hertz area, then shift and rate, (rows + 2, panels, nodes + checks);
  * in the panel from 0 weights lack the power of delta that they begin with. */
-void mbma_profile_missed(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+void mbma_profile_missed(const mbma_panel_rule *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double last, double *error);
 
 /* Series of the logarithm of each row's sum over each panel, (panels, rows, 20), and their errors; the islands, and how
  * many lie below each panel and in all. */
-void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+void mbma_profile_series(const mbma_panel_rule *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double *series, double *error,
                          const mbma_nodes *islands, int64_t *stops);
 
@@ -131,9 +125,9 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
 
 /* ---- spline4.c: islands by the four-number table ----------------------------------------------------------------- */
 
-/* Two functions of four axes by their tensor spline of degree 3 over equally spaced nodes. `places` is (4, n), positions
- * along the axes from 0 to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2);
- * `out` is (2, n), or with slopes (10, n): f, its derivatives along the axes, g, its derivatives. */
+/* Two functions f and g of four axes by their cubic tensor spline over equally spaced nodes. `places` is (4, n), from 0
+ * to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2); `out` is (2, n), or
+ * with `slopes` (10, n): f, its derivatives along the axes, g, its derivatives. */
 size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
                     double *out);
 
@@ -142,12 +136,11 @@ size_t mbma_spline4(size_t n, const double *places, const double *coefficients, 
 /* F_n(x) = integral_x^inf (z - x)^n phi(z) dz, phi the standard normal density, of twice_n = 1, 2, 3, 4 or 5. */
 size_t mbma_height_integrals(int64_t twice_n, size_t n, const double *x, double *out);
 
-/* Gauss nodes v = (rho/a)^2 on [0, 1] and the half-space in them (37), for vectors of values times `root_weights`. */
+/* Gauss nodes v = (rho/a)^2 on [0, 1], 8 or more, and the half-space in them (37), for vectors of values times
+ * `root_weights`: row k of `modes` gives the k-th orthonormal Legendre coefficient, and w = a matrix p. */
 typedef struct {
-    size_t nodes; /* at least 8 */
-    const double *v, *root_weights;
-    const double *modes;  /* row k takes a vector to its k-th orthonormal Legendre coefficient */
-    const double *matrix; /* w = a matrix p; symmetric and positive definite */
+    size_t nodes;
+    const double *v, *root_weights, *modes, *matrix;
 } mbma_basis;
 
 #define MBMA_ISLANDS_WORK(nodes) ((nodes) * ((nodes) + 9))
@@ -164,11 +157,9 @@ size_t mbma_island_extents(size_t n, const double *X, const double *mu, double s
 
 /* ---- law.c: contact laws ---------------------------------------------------------------------------------------- */
 
-/* A contact law holds one surface's force and area as polynomials of the gap, of which there are three coordinates:
- *
- *     d  separation, from h_max at first contact to -h_max at full compression,
- *     u  mean separation (h_max + d)/2,
- *     c  overclosure h_max - u, from 0 at first contact.
+/* A contact law holds one surface's force and area as polynomials of the gap, of which there are three coordinates: the
+ * separation d, from h_max at first contact to -h_max; the mean separation u = (h_max + d)/2; and the overclosure
+ * c = h_max - u, from 0 at first contact.
  *
  * A law is one block of 8-byte words: head, rows, records. With x = (h_max + s d) scale, s the sign that the head gives
  * for this side of d = 0, the exponent of x picks a row, the row a record, and with t = (x - centre) rate
@@ -282,20 +273,18 @@ typedef struct {
     double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */
 } mbma_calibrated_table;
 
-/* Surfaces that entries of calls share. */
+/* Surfaces that entries of calls share, at least one: h_max and two numbers each by mbma_calibrated_ends for the
+ * calibrated law alone; pieces by mbma_spline_pieces, or NULL, as where these and slopes are made. */
 typedef struct {
-    size_t count; /* at least 1 where entries ask for them */
-    const double *hurst, *log_zeta_1;
-    const double *h_max;  /* of the calibrated law alone, */
-    const double *ends;   /* and two numbers each by mbma_calibrated_ends */
-    const double *pieces; /* by mbma_spline_pieces; NULL where that does not pay, and where they and slopes are made */
+    size_t count;
+    const double *hurst, *log_zeta_1, *h_max, *ends, *pieces;
 } mbma_surfaces;
 
 /* Nayak's alpha of self-affine surfaces, and their rms gradient over q0 h_rms. */
 size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient);
 
-/* Six coefficients for each cell of the third axis and each surface. With these, calls give the same bits in less time;
- * they are worth making from about 40 entries a surface on. */
+/* Six coefficients for each cell of the third axis and each surface, by which calls give the same bits in less time;
+ * worth making from about 40 entries a surface on. */
 size_t mbma_spline_pieces(const mbma_spline *spline, const mbma_surfaces *surfaces, double *pieces);
 
 /* s0 of each surface, and ln F at its h_max. */
@@ -309,26 +298,24 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *table, const mbma_su
 size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u);
 
-/* The spline and its slope at places of the third axis, held at its ends. With `pieces`, which may be those of any
- * spectrum, nothing else of the surfaces is read. */
+/* The spline and its slope at places of the third axis, held at its ends; `pieces` may be those of any spectrum. */
 size_t mbma_spline_values(const mbma_spline *spline, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
                           const double *x, double *value, double *slope);
 
 /* ---- spectrum_laws.c: Persson's theory and the calibrated law of a spectrum --------------------------------------- */
 
-/* A spectrum as a quadrature rule, wavenumbers rising. Here F is over A0 E* g with g the rms gradient, mean separations u
- * and h_max are over h_rms. */
+/* A spectrum as a quadrature rule, wavenumbers x rising, over any one, q0; shares of h_rms^2 that sum up to 1, and of g^2
+ * of the waves below; g over q0 h_rms, and Nayak's alpha. F is over A0 E* g, mean separations u and h_max over h_rms. */
 typedef struct {
     size_t count;
-    const double *x;                /* wavenumbers over any one, q0 */
-    const double *variance, *below; /* shares of h_rms^2 that sum up to 1, and of g^2 of the waves below */
-    double gradient, alpha;         /* g over q0 h_rms, Nayak's parameter */
+    const double *x, *variance, *below;
+    double gradient, alpha;
 } mbma_waves;
 
+/* Area as in the calibrated law's table, s0 = 1 being Persson's; W = a P + b P^3 + (1 - a - b) P^16, a linear in the
+ * spectrum's narrowness, b cubic; forces fall by exp(-tail (1 - narrowness) u^3). */
 typedef struct {
-    double area_s0, area_slope, area_t0; /* as in the calibrated law's table; s0 = 1 is Persson's area */
-    double weight, weight_slope, cubic;  /* W = a P + b P^3 + (1 - a - b) P^16, a linear in the spectrum's narrowness */
-    double tail;                         /* forces fall by exp(-tail (1 - narrowness) u^3) */
+    double area_s0, area_slope, area_t0, weight, weight_slope, cubic, tail;
 } mbma_law_constants;
 
 enum { MBMA_ORDER = 12, MBMA_MOST_PANELS = 120 };
@@ -338,8 +325,7 @@ typedef struct {
     double s0, t0, tail, h_max, end; /* end: ln F at h_max of a surface without end */
     double shift, lightest[2];       /* of ln F; u where panels begin, and its slope */
     uint64_t panels;
-    double edge[MBMA_MOST_PANELS + 1], log_u[MBMA_MOST_PANELS + 1];
-    double p[MBMA_MOST_PANELS][MBMA_ORDER];
+    double edge[MBMA_MOST_PANELS + 1], p[MBMA_MOST_PANELS][MBMA_ORDER];
 } mbma_spectrum_law;
 
 /* A quadrature rule for power laws between samples: q rising [1/length], a repeated one is a jump; C not negative
@@ -354,29 +340,20 @@ size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_
 mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *constants, double h_max,
                                  double *work, mbma_spectrum_law *law);
 
-/* Mean separation and its derivative by ln F of a surface without end, before the tail's factor. */
-size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const double *force, double *u, double *slope);
-
 /* Force, area and -dF/du at mean separations. */
 size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
                                  double *stiffness);
 
-/* Mean separations at forces > 0; 0 at forces that leave none. */
-size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, double *u);
+/* Mean separations at forces > 0, 0 at forces that leave none, and du/d ln F of what is solved for; without `whole` of
+ * a surface without end, before the tail's factor. */
+size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, int whole, double *u,
+                                    double *slope);
 
-/* ---- hardness.c: contact with a hardness -------------------------------------------------------------------------- */
-
-/* Contact whose pressure cannot exceed a hardness p_m, from the elastic contact of the same surface. Lengths are in
- * h_rms, forces in A0 E* g with g the rms gradient; eta = p_m/(E* g) is infinite where nothing yields. */
-
-/* Levels d below which Gaussian heights leave a mean gap u: the inverse of u = d Phi(d) + phi(d); -inf below 1e-300. */
-size_t mbma_gaussian_level(size_t n, const double *u, double *level);
-
-/* Share Q of Gaussian heights above the level of mean gap u, and dQ/du; heights end at h_max, which may be infinite. */
-size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope);
+/* ---- hardness.c: contact with a hardness p_m ---------------------------------------------------------------------- */
 
 /* Force F and -dF/du of F^-n = F_el^-n + (eta Q)^-n, n = light + by_eta eta + by_share Q, from the elastic force and
- * -dF_el/du and from the share Q and dQ/du at a mean gap. */
+ * -dF_el/du and from the share Q and dQ/du at a mean gap. Lengths are in h_rms, forces in A0 E* g; eta = p_m/(E* g) is
+ * infinite where nothing yields. */
 size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffness, const double *share,
                          const double *slope, const double *eta, double light, double by_eta, double by_share,
                          double *force, double *steepness);

@@ -21,14 +21,8 @@ MBMA_INLINE gradient along_x(eight row, double x) {
     return found;
 }
 
-/* The polynomial of a cell at x and y; without slopes by pairs of rows, which wait less than one after the other. */
-MBMA_INLINE gradient polynomial(const double c[8][8], double x, double y, bool slopes) {
-    if (!slopes) {
-        const double y2 = y * y;
-        const eight low = fma8(fma8(eight_of(c[3]), y, eight_of(c[2])), y2, fma8(eight_of(c[1]), y, eight_of(c[0])));
-        const eight high = fma8(fma8(eight_of(c[7]), y, eight_of(c[6])), y2, fma8(eight_of(c[5]), y, eight_of(c[4])));
-        return along_x(fma8(high, y2 * y2, low), x);
-    }
+/* The polynomial of a cell at x and y; slopes that are not used are not computed. */
+MBMA_INLINE gradient polynomial(const double c[8][8], double x, double y) {
     eight slope = eight_of(c[7]), value = fma8(slope, y, eight_of(c[6]));
     for (int k = 5; k >= 0; k--) {
         slope = fma8(slope, y, value);
@@ -39,13 +33,13 @@ MBMA_INLINE gradient polynomial(const double c[8][8], double x, double y, bool s
     return found;
 }
 
-/* Phi_F and Phi_A of an island, and their derivatives, which hold with `slopes`. */
+/* Phi_F and Phi_A of an island, and their derivatives. */
 typedef struct {
     int status;
     double error, value[2], by_X[2], by_mu[2];
 } phi;
 
-MBMA_INLINE phi phi_at(const mbma_cells *t, double X, double mu, bool slopes) {
+MBMA_INLINE phi phi_at(const mbma_cells *t, double X, double mu) {
     if (!(X >= t->X_low && X <= t->X_high && mu <= t->mu_high && mu >= 0.0)) {
         const phi none = {!(X == X && mu >= 0.0) ? MBMA_INVALID : X < t->X_low ? MBMA_X_BELOW :
                           X > t->X_high ? MBMA_X_ABOVE : MBMA_MU_ABOVE, NAN, {NAN, NAN}, {NAN, NAN}, {NAN, NAN}};
@@ -57,7 +51,7 @@ MBMA_INLINE phi phi_at(const mbma_cells *t, double X, double mu, bool slopes) {
     const double bottom = mbma_fma(mu, c->bottom_mu, c->bottom), over = 1.0 / bottom;
     const double x = (X - c->centre) * c->rate, y = mbma_fma(mu, c->top_mu, c->top) * over;
     const double by_mu = (c->top_mu * c->bottom - c->top * c->bottom_mu) * (over * over);
-    const gradient F = polynomial(c->force, x, y, slopes), A = polynomial(c->area, x, y, slopes);
+    const gradient F = polynomial(c->force, x, y), A = polynomial(c->area, x, y);
     const phi found = {MBMA_OK, c->error, {mu * F.value, A.value}, {mu * F.by_x * c->rate, A.by_x * c->rate},
                        {mbma_fma(mu * F.by_y, by_mu, F.value), A.by_y * by_mu}};
     return found;

@@ -7,7 +7,7 @@
 #include "elementary.h"
 #include "mbma.h"
 
-enum { ORDER = MBMA_ORDER, CELLS = 85, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
+enum { ORDER = MBMA_ORDER, CELLS = 85, NODES = 12, FEW_NODES = 4, MOST_STEPS = 100 };
 
 #define LOWEST -14.0   /* ln y of the first cell, up to whose end I is linear in ln y, */
 #define HIGHEST 3.0    /* and of the last, above which I is below 1e-350 */
@@ -26,66 +26,51 @@ static const double EDGES[] = {-48.0, -36.0, -26.0, -22.0, -18.0, -15.0,  -12.0,
 
 static const double ROOT_8_PI = 1.5957691216057308; /* sqrt(8/pi) */
 
-/* Gauss's rules of 2, 4, 6 and 12 nodes on [-1, 1]: positive nodes and their weights. */
-static const int RULE_NODES[4] = {2, 4, 6, 12};
-static const double RULES[4][6][2] = {
-    {{0.5773502691896257, 1.0}},
-    {{0.33998104358485626, 0.6521451548625461}, {0.8611363115940526, 0.34785484513745385}},
-    {{0.2386191860831969, 0.46791393457269104},
-     {0.6612093864662645, 0.3607615730481386},
-     {0.932469514203152, 0.17132449237917036}},
-    {{0.1252334085114689, 0.24914704581340277},
-     {0.3678314989981802, 0.2334925365383548},
-     {0.5873179542866175, 0.20316742672306592},
-     {0.7699026741943047, 0.16007832854334622},
-     {0.9041172563704749, 0.10693932599531843},
-     {0.9815606342467192, 0.04717533638651183}},
-};
+/* Gauss's rules of 4 and 12 nodes on [-1, 1]: positive nodes and their weights. */
+static const double FEW[FEW_NODES / 2][2] = {{0.33998104358485626, 0.6521451548625461},
+                                             {0.8611363115940526, 0.34785484513745385}};
+static const double RULE[NODES / 2][2] = {{0.1252334085114689, 0.24914704581340277},
+                                          {0.3678314989981802, 0.2334925365383548},
+                                          {0.5873179542866175, 0.20316742672306592},
+                                          {0.7699026741943047, 0.16007832854334622},
+                                          {0.9041172563704749, 0.10693932599531843},
+                                          {0.9815606342467192, 0.04717533638651183}};
 
 /* ---- polynomials through Chebyshev nodes of [-1, 1] -------------------------------------------------------------- */
 
-typedef struct {
-    double node[ORDER], chebyshev[ORDER][ORDER], powers[ORDER][ORDER];
-} fit;
-
-static void make_fit(fit *f) {
-    for (int m = 0; m < ORDER; m++)
-        for (int j = 0; j < ORDER; j++) {
-            const double step = 1.0 / (double)ORDER, angle = MBMA_PI * (j + 0.5) * step;
-            const double twice = m > 1 && j > 0 ? 2.0 * f->powers[m - 1][j - 1] : 0.0;
-            f->node[j] = cos(angle);
-            f->chebyshev[m][j] = (m == 0 ? 1.0 : 2.0) * step * cos(m * angle);
-            f->powers[m][j] = m > 1 ? twice - f->powers[m - 2][j] : (double)(m == j);
-        }
-}
+static double node(int j) { return cos(MBMA_PI * (j + 0.5) / ORDER); }
 
 /* Powers from values at the nodes; the last two Chebyshev coefficients, which tell the error. */
-static double powers_of(const fit *f, const double value[ORDER], double p[ORDER]) {
-    double c[ORDER];
+static double powers_of(const double value[ORDER], double p[ORDER]) {
+    double before[ORDER] = {0.0}, term[ORDER] = {1.0}, last[2] = {0.0};
+    memset(p, 0, ORDER * sizeof *p);
     for (int m = 0; m < ORDER; m++) {
-        c[m] = 0.0;
-        p[m] = 0.0;
+        double c = 0.0;
         for (int j = 0; j < ORDER; j++)
-            c[m] += f->chebyshev[m][j] * value[j];
+            c += (m == 0 ? 1.0 : 2.0) / ORDER * cos(m * (MBMA_PI * (j + 0.5) / ORDER)) * value[j];
+        last[m % 2] = fabs(c);
+        /* the next Chebyshev polynomial is 2 x times this one less the one before */
+        for (int j = ORDER - 1; j >= 0; j--) {
+            const double next = (m == 0 ? 1.0 : 2.0) * (j > 0 ? term[j - 1] : 0.0) - before[j];
+            p[j] += c * term[j];
+            before[j] = term[j];
+            term[j] = next;
+        }
     }
-    for (int m = 0; m < ORDER; m++)
-        for (int j = 0; j <= m; j++)
-            p[j] += c[m] * f->powers[m][j];
-    return fabs(c[ORDER - 1]) + fabs(c[ORDER - 2]);
+    return last[0] + last[1];
 }
 
 /* ---- inner integrals I(y), times exp(2 y^2) ---------------------------------------------------------------------- */
 
-/* From ln y down to another, by steps over which exp(2 y^2) changes by a factor e at most. */
+/* From ln y down to another, by steps over which exp(2 y^2) changes by a factor e^4 at most. */
 static double integrated_down(double from, double to, const double weight[3], double inner) {
-    const double span = 2.0 * (exp(2.0 * from) - exp(2.0 * to));
-    const int steps = 1 + (int)span;
+    const int steps = 1 + (int)(0.5 * (exp(2.0 * from) - exp(2.0 * to)));
     for (int step = 0; step < steps; step++) {
         const double high = from + (to - from) * step / steps, low = from + (to - from) * (step + 1) / steps;
         const double end = exp(2.0 * low);
         inner *= mbma_exp(2.0 * (end - exp(2.0 * high)));
-        for (int k = 0; k < RULE_NODES[2]; k++) {
-            const double *rule = RULES[2][k / 2], s = 0.5 * (low + high + (high - low) * (k % 2 ? rule[0] : -rule[0]));
+        for (int k = 0; k < NODES; k++) {
+            const double *rule = RULE[k / 2], s = 0.5 * (low + high + (high - low) * (k % 2 ? rule[0] : -rule[0]));
             const double y = mbma_exp(s), P = mbma_erf(1.4142135623730951 * y), P2 = P * P, P4 = P2 * P2, P8 = P4 * P4;
             const double slope = weight[0] + 3.0 * weight[1] * P2 + 16.0 * weight[2] * (P8 * P4) * (P2 * P);
             inner += 0.5 * (high - low) * rule[1] * ROOT_8_PI * mbma_exp(2.0 * (end - y * y)) * slope;
@@ -94,7 +79,7 @@ static double integrated_down(double from, double to, const double weight[3], do
     return inner;
 }
 
-static void inner_integral(const fit *f, const double weight[3], double p[CELLS][ORDER]) {
+static void inner_integral(const double weight[3], double p[CELLS][ORDER]) {
     const double z = 2.0 * exp(2.0 * HIGHEST);
     double series = 1.0, at = HIGHEST, value[ORDER];
     /* exp(z) z E1(z) */
@@ -103,11 +88,11 @@ static void inner_integral(const fit *f, const double weight[3], double p[CELLS]
     double own = 0.5 * ROOT_8_PI / z * series * (weight[0] + 3.0 * weight[1] + 16.0 * weight[2]);
     for (int cell = CELLS - 1; cell >= 0; cell--) {
         for (int j = 0; j < ORDER; j++) {
-            const double next = LOWEST + (cell + 0.5 * (1.0 + f->node[j])) / CELL_RATE;
+            const double next = LOWEST + (cell + 0.5 * (1.0 + node(j))) / CELL_RATE;
             value[j] = own = integrated_down(at, next, weight, own);
             at = next;
         }
-        (void)powers_of(f, value, p[cell]);
+        (void)powers_of(value, p[cell]);
     }
     p[0][1] = -0.5 * ROOT_8_PI / CELL_RATE * weight[0];
     for (int m = 2; m < ORDER; m++)
@@ -125,43 +110,30 @@ typedef struct {
 /* ln u + 2 F^2. */
 static double sum_at(const wave_sum *w, double log_force) {
     const double square = 2.0 * exp(2.0 * log_force);
-    double lanes[LANES] = {0.0}, part[CHUNK], place[CHUNK];
-    int32_t cell[CHUNK];
-    size_t heaviest = 0; /* wave that is not negligible */
-    while (heaviest + 1 < w->count && square * w->fall[heaviest] > NOTHING)
-        heaviest++;
-    for (size_t first = heaviest; first < w->count; first += CHUNK) {
-        const size_t count = w->count - first < (size_t)CHUNK ? w->count - first : (size_t)CHUNK;
-        const double *log_g = w->log_g + first, *fall = w->fall + first, *share = w->share + first;
-        for (size_t k = 0; k < count; k++) {
-            const double at = mbma_min((log_force - log_g[k] - LOWEST) * CELL_RATE, (double)CELLS);
-            cell[k] = (int32_t)mbma_held(at, 0.0, (double)(CELLS - 1));
-            place[k] = 2.0 * (at - cell[k]) - 1.0;
-        }
-        for (size_t k = 0; k < count; k++)
-            part[k] = share[k] * mbma_exp(-square * fall[k]);
-        for (size_t k = 0; k < count; k++) {
-            const double *p = w->p[cell[k]], t = place[k], t2 = t * t, t4 = t2 * t2;
-            const double low = mbma_fma(t2, mbma_fma(t, p[3], p[2]), mbma_fma(t, p[1], p[0]));
-            const double middle = mbma_fma(t2, mbma_fma(t, p[7], p[6]), mbma_fma(t, p[5], p[4]));
-            const double high = mbma_fma(t2, mbma_fma(t, p[11], p[10]), mbma_fma(t, p[9], p[8]));
-            part[k] *= mbma_fma(t4, mbma_fma(t4, high, middle), low);
-        }
-        for (size_t k = 0; k < count; k++)
-            lanes[k % LANES] += part[k];
+    double sum = 0.0;
+    for (size_t k = 0; k < w->count; k++) {
+        /* waves that are closed, but for the last one */
+        if (square * w->fall[k] > NOTHING && k + 1 < w->count)
+            continue;
+        const double at = mbma_min((log_force - w->log_g[k] - LOWEST) * CELL_RATE, (double)CELLS);
+        const int cell = (int)mbma_held(at, 0.0, (double)(CELLS - 1));
+        double own = 0.0;
+        for (int m = ORDER - 1; m >= 0; m--)
+            own = mbma_fma(own, 2.0 * (at - cell) - 1.0, w->p[cell][m]);
+        sum = mbma_fma(w->share[k] * mbma_exp(-square * w->fall[k]), own, sum);
     }
-    return log(((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7])));
+    return log(sum);
 }
 
 /* Panels from `start` to `end`, halved until polynomials hold. */
-static bool fill_panels(const wave_sum *w, const fit *f, double start, double end, mbma_spectrum_law *law) {
+static bool fill_panels(const wave_sum *w, double start, double end, mbma_spectrum_law *law) {
     while (start < end && law->panels < MBMA_MOST_PANELS) {
         double width = 2.0 * (end - start), value[ORDER], tail;
         do {
             width *= 0.5;
             for (int j = 0; j < ORDER; j++)
-                value[j] = sum_at(w, start + 0.5 * width * (1.0 + f->node[j]));
-            tail = powers_of(f, value, law->p[law->panels]);
+                value[j] = sum_at(w, start + 0.5 * width * (1.0 + node(j)));
+            tail = powers_of(value, law->p[law->panels]);
         } while (tail > TINY && width > NARROWEST);
         start = end - start > width ? start + width : end;
         law->edge[++law->panels] = start;
@@ -184,18 +156,20 @@ static double log_u_in(const mbma_spectrum_law *law, size_t panel, double log_fo
 
 /* ln F at a mean separation before the tail's factor, by Newton's method in a bracket, and d ln u/d ln F. */
 static double log_force_of(const mbma_spectrum_law *law, double u, double *slope) {
-    const double log_u = log(u), *edge = law->edge, *ends = law->log_u;
+    const double log_u = log(u), *edge = law->edge;
     size_t panel = 0;
     if (u >= law->lightest[0]) {
         *slope = law->lightest[1] / u;
         return edge[0] + (u - law->lightest[0]) / law->lightest[1];
     }
-    if (!(log_u >= ends[law->panels]))
+    double from = log(law->lightest[0]), to = log_u_in(law, 0, edge[1], slope);
+    while (to > log_u && ++panel < law->panels) {
+        from = to;
+        to = log_u_in(law, panel, edge[panel + 1], slope);
+    }
+    if (!(log_u >= to))
         return NAN;
-    while (panel + 1 < law->panels && ends[panel + 1] >= log_u)
-        panel++;
-    double low = edge[panel], high = edge[panel + 1], x = low, step = NAN;
-    x += (high - low) * (ends[panel] - log_u) / (ends[panel] - ends[panel + 1]);
+    double low = edge[panel], high = edge[panel + 1], x = low + (high - low) * (from - log_u) / (from - to), step;
     for (int k = 0; k < MOST_STEPS; k++) {
         const double miss = log_u_in(law, panel, x, slope) - log_u;
         *(miss > 0.0 ? &low : &high) = x;
@@ -233,7 +207,6 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
     double mean = 0.0, inverse = 0.0, slope;
     wave_sum w = {{{0.0}}, n, work, work + n, work + 2 * n};
     bool good = n > 0 && h_max > 0.0 && waves->gradient > 0.0 && waves->gradient < INFINITY && waves->alpha > 0.0;
-    fit f;
     memset(law, 0, sizeof *law);
     for (size_t k = 0; k < n && good; k++) {
         const double below = waves->below[k], last = waves->below[n - 1];
@@ -249,8 +222,7 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
         return MBMA_INVALID;
     const double narrowness = 1.0 / (mean * inverse), a = c->weight + c->weight_slope * (narrowness - NARROWNESS);
     const double weight[3] = {a, c->cubic, 1.0 - a - c->cubic};
-    make_fit(&f);
-    inner_integral(&f, weight, w.p);
+    inner_integral(weight, w.p);
     law->s0 = mbma_min(c->area_s0 + c->area_slope * log(waves->alpha / 10.0), 1.0);
     law->t0 = c->area_t0;
     law->tail = c->tail * (1.0 - narrowness);
@@ -258,10 +230,7 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
     law->shift = 0.5 * log(waves->below[n - 1]);
     law->edge[0] = EDGES[0];
     for (size_t k = 0; k + 1 < sizeof EDGES / sizeof *EDGES; k++)
-        good = good && fill_panels(&w, &f, EDGES[k], EDGES[k + 1], law);
-    for (size_t k = 0; k < law->panels; k++)
-        law->log_u[k] = log_u_in(law, k, law->edge[k], &slope);
-    law->log_u[law->panels] = log_u_in(law, law->panels - 1, law->edge[law->panels], &slope);
+        good = good && fill_panels(&w, EDGES[k], EDGES[k + 1], law);
     law->lightest[0] = exp(log_u_in(law, 0, law->edge[0], &slope));
     /* without the first power in W, u is constant there */
     law->lightest[1] = fmin(slope * law->lightest[0], -1e-300);
@@ -273,19 +242,6 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
 
 /* Whether a law was prepared: nothing is read beyond its panels. */
 static bool is_prepared(const mbma_spectrum_law *law) { return law->panels > 0 && law->panels <= MBMA_MOST_PANELS; }
-
-size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const double *force, double *u,
-                                 double *slope) {
-    const bool ready = is_prepared(law);
-    size_t bad = 0;
-    for (size_t k = 0; k < n; k++) {
-        const bool good = ready && force[k] > 0.0;
-        u[k] = good ? separation_of(law, log(force[k]) - law->shift, &slope[k]) : NAN;
-        slope[k] = good ? slope[k] : NAN;
-        bad += !good;
-    }
-    return bad;
-}
 
 size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
                                  double *stiffness) {
@@ -309,30 +265,34 @@ size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const d
 }
 
 /* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for it. */
-static double separation_at(const mbma_spectrum_law *law, double log_force) {
-    const double over = log_force - law->end, heaviest = law->edge[law->panels];
-    const double goal = over < 700.0 ? law->end + fmax(over, 0.0) + log1p(exp(-fabs(over))) : log_force;
-    double low = -800.0, high = heaviest, x = goal - law->shift, slope;
-    if (x >= heaviest)
-        return 0.0;
-    for (int step = 0; step < MOST_STEPS; step++) {
+static double separation_at(const mbma_spectrum_law *law, double log_force, double end, double tail, double *slope) {
+    const double over = log_force - end, heaviest = law->edge[law->panels];
+    const double goal = over < 700.0 ? end + fmax(over, 0.0) + log1p(exp(-fabs(over))) : log_force;
+    double low = -800.0, high = heaviest, x = goal - law->shift, u = 0.0;
+    *slope = 0.0;
+    for (int step = 0; step < MOST_STEPS && goal - law->shift < heaviest; step++) {
         x = x > low && x < high ? x : 0.5 * (low + high);
-        const double u = separation_of(law, x, &slope), miss = x + law->shift - tail_at(law, u) - goal;
-        const double move = -miss / (1.0 - 3.0 * tail_at(law, u) / u * slope);
+        u = separation_of(law, x, slope);
+        const double miss = x + law->shift - tail * u * u * u - goal, move = -miss / (1.0 - 3.0 * tail * u * u * *slope);
         *(miss > 0.0 ? &high : &low) = x;
         x += move;
         if (fabs(move) <= CLOSE)
-            break;
+            return tail > 0.0 ? separation_of(law, x, slope) : u;
     }
-    return fmin(separation_of(law, x, &slope), law->h_max);
+    return u;
 }
 
-size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, double *u) {
+size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, int whole, double *u,
+                                    double *slope) {
+    const double end = whole ? law->end : -INFINITY, tail = whole ? law->tail : 0.0;
     const bool ready = is_prepared(law);
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
-        u[k] = ready && force[k] > 0.0 ? separation_at(law, log(force[k])) : NAN;
-        bad += u[k] != u[k];
+        const bool good = ready && force[k] > 0.0;
+        u[k] = slope[k] = NAN;
+        if (good)
+            u[k] = mbma_min(separation_at(law, log(force[k]), end, tail, &slope[k]), whole ? law->h_max : INFINITY);
+        bad += !good;
     }
     return bad;
 }
@@ -364,10 +324,10 @@ static double part_of(const piece *s, int order, double rise) {
     return s->content * exp(order * s->start) * rise * growth((s->power + order) * rise);
 }
 
-/* Where the panel that begins at t = ln x ends, and by which rule it is integrated. Panels are graded towards the
- * longest wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one,
- * neither what it holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
-static double panel_end(const piece *s, double t, double last, double before, int *rule) {
+/* Where the panel that begins at t = ln x ends, and whether few nodes are enough. Panels are graded towards the longest
+ * wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one, neither what it
+ * holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
+static double panel_end(const piece *s, double t, double last, double before, bool *few) {
     const double first = fmin(last, 1.0), left = last - t, rise = t - s->start, power = fabs(s->power) + 2.0;
     const double low = t > 0.0 ? fmax(t * exp(2.0), first * exp(-40.0)) : first * exp(-40.0);
     /* steps that rounding leaves, and those in which a gradient that jumps counts for nothing */
@@ -380,7 +340,7 @@ static double panel_end(const piece *s, double t, double last, double before, in
         while (change > 2.01 && (width *= 0.5) > finest);
     width = fmax(width, least);
     const double wide = fmax(fmax(width * fmax(1.0, 0.3 * power), change), width / left);
-    *rule = wide < 0.01 ? 0 : wide < 0.1 ? 1 : wide < 0.4 ? 2 : 3;
+    *few = wide < 0.1;
     return width < s->start + s->width - t ? t + width : s->start + s->width;
 }
 
@@ -411,13 +371,13 @@ size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_
             continue;
         const piece own = piece_of(q, C, base, k);
         for (double t = own.start, end; t < own.start + own.width; t = end) {
-            int rule;
-            end = panel_end(&own, t, last, before, &rule);
+            bool few;
+            end = panel_end(&own, t, last, before, &few);
             /* nodes in the root of ln x, to which the gradient rises in proportion */
             const double low = sqrt(t), high = sqrt(end);
-            const int half = RULE_NODES[rule] / 2;
+            const int half = (few ? FEW_NODES : NODES) / 2;
             for (int n = -half; n < half; n++, waves++) {
-                const double *node = RULES[rule][n < 0 ? -1 - n : n];
+                const double *const node = few ? FEW[n < 0 ? -1 - n : n] : RULE[n < 0 ? -1 - n : n];
                 const double root = 0.5 * (low + high + (high - low) * (n < 0 ? -node[0] : node[0]));
                 const double log_x = root * root, rise = fmin(fmax(log_x - own.start, 0.0), own.width);
                 if (waves >= most)

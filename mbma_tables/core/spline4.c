@@ -28,8 +28,8 @@ MBMA_INLINE void last_axis(const double *w, eight sums, double *f, double *g) {
     *g = mbma_fma(w[0], lanes[1], w[1] * lanes[3]) + mbma_fma(w[2], lanes[5], w[3] * lanes[7]);
 }
 
-MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes,
-                           bool slopes, double *out) {
+size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
+                    double *out) {
     static const double ZEROS[8] = {0};
     const int64_t row = 2 * (nodes[3] + 2), plane = row * (nodes[2] + 2), cube = plane * (nodes[1] + 2);
     const size_t count = slopes ? 5 : 1; /* of each function */
@@ -46,7 +46,6 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
         const int64_t corner = w[0].cell * cube + w[1].cell * plane + w[2].cell * row + 2 * w[3].cell;
         const double *const start = coefficients + corner;
         eight value = none, by_x = none, by_y = none, by_z = none;
-        /* without slopes, what is not read is not computed either */
         for (int a = 0; a < 4; a++) {
             eight over_y = none, slope_y = none, slope_z = none;
             for (int b = 0; b < 4; b++) {
@@ -76,10 +75,4 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
         bad += !inside;
     }
     return bad;
-}
-
-size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
-                    double *out) {
-    return slopes ? spline4(n, places, coefficients, nodes, true, out)
-                  : spline4(n, places, coefficients, nodes, false, out);
 }

@@ -1,5 +1,5 @@
-/* The part of CPython's stable ABI that binding.c uses, for builds without Python's own headers: on machines that have
- * none, and for other platforms. Layouts and names are fixed for every CPython from 3.11 on with a global lock
+/* The part of CPython's stable ABI that binding.c uses: Python's own headers are not needed, on machines that have none
+ * and for other platforms. Layouts and names are fixed for every CPython from 3.11 on with a global lock
  * (https://docs.python.org/3/c-api/stable.html); tests/core/test_core_builds.py compares them with Python.h. */
 #ifndef MBMA_STABLE_ABI_H
 #define MBMA_STABLE_ABI_H
@@ -76,7 +76,7 @@ PyAPI_FUNC(int) PyModule_AddStringConstant(PyObject *, const char *, const char 
 PyAPI_FUNC(PyObject *) PyModuleDef_Init(PyModuleDef *);
 PyAPI_FUNC(PyObject *) PyObject_CallMethod(PyObject *, const char *, const char *, ...);
 PyAPI_FUNC(PyObject *) PyObject_GetAttrString(PyObject *, const char *);
-PyAPI_FUNC(int) PyObject_GetBuffer(PyObject *, Py_buffer *, int);
+PyAPI_FUNC(int) PyObject_GetBuffer(PyObject *, Py_buffer *, int); PyAPI_FUNC(Py_ssize_t) PyObject_Size(PyObject *);
 PyAPI_FUNC(PyObject *) PyTuple_GetItem(PyObject *, Py_ssize_t); PyAPI_FUNC(Py_ssize_t) PyTuple_Size(PyObject *);
 PyAPI_FUNC(PyObject *) PyType_FromSpec(PyType_Spec *); PyAPI_FUNC(void *) PyType_GetSlot(PyTypeObject *, int);
 PyAPI_FUNC(int) PyUnicode_CompareWithASCIIString(PyObject *, const char *);

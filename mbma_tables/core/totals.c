@@ -132,22 +132,6 @@ MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const inter
     }
 }
 
-/* Each case in functions of its own, which compilers take for a loop of its own. */
-#define FILL(name, floor_d, floor_u) \
-    static void name##_values(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
-        fill_nodes(floor_d, floor_u, false, p, r, g, out); \
-    } \
-    static void name##_slopes(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
-        fill_nodes(floor_d, floor_u, true, p, r, g, out); \
-    }
-FILL(free, false, false)
-FILL(floor_u, false, true)
-FILL(floor_d, true, false)
-FILL(floors, true, true)
-static void (*const FILLS[2][2][2])(const interval *, const rule *, const gap *, at_nodes *) = {
-    {{free_values, floor_u_values}, {floor_d_values, floors_values}},
-    {{free_slopes, floor_u_slopes}, {floor_d_slopes, floors_slopes}}};
-
 /* The pieces of [0, compression] between the kinks; their number. */
 static int first_intervals(const gap *g, interval *intervals) {
     const double first = mbma_min(g->s.kink_d, g->s.kink_u), second = mbma_max(g->s.kink_d, g->s.kink_u);
@@ -171,10 +155,18 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
     const rule *const r = &g->rules[!(p->floor_d && p->high - p->low < NARROW)];
     double sums[2][COLUMNS] = {{0.0}}, gauss[2] = {0.0};
     at_nodes at;
-    FILLS[slopes][p->floor_d][p->floor_u](p, r, g, &at);
+    /* loops of their own for compilers, with constants */
+    if (p->floor_d && p->floor_u)
+        fill_nodes(true, true, slopes, p, r, g, &at);
+    else if (p->floor_d)
+        fill_nodes(true, false, slopes, p, r, g, &at);
+    else if (p->floor_u)
+        fill_nodes(false, true, slopes, p, r, g, &at);
+    else
+        fill_nodes(false, false, slopes, p, r, g, &at);
     g->islands += r->count;
     for (int k = 0; k < r->count; k++) {
-        const phi found = phi_at(g->cells, at.X[k], at.mu[k], slopes);
+        const phi found = phi_at(g->cells, at.X[k], at.mu[k]);
         if (found.status != MBMA_OK)
             return found.status;
         g->table_error = mbma_max(g->table_error, found.error);
@@ -250,7 +242,7 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
 /* The integrands of force and area over x = delta/h_rms. */
 static int integrand(double x, const gap *g, double out[2]) {
     const island n = island_at(x, x >= g->s.kink_d, x > g->s.kink_u, &g->s);
-    const phi found = phi_at(g->cells, n.X, n.mu, false);
+    const phi found = phi_at(g->cells, n.X, n.mu);
     const double height = height_of(g->peak - (g->compression - x), &n, &g->s);
     const double weight = n.count * exp(-0.5 * height * height);
     out[0] = n.force * found.value[0] * weight;

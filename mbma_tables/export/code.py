@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import functools
 import importlib.util
 import os
 import pathlib
@@ -16,13 +17,15 @@ import subprocess
 import sys
 import tempfile
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
-from mbma_tables.export import CODE, c_code
+from mbma_tables.export import c_code
+from mbma_tables.export.again import written_by
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
+from mbma_tables.export.targets import Target
 from mbma_tables.export.text import filled, opening, wrapped
 from mbma_tables.models.tables import open_table
 from mbma_tables.models.universal import UniversalModel
@@ -98,8 +101,8 @@ def write_code(
     ...     [path.name for path in write_code("c", folder) if path.name.startswith("mbma_")]
     ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
     """
-    if target not in CODE:
-        raise InputError(f"target must be one of {CODE}, got {target!r}")
+    if target not in LANGUAGES:
+        raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     rule = get_variant(variant)
     model = open_table(table)
     if not isinstance(model, UniversalModel):
@@ -116,6 +119,7 @@ def source_texts(target: str, model: UniversalModel, variant: Variant) -> dict[s
     c_texts = c_code.c_texts(model, variant)
     texts = {} if target == "javascript" else c_texts
     about = c_code.about_model(model, variant) + c_code.about_theories()
+    about.append(written_by([target, "--variant", variant.name, "--out", "."]))
     declarations = c_texts["mbma.h"] + c_texts["mbma_model.h"]
     for name, title in language.titles.items():
         lines = c_code.header(f"{name}: {title}", language.usage, about)
@@ -136,15 +140,26 @@ def web_assembly(c_texts: dict[str, str], names: Iterable[str], *options: str) -
             "javascript is compiled from C by the package ziglang, which is not installed: "
             "pip install 'mbma_tables[javascript]'"
         )
+    exports = [f"-Wl,--export={name}" for name in names]
+    return built_by([sys.executable, *ZIG, *options, *exports], c_texts, "mbma.wasm")
+
+
+class BuildError(InputError):
+    """A compiler that failed."""
+
+
+def built_by(command: list[str], texts: Mapping[str, str], made: str, *last: str) -> bytes:
+    """What a compiler makes of C sources among texts."""
     with tempfile.TemporaryDirectory() as work:
-        for name, text in c_texts.items():
+        for name, text in texts.items():
             write_file(pathlib.Path(work, name), text.encode())
-        sources = [name for name in c_texts if name.endswith(".c")]
-        exports = [f"-Wl,--export={name}" for name in names]
-        done = _run([sys.executable, *ZIG, *options, *exports, *sources, "-o", "mbma.wasm"], work)
+        sources = [name for name in texts if name.endswith(".c")]
+        done = _run([*command, *sources, "-o", made, *last], work)
         if done.returncode:
-            raise InputError(f"ziglang did not compile {' '.join(sources)}: {done.stderr.strip()[:500]}")
-        return pathlib.Path(work, "mbma.wasm").read_bytes()
+            raise BuildError(
+                f"{' '.join(command[:3])} did not compile {' '.join(sources)}: {done.stderr.strip()[:500]}"
+            )
+        return pathlib.Path(work, made).read_bytes()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,8 +176,8 @@ class Replay:
 
 def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
     """Build what `write_code` wrote where its compiler is installed, and replay the points beside it, or others."""
-    if target not in CODE:
-        raise InputError(f"target must be one of {CODE}, got {target!r}")
+    if target not in LANGUAGES:
+        raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     place = pathlib.Path(folder).absolute()
     csv = place / POINTS_FILE if points is None else pathlib.Path(points).absolute()
     if not csv.is_file():
@@ -300,3 +315,7 @@ def _lines(text: str, first: str, later: str | None = None) -> list[str]:
 
 def _text(lines: Iterable[str], indent: int = 0) -> str:
     return textwrap.indent("\n".join(lines), " " * indent)
+
+
+_TAKES = frozenset({"variant", "check"})
+TARGETS = tuple(Target(name, functools.partial(write_code, name), _TAKES) for name in LANGUAGES)

@@ -13,6 +13,7 @@ from mbma_tables.common.arguments import finite_array, needed, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_rows import LawTable
+from mbma_tables.export.targets import Target
 from mbma_tables.export.text import checked_name, comment, csv_cell
 
 MAX_MATLAB_NAME = 63
@@ -135,3 +136,11 @@ def to_parquet(law: LawTable) -> bytes:
     stream = io.BytesIO()
     parquet.write_table(table, stream)
     return stream.getvalue()
+
+
+def _matlab(law: LawTable, name: str) -> dict[str, bytes]:
+    return {"": to_matlab(law), ".m": matlab_reader(law, name)}
+
+
+_WRITE = {"csv": to_csv, "json": to_json, "netcdf": to_netcdf, "hdf5": to_hdf5, "parquet": to_parquet}
+TARGETS = (*(Target(name, write) for name, write in _WRITE.items()), Target("matlab", _matlab, end=".mat"))

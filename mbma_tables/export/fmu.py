@@ -1,8 +1,14 @@
-"""A contact law as a Functional Mock-up Unit of sources, of FMI 2.0 or 3.0, for model exchange and co-simulation."""
+"""A contact law as a Functional Mock-up Unit, FMI 2.0 or 3.0, model exchange and co-simulation: C and binaries."""
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import importlib.util
 import io
+import platform
+import shutil
+import sys
 import uuid
 import zipfile
 from typing import Any
@@ -11,9 +17,11 @@ from xml.etree import ElementTree as ET
 from mbma_tables import __version__
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
+from mbma_tables.export.code import BuildError, built_by
 from mbma_tables.export.joint import Joint
 from mbma_tables.export.law_code import MORE, AskedLaw, asked_law, code_name, text_of
 from mbma_tables.export.law_numbers import LawNumbers
+from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -28,11 +36,21 @@ SAID = {
     "conductance": "through the contact, over nominal area",
     "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
 }
+# names of platforms in FMI 3.0; folders in FMI 2.0, which has none of ARM, ends of libraries, and zig's names
+PLATFORMS = {
+    "x86_64-linux": ("linux64", ".so", "x86_64-linux-gnu.2.17"),
+    "aarch64-linux": ("", ".so", "aarch64-linux-gnu.2.17"),
+    "x86_64-darwin": ("darwin64", ".dylib", "x86_64-macos.10.13"),
+    "aarch64-darwin": ("", ".dylib", "aarch64-macos.11.0"),
+    "x86_64-windows": ("win64", ".dll", "x86_64-windows-gnu"),
+}
 INPUT = 1  # value reference of overclosure, after time
 
 
-def fmu(target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", **asked: Any) -> bytes:
-    """A contact law as an FMU of sources: overclosure in; pressure, tangent, area and energy out.
+def fmu(
+    target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", binaries: str = "here", **asked: Any
+) -> bytes:
+    """A contact law as an FMU: overclosure in; pressure, tangent, area and energy out.
 
     Parameters
     ----------
@@ -40,11 +58,14 @@ def fmu(target: str, surface: AnySurface, E_star: float | str, *, name: str = "l
         "fmu" for FMI 2.0, "fmu3" for FMI 3.0.
     surface, E_star, name, **asked
         As for `law_text`; a conductivity adds the output conductance, leakage the output leakage.
+    binaries : {"here", "all", "none"}
+        Beside the sources: a binary for this platform, by the system's C compiler or zig, where one of them is
+        installed; binaries for Linux, macOS and Windows, by zig (the extra "javascript"); or none.
 
     Returns
     -------
     bytes
-        The file, the same for the same law.
+        The file, the same for the same law and compiler; its description lists the binaries.
 
     Raises
     ------
@@ -55,7 +76,7 @@ def fmu(target: str, surface: AnySurface, E_star: float | str, *, name: str = "l
     --------
     >>> import io, zipfile
     >>> from mbma_tables import Surface
-    >>> file = fmu("fmu", Surface.named("concrete"), "13.3 MPa", name="road", theory="calibrated")
+    >>> file = fmu("fmu", Surface.named("concrete"), "13.3 MPa", name="road", theory="calibrated", binaries="none")
     >>> zipfile.ZipFile(io.BytesIO(file)).namelist()
     ['modelDescription.xml', 'sources/road.c']
     """
@@ -69,14 +90,38 @@ def fmu(target: str, surface: AnySurface, E_star: float | str, *, name: str = "l
     parts |= {name.upper(): found.more.get(name, "") and repr(found.ratio) for name in MORE}
     least, most = found.numbers.c_least, found.numbers.c_most
     parts |= {"LEAST": "-INFINITY" if found.numbers.ends else repr(least), "MOST": repr(most)}
-    described = _description(target == "fmu3", name, token, "\n".join(found.said), variables, found.joint)
-    files = {
-        "modelDescription.xml": described,
-        f"sources/{name}.c": filled("fmu.c", WRAPPER=filled(f"{parts['FMI']}.c"), **parts).encode(),
-    }
-    if target == "fmu3":
+    parts |= {"WRAPPER": filled(f"{parts['FMI']}.c"), "DECLARED": filled(f"{parts['FMI']}.h")}
+    source, third = filled("fmu.c", **parts), target == "fmu3"
+    built = _binaries(name, source, third, binaries)
+    listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
+    said = "\n".join((*found.said, f"binaries: {listed}"))
+    files = {"modelDescription.xml": _description(third, name, token, said, variables, found.joint)}
+    files[f"sources/{name}.c"] = source.encode()
+    if third:
         files["sources/buildDescription.xml"] = _build(name)
-    return _zipped(files)
+    return _zipped(files | built)
+
+
+def _binaries(name: str, source: str, third: bool, asked: str) -> dict[str, bytes]:
+    """Shared libraries by their paths in the file, for the platforms asked for, as far as there is a compiler."""
+    if asked not in ("here", "all", "none"):
+        raise InputError(f"binaries must be one of {('here', 'all', 'none')}, got {asked!r}")
+    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine := platform.machine().lower(), machine)
+    here, zig = f"{processor}-{sys.platform.replace('win32', 'windows')}", importlib.util.find_spec("ziglang")
+    if asked == "all" and zig is None:
+        raise InputError("binaries for all platforms are compiled by ziglang: pip install 'mbma_tables[javascript]'")
+    found = {}
+    for own, (second, end, target) in PLATFORMS.items():
+        own_cc = own == here and shutil.which("cc")
+        wanted = own == here if asked == "here" else asked == "all"
+        if not (wanted and (own_cc or zig) and (third or second)):
+            continue
+        command = ["cc"] if own_cc else [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s"]
+        flags = ["-w", "-O2", "-shared", "-DMBMA_WITHOUT_HEADERS", *([] if end == ".dll" else ["-fPIC"])]
+        with contextlib.suppress(*([BuildError] if asked == "here" else [])):
+            library = built_by([*command, *flags], {f"{name}.c": source}, f"{name}{end}", "-lm")
+            found[f"binaries/{own if third else second}/{name}{end}"] = library
+    return found
 
 
 def _start(numbers: LawNumbers) -> float:
@@ -181,3 +226,6 @@ def _zipped(files: dict[str, bytes]) -> bytes:
             # without the time of writing: the same law is the same file
             archive.writestr(zipfile.ZipInfo(path), content, zipfile.ZIP_DEFLATED)
     return stream.getvalue()
+
+
+TARGETS = tuple(Target(name, functools.partial(fmu, name), CODE | {"binaries"}, rows=False) for name in STANDARDS)

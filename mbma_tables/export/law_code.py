@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,18 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
-from mbma_tables.export.text import checked_name, core_file, filled, opening, page_file, template, wrapped
+from mbma_tables.export.targets import CODE, Target
+from mbma_tables.export.text import (
+    braces,
+    checked_name,
+    core_file,
+    filled,
+    numerals,
+    opening,
+    page_file,
+    template,
+    wrapped,
+)
 from mbma_tables.law import block as at
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -63,13 +74,23 @@ def law_text(
     >>> "double road_with_tangent(double c, double *tangent);" in text, "size_t mbma_law_fill(" in text
     (True, True)
     """
+    return law_files(target, surface, E_star, name=name, leakage=leakage, **asked)[""]
+
+
+def law_files(
+    target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", leakage: bool = False, **asked: Any
+) -> dict[str, str]:
+    """What `law_text` returns, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     name, language = code_name(name, target), LANGUAGES[target]
     if leakage and language.subroutine:
         raise InputError(f"{target} has no place for leakage: leave it out")
-    asked |= {"leakage": leakage, "only_conductance": language.only_conductance}
-    return text_of(target, name, asked_law(surface, E_star, **asked))
+    found = asked_law(surface, E_star, leakage=leakage, only_conductance=language.only_conductance, **asked)
+    files = {"": text_of(target, name, found)}
+    for end, other in language.beside:
+        files[end] = text_of(other, name, found) if other in LANGUAGES else text_of(target, name, found, other)
+    return files
 
 
 class AskedLaw(NamedTuple):
@@ -124,8 +145,8 @@ def asked_law(
     return AskedLaw(joint, numbers, flow, k_s / joint.modulus, more, _head(joint, numbers, more))
 
 
-def text_of(target: str, name: str, asked: AskedLaw) -> str:
-    """The text of one file."""
+def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
+    """The text of a target's own file, or of another template of it."""
     language, numbers, flow = LANGUAGES[target], asked.numbers, asked.flow
     lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
     lines.append(_example(asked.joint, language))
@@ -138,6 +159,8 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
         **dict(language.parts),
         **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
     }
+    if template:
+        return filled(template, **parts)
     if language.arrays is None:
         parts |= _core(target, name, asked, language.number)
     else:
@@ -164,6 +187,8 @@ def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str
         held |= {f"{prefix}BLOCK": block.astype("<f8", copy=False).tobytes() for prefix, block in blocks.items()}
         return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
     parts["CORE"] = core_text(["law.c"], name)
+    more = {quantity.upper(): asked.more.get(quantity, "") for quantity in MORE}
+    parts["DECLARED"] = filled("law.h", HEADER="", NAME=name, **more).lstrip()
     whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
     parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
     parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
@@ -235,16 +260,23 @@ def block_rows(block: FloatArray) -> tuple[int, int]:
 def block_text(block: FloatArray) -> str:
     """A law's block as the initializer of head, rows and records in C, every number as it is."""
     rows, _ = block_rows(block)
-    whole = block.view(np.int64)
-    head = [*map(repr, block[: at.EXPONENT].tolist()), *map(str, whole[at.EXPONENT : at.HEAD].tolist())]
-    pairs = whole[at.HEAD : at.HEAD + 2 * rows].reshape(-1, 2).tolist()
-    records = block[at.HEAD + 2 * rows :].reshape(-1, at.RECORD)
-    lines = [f"{{{wrapped(head)}}},", f"{{{wrapped(f'{{{shift}, {base}}}' for shift, base in pairs)}}},"]
-    return "\n".join([*lines, "{", *(f"{wrapped(_record(row.tolist()))}," for row in records), "}"])
+    whole, last = block.view(np.int64), at.HEAD + 2 * rows
+    head = braces(*numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD]))
+    records = [
+        braces(*numerals(row[: at.FORCE_AT]), *np.split(row[at.FORCE_AT : -1], 2), *numerals(row[-1]))
+        for row in block[last:].reshape(-1, at.RECORD)
+    ]
+    parts = head, braces(*whole[at.HEAD : last].reshape(-1, 2)), braces(*records)
+    return ",\n".join(wrapped([part]) for part in parts)
 
 
-def _record(row: list[float]) -> Iterator[str]:
-    """The numbers of a record with the braces of its structure."""
-    begins, ends = (at.CENTRE, at.FORCE_AT, at.AREA_AT), (at.AREA_AT - 1, at.ENERGY_AT - 1, at.ENERGY_AT)
-    for k, value in enumerate(row):
-        yield f"{'{' if k in begins else ''}{value!r}{'}' if k in ends else ''}"
+TARGETS = tuple(
+    Target(
+        name,
+        functools.partial(law_files, name),
+        CODE - {"leakage"} if language.subroutine else CODE,
+        rows=False,
+        alone=not language.own_name or language.arrays is not None,
+    )
+    for name, language in LANGUAGES.items()
+)

@@ -24,8 +24,8 @@ class Language(NamedTuple):
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
     rows of polynomials by their places in the template, whose names begin with a prefix; None where the law is read by
     the core's C. `subroutine` is the template of a solver's user subroutine that calls the law, `parts` what else is
-    filled in. `own_name` has key words where the law's name stands alone, as that of a module or package. `beside` is
-    the target that it calls, of the same name, in a file of its own; `inverts` whether it has `overclosure`.
+    filled in. `own_name` has key words where the law's name stands alone, as that of a module or package. `beside` has
+    other files by the ends of their names, each a target or a template; `inverts` is whether it has `overclosure`.
     """
 
     template: str
@@ -38,7 +38,7 @@ class Language(NamedTuple):
     parts: tuple[tuple[str, str], ...] = ()
     only_conductance: bool = False
     own_name: str = ""
-    beside: str = ""
+    beside: tuple[tuple[str, str], ...] = ()
     inverts: bool = True
 
 
@@ -96,10 +96,11 @@ NAN = "Outside the range: NaN."
 C = Language(
     "law.c",
     "/*",
-    "C99, also C++11: cc -O2 -c {name}.c, link with -lm; declare what you call as where they are declared below. The "
-    f"C of the library itself, and the law's own numbers. {NAN}",
+    "C99, also C++11: cc -O2 -c {name}.c, link with -lm; {name}.h beside it declares the functions. The C of the "
+    f"library itself, and the law's own numbers. {NAN}",
     "{name}_{what}({x})",
     repr,
+    beside=((".h", "law.h"),),
 )
 FORTRAN_INTERFACE = """\
     pure function c_{what}(x) bind(c, name="{name}_{what}") result(y)
@@ -114,11 +115,13 @@ FORTRAN_FUNCTION = """\
     y = c_{what}(x)
   end function {what}
 """
-SUBROUTINE = (
+CALLED = (
     "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
-    "tests; not run in the solver."
+    "tests; not run in Abaqus."
 )
-GAPCON = C._replace(subroutine="gapcon.c", only_conductance=True)
+LAST = "At pressures beyond the law's range the last value is taken, and a line on stderr tells of the first one."
+SUBROUTINE = C._replace(beside=())
+GAPCON = SUBROUTINE._replace(subroutine="gapcon.c", only_conductance=True)
 LANGUAGES = {
     "c-law": C,
     "fortran-law": Language(
@@ -129,16 +132,17 @@ LANGUAGES = {
         "{what}({x})",
         _fortran_number,
         own_name="import program pure result value x y",
-        beside="c-law",
+        beside=(("_c.c", "c-law"),),
     ),
     "javascript-law": Language(
         "law.mjs",
         "/*",
         "An ECMAScript module: import {{ pressure, withTangent, area, energy, overclosure }} from './{name}.mjs'. "
-        "The C of the library itself as WebAssembly. Outside the range a RangeError is thrown, of what is no number a "
-        "TypeError.",
+        "The C of the library itself as WebAssembly; {name}.d.mts beside it has the types for TypeScript. Outside the "
+        "range a RangeError is thrown, of what is no number a TypeError.",
         "{what}({x})",
         _with_infinity("-Infinity"),
+        beside=((".d.mts", "law.d.mts"),),
     ),
     "python-law": Language(
         "law.py",
@@ -181,24 +185,26 @@ LANGUAGES = {
         "expandable extends external false final flow impure import initial inner model operator or outer partial "
         "public pure record redeclare replaceable return stream then time true type when while within",
     ),
-    "abaqus-uinter": C._replace(
+    "abaqus-uinter": SUBROUTINE._replace(
         usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.c. Place the bodies so that their "
         "surfaces touch where the mean planes are h_max apart. Beyond the law's range the increment is tried again "
         "with a smaller step. Without friction. A linear perturbation step stops the program: for "
         "modes of a preloaded joint take the tangent at its pressure, from this file, as a spring's stiffness. "
-        f"{SUBROUTINE} Arguments: Abaqus 2017, user subroutines, UINTER.",
+        f"{CALLED} Arguments: Abaqus 2017, user subroutines, UINTER.",
         subroutine="uinter.c",
     ),
     "abaqus-gapcon": GAPCON._replace(
-        usage="*GAP CONDUCTANCE, USER: abaqus job=... user={name}.c, beside a table of pressures. A pressure beyond "
-        f"the law's range stops the program. {SUBROUTINE} Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON.",
+        usage=f"*GAP CONDUCTANCE, USER: abaqus job=... user={{name}}.c, beside a table of pressures. {LAST} {CALLED} "
+        "Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON.",
         parts=(("SOLVER", "Abaqus/Standard"),),
     ),
     "calculix-gapcon": GAPCON._replace(
-        usage="*GAP CONDUCTANCE, USER, in place of CalculiX's gapcon.f: in its sources cc -O2 -c {name}.c -o gapcon.o, "
-        "ar r ccx_2.20.a gapcon.o, and link ccx anew. Use it with *CONTACT PAIR, TYPE=SURFACE TO SURFACE and a closure "
-        "that is LINEAR or EXPONENTIAL: 2.20 takes wrong conductances with NODE TO SURFACE, and none with TABULAR. A "
-        f"pressure beyond the law's range stops the program. {SUBROUTINE} Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
+        usage="*GAP CONDUCTANCE, USER in place of CalculiX's gapcon.f: in its sources cc -O2 -c {name}.c -o gapcon.o, "
+        "ar r ccx_2.20.a gapcon.o, and make, which links ccx again. Use it with *CONTACT PAIR, TYPE=SURFACE TO SURFACE "
+        "and *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR: with NODE TO SURFACE 2.20 hands over "
+        "another pressure, without a message, and with TABULAR it has no force. EXPONENTIAL, which `mbma export "
+        "calculix --conductivity` fits to this law, gives closure and conductance in one interaction. "
+        f"{LAST} {{name}}.c is C99, also C++11. Run in ccx 2.20. Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
         parts=(("SOLVER", "CalculiX"),),
     ),
 }

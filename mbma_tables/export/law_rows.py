@@ -110,6 +110,7 @@ def describe_law(
     evenly: bool = False,
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
+    made_by: tuple[str, ...] = (),
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -144,6 +145,8 @@ def describe_law(
         As for `contact`: the law of loading, and conductance by the stiffness of the frozen contact.
     evenly : bool
         Equally spaced rows instead, for comparison.
+    made_by : tuple of str
+        Lines for the header of a file that say how to write it again.
 
     Raises
     ------
@@ -160,7 +163,7 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness)
+    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
     law, units = joint.law, joint.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
     k_s, names = 1.0, (own := ("overclosure", "pressure", joint.length, joint.stress))
@@ -171,7 +174,7 @@ def describe_law(
         names = ("pressure", "leakage", joint.stress, f"{joint.length}^3")
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
-    choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly, jump=law.highest < np.inf)
+    choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
     behaviour = _table(joint, "pressure", own, least, end, choose) if quantity == "conductance" else None
     return _table(joint, quantity, names, least, end, choose, k_s, behaviour)
 
@@ -198,7 +201,11 @@ def _table(
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
-    x, y, error = choose(fine_x, fine_y, floor)
+    if heat := quantity == "conductance":
+        # between no contact and the smallest pressure that counts there is one row alone, that of zero
+        used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
+        fine_x, fine_y = fine_x[used], fine_y[used]
+    x, y, error = choose(fine_x, fine_y, floor, jump=heat or law.highest < np.inf)
     comments = joint.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
         f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",

@@ -1,4 +1,4 @@
-"""Contact laws in the words of finite-element and system codes; each target is one function of a `LawTable`.
+"""Contact laws in the words of finite-element and system codes; each target is a `Grammar` of rows.
 
 CalculiX 2.20 was run with what is written here, force and conductance; the others are written from their manuals.
 """
@@ -6,6 +6,7 @@ CalculiX 2.20 was run with what is written here, force and conductance; the othe
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -13,21 +14,37 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import in_unit, modulus_and_units
-from mbma_tables.export.law_rows import LawTable
-from mbma_tables.export.text import DIGITS, checked_name, comment, number
+from mbma_tables.export.law_rows import QUANTITIES, LawTable
+from mbma_tables.export.targets import Grammar, Target
+from mbma_tables.export.text import DIGITS, checked_name, comment, number, opening
 from mbma_tables.surfaces.any_surface import AnySurface
 
-MAX_CALCULIX_ROWS = 200
-MAX_CALCULIX_CONDUCTANCES = 20  # of more, 2.20 keeps the last twenty, without a message
 MIN_CALCULIX_STEP = 1e-10  # overclosures that are closer are moved apart when they are read
 MAX_ID = 99_999_999  # of a card: eight columns
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
+DEPARTURES = (0.01, 0.1)  # of the exponential law from Persson's theory: the pressures of these are stated
+PAIR = "*CONTACT PAIR, INTERACTION={name}, TYPE="
+CALCULIX_TABULAR = (
+    f"Use this interaction with {PAIR}NODE TO SURFACE",
+    "and no other type: with SURFACE TO SURFACE 2.20 reads TABULAR into arrays that are too short and has no force at "
+    "up to 41 rows, without a message, and from 50 rows on it aborts (stack smashing detected); MORTAR reads 50 rows "
+    "wrongly. Place the bodies so that their surfaces touch where the mean planes are h_max apart.",
+)
+CALCULIX_HEAT = (
+    f"Use this interaction with {PAIR}SURFACE TO SURFACE",
+    "and no other type: with NODE TO SURFACE 2.20 takes one conductance for all pressures, without a message. Use it "
+    "in steps of *COUPLED TEMPERATURE-DISPLACEMENT: with UNCOUPLED an increment has the conductance of the pressure "
+    "of the one before it, so that loads must be held for one more. Below the second row conductance is linear from 0.",
+    "2.20 takes no table of pressures beside one of conductances. The closure is exponential here, p = p0 exp(c/c0): "
+    "pressure at a given overclosure is within {by_p:.0%} of the law from p = {low} to {high} {stress}, overclosure at "
+    "a given pressure within {by_c} {length}. Where forces are prescribed, this does not change the conductance.",
+    "From an open gap press by displacements at first: by forces alone EXPONENTIAL does not converge. LINEAR does, "
+    "with the line {slope} below *SURFACE BEHAVIOR, but its closure is the law's at the largest pressure alone.",
+)
 
 
-def _is_contact(law: LawTable, target: str, conducts: bool = True) -> None:
-    """Refuse all but pressure, and, where the target `conducts`, conductance with its pressure."""
-    if law.y_name != "pressure" and not (conducts and law.behaviour):
-        raise InputError(f"{target} takes pressure against overclosure here, got {law.y_name} against {law.x_name}")
+def _notes(lines: tuple[str, ...], **said: Any) -> str:
+    return opening((line.format_map(said) for line in lines), "**") + "\n"
 
 
 def _interaction(name: str, *cards: str) -> str:
@@ -39,59 +56,42 @@ def _card(head: str, law: LawTable) -> str:
     return f"{head}\n" + "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True))
 
 
-def calculix(law: LawTable, name: str = "ROUGH") -> str:
-    """A surface interaction for CalculiX, with the contact pair that reads it rightly.
+def _exponential_card(u0: float, p0: float) -> str:
+    """CalculiX's p = p0 exp(c/u0), by the distance over which the pressure falls to a hundredth."""
+    return f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{number(u0 * math.log(100))}, {number(p0)}\n"
 
-    A law of conductance comes with a linear closure, the only one with which 2.20 takes a table of conductances.
 
-    Raises
-    ------
-    InputError
-        For more rows than its arrays hold, 200 of pressure or 20 of conductance, and for rows that it would move apart.
-    """
-    _is_contact(law, "CalculiX")
-    most = MAX_CALCULIX_ROWS if law.behaviour is None else MAX_CALCULIX_CONDUCTANCES
-    if law.x.size > most:
-        raise InputError(f"CalculiX holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows")
-    if law.behaviour is not None:
-        return _calculix_conductance(law, law.behaviour, name)
+def _calculix(law: LawTable, name: str) -> str:
     if (np.diff(law.x) <= MIN_CALCULIX_STEP).any():
         raise InputError(
             f"rows are closer than {MIN_CALCULIX_STEP:g} {law.x_unit}, which CalculiX cannot tell apart: take fewer "
             "rows or a smaller unit of length"
         )
-    notes = (
-        *law.comments,
-        "CalculiX keeps the pressure constant beyond the last row. Use this interaction with",
-        f"  *CONTACT PAIR, INTERACTION={name}, TYPE=NODE TO SURFACE",
-        "and no other type: 2.20 reads TABULAR wrongly with SURFACE TO SURFACE and MORTAR, without a message.",
-        "Place the bodies so that their surfaces touch where the mean planes are h_max apart.",
-    )
-    return comment(notes, "**") + _interaction(name, _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law))
+    cards = _interaction(name, _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law))
+    return _notes(CALCULIX_TABULAR, name=name) + cards
 
 
-def _calculix_conductance(law: LawTable, behaviour: LawTable, name: str) -> str:
-    slope = float(behaviour.y[-1] / behaviour.x[-1])
-    notes = (
-        *law.comments,
-        "Use this interaction with",
-        f"  *CONTACT PAIR, INTERACTION={name}, TYPE=SURFACE TO SURFACE",
-        "and no other type: with NODE TO SURFACE 2.20 takes one conductance for all pressures, or none, silently.",
-        f"The closure is linear here, p = {number(slope)} c, and the law's at the largest pressure alone:",
-        "2.20 takes no table of pressures beside one of conductances. Prescribe forces; for closures export pressure.",
-    )
-    linear = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{number(slope)}\n"
-    return comment(notes, "**") + _interaction(name, linear, _card("*GAP CONDUCTANCE", law))
+def _calculix_heat(law: LawTable, name: str) -> str:
+    """Conductance beside the exponential closure that is nearest to the law, the only pair of the two in 2.20."""
+    rows = law.behaviour
+    assert rows is not None
+    c = np.linspace(np.interp(max(rows.floor, law.x[1]), rows.y, rows.x), rows.x[-1], 1001)
+    p = np.interp(c, rows.x, rows.y)
+    # of a concave ln p the chord has the slope of the line with the least largest distance
+    u0 = (c[-1] - c[0]) / math.log(p[-1] / p[0])
+    off = np.log(p) - c / u0
+    middle, spread = (off.max() + off.min()) / 2, (off.max() - off.min()) / 2
+    said = {"low": f"{p[0]:.4g}", "high": f"{p[-1]:.4g}", "by_p": math.expm1(spread), "by_c": f"{spread * u0:.2g}"}
+    said |= {"slope": number(p[-1] / c[-1]), "name": name, "stress": rows.y_unit, "length": rows.x_unit}
+    cards = _exponential_card(u0, math.exp(middle)), _card("*GAP CONDUCTANCE", law)
+    return _notes(CALCULIX_HEAT, **said) + _interaction(name, *cards)
 
 
-def abaqus(law: LawTable, name: str = "ROUGH") -> str:
-    """A surface interaction for Abaqus, which continues the last slope beyond the last row; pressure, or both."""
-    _is_contact(law, "Abaqus")
-    notes = (*law.comments, "Abaqus continues the last slope beyond the last row: stay within the range.")
+def _abaqus(law: LawTable, name: str) -> str:
     cards = [_card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)]
     if law.behaviour is not None:
         cards.append(_card("*GAP CONDUCTANCE, PRESSURE", law))
-    return comment(notes, "**") + _interaction(name, *cards)
+    return _interaction(name, *cards)
 
 
 def exponential(
@@ -101,10 +101,12 @@ def exponential(
     length_unit: str | None = None,
     stress_unit: str | None = None,
     name: str = "ROUGH",
+    made_by: tuple[str, ...] = (),
 ) -> str:
     """CalculiX's card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20).
 
-    Abaqus has a card of that name for another curve, which ends at a clearance.
+    Its header states the pressures up to which it is within 1% and 10% of Persson's theory. Abaqus has a card of that
+    name for another curve, which ends at a clearance.
     """
     from mbma_tables.theories import Persson
 
@@ -117,30 +119,32 @@ def exponential(
     near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).pressure
     u0 = h_rms / math.log(near / far)
     p0 = near * math.exp((h_rms - float(surface.h_max)) / u0)
+    u = float(surface.h_max) * np.geomspace(1e-3, 1, 2000)[::-1]
+    full = modulus * Persson().answer(surface, u).pressure
+    off = np.abs(p0 * np.exp((float(surface.h_max) - u) / u0) / full - 1)
+    up_to = (f"{share:.0%} up to p = {full[np.argmax(off > share)]:.3g}" for share in DEPARTURES)
     numbers = ", ".join(f"{key} = {float(getattr(surface, key)):.10g}" for key in surface.parameters)
     notes = (
         f"Contact law of a rough surface by Persson's theory for light loads; mbma_tables {__version__}",
         f"p = p0 exp(c/u0), p0 = {number(p0)} {units.stress}, u0 = {number(u0)} {units.length}; u0 ln 100, p0 follow",
         f"surface: {numbers}; lengths in {units.length}; E* = {modulus:.10g} {units.stress}",
         "overclosure c = h_max - u with the mean separation u: bodies touch where the mean planes are h_max apart;",
-        "this law has no last contact: at c = 0 its pressure is p0. It holds for light loads alone.",
+        "this law has no last contact: at c = 0 its pressure is p0. It holds for light loads alone:",
+        f"within {', '.join(up_to)} {units.stress} of Persson's theory for all loads at the same overclosure.",
+        *made_by,
     )
-    row = f"{number(u0 * math.log(100))}, {number(p0)}\n"
-    card = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{row}"
-    return comment(notes, "**") + _interaction(name, card)
+    return comment(notes, "**") + _interaction(name, _exponential_card(u0, p0))
 
 
-def lsdyna(law: LawTable, curve: int = 1) -> str:
-    """A *DEFINE_CURVE for LS-DYNA, to be included: without *END, which would end the deck that it is pasted into."""
+def _lsdyna(law: LawTable, curve: int = 1) -> str:
+    """To be included: without *END, which would end the deck that it is pasted into."""
     curve = whole_number_in("curve", curve, 1, MAX_ID)
     head = f"*DEFINE_CURVE\n{curve:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
-    rows = "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
-    return comment(law.comments, "$") + head + rows
+    return head + "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
 
 
-def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
-    """PCONT and TABLES1 for OptiStruct, in long fields of 16 columns."""
-    _is_contact(law, "OptiStruct", conducts=False)
+def _optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
+    """PCONT and TABLES1, in long fields of 16 columns."""
     contact, table = (whole_number_in(n, k, 1, MAX_ID) for n, k in (("contact", contact), ("table", table)))
     pairs = [f"{value:<16.9E}" for row in zip(law.x, law.y, strict=True) for value in row]
     # the keyword stands where a line begins: on the first one that field is the friction coefficient
@@ -148,28 +152,54 @@ def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
     lines.append(f"{'*':<8}")
     fields = [*pairs, f"{'ENDT':<16}"]
     lines += [f"{'*':<8}{''.join(fields[start : start + 4])}".rstrip() for start in range(0, len(fields), 4)]
-    return comment(law.comments, "$") + "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n"
 
 
 def _columns(law: LawTable) -> str:
     return "".join(f"{number(x)} {number(y)}\n" for x, y in zip(law.x, law.y, strict=True))
 
 
-def comsol(law: LawTable) -> str:
-    """A text file for COMSOL's interpolation function: spreadsheet columns with % comments."""
-    return comment((*law.comments, "Interpolation: linear; extrapolation: none."), "%") + _columns(law)
+def _matrix(law: LawTable, name: str) -> str:
+    return f"double {checked_name(name, MAX_NAME)}({law.x.size},2)\n{_columns(law)}"
 
 
-def moose(law: LawTable) -> str:
-    """A data file for MOOSE's PiecewiseLinear."""
-    notes = (*law.comments, "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns")
-    return comment(notes, "#") + _columns(law)
-
-
-def modelica(law: LawTable, name: str = "law") -> str:
-    """A text file for Modelica's CombiTable1Ds: first line #1, then the matrix.
-
-    Its default is linear interpolation (smoothness LinearSegments), for which the rows were chosen.
-    """
-    notes = (*law.comments, "smoothness = Modelica.Blocks.Types.Smoothness.LinearSegments; no extrapolation")
-    return f"#1\n{comment(notes, '#')}double {checked_name(name, MAX_NAME)}({law.x.size},2)\n{_columns(law)}"
+calculix = Grammar(
+    "CalculiX",
+    "**",
+    {"pressure": _calculix, "conductance": _calculix_heat},
+    "CalculiX keeps the value of the last row beyond it.",
+    # of more conductances, 2.20 keeps the last twenty, without a message
+    {"pressure": 200, "conductance": 20},
+    "ROUGH",
+)
+abaqus = Grammar(
+    "Abaqus",
+    "**",
+    {"pressure": _abaqus, "conductance": _abaqus},
+    "Abaqus continues the last slope beyond the last row: stay within the range.",
+    named="ROUGH",
+)
+STAY = "Stay within the rows: what the solver has beyond them was not tried."
+lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(QUANTITIES, _lsdyna), STAY)
+optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
+comsol = Grammar("COMSOL", "%", dict.fromkeys(QUANTITIES, _columns), "Interpolation: linear; extrapolation: none.")
+moose = Grammar(
+    "MOOSE",
+    "#",
+    dict.fromkeys(QUANTITIES, _columns),
+    "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns; constant outside the rows",
+)
+# of Modelica's CombiTable1Ds
+modelica = Grammar(
+    "Modelica",
+    "#",
+    dict.fromkeys(QUANTITIES, _matrix),
+    "smoothness = Modelica.Blocks.Types.Smoothness.LinearSegments; no extrapolation",
+    named="law",
+    first="#1\n",
+)
+SOLVERS = calculix, abaqus, lsdyna, optistruct, comsol, moose, modelica
+TARGETS = (
+    *(grammar.target(grammar.program.lower().replace("-", "")) for grammar in SOLVERS),
+    Target("calculix --exponential", exponential, frozenset({"name", "exponential"}), rows=False),
+)

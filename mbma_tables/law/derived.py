@@ -1,4 +1,4 @@
-"""What follows from a law, made when it is asked for: unloading, sliding, softening, leakage, its picture."""
+"""What follows from a law, computed when first read: unloading, sliding, softening, leakage, its picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.interface import Tangential, ratio_of
+from mbma_tables.answers.interface import OF_LAY, OF_YIELDING, Tangential, ratio_of
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
@@ -19,6 +19,7 @@ from mbma_tables.law.block import softening
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mbma_tables.law.continued import ContinuedLaw
     from mbma_tables.law.leakage import LeakageLaw
 
 
@@ -26,7 +27,7 @@ DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polyno
 
 
 class Derived:
-    """The part of a `ContactLaw` that is made when it is asked for."""
+    """The part of a `ContactLaw` that is computed when first read."""
 
     def unloading_stiffness(
         self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
@@ -57,6 +58,7 @@ class Derived:
         friction: float | None = None,
         nu: Any = None,
         E: Any = None,
+        direction: str | None = None,
     ) -> Tangential:
         """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`.
 
@@ -76,12 +78,41 @@ class Derived:
             held = self.pressure(u)
         else:
             u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
-        ratio = ratio_of(nu, E, self.materials)
+        ratio = ratio_of(nu, E, self.materials, direction, self.surface, self.area(u))
+        reason = OF_YIELDING if self.hardness < math.inf else OF_LAY if direction else None
         return Tangential(
             ratio, friction, held, u, self.unloading_stiffness(u) / ratio,
             self.h_max if math.isinf(self.highest) else math.inf, self.units,
-            None if self.hardness < math.inf else (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
+            reason or (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
         )  # fmt: skip
+
+    def continued(self: Any, pressures: tuple[Any, Any] | None = None) -> ContinuedLaw:
+        """The law continued by its tangents beyond two pressures, for the trial steps of Newton's method.
+
+        From bodies that just touch, where the law has neither pressure nor stiffness, and from trial steps beyond full
+        compression, where it raises, Newton's method comes back by these lines. Check `inside` at the solution; where
+        bodies are apart there, iterate on from it with the law itself.
+
+        Parameters
+        ----------
+        pressures : pair of float or str, optional
+            Smallest and largest pressure of the law itself; else those at 1% and 99% of its compression, or where its
+            stiffness begins to fall.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
+        >>> trial, u = law.continued(), law.h_max
+        >>> for _ in range(12):  # the load is 0.1 MPa
+        ...     pressure, stiffness = trial.pressure_and_stiffness(u)
+        ...     u += (pressure - 0.1) / stiffness
+        >>> bool(trial.inside(u)), round(float(law.pressure(u)), 12)
+        (True, 0.1)
+        """
+        from mbma_tables.law.continued import continued_law
+
+        return continued_law(self, pressures)
 
     @functools.cached_property
     def softening(self: Any) -> float | None:

@@ -1,4 +1,4 @@
-"""What a contact law answers, whatever theory it is of: values, slopes, energy and inverses against the gap.
+"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses.
 
 All of them come from one record of polynomials, found from the bits of the gap (`core/law.c`).
 """
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 else:
     Law = core.Law
 
-BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
+BLOCK = 1 << 16  # gaps between two checks for interrupts
 SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
 SPACED = (1e-3, 0.2)  # of the way down: geometric up to here, then even
 ROUNDING = 4 * float(np.finfo(float).eps)
@@ -150,15 +150,12 @@ class ContactLaw(Law, Derived, Displayed):
             require(name, gaps, d <= most * (1 + ROUNDING), f"at most {shown_most:.17g}, where the law ends")
         return gaps, d
 
-    def _ask(
-        self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]
-    ) -> tuple[Any, ...]:
-        """What `fill` writes of checked input, in blocks, where it says that all is in range; else `check` refuses."""
+    def _ask(self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]) -> Any:
+        """What `fill` writes, in blocks, where it returns that all is in range; else `check` raises."""
         if is_labelled(given):
             from mbma_tables.surfaces.labels import apply
 
-            found: tuple[Any, ...] = apply(lambda block: self._ask(block, count, check, fill), (given,), count)
-            return found
+            return apply(lambda block: self._ask(block, count, check, fill), (given,), count)
         # entries of plain arrays are checked as they are answered
         plain = type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
         known = given if plain else check(given)
@@ -168,7 +165,7 @@ class ContactLaw(Law, Derived, Displayed):
             check(given)
         return tuple(values.reshape(known.shape)[()] for values in out)
 
-    def _values(self, wanted: tuple[str, ...], mean_separation: Any, separation: Any) -> tuple[Any, ...]:
+    def _values(self, wanted: tuple[str, ...], mean_separation: Any, separation: Any) -> Any:
         """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
         name, given = self._known(mean_separation, separation)
 
@@ -207,7 +204,7 @@ class ContactLaw(Law, Derived, Displayed):
         Raises
         ------
         OutOfRangeError
-            Where the branch does not reach the value; the message says how far it goes.
+            Where the branch does not reach the value; the message has its end.
         """
         if (pressure is None) == (area is None):
             raise InputError("give pressure or area, one of them")
@@ -225,7 +222,7 @@ class ContactLaw(Law, Derived, Displayed):
         point.units = self.units
         return point
 
-    def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
+    def _inverse(self, name: str, given: Any, count: int = 1) -> Any:
         """Gaps of pressures or areas, and with a `count` of 3 area and -dF/du there."""
         which, inverse = (FORCE if name == "pressure" else AREA), self._inverse_block(name)
         least, most, end = inverse[at.Y_LEAST], inverse[at.Y_HIGH], inverse[at.END]
@@ -248,7 +245,7 @@ class ContactLaw(Law, Derived, Displayed):
         return self._ask(given, count, check, fill)
 
     def _inverse_block(self, name: str) -> FloatArray:
-        """Polynomials of x over force or area, made when first asked for."""
+        """Polynomials of x over force or area, made when first needed."""
         made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
         if name not in made:
             turn = self.turning_point if name == "pressure" else self.area_turning_point

@@ -70,7 +70,7 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
     Raises
     ------
     InputError
-        For theories that press a map, whose leakage differs by axis.
+        For theories of a simulated map, whose leakage differs by axis.
     """
     if law.theory in OF_MAPS:
         raise InputError(

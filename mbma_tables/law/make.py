@@ -10,10 +10,11 @@ import functools
 import math
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, cast
 
 import numpy as np
 
+from mbma_tables.answers.contact import chosen_theory
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
@@ -26,9 +27,9 @@ from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import chosen_theory
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.totals.island import check_band
 from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile, source_of
 
@@ -66,10 +67,10 @@ def contact_law(
     theory : str or theory, optional
         As for `contact`.
     rtol : float
-        Relative error asked of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; no more than a
-        tenth of its own error, the median over gaps, is asked of another theory's.
+        Requested relative error of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; for
+        other theories at least a tenth of their own error, the median over gaps.
     island model, variant, E_star
-        As for `contact`; `island_model` may be an island model of one's own.
+        As for `contact`; `island_model` may be a user-defined island model.
     hardness, materials : optional
         As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
 
@@ -127,78 +128,47 @@ def contact_law(
 def _mbma_law(
     surface: AnySurface, island_model: Any, variant: Variant, rtol: float, facts: dict[str, Any]
 ) -> ContactLaw:
-    """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer.
-
-    Where the island model's table does not cover the islands of full compression, the law ends with the table.
-    """
-    inner = max(0.1 * rtol, MIN_RTOL)
-    model = get_model(island_model, inner, variant)
-    h_max = float(surface.h_max)
-    islands = _islands(surface, model, variant, inner)
-    end = islands.end
-    errors: list[float] = []
-
-    def values(x: FloatArray) -> FloatArray:
-        found, error = islands.totals(x * end)
-        errors.append(error)
-        if not found.all():
-            high = h_max / float(surface.h_rms)
-            raise OutOfRangeError(f"h_max is {high:g} h_rms, so high that force or area underflow")
-        found[1] = variant.area_of(found[1])
-        return found
-
-    places = [kink / end for kink in islands.kinks]
-    tolerance = min(rtol, RESOLVED)
-    octaves = range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / end, *places))), 1100)
-    start, first = fit.first_record(lambda start: fit.power_record(values, start, POWERS), octaves, tolerance)
-    facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
-    side, limits = fit.Side(-1, start, values, tuple(places)), (h_max - end, math.inf)
-    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: max(errors), islands.leverage, facts)
-
-
-class Islands(NamedTuple):
-    """What a law needs of a surface's islands."""
-
-    end: float  # largest approach [length]
-    layer: float  # approach at which an island's band leaves the shortest wave [length]
-    kinks: list[float]  # approaches at floors of the band [length]
-    leverage: float  # what their error is worth in slopes
-    totals: Callable[[FloatArray], tuple[FloatArray, float]]  # force with E* = 1, sum of areas; error, at h_max - d
-
-
-def _islands(surface: AnySurface, model: AnyModel, variant: Variant, rtol: float) -> Islands:
-    h_rms, stress = float(surface.h_rms), 1.0
+    """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer."""
+    inner, h_max, h_rms = max(0.1 * rtol, MIN_RTOL), float(surface.h_max), float(surface.h_rms)
+    model, stress = get_model(island_model, inner, variant), 1.0
     shape: Any = surface
     if isinstance(surface, Surface):
-        if not surface.zeta_1 > variant.floor_u:
-            raise OutOfRangeError(f"q1/q0 must be greater than {variant.floor_u:g}, the variant's floor of zeta_u")
+        check_band(surface, variant)
         stress = float(surface.q0 * surface.s)
-        shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max) / h_rms
-    end = 2 * float(surface.h_max)
-
-    def of_profile(depth: FloatArray) -> tuple[FloatArray, float]:
-        found = kept.totals(depth / h_rms)
-        found[0] *= stress
-        return found, kept.error
-
+        shape = float(surface.hurst), float(surface.zeta_1), h_max / h_rms
+    end, errors = 2 * h_max, [0.0]
+    kept: Any = None
     try:
-        kept = profile(shape, model, variant, rtol)
+        kept = profile(shape, model, variant, inner)
     except ConvergenceError:
         if not isinstance(surface, Surface):
             raise
         # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
-        one = surface
-
-        def of_gaps(depth: FloatArray) -> tuple[FloatArray, float]:
-            found = totals_of(model, Pairs.of(one, depth), variant, max(0.03 * rtol, MIN_RTOL))
-            return np.stack([found.force * stress, found.area]), float(found.error.max())
-
-        source, leverage, totals = source_of(shape, variant), ROUGH_LEVERAGE, of_gaps
+        source, leverage = source_of(shape, variant), ROUGH_LEVERAGE
     else:
-        # rounding may pass full compression
+        # the law ends with the island model's table; rounding may pass full compression
         end = min(float(kept.edges[-1]) * h_rms, end)
-        source, leverage, totals = kept.source, kept.leverage, of_profile
-    return Islands(end, source.layer * h_rms, [float(x) * h_rms for x in source.breaks[-2:]], leverage, totals)
+        source, leverage = kept.source, kept.leverage
+
+    def values(x: FloatArray) -> FloatArray:
+        if kept is None:
+            sums = totals_of(model, Pairs.of(cast(Surface, surface), x * end), variant, max(0.03 * inner, MIN_RTOL))
+            found, error = np.stack([sums.force, sums.area]), float(sums.error.max())
+        else:
+            found, error = kept.totals(x * end / h_rms), kept.error
+        errors.append(error)
+        if not found.all():
+            raise OutOfRangeError(f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow")
+        found[0] *= stress
+        found[1] = variant.area_of(found[1])
+        return found
+
+    kinks, layer = (source.breaks[-2:] * h_rms / end).tolist(), LAYER_SHARE * source.layer * h_rms / end
+    tolerance, octaves = min(rtol, RESOLVED), range(math.ceil(-math.log2(min(layer, *kinks))), 1100)
+    start, first = fit.first_record(lambda start: fit.power_record(values, start, POWERS), octaves, tolerance)
+    facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
+    side, limits = fit.Side(-1, start, values, tuple(kinks)), (h_max - end, math.inf)
+    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: max(errors), leverage, facts)
 
 
 def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
@@ -220,7 +190,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
         return np.stack([found.pressure, found.area])
 
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
-    # where it has far larger errors at some gaps, as at the lightest contact of a small map, these tell of no others
+    # where it has far larger errors at some gaps, as at the lightest contact of a small map, these do not count
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
     bends = np.asarray(theory.elastic.bends(surface), dtype=float)
 
@@ -242,10 +212,8 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
     facts |= {"theory": theory.name, "variant": "", "island_model": ""}
 
-    def own_error() -> float:
-        return max(float(each.max()) for each in errors)
-
-    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, own_error, 0.0, facts)
+    worst = lambda: float(np.concatenate(errors).max())  # noqa: E731
+    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, worst, 0.0, facts)
 
 
 def _finish(
@@ -302,9 +270,7 @@ def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> f
             return False
         return math.isfinite(pressure) and pressure > 0
 
-    for share in shares:
-        if answers(u := share * float(surface.h_max)):
+    for u in (*(share * float(surface.h_max) for share in shares), float(theory.interval(surface)[0])):
+        if answers(u):
             return u
-    if answers(u := float(theory.interval(surface)[0])):
-        return u
     raise OutOfRangeError(f"theory {theory.name!r} has no finite force on this surface up to u = {u:.6g}")

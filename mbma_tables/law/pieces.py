@@ -23,7 +23,7 @@ from mbma_tables.law import block as at
 SAMPLES = 16
 MAX_RECORDS = 4000
 TAIL_SHARE = 4.0  # of the last two coefficients, for all that follow: they fall by 2 at least
-NEAR = 1e-7  # relative width of a bucket that tells no errors, and takes its neighbour's polynomials
+NEAR = 1e-7  # relative width of a bucket too narrow to fit, which takes its neighbour's polynomials
 FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # of the octaves below x = 1, where Gaussians of heights bend; 2 below
 SLOPES = 100.0  # times the tolerance of values: that of slopes, over F/x where they are smaller
 COARSE, COARSE_SLOPES = 1e-7, 10.0  # tolerance above which octaves begin with one bucket; and that of slopes there

@@ -1,4 +1,4 @@
-"""What a height map knows of its tops: bearing curve, gradients of its highest parts, anisotropy, radial spectrum."""
+"""Statistics of a height map: bearing curve, gradients of its highest parts, anisotropy, radial spectrum."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RadialSpectrum:
     variance: FloatArray  # what the band adds to m0 [length^2],
     gradient: FloatArray  # to 2 m2,
     curvature: FloatArray  # and to m4 [1/length^2]
-    # of every wavevector of the real transform, (n, n // 2 + 1): -1 below the longest wave, BANDS above the shortest
+    # of every wavevector of the real transform: -1 below the smallest wavenumber, BANDS above the largest
     band: NDArray[np.intp]
 
 
@@ -100,7 +100,7 @@ def bearing(heights: FloatArray, sizes: tuple[float, float], part: tuple[slice, 
     stiffness = np.hypot(qx, qy) / 2
     for q, count in zip((qx, qy), whole.shape, strict=True):
         if count % 2 == 0:
-            # the shortest wave is level at its points
+            # the shortest wavelength has no slope at its points
             q.flat[count // 2] = 0.0
     slopes = np.stack([np.fft.irfft2(1j * q * transform, s=whole.shape)[part].ravel() for q in (qx, qy)])
     tensor = slopes @ slopes.T / values.size

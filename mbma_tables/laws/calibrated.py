@@ -4,7 +4,7 @@ Units: force over A0 E* g with g the rms gradient in two dimensions, lengths in 
 energy over A0 E* g h_rms. A spectrum enters by its shares w(x) of h_rms^2 per d ln x. ::
 
     A/A0    = erf(sqrt(2) F/sqrt(S)),  S = (s0 + t)/(1 + t),  t = F/t0,  s0 of Nayak's alpha (S = 1: Persson's)
-    P(x; F) = erf(sqrt(2) F g/g(x))                      g(x)^2: the gradient's square of the waves below x
+    P(x; F) = erf(sqrt(2) F g/g(x))                      g(x)^2: the squared gradient of wavenumbers below x
     U(F)    = 1/(4 g^) integral x w(x) W(P) d ln x,      W(P) = a P + b P^3 + (1 - a - b) P^16,  g^ = g/(q0 h_rms)
     u_P(F)  = integral from F to infinity of dU/F        so that F = -dU/du, and full contact is exact
     F_G(u)  = F_P(u) exp(-c (1 - nu) u^3)                a Gaussian surface without end
@@ -32,7 +32,7 @@ POWERS = (1, 3, 16)  # of the cover in the weight W
 NARROWNESS = 0.65  # that W's slope refers to
 LAW_ERROR = 1e-7  # of a measured spectrum's law
 TESTED_AREA = (1e-3, 0.97)  # A/A0 that was simulated
-KEPT = 256  # spectra and laws of surfaces that are kept while these are asked again
+KEPT = 256  # spectra and laws of surfaces in the cache
 MOST_FORCE = 1e100  # for which contact is full
 UNRESOLVED = 4  # the core's status where a quadrature did not reach its tolerance
 
@@ -99,7 +99,7 @@ class Spectrum:
 
     x: FloatArray  # wavenumbers over a reference q0 (any: it cancels), rising
     variance: FloatArray  # shares of h_rms^2, their sum 1
-    below: FloatArray  # shares of g^2 of the waves below each x
+    below: FloatArray  # shares of g^2 of wavenumbers below each x
     gradient: float  # g/(q0 h_rms)
     alpha: float  # m0 m4/m2^2
 
@@ -132,7 +132,7 @@ class Spectrum:
         wavenumber, share = wavenumber[held], share[held] / share[held].sum()
         slopes = share * wavenumber**2
         m2 = slopes.sum()
-        # a band's own waves lie half below its middle
+        # half of a band lies below its middle
         below = (np.cumsum(slopes) - slopes / 2) / m2
         alpha = 1.5 * np.sum(share * wavenumber**4) / m2**2
         return cls(wavenumber, share, below, float(np.sqrt(m2)), float(alpha))
@@ -160,7 +160,7 @@ class Law:
 
     @functools.cached_property
     def _prepared(self) -> FloatArray:
-        """What the core knows of the law."""
+        """The law as the core takes it."""
         s, c = self.spectrum, self.constants
         highest = np.inf if self.h_max is None else self.h_max
         constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
@@ -173,9 +173,10 @@ class Law:
             raise InputError("a spectrum has rising positive wavenumbers and shares of variance that are not negative")
         return law
 
-    def _asked(self, function: Any, given: ArrayLike, rows: int) -> list[FloatArray]:
-        """Rows of what a function of the core answers of an array."""
-        return answered(lambda *entries: function(self._prepared, *entries), (given,), rows)
+    def _separations(self, force: ArrayLike, whole: bool) -> list[FloatArray]:
+        """Mean separations, and their derivatives by ln F, without end and tail factor unless `whole`."""
+        law = self._prepared
+        return answered(lambda F, *out: core.spectrum_law_separation(law, F, int(whole), *out), (force,), 2)
 
     def energy(self, force: ArrayLike) -> FloatArray:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
@@ -188,12 +189,12 @@ class Law:
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor; 0 at loads that leave no gap."""
-        u, slope = self._asked(core.spectrum_law_persson, force, 2)
+        u, slope = self._separations(force, False)
         return u, slope
 
     def contact(self, u: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Force, area and -dF/du at mean separations u [h_rms]: 0 from h_max on, without bound at u = 0."""
-        force, share, stiffness = self._asked(core.spectrum_law_contact, u, 3)
+        force, share, stiffness = answered(functools.partial(core.spectrum_law_contact, self._prepared), (u,), 3)
         return force, share, stiffness
 
     def force(self, u: ArrayLike) -> FloatArray:
@@ -207,7 +208,7 @@ class Law:
 
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
-        return self._asked(core.spectrum_law_separation, force, 1)[0]
+        return self._separations(force, True)[0]
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
@@ -216,7 +217,7 @@ class Law:
 
 @functools.lru_cache(KEPT)
 def self_affine_law(hurst: float, zeta_1: float, h_max: float | None, constants: Constants = CONSTANTS) -> Law:
-    """The law of a self-affine surface, kept while it is asked again."""
+    """The law of a self-affine surface, cached."""
     return Law(Spectrum.self_affine(hurst, zeta_1), h_max, constants)
 
 

@@ -6,8 +6,8 @@ pressure does not move. Flow per length of seal is K (p1 - p2)/(12 viscosity wid
     k = u^3 (1 - 1.5/(u^2 + 4)) R(A)            u: mean gap over h_rms, A: A/A0; R = 1 without contact, 0 at blocking
 
 The factor beside u^3 is Bruggeman's effective medium of Gaussian gaps, exact to the second order in h_rms/u. R comes
-from the same medium with the gaps of the calibrated law, magnification by magnification: where waves below x are seen
-the law's cover P(x) carries the load, and the mean gap there is that of the waves above x alone, ubar(x) with rms
+from the same medium with the gaps of the calibrated law, magnification by magnification: with wavenumbers below
+x resolved, the law's cover P(x) carries the load, and the mean gap there is that of those above x, ubar(x) with rms
 height s(x). What leaves contact between x and x + dx has mean gap u1 = d(ubar P)/dP and heights N(u1, s) + N(-u1, s)
 on h > 0, so that ::
 
@@ -69,7 +69,7 @@ class Gaps:
 
     share: FloatArray  # of the surface that leaves contact within a band of magnification, (loads, bands),
     mean: FloatArray  # and u1 of it [h_rms]
-    spread: FloatArray  # rms height of the waves above each band [h_rms]
+    spread: FloatArray  # rms height of the wavenumbers above each band [h_rms]
     area: FloatArray  # A/A0 at each load,
     separation: FloatArray  # and mean gap [h_rms]
 
@@ -94,7 +94,7 @@ def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
     band = np.clip(np.searchsorted(edges, log_x, side="right") - 1, 0, BANDS - 1)
     x, variance = spectrum.x, spectrum.variance
     parts = [np.bincount(band, v, BANDS).astype(float) for v in (variance, variance * x**2, variance * x)]
-    # the last waves of a map may be rounding
+    # the last wavenumbers of a map may be rounding
     held = (parts[0] > 0) & (np.cumsum(parts[1][::-1])[::-1] > NO_SLOPE * parts[1].sum())
     return parts[0][held], parts[1][held] / parts[1].sum(), parts[2][held]
 
@@ -132,7 +132,7 @@ def _mean_gaps(
     wave: FloatArray,
     spread: FloatArray,
 ) -> FloatArray:
-    """Mean gap under each load where only the waves from a band on are rough."""
+    """Mean gap under each load of the wavenumbers from a band on alone."""
     found = np.zeros(load.shape)
     middle = (below[:-1] + below[1:]) / 2
     for first in range(variance.size):

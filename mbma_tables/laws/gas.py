@@ -118,17 +118,28 @@ def mean_inverse(
     >>> f"{mean_inverse(2.0, 0.02, 0.3, 1.0):.3f}"  # 1/(u + M) is 0.435
     '0.573'
     """
+    density, g = open_gaps(u, area, h_rms, eta)
+    return np.asarray((density / (g + np.asarray(jump)[..., None])).sum(axis=-1))
+
+
+def open_gaps(
+    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf
+) -> tuple[FloatArray, FloatArray]:
+    """Shares of the nominal area and gaps there [length] on a last axis of `NODES`, of contacts as for `mean_inverse`.
+
+    The shares add up to that of the open gaps; the mean gap over the nominal area is u.
+    """
     from scipy.special import ndtri
 
-    gap, share, rest, height, cap = (part[..., None] for part in np.broadcast_arrays(u, area, jump, h_rms, eta))
+    gap, share, height, cap = (part[..., None] for part in np.broadcast_arrays(u, area, h_rms, eta))
     share = np.minimum(share, FULLEST)
     with np.errstate(divide="ignore"):
         d = np.minimum(-ndtri(share), np.maximum(DEEPEST * gap / height, DEEP))
+    d = np.where(share > 0, d, gap / height)
     q = 1 + BEND * share / (share + LIGHT) * -np.expm1(-((cap / SOFT) ** POWER))
     node, weight = _rule()
     low, high = np.maximum(d - TAIL, 0.0), np.maximum(d + TAIL, 0.0)
     y = low + (high - low) * node
     density = np.exp(-((d - y) ** 2) / 2) / math.sqrt(2 * math.pi) * weight * (high - low)
     bent = y**q
-    g = gap * bent / (density * bent).sum(axis=-1, keepdims=True)
-    return np.asarray((density / (g + rest)).sum(axis=-1))
+    return density, gap * bent / (density * bent).sum(axis=-1, keepdims=True)

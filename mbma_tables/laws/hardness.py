@@ -19,12 +19,13 @@ A = A_yield = x and F = eta Q(u), as it falls.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
-from scipy.special import erf, erfc, erfinv, ndtr, ndtri
+from scipy.interpolate import PchipInterpolator, make_interp_spline
+from scipy.special import erf, erfc, erfcx, erfinv, ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.errors import InputError
@@ -37,6 +38,9 @@ SEEN = 6.0  # from which erfc is less than a rounding of 1
 MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
 DEPTH = 30.0  # of a map's valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
+LEVELS = -37.2, 9.0, 1500  # of Gaussian heights: nodes; above, the mean gap is the level itself
+LEAST_GAP = 1e-300  # mean gap at which all heights lie above the level
+ROOT_TWO_PI = np.sqrt(2 * np.pi)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +72,7 @@ def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: C
 def yielded_area(
     force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
-    """Yielded part of A/A0, likewise."""
+    """Yielded part of A/A0, from the same numbers."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
     return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
 
@@ -145,6 +149,16 @@ def force(
     return found, steep
 
 
+def closed(
+    heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
+) -> tuple[FloatArray, FloatArray]:
+    """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
+    x, elastic = u / h_rms, (pressure / gradient, stiffness / gradient)
+    share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
+    load, steep = force(*elastic, share, slope / h_rms, eta)
+    return load * gradient, steep * gradient
+
+
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """Stiffness of the frozen contact over the elastic -dF/du at the same mean gap."""
     return np.asarray(1 + constants.frozen * np.exp(-np.asarray(eta, float) / constants.frozen_eta))
@@ -159,15 +173,31 @@ def plane_separation(u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: C
     return np.asarray(u - flattened * np.exp(-(constants.plane_eta - constants.plane_load * x) * cap))
 
 
+@np.errstate(all="ignore")
 def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
-    share, slope = answered(core.bearing_share, (u, np.inf if h_max is None else h_max), 2)
-    return share, slope
+    gap, last = np.asarray(u, float), np.asarray(np.inf if h_max is None else h_max)
+    d, end = _levels(gap), _levels(last)
+    below, whole = ndtr(d), ndtr(end)
+    share = np.maximum(np.where(end > 0, ndtr(-d) - ndtr(-end), whole - below), 0.0)
+    slope = np.where(gap <= LEAST_GAP, -np.inf, np.exp(-d * d / 2) / (-ROOT_TWO_PI * below))
+    return share / whole, np.where(gap >= last, 0.0, slope) / whole
+
+
+@functools.cache
+def _level_spline() -> Any:
+    """Levels d of Gaussian heights by ln of the mean gaps d Phi(d) + phi(d) below them, to 1e-15."""
+    d = np.linspace(*LEVELS)
+    x = abs(d)
+    # the gap of -x, where both terms nearly cancel; that of x is larger by x
+    deep = np.exp(-x * x / 2) * (1 / ROOT_TWO_PI - x * erfcx(x / np.sqrt(2)) / 2)
+    return make_interp_spline(np.log(np.maximum(d, 0.0) + deep), d, 7)
 
 
 def _levels(u: FloatArray) -> FloatArray:
-    """Levels of Gaussian heights at mean gaps [h_rms]."""
-    return answered(core.gaussian_level, (u,))[0]
+    """Levels of Gaussian heights at mean gaps [h_rms], of gaps below `LEAST_GAP` as at that."""
+    held = np.minimum(np.maximum(u, LEAST_GAP), LEVELS[1])
+    return np.asarray(_level_spline()(np.log(held)) + np.maximum(u - LEVELS[1], 0.0))
 
 
 class BearingCurve:

@@ -24,12 +24,18 @@ TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
 
 
-def _of_core(name: str) -> Callable[..., Any]:
+def _of_core(number: int) -> Callable[..., Any]:
     """A closed form of arrays, which broadcast."""
-    return lambda *given: answered(getattr(core, name), given)[0][()]
+
+    def of(*given: ArrayLike) -> Any:
+        rest = [None] * (4 - len(given))
+        return answered(lambda *rows: core.closed_form(number, *rows[:-1], *rest, rows[-1]), given)[0][()]
+
+    return of
 
 
-FUNCTIONS = {form: {name: _of_core(f"{form}_{name}") for name in own} for form, own in CERTIFICATES.items()}
+NAMES = [(form, name) for form in ISLAND_FORMS for name in RESULTS] + [(TOTALS, "pressure"), (TOTALS, "area")]
+FUNCTIONS = {form: {name: _of_core(NAMES.index((form, name))) for name in own} for form, own in CERTIFICATES.items()}
 
 
 class FormulaModel(Ranged):

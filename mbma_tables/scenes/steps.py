@@ -229,7 +229,7 @@ def other_theory(
 
         theory: Theory = Persson("simplified")
     else:
-        theory = get_theory(name)
+        theory = get_theory(name, surface)
     if hardness < math.inf:
         from mbma_tables.theories.yielding import Yielding
 

@@ -225,7 +225,7 @@ class SelfAffine(AnySurface):
             return cls.from_moments(**case.numbers, unit=case.length_unit)
         return cls(**case.numbers, unit=case.length_unit)
 
-    @property
+    @functools.cached_property
     def labelled(self) -> bool:
         """Whether any parameter is an xarray DataArray."""
         return any(is_labelled(getattr(self, name)) for name in PARAMETERS)

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,9 @@ from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.treatment import Treated
+
+if TYPE_CHECKING:
+    from mbma_tables.laws.pressing import Table
 
 # of the surfaces of docs/data/boundary_elements.nc. As isotropic Gaussian ones they give area within 20% between 1% and
 # 10% contact, and beyond these it is wrong by 30% to factors
@@ -68,6 +71,8 @@ class SpectralSurface(AnySurface):
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
     map : Treated, optional
         The treated heights themselves, which `theory="simulated"` presses.
+    table : Table, optional
+        What boundary elements found of them already (`mbma_tables.laws.pressing`).
     samples : array_like, shape (n,), optional
         Independent samples behind each entry of C, as weights of a fit.
     anisotropy : float, optional
@@ -101,6 +106,7 @@ class SpectralSurface(AnySurface):
     bearing: Bearing | None = None
     bands: RadialSpectrum | None = None
     map: Treated | None = None
+    table: Table | None = None
     samples: Any = None
     anisotropy: float | None = None
     unit: str | None = None
@@ -245,6 +251,7 @@ class SpectralSurface(AnySurface):
             bearing=known,
             bands=bands,
             map=whole,
+            table=None if self.table is None else self.table.resized(up, along),
         )
 
     def between(self, low: float, high: float) -> Self:
@@ -259,6 +266,7 @@ class SpectralSurface(AnySurface):
             bearing=None,
             bands=None,
             map=None,
+            table=None,
         )
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 

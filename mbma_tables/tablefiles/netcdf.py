@@ -80,8 +80,10 @@ def read_sealed(path: pathlib.Path) -> bytes:
     return body
 
 
-def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
-    """The table in an open file whose kind and format are known."""
+def verified(
+    dataset: netCDF4.Dataset, required: tuple[str, ...] = ("values_sha256",)
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]], dict[str, Any]]:
+    """Attributes of an open file, those of its variables, and their values, all as their hashes and types say."""
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
     own = _attributes_of(dataset)
@@ -92,7 +94,7 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
             raise ValueError(f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}")
-    missing = [name for name in schema.REQUIRED if name not in own]
+    missing = [name for name in required if name not in own]
     if missing or own.get("attributes_sha256") != attributes_digest(dataset):
         raise ValueError(f"lacks attribute {missing[0]}" if missing else "has attributes that were edited")
     if dataset.groups or sum(variable.size for variable in dataset.variables.values()) * 8 > MAX_BYTES:
@@ -101,6 +103,12 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
     if digest_arrays(values) != own["values_sha256"]:
         raise ValueError("has values that do not match their hash")
+    return own, described, values
+
+
+def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
+    """The table in an open file whose kind and format are known."""
+    own, described, values = verified(dataset, schema.REQUIRED)
     names, fields = [name for name, _ in schema.AXES[kind]], ("long_name", "transform", "offset", "first", "last")
     axes = tuple(schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size)) for name in names)
     kinds = schema.COEFFICIENTS[kind], "error"

@@ -1,7 +1,8 @@
-"""Theories of rough contact behind one protocol: MBMA, Persson, Greenwood-Williamson, or an object of one's own."""
+"""Theories of rough contact behind one protocol: MBMA, Persson, Greenwood-Williamson, or a user-defined object."""
 
 from __future__ import annotations
 
+import functools
 import importlib
 import reprlib
 from typing import TYPE_CHECKING, Any
@@ -28,14 +29,14 @@ __all__ = [
     "Theory",
     "TheoryAnswer",
     "UserTheory",
-    "chosen_theory",
+    "default_theory",
     "get_theory",
     "theory_name",
 ]
 
 THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")  # also their modules
 _NAMED = dict(zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True))
-# a theory's module is imported when it is first asked for
+# a theory's module is imported when first needed
 _HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson", "BoundaryElements": "simulated"}
 _HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by pressing it
@@ -52,7 +53,7 @@ def __getattr__(name: str) -> Any:
 def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory:
     """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
 
-    "simulated" and "corrected" are theories of one `surface`, made from a map, which they press: `BoundaryElements.of`
+    "simulated" and "corrected" are theories of one `surface`, made from a map: `BoundaryElements.of`
     and `Corrected.of` that surface, kept for the last eight of them.
 
     Raises
@@ -83,24 +84,28 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     )
 
 
+@functools.cache
+def default_theory(name: str) -> Theory:
+    """One of `THEORIES` with its defaults, made once a process."""
+    return get_theory(name)
+
+
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
+    """The theory as given; without one "mbma" for five numbers or its options, and for a measured surface the nearest.
+
+    That is "simulated" for a surface opened from a table, "corrected" for maps that are fit for it, "calibrated" for
+    others.
+    """
     from mbma_tables.surfaces.surface import Surface
 
     if theory is not None:
         return theory
-    asked = any(value != OPTIONS[name] for name, value in options.items())
-    return "mbma" if isinstance(surface, Surface) or asked else "calibrated"
+    if isinstance(surface, Surface) or OPTIONS | options != OPTIONS:
+        return "mbma"
+    if getattr(surface, "table", None) is not None:
+        return "simulated"
+    if getattr(surface, "map", None) is None:
+        return "calibrated"
+    from mbma_tables.theories.corrected import applies
 
-
-def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
-    """The theory asked for, with MBMA's `options`, which others refuse."""
-    named = theory_name(surface, theory, **options)
-    if isinstance(named, str) and named == "mbma":
-        from mbma_tables.theories.mbma import Mbma
-
-        return Mbma(**options)
-    given = ", ".join(name for name, value in options.items() if value != OPTIONS[name])
-    if given:
-        raise InputError(f"{given}: options of theory 'mbma' alone, asked for by its name")
-    return get_theory(named, surface)
+    return "corrected" if applies(surface) else "calibrated"

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import functools
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, grouped, require, spread
-from mbma_tables.laws.calibrated import TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
+from mbma_tables.common.arguments import FloatArray, filled, grouped, require, spread
+from mbma_tables.core import core
+from mbma_tables.laws.calibrated import KEPT, TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
 from mbma_tables.laws.calibrated import area as law_area
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated_table
-from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.protocol import Curve, Theory, TheoryAnswer
 
 if TYPE_CHECKING:
     from mbma_tables.theories.calibrated_curves import OwnLaw
@@ -23,9 +24,11 @@ TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 # h_max/h_rms: simulated up to 5.5, beyond which separation and stiffness change by 0.1% at most from 0.1% contact on
 TESTED_HEIGHTS = (2.5, 8.0)
 NEAREST = 0.95  # of h_max: where the certificate of the table ends
+TAIL = 3.0, 0.8  # u/h_rms from which the error of the table grows, and its rate: exp(0.8 (u/h_rms - 3))
 # standard deviations that come on top of what is stated for Gaussian maps, of maps without `departures` and of others;
 # of docs/data/machined.nc, where so many leave 70% within one and 93.5% within two
 MAP_SCATTER = {"area": (0.038, 0.075), "pressure": (0.046, 0.13), "stiffness": (0.13, 0.21)}
+MANY = 1000  # entries for which polynomials of one surface are made
 ROUNDING = 1e-14  # what a separation loses beside h_max
 
 
@@ -36,45 +39,75 @@ def _own_law(surface: MeasuredSurface) -> OwnLaw:
     return own_law(surface)
 
 
-def _error(stated: float, nearer: float, share: FloatArray) -> FloatArray:
+def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
     """Relative error at shares of h_max; nearer to it than NEAREST force is a small difference, which loses digits."""
     near = (share > NEAREST) & (share < 1)
-    error = np.full(share.shape, stated)
-    error[near] = nearer + ROUNDING / (1 - share[near])
+    error = np.array(np.broadcast_to(stated, share.shape))
+    error[near] = nearer * error[near] + ROUNDING / (1 - share[near])
     return error
 
 
-class Places:
-    """A batch of surfaces and numbers that broadcast with it, flat."""
+class Batch:
+    """Surfaces bound to the table, for about so many entries."""
 
-    def __init__(self, surface: Surface, value: ArrayLike) -> None:
-        self.shape = np.broadcast_shapes(np.shape(value), surface.shape)
-        self.flat = np.ascontiguousarray(spread(np.asarray(value, float), self.shape)).ravel()
-        hurst = np.asarray(surface.hurst, float).ravel()
-        zeta_1, h_rms = np.asarray(surface.zeta_1, float).ravel(), np.asarray(surface.h_rms, float).ravel()
-        self.columns = np.array([hurst, np.log(zeta_1), np.asarray(surface.h_max, float).ravel() / h_rms])
-        number = np.arange(hurst.size).reshape(surface.shape)
-        self.owner = np.ascontiguousarray(spread(number, self.shape)).ravel()
-        self.h_rms = h_rms[self.owner] if hurst.size > 1 else h_rms
-        gradient = np.asarray(surface.rms_gradient, float).ravel()
-        self.gradient = gradient[self.owner] if hurst.size > 1 else gradient
+    def __init__(self, surface: Surface, entries: int) -> None:
+        names = ("hurst", "zeta_1", "h_max", "h_rms", "rms_gradient")
+        hurst, zeta_1, h_max, h_rms, gradient = (np.asarray(getattr(surface, name), float).ravel() for name in names)
+        table, self.shape, self.h_rms, self.gradient = calibrated_table.shipped(), surface.shape, h_rms, gradient
+        self.columns = np.array([hurst, np.log(zeta_1), h_max / h_rms])
+        self.covered = table.covers(*self.columns[:2]) & (self.columns[2] <= np.exp(table.covered[2, 1]))
+        self.whole, given = bool(self.covered.all()), table.given(self.columns, entries)
+        self.contact = functools.partial(core.calibrated_contact, *given)
+        self.separation = functools.partial(core.calibrated_separation, *given)
 
-    def covered(self, table: calibrated_table.Table) -> Any:
-        """Whether the table holds each surface."""
-        return table.covers(*self.columns[:2])
+    def placed(self, value: FloatArray) -> tuple[FloatArray, Any, tuple[int, ...], Any]:
+        """Numbers that broadcast with the surfaces, flat; the surface of each, as a number and to index; the shape."""
+        if not self.shape:
+            return np.ravel(value), np.zeros(value.size, np.int64), value.shape, slice(None)
+        shape = np.broadcast_shapes(value.shape, self.shape)
+        number = np.arange(self.h_rms.size).reshape(self.shape)
+        flat, owner = (np.ascontiguousarray(spread(each, shape)).ravel() for each in (value, number))
+        return flat, owner, shape, owner
 
-    def outside(self, mask: Any) -> list[tuple[int, Any]]:
-        """Surfaces that have entries under a mask, with these."""
-        chosen = np.flatnonzero(mask)
-        return [(row, chosen[mine]) for row, mine in grouped(self.owner[chosen])]
+    def outside(self, owner: Any, loaded: Any = True) -> list[tuple[Law, Any]]:
+        """Laws of the surfaces outside of the table, with their entries."""
+        if self.whole:
+            return []
+        chosen = np.flatnonzero(~self.covered[owner] & loaded)
+        return [(self._law(row), chosen[mine]) for row, mine in grouped(owner[chosen])]
 
-    def law(self, row: int) -> Law:
-        """The law of one surface."""
+    def _law(self, row: int) -> Law:
         hurst, log_zeta, heights = self.columns[:, row]
         return self_affine_law(float(hurst), float(np.exp(log_zeta)), float(heights))
 
 
-def area_concerns(area: FloatArray) -> dict[str, Any]:
+@functools.lru_cache(KEPT)
+def _single(surface: Surface) -> Batch:
+    return Batch(surface, MANY)
+
+
+def _bound(surface: Surface, value: FloatArray) -> Batch:
+    return Batch(surface, max(np.size(value), surface.hurst.size)) if surface.shape else _single(surface)
+
+
+def _contact(batch: Batch, u: FloatArray) -> FloatArray:
+    """Force, area and stiffness of surfaces at mean separations."""
+    flat, owner, shape, own = (
+        batch.placed(u) if batch.shape else (u.ravel(), np.zeros(u.size, np.int64), u.shape, slice(None))
+    )
+    gradient, h_rms = batch.gradient[own], batch.h_rms[own]
+    x = flat / h_rms
+    out = filled(batch.contact, (owner, x), 3)
+    if not batch.whole:
+        for law, mine in batch.outside(owner):
+            out[:, mine] = law.contact(x[mine])
+    out[0] *= gradient
+    out[2] *= gradient
+    out[2] /= h_rms
+    return out.reshape(3, *shape)
+
+
+def area_reasons(area: FloatArray) -> dict[str, Any]:
     """Contact fractions that were not simulated, or hardly."""
     low, high = TESTED_AREA
     return {f"A/A0 is below {low:g}": (area > 0) & (area < low), f"A/A0 is above {high:g}": area > high}
@@ -83,7 +116,8 @@ def area_concerns(area: FloatArray) -> dict[str, Any]:
 class Calibrated(Theory):
     """Persson's energy integral with cover and weight calibrated on boundary elements.
 
-    Self-affine surfaces are answered by its table, those outside of it (H below 0.1, zeta_1 above 1e5) by the law's
+    Self-affine surfaces are answered by its table, those outside of it (H below 0.1, zeta_1 above 1e5,
+    h_max above 8 h_rms) by the law's
     quadrature. A surface that is its own spectrum is answered by that; where its heights were
     measured, they decide the separation, and where they were measured as a map, its tops and valleys the area, too.
     """
@@ -92,8 +126,10 @@ class Calibrated(Theory):
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """From full contact, or where a map's curve ends before, to last contact."""
-        low, high = super().interval(surface, quantity)
-        return (np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else low), high
+        high = np.asarray(surface.h_max, dtype=float)
+        return (
+            np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else np.zeros_like(high)
+        ), high
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; without bound at u = 0."""
@@ -101,41 +137,52 @@ class Calibrated(Theory):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
             (pressure, area, stiffness), own_error = _own_law(surface).answer(gap)
-            error = _error(own_error, own_error, gap / np.asarray(surface.h_max))
+            error = _error(own_error, 1.0, gap / np.asarray(surface.h_max))
             return TheoryAnswer(pressure, area, stiffness, error)
         assert isinstance(surface, Surface)
-        table, places = calibrated_table.shipped(), Places(surface, mean_separation)
-        u = places.flat / places.h_rms
-        require("mean_separation", places.flat.reshape(places.shape), u.reshape(places.shape) >= 0, "at least 0")
-        out = table.fill(places.columns, places.owner, u)
-        for row, mine in places.outside(~places.covered(table)[places.owner]):
-            out[:, mine] = places.law(row).contact(u[mine])
-        out[0] *= places.gradient
-        out[2] *= places.gradient
-        out[2] /= places.h_rms
-        pressure, area, stiffness = out.reshape(3, *places.shape)
-        share = (u / places.columns[2][places.owner]).reshape(places.shape)
-        return TheoryAnswer(pressure, area, stiffness, _error(table.error, 2 * table.error, share))
+        gap, h_rms, (start, rate) = np.asarray(mean_separation, float), np.asarray(surface.h_rms), TAIL
+        found = _contact(_bound(surface, gap), gap)
+        x = gap / h_rms
+        require("mean_separation", spread(gap, x.shape), x >= 0, "at least 0")
+        stated = calibrated_table.shipped().error * np.exp(rate * np.clip(x - start, 0, TESTED_HEIGHTS[1] - start))
+        pressure, area, stiffness = found
+        return TheoryAnswer(pressure, area, stiffness, _error(stated, 2.0, x / (np.asarray(surface.h_max) / h_rms)))
+
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
+        """Of self-affine surfaces by the table."""
+        if isinstance(surface, MeasuredSurface):
+            return super().curve(surface, quantity)
+        batch = _bound(cast(Surface, surface), np.empty(0))
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            pressure, area, stiffness = _contact(batch, u)
+            if quantity == "pressure":
+                return pressure, stiffness, True
+            return area, area * stiffness / pressure, False
+
+        return values
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).mean_separation(quantity, np.asarray(wanted, float))
         assert isinstance(surface, Surface)
-        table, places = calibrated_table.shipped(), Places(surface, wanted)
+        wanted = np.asarray(wanted, float)
+        batch = _bound(surface, wanted)
+        flat, owner, shape, own = batch.placed(wanted)
         if quantity == "area":
-            light = np.broadcast_to(light_factor(surface.alpha), places.shape)
-            loads = force_at_area(places.flat.reshape(places.shape), light).ravel()
+            light = np.broadcast_to(light_factor(surface.alpha), shape)
+            loads = force_at_area(flat.reshape(shape), light).ravel()
         else:
-            loads = places.flat / places.gradient
+            loads = flat / batch.gradient[own]
         # zero load is last contact
-        u, loaded, covered = np.full(loads.size, np.inf), loads > 0, places.covered(table)[places.owner]
-        some = np.flatnonzero(covered & loaded)
-        u[some] = table.separations(places.columns, places.owner[some], loads[some])
-        for row, mine in places.outside(~covered & loaded):
-            u[mine] = places.law(row).separation(np.maximum(loads[mine], 1e-300))
-        require(quantity, np.broadcast_to(wanted, places.shape), ~np.isnan(u).reshape(places.shape), "less: u is 0")
-        return np.asarray(np.minimum((u * places.h_rms).reshape(places.shape), surface.h_max))
+        u, loaded = np.full(loads.size, np.inf), loads > 0
+        some = np.flatnonzero(batch.covered[owner] & loaded)
+        u[some] = filled(batch.separation, (owner[some], loads[some]), 1)[0]
+        for law, mine in batch.outside(owner, loaded):
+            u[mine] = law.separation(np.maximum(loads[mine], 1e-300))
+        require(quantity, np.broadcast_to(wanted, shape), ~np.isnan(u).reshape(shape), "less: u is 0")
+        return np.asarray(np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max))
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*, but for a map in closed form."""
@@ -145,23 +192,23 @@ class Calibrated(Theory):
             pressure / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants
         )
 
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Share of heights above the level whose mean gap is u, and its derivative: measured heights, or Gaussian."""
-        heights = _own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
-        if heights is None:
-            return super().bearing_share(surface, mean_separation)
-        share, slope = heights(np.asarray(mean_separation) / np.asarray(surface.h_rms))
-        return share, slope / np.asarray(surface.h_rms)
+    def heights(self, surface: AnySurface) -> Any:
+        """Those of a map, or Gaussian."""
+        own = _own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
+        return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what boundary elements have tested."""
         if isinstance(surface, MeasuredSurface):
             law = _own_law(surface)
             straight = np.zeros(answer.area.shape, dtype=bool)
             if law.curve is not None:
                 straight |= law.curve.straight(np.asarray(mean_separation) / law.h_rms)
-            text = "the map's tops and valleys contradict each other: one stiffness stands for a range of forces"
-            return {text: straight & (answer.area >= TESTED_AREA[0])} | area_concerns(answer.area)
+            text = (
+                "the light-load and near-full-contact approximations disagree for this map: one stiffness stands for a "
+                "range of forces"
+            )
+            return {text: straight & (answer.area >= TESTED_AREA[0])} | area_reasons(answer.area)
         assert isinstance(surface, Surface)
         heights = np.asarray(surface.h_max / surface.h_rms)
         reasons = {
@@ -170,7 +217,7 @@ class Calibrated(Theory):
             f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < TESTED_HEIGHTS[0]) | (heights > TESTED_HEIGHTS[1]),
         }
         found = {text: np.broadcast_to(mask, answer.area.shape) for text, mask in reasons.items()}
-        return found | area_concerns(answer.area)
+        return found | area_reasons(answer.area)
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """Why a measured surface is not like those that boundary elements have tested."""

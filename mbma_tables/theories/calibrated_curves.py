@@ -27,7 +27,7 @@ STRAIGHT, SAME = 1.0, 1e-9  # of ln F, over which one stiffness is no curve; dif
 NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
 
 
-ENDS = ", where the map's tops and valleys leave no gap: theory='simulated' presses the map itself"
+ENDS = ", where the light-load and near-full-contact approximations of this map leave no gap: use theory='simulated'"
 
 
 class Curve:
@@ -65,7 +65,7 @@ class Curve:
         # -d ln F/d ln u where full contact is continued
         self._heaviest_rate = -float(rate[0])
         self._law = law
-        # tops and valleys of odd maps contradict each other: gaps close, or run back, at partial contact
+        # both approximations may disagree: gaps close, or run back, at partial contact
         heaviest = float(total[0])
         closed = float(self.area(np.array(heaviest))) < TESTED_AREA[1]
         self.end, self.heaviest = (float(np.exp(fine[0])), heaviest) if closed else (0.0, np.inf)
@@ -130,7 +130,7 @@ class Curve:
 
 @functools.lru_cache(maxsize=32)
 def own_law(surface: MeasuredSurface) -> OwnLaw:
-    """The law of a surface, kept while it is asked again."""
+    """The law of a surface, cached."""
     return OwnLaw(surface)
 
 

@@ -15,17 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray, filled
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import core
 from mbma_tables.laws.calibrated import Constants
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "pressure", "stiffness")
-BLOCK = 65536  # entries answered between two chances of Ctrl-C
 FEW, MIN_SHARED = 64, 40  # surfaces up to which, and entries a surface from which, its polynomials are worth making
 
 Owners = NDArray[np.int64]
@@ -39,6 +38,7 @@ class SurfaceSpline:
     step: FloatArray  # and their distance, shape (3,)
     covered: FloatArray  # first and last that are answered, shape (3, 2) or (2, 2)
     coefficients: FloatArray  # float32
+    law_constants: tuple[float, float, float]  # of the law beside the spline, for the core
 
     @functools.cached_property
     def cells(self) -> Any:
@@ -49,11 +49,6 @@ class SurfaceSpline:
     def last(self) -> float:
         """Where the last axis ends."""
         return float(self.first[2] + self.cells[2] * self.step[2])
-
-    @property
-    def law_constants(self) -> tuple[float, float, float]:
-        """What the core needs to know of the law beside the spline."""
-        raise NotImplementedError
 
     @functools.cached_property
     def core_table(self) -> tuple[Any, FloatArray, Any]:
@@ -85,40 +80,33 @@ class Table(SurfaceSpline):
     scatter: dict[str, FloatArray]  # by theory: ln of rms of ln(theory/simulation), rows `QUANTITIES`, by
     log_area: FloatArray  # ln of contact fractions
 
-    @property
-    def law_constants(self) -> tuple[float, float, float]:
-        """Of the area."""
-        return self.constants.area_s0, self.constants.area_slope, self.constants.area_t0
-
-    def _given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
+    def given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
+        """The table and surfaces (columns: H, ln zeta_1, h_max/h_rms) as the core takes them, for so many entries."""
         ends = np.empty((surfaces.shape[1], 2))
         core.calibrated_ends(*self.core_table, *surfaces, None, None, ends)
         return *self.core_table, *surfaces, ends, self.shared(surfaces, entries)
 
     def fill(self, surfaces: FloatArray, owner: Owners, u: FloatArray) -> FloatArray:
-        """Force, area and -dF/du, shape (3, n), at u [h_rms] of surfaces (columns: H, ln zeta_1, h_max/h_rms)."""
-        given, out = self._given(surfaces, u.size), np.empty((3, u.size))
-        in_blocks(lambda k: core.calibrated_contact(*given, owner[k], u[k], *out[:, k]), u.size, BLOCK)
-        return out
+        """Force, area and -dF/du, shape (3, n), at u [h_rms] of surfaces."""
+        return filled(functools.partial(core.calibrated_contact, *self.given(surfaces, u.size)), (owner, u), 3)
 
     def separations(self, surfaces: FloatArray, owner: Owners, pressure: FloatArray) -> FloatArray:
         """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
-        given, out = self._given(surfaces, pressure.size), np.empty(pressure.size)
-        in_blocks(lambda k: core.calibrated_separation(*given, owner[k], pressure[k], out[k]), pressure.size, BLOCK)
-        return out
+        given = self.given(surfaces, pressure.size)
+        return np.ravel(filled(functools.partial(core.calibrated_separation, *given), (owner, pressure), 1))
 
     def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""
         if theory not in self.scatter:
             return np.full(np.shape(area), np.nan)
-        return np.asarray(np.exp(at_contact(self.log_area, self.scatter[theory][QUANTITIES.index(quantity)], area)))
+        with np.errstate(divide="ignore"):
+            return np.exp(known_at(self.log_area, self.scatter[theory][QUANTITIES.index(quantity)], np.log(area)))
 
 
-def at_contact(log_area: FloatArray, row: FloatArray, area: FloatArray) -> FloatArray:
-    """Numbers known at some contact fractions at others; NaN above the last one with a number."""
+def known_at(places: FloatArray, row: FloatArray, x: FloatArray) -> FloatArray:
+    """Numbers at some places, NaN where not known, interpolated; NaN above the last one that is known."""
     known = np.isfinite(row)
-    with np.errstate(divide="ignore"):
-        return np.interp(np.log(area), log_area[known], row[known], right=None if known[-1] else np.nan)
+    return np.interp(x, places[known], row[known], right=None if known[-1] else np.nan)
 
 
 def nodes_of(axes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -145,11 +133,13 @@ def _read(path: pathlib.Path, group: str = "") -> tuple[dict[str, FloatArray], d
 def load(path: pathlib.Path) -> Table:
     """Read a table file; one that is damaged, or is another file, is a TableFileError."""
     values, facts, covered = _read(path)
+    constants = Constants(*(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants)))
     return Table(
         *nodes_of([values[name] for name in AXES]),
         np.array([covered[name] for name in AXES]),
         values["spline"],
-        Constants(*(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants))),
+        (constants.area_s0, constants.area_slope, constants.area_t0),
+        constants,
         float(facts["largest_error_force"]),
         dict(zip(facts["theories"].split(), np.log(values["stated_scatter"]), strict=True)),
         np.log(values["contact"]),

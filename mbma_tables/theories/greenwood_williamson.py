@@ -48,7 +48,7 @@ class GreenwoodWilliamson(Theory):
         high = np.asarray((surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float)
         return np.zeros_like(high), high
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what the theory was made for."""
         dense = {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}
-        return {**super().concerns(surface, answer, mean_separation), **dense}
+        return {**super().reasons(surface, answer, mean_separation), **dense}

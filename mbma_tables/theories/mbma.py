@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 from collections.abc import Callable
 from typing import Any
@@ -10,15 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, whole_number_in
+from mbma_tables.common.arguments import FloatArray, require, whole_number_in
 from mbma_tables.models import BOTH, ISLAND_MODELS, QUANTITIES, AnyModel, check_outside, island_model_name
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
 from mbma_tables.theories.differences import differences
-from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Theory, TheoryAnswer, select
-from mbma_tables.totals.contact import Totals, totals_at
+from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Curve, Theory, TheoryAnswer, select
+from mbma_tables.totals.contact import Sums, Totals, totals_at
+from mbma_tables.totals.island import check_band
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, kinks
 from mbma_tables.totals.profile import profile
 
@@ -52,14 +52,23 @@ class Mbma(Theory):
         self.island_model, self.variant, self.rtol, self.outside = island_model, get_variant(variant), rtol, outside
         self.workers = whole_number_in("workers", workers, 1, MOST_WORKERS)
         self.variant_name, self.island_model_name = self.variant.name, island_model_name(island_model)
+        self._by_table = self.island_model_name == "universal" and outside != "exact"
 
     @functools.cached_property
-    def model(self) -> AnyModel:
-        """The island model as an object."""
-        return get_model(self.island_model, self.rtol, self.variant)
+    def sums(self) -> Sums:
+        """The island model as an object, and how its islands are summed."""
+        model = get_model(self.island_model, self.rtol, self.variant)
+        return Sums(model, self.variant, self.rtol, self.outside, self.workers)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "model"}
+    @functools.cached_property
+    def _scanned(self) -> Mbma:
+        """As it is, but with NaN in place of errors where islands are not covered."""
+        if self.outside != "raise":
+            return self
+        return Mbma(self.island_model, self.variant, self.rtol, "nan", self.workers)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Mbma, (self.island_model, self.variant, self.rtol, self.outside, self.workers)
 
     def totals(
         self,
@@ -70,15 +79,15 @@ class Mbma(Theory):
         quantities: tuple[str, ...] = QUANTITIES,
     ) -> Totals:
         """Force and area at separations d [length] of the surface's broadcast shape."""
+        gap = np.asarray(separation, float)
+        require("separation", gap, gap >= -surface.h_max, "at least -h_max, where the model ends at full compression")
+        if isinstance(surface, Surface):
+            check_band(surface, self.variant)
         which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
-        return totals_at(
-            surface, np.asarray(separation, float), self.model, self.variant, self.rtol, E_star, self.outside,
-            derivatives, which, self.workers,
-        )  # fmt: skip
+        return totals_at(surface, gap, self.sums, E_star, derivatives, which)
 
     def _has_slopes(self, surface: AnySurface) -> bool:
-        by_table = self.island_model_name == "universal" and self.outside != "exact"
-        return by_table or isinstance(surface, MeasuredSurface)
+        return self._by_table or isinstance(surface, MeasuredSurface)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
@@ -102,13 +111,20 @@ class Mbma(Theory):
         """Few of island models that take long."""
         return super().looks(surface) if self._has_slopes(surface) else FEW_LOOKS
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force or area, without slopes where these are differences."""
-        if self._has_slopes(surface):
-            return super().values(surface, mean_separation, quantity)
-        gap = 2 * np.asarray(mean_separation) - np.asarray(surface.h_max)
-        found = np.asarray(getattr(self.totals(surface, gap, quantities=(quantity,)), quantity))
-        return found, np.full(found.shape, np.nan), False
+        h_max, which = np.asarray(surface.h_max), QUANTITIES.index(quantity)
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            found = totals_at(surface, 2 * u - h_max, self.sums, 1.0, "separation")
+            steep = -2 * found.pressure_by["separation"]  # type: ignore[index]
+            return (found.area, found.area * steep / found.pressure, False) if which else (found.pressure, steep, True)
+
+        def without_slopes(u: FloatArray) -> tuple[Any, Any, bool]:
+            found = getattr(totals_at(surface, 2 * u - h_max, self.sums, which=which), quantity)
+            return found, np.full(np.shape(found), np.nan), False
+
+        return values if self._has_slopes(surface) else without_slopes
 
     def _differences(self, surface: AnySurface, u: FloatArray) -> FloatArray:
         """-dF/du by differences, for island models without derivatives."""
@@ -139,9 +155,11 @@ class Mbma(Theory):
         lowest = np.zeros(surface.shape)
         if isinstance(surface, MeasuredSurface):
             # islands up to an approach of 2 h_max make u = 0
-            kept = profile(surface, self.model, self.variant, QUADRATURE_SHARE * self.rtol, self.outside)
+            kept = profile(surface, self.sums.model, self.variant, QUADRATURE_SHARE * self.rtol, self.outside)
             end = float(kept.edges[-1]) / (2 * kept.source.peak)
             lowest = np.asarray(surface.h_max * (1 - end))
+        else:
+            check_band(surface, self.variant)
         return self._maximum(surface, quantity, lowest), np.asarray(surface.h_max, dtype=float)
 
     def softening(self, surface: AnySurface) -> FloatArray:
@@ -160,10 +178,10 @@ class Mbma(Theory):
         """That of the variant: those with a name were compared with boundary elements, no other was."""
         name = self.variant.name
         if self.variant not in NAMED.values():
-            return f"{self.name}, a variant of one's own"
+            return f"{self.name}, user-defined variant"
         return self.name if name == "reported" else f"{self.name}_{name}"
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""
         return {
             f"areas of islands are added, A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
@@ -174,26 +192,20 @@ class Mbma(Theory):
 
     def _maximum(self, surface: AnySurface, quantity: str, otherwise: FloatArray) -> FloatArray:
         """Mean separation of the first local maximum of a quantity under compression, or `otherwise`."""
-        # where some islands are not covered, it is looked for among the rest
-        theory = copy.copy(self)
-        theory.outside = "exact" if self.outside == "exact" else "nan"
+        kind, row = ("pressure", 1) if quantity == "stiffness" else (quantity, 0)
         depth = np.arange(1, SCAN + 1) / SCAN
         h_max = np.asarray(surface.h_max, dtype=float)
         batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))
-        values = np.reshape(getattr(theory.answer(batch, h_max[..., None] * (1 - depth)), quantity), (-1, SCAN))
-        falls = np.diff(values, axis=-1) < 0
+        # where some islands are not covered, it is looked for among the rest
+        found = self._scanned.curve(batch, kind)(h_max[..., None] * (1 - depth))[row]
+        falls = np.diff(np.reshape(found, (-1, SCAN)), axis=-1) < 0
         turns = np.flatnonzero(falls.any(axis=-1))
         result = np.array(otherwise, dtype=float).reshape(-1)
         if turns.size:
-            peak = falls[turns].argmax(axis=-1)
-            chosen = select(surface, surface.shape, turns)
-
-            def value(x: FloatArray) -> FloatArray:
-                return np.asarray(getattr(theory.answer(chosen, h_max.ravel()[turns] * (1 - x)), quantity))
-
-            result[turns] = h_max.ravel()[turns] * (
-                1 - _highest(value, np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN)
-            )
+            peak, top = falls[turns].argmax(axis=-1), h_max.ravel()[turns]
+            curve = self._scanned.curve(select(surface, surface.shape, turns), kind)
+            low, high = np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN
+            result[turns] = top * (1 - _highest(lambda x: np.asarray(curve(top * (1 - x))[row]), low, high))
         return result.reshape(surface.shape)
 
 

@@ -1,7 +1,7 @@
 """Persson's theory of area and average separation (Eqs. 18-21).
 
 The double integral (19) is the calibrated law's energy integral with the weight W = gamma P + (1 - gamma) P^3 and
-without its tail, u_P of `mbma_tables.laws.calibrated`; u0 and lambda of (21) are sums over the same waves.
+without its tail, u_P of `mbma_tables.laws.calibrated`; u0 and lambda of (21) are sums over the same wavenumbers.
 """
 
 from __future__ import annotations
@@ -49,50 +49,21 @@ def _light(law: Law) -> tuple[float, float]:
 
 
 def _by_law(surface: AnySurface, given: FloatArray, answer: Callable[[Law, FloatArray], FloatArray]) -> FloatArray:
-    """Rows of what `answer` says of each law and of its entries, columns of `given`, among those of a batch."""
+    """Rows of ``answer(law, columns of given)`` of each distinct law, in the places of its entries."""
     if isinstance(surface, MeasuredSurface):
         return answer(_own_law(surface), given)
     assert isinstance(surface, Surface)
     if not surface.shape:
-        return answer(_law(float(surface.hurst), float(surface.zeta_1)), given)
+        return answer(self_affine_law(float(surface.hurst), float(surface.zeta_1), None, YANG_PERSSON), given)
     shape = given.shape[1:]
     pairs = np.stack([np.broadcast_to(part, shape).ravel() for part in (surface.hurst, surface.zeta_1)])
     known, inverse = np.unique(pairs, axis=1, return_inverse=True)
     columns, groups = given.reshape(len(given), -1), grouped(inverse.ravel())
-    parts = [answer(_law(*known[:, k].tolist()), columns[:, mine]) for k, mine in groups]
+    laws = [self_affine_law(*pair, None, YANG_PERSSON) for pair in known.T.tolist()]
+    parts = [answer(laws[k], columns[:, mine]) for k, mine in groups]
     out = np.empty((len(parts[0]), inverse.size))
     out[:, np.concatenate([mine for _, mine in groups])] = np.concatenate(parts, axis=1)
     return out.reshape(-1, *shape)
-
-
-def _law(hurst: float, zeta_1: float) -> Law:
-    return self_affine_law(hurst, zeta_1, None, YANG_PERSSON)
-
-
-def _separations(law: Law, given: FloatArray) -> FloatArray:
-    """u/h_rms of Eq. (19) and du/d ln F at loads over A0 E* g."""
-    return np.array(law.separation_persson(given[0]))
-
-
-def _forces(law: Law, given: FloatArray) -> FloatArray:
-    """Force over A0 E* g and -dF/du at u/h_rms, and u/h_rms at the lightest and the heaviest load answered."""
-    u, lightest = given
-    most, _ = law.separation_persson(lightest)
-    least, _ = law.separation_persson(MAX_RATIO / math.sqrt(2))
-    return np.array([*law.force_and_stiffness(u), most, np.broadcast_to(least, u.shape)])
-
-
-def _simplified_separations(law: Law, given: FloatArray) -> FloatArray:
-    """As `_separations`, of Eq. (20)."""
-    u0, log_lambda = _light(law)
-    return np.array([u0 * (log_lambda - np.log(given[0])), np.full(given[0].shape, -u0)])
-
-
-def _simplified_forces(law: Law, given: FloatArray) -> FloatArray:
-    """Force over A0 E* g and -dF/du at u/h_rms, by Eq. (20)."""
-    u0, log_lambda = _light(law)
-    pressure = np.exp(log_lambda - given[0] / u0)
-    return np.array([pressure, pressure / u0])
 
 
 class Persson(Theory):
@@ -131,6 +102,24 @@ class Persson(Theory):
     def _is_full(self) -> bool:
         return self.method == "full"
 
+    def _separations(self, law: Law, given: FloatArray) -> FloatArray:
+        """u/h_rms of Eqs. (19) or (20), and du/d ln F, at loads over A0 E* g."""
+        if self._is_full:
+            return np.array(law.separation_persson(given[0]))
+        u0, log_lambda = _light(law)
+        return np.array([u0 * (log_lambda - np.log(given[0])), np.full(given[0].shape, -u0)])
+
+    def _forces(self, law: Law, given: FloatArray) -> FloatArray:
+        """Force over A0 E* g and -dF/du at u/h_rms, and u/h_rms at the lightest and the heaviest load answered."""
+        u, lightest = given
+        if not self._is_full:
+            u0, log_lambda = _light(law)
+            pressure = np.exp(log_lambda - u / u0)
+            return np.array([pressure, pressure / u0, np.full(u.shape, np.inf), np.zeros(u.shape)])
+        force, _, stiffness = law.contact(u)
+        least, _ = law.separation_persson(MAX_RATIO / math.sqrt(2))
+        return np.array([force, stiffness, law.separation_persson(lightest)[0], np.broadcast_to(least, u.shape)])
+
     def scatter_name(self, surface: AnySurface) -> str:
         """The two forms differ by more than their distance from boundary elements."""
         return self.name if self._is_full else f"{self.name}_{self.method}"
@@ -153,31 +142,28 @@ class Persson(Theory):
         allowed = u > 0 if self._is_full else u >= 0
         require("mean_separation", u, allowed, "positive" if self._is_full else "zero or positive")
         u = np.broadcast_to(u, np.broadcast_shapes(u.shape, surface.shape))
+        self._check_form(surface)
         h_rms, gradient = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient)
-        if self._is_full:
-            unit = np.asarray(surface.s if isinstance(surface, Surface) else h_rms)
-            lightest = np.exp(MIN_LOG_FORCE) * np.asarray(surface.q0) * unit / gradient
-            given = np.stack([u / h_rms, np.broadcast_to(lightest, u.shape)])
-            pressure, stiffness, most, least = _by_law(surface, given, _forces)
-            inside = (u >= least * h_rms) & (u <= most * h_rms)
-            reached = [np.max(least * h_rms / unit), np.min(most * h_rms / unit)]
-            text = "within what normal numbers reach, {:.3g} to {:.6g}".format(*reached)
-            require("mean_separation/s", u / unit, inside, text)
-        else:
-            pressure, stiffness = _by_law(self._self_affine(surface), (u / h_rms)[None], _simplified_forces)
+        unit = np.asarray(surface.s if isinstance(surface, Surface) else h_rms)
+        lightest = np.exp(MIN_LOG_FORCE) * np.asarray(surface.q0) * unit / gradient
+        given = np.stack([u / h_rms, np.broadcast_to(lightest, u.shape)])
+        pressure, stiffness, most, least = _by_law(surface, given, self._forces)
+        inside = (u >= least * h_rms) & (u <= most * h_rms)
+        reached = [np.max(least * h_rms / unit), np.min(most * h_rms / unit)]
+        text = "within what normal numbers reach, {:.3g} to {:.6g}".format(*reached)
+        require("mean_separation/s", u / unit, inside, text)
         return pressure * gradient, stiffness * gradient / h_rms
 
     def _loaded(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean separation [length] at loads over A0 E*, negative beyond lambda E*, and -du/dlog F."""
-        answer = _separations if self._is_full else _simplified_separations
+        self._check_form(surface)
         load = (pressure / np.asarray(surface.rms_gradient))[None]
-        u, slope = _by_law(surface if self._is_full else self._self_affine(surface), load, answer)
+        u, slope = _by_law(surface, load, self._separations)
         return u * np.asarray(surface.h_rms), -slope * np.asarray(surface.h_rms)
 
-    def _self_affine(self, surface: AnySurface) -> AnySurface:
-        if isinstance(surface, MeasuredSurface):
-            raise InputError("the simplified form (20) is of self-affine surfaces: ask method='full', or surface.fit()")
-        return surface
+    def _check_form(self, surface: AnySurface) -> None:
+        if not self._is_full and isinstance(surface, MeasuredSurface):
+            raise InputError("the simplified form (20) is of self-affine surfaces: use method='full', or surface.fit()")
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] of the theory, whose heights have no end."""

@@ -1,7 +1,7 @@
 """What a theory is: anything that answers a surface and a mean separation with pressure, area and stiffness.
 
 MBMA, Persson's theory, Greenwood and Williamson's and the law calibrated on boundary elements are theories, and so is a
-user's own object with a `name` and an ``answer(surface, mean_separation)``. What a theory does not know in closed form
+user's own object with a `name` and an ``answer(surface, mean_separation)``. What a theory has not in closed form
 (stiffness, energy, the separation at a given load) follows from its forces here.
 """
 
@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import abc
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows, spread
+from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -30,6 +30,9 @@ MISSED = 0.5  # of ln of a value that lies between two numbers u
 ENERGY_RTOL = 1e-9
 LEAST_LEVEL = 4  # of the rule of energies, whose estimate of its error may vanish by chance where it is coarse
 SCAN = 49  # compressions at which a law is looked at for a turning point
+
+# values at mean separations, about -d/du of them, and whether that is exact
+Curve = Callable[[FloatArray], tuple[Any, Any, bool]]
 
 
 class TheoryAnswer(NamedTuple):
@@ -59,6 +62,7 @@ class Theory(abc.ABC):
     name: str
     variant_name = island_model_name = ""  # what results call its variant of the paper and its island model
     advice = ""  # one line beside each answer
+    origin = ""  # what its numbers were found of, where that is no shipped file
     reached = 0.0  # by how much, relatively, a wanted value may be more than the largest
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
 
@@ -87,14 +91,18 @@ class Theory(abc.ABC):
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
 
+    def heights(self, surface: AnySurface) -> Any:
+        """Where the Gaussian heights end over h_rms, or a map's own `laws.hardness.BearingCurve`; for a hardness."""
+        return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if self.ends_at_h_max else np.inf
+
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
-        # what needs it is asked for a hardness alone
+        """Share of heights above the level whose mean gap is u, and its derivative by u."""
+        # needed with a hardness alone
         from mbma_tables.laws import hardness
 
-        h_rms = np.asarray(surface.h_rms)
-        end = np.asarray(surface.h_max) / h_rms if self.ends_at_h_max else None
-        share, slope = hardness.bearing_share(np.asarray(mean_separation) / h_rms, end)
+        h_rms, heights = np.asarray(surface.h_rms), self.heights(surface)
+        x = np.asarray(mean_separation) / h_rms
+        share, slope = heights(x) if callable(heights) else hardness.bearing_share(x, heights)
         return share, slope / h_rms
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
@@ -106,7 +114,7 @@ class Theory(abc.ABC):
         """Mean separations [length], two at most, at which derivatives of force or area jump; rows of a batch's."""
         return np.empty(0)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
         if self.ends_at_h_max:
             return {}
@@ -125,7 +133,7 @@ class Theory(abc.ABC):
         return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficient [length^3] along both axes, shape (2, ...), of gaps that it knows; None: it knows none."""
+        """Flow coefficient [length^3] along both axes, shape (2, ...), of simulated gaps, if there are any."""
         return None
 
     def flow_trust(
@@ -151,29 +159,32 @@ class Theory(abc.ABC):
             rtol=ENERGY_RTOL,
             minlevel=LEAST_LEVEL,
         )
-        refuse_unfinished(found.success.all(axis=0), "the elastic energy")
+        if not found.success.all():
+            raise unfinished(~found.success.all(axis=0), "the elastic energy")
         return np.asarray(found.integral.sum(axis=0))
 
-    @property
-    def knows_areas(self) -> bool:
-        """Whether the area at a force needs no separation."""
-        return type(self.elastic).area_at is not Theory.area_at
-
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
-        """Derivatives of force and of area by "mean_separation" and the surface's parameters, where it knows them."""
+        """Derivatives of force and of area by "mean_separation" and the surface's parameters, if in closed form."""
         return None
 
     def looks(self, surface: AnySurface) -> int:
         """At how many gaps of each surface an inversion begins."""
         return LOOKS if surface.shape == () else FEW_LOOKS
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
-        """Force or area at mean separations, about -d/du of it, and whether that is exact; NaN where not known."""
-        found = self.answer(surface, mean_separation)
-        if quantity == "pressure":
-            return found.pressure, found.stiffness, True
-        # area rises nearly as force does
-        return found.area, found.area * found.stiffness / found.pressure, False
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
+        """What inversions work on: unchecked force or area of a surface against mean separations.
+
+        With each value, about -d/du of it, NaN where that is not known; and whether it is exact.
+        """
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            found = self.answer(surface, u)
+            if quantity == "pressure":
+                return found.pressure, found.stiffness, True
+            # area rises nearly as force does
+            return found.area, found.area * found.stiffness / found.pressure, False
+
+        return values
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "pressure" (over A0 E*) or "area" has a wanted value; h_max at zero.
@@ -184,7 +195,8 @@ class Theory(abc.ABC):
             Where the branch of first contact does not reach it.
         """
         u, missed = self.inverted(surface, quantity, np.asarray(wanted, dtype=float))
-        refuse_unfinished(~missed, f"the separation at this {quantity}")
+        if missed.any():
+            raise unfinished(missed, f"the separation at this {quantity}")
         return u
 
     @np.errstate(all="ignore")
@@ -197,22 +209,28 @@ class Theory(abc.ABC):
             allowed = f"positive: contact has no end in theory {self.name!r}"
             require(quantity, goal.reshape(shape), goal.reshape(shape) != 0, allowed)
         near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
-        shares = _shares(self.looks(surface)).reshape(-1, *(1 for _ in shape))
+        shares = _shares(self.looks(surface)).reshape(-1, *[1] * len(shape))
         looked = np.asarray(first + (near - first) * shares)
-        value, steep, exact = self.values(surface, looked, quantity)
+        curve = self.curve(surface, quantity)
+        value, steep, exact = curve(looked)
         # one column of places for all, or one for each
-        whole = shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)
-        seen = [np.ascontiguousarray(spread(each, whole)) for each in (looked, value, steep)]
+        seen = np.empty(
+            (3, *(shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)))
+        )
+        seen[0], seen[1], seen[2] = looked, value, steep
         state = np.full((6, goal.size), np.nan)
         state[1], state[2] = low, high
         core.gap_start(seen[0][0].size, *seen, exact, goal, ends, state)
-        at_end = self._at_end(surface, quantity, goal, seen[1][-1], first, shape)
+        at_end = goal > seen[1][-1].ravel()
+        if at_end.any():
+            at_end = self._at_end(surface, quantity, goal, first, shape)
         left = np.flatnonzero((goal > 0) & ~at_end)
         for _ in range(STEPS):
             if not left.size:
                 break
             u, more = state[0, left], np.empty(left.size, dtype=bool)
-            value, steep, _ = self.at(shape, left).values(select(surface, shape, left), u, quantity)
+            theory, own = self.at(shape, left), select(surface, shape, left)
+            value, steep, _ = (curve if theory is self and own is surface else theory.curve(own, quantity))(u)
             known = np.ascontiguousarray(value), np.ascontiguousarray(steep)
             core.gap_step(*known, exact, left, goal, ends, state, more)
             left = left[more]
@@ -222,12 +240,9 @@ class Theory(abc.ABC):
         return u.reshape(shape), missed.reshape(shape)
 
     def _at_end(
-        self, surface: AnySurface, quantity: str, goal: FloatArray, seen: FloatArray, first: FloatArray, shape: Any
+        self, surface: AnySurface, quantity: str, goal: FloatArray, first: FloatArray, shape: Any
     ) -> NDArray[np.bool_]:
-        """Which of the wanted values are the largest one; more is refused. No larger ones were `seen` before."""
-        beyond = goal > seen.ravel()
-        if not beyond.any():
-            return beyond
+        """Which of the wanted values are the largest one; more is refused."""
         largest = np.broadcast_to(getattr(self.answer(surface, first), quantity), shape)
         wanted = goal.reshape(shape)
         out = wanted > largest * (1 + self.reached)
@@ -255,11 +270,9 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurfac
     return surface.with_numbers(*numbers)
 
 
-def refuse_unfinished(success: Any, what: str) -> None:
-    """Say which entries were not found."""
-    failed = ~np.asarray(success)
-    if failed.any():
-        raise ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
+def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:
+    """The error of entries that were not found."""
+    return ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
 
 
 def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
@@ -285,7 +298,7 @@ class Wrapped(Theory):
     """A user's theory, its stiffness by numerical differentiation."""
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """What it is of, its author knows."""
+        """None: its author decides."""
         return ()
 
     def __init__(self, theory: UserTheory) -> None:
@@ -309,8 +322,11 @@ class Wrapped(Theory):
         """Few: an answer may take long."""
         return FEW_LOOKS
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force or area alone."""
-        u = np.asarray(mean_separation, dtype=float)
-        found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)
-        return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)
+            return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False
+
+        return values

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +18,8 @@ from mbma_tables.common.arguments import FloatArray, checked_hardness
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws import hardness as law
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.calibrated_table import at_contact, shipped_part
-from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished
+from mbma_tables.theories.calibrated_table import known_at, shipped_part
+from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer, unfinished
 
 GROUP = "hardness"  # of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "stiffness")
@@ -42,7 +42,9 @@ class Scatter(NamedTuple):
     def _at(self, rows: FloatArray, eta: FloatArray, area: FloatArray) -> FloatArray:
         """At hardnesses and contact fractions, held constant beyond those simulated."""
         shape = np.broadcast_shapes(np.shape(eta), np.shape(area))
-        values = np.array([at_contact(self.log_area, row, np.broadcast_to(area, shape)) for row in rows])
+        with np.errstate(divide="ignore"):
+            log_area = np.log(np.broadcast_to(area, shape))
+        values = np.array([known_at(self.log_area, row, log_area) for row in rows])
         y = np.interp(np.log(np.broadcast_to(eta, shape)), np.log(self.eta), np.arange(self.eta.size))
         below = np.minimum(y.astype(int), self.eta.size - 2)
         low, high = (np.take_along_axis(values, k[None], 0)[0] for k in (below, below + 1))
@@ -119,31 +121,19 @@ class Yielding(Theory):
         p_m/E*; broadcasts with surfaces and separations. Where it is infinite, answers are the elastic theory's own.
     """
 
+    elastic: Any = None
+
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
-        self._elastic, self.hardness, self.reached = theory, checked_hardness(hardness), REACHED
+        self.elastic, self.hardness, self.reached = theory, checked_hardness(hardness), REACHED
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
-
-    def changed(self, **fields: Any) -> Yielding:
-        """The same with another elastic theory, or other hardnesses, checked before."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__ | fields)
-        return other
-
-    @property
-    def elastic(self) -> Theory:
-        """The theory of the elastic contact."""
-        return self._elastic
+        # whether the elastic area at a force needs no separation
+        self.knows_areas = type(theory).area_at is not Theory.area_at
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
         """With the hardnesses at flat places of a broadcast shape."""
         if self.hardness.ndim == 0:
             return self
-        chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
-        return self.changed(hardness=chosen)
-
-    def stiffer(self, times: FloatArray) -> Yielding:
-        """At a modulus so many times as large, of which hardnesses are less."""
-        return self.changed(hardness=np.asarray(self.hardness / times))
+        return Yielding(self.elastic, np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)])
 
     def _eta(self, surface: AnySurface) -> FloatArray:
         """p_m/(E* g)."""
@@ -155,26 +145,23 @@ class Yielding(Theory):
         return self.loaded(surface, mean_separation).answer
 
     def loaded(self, surface: AnySurface, mean_separation: FloatArray, lighter: FloatArray | None = None) -> Loaded:
-        """The answer at mean separations u [length], and what more is known there.
-
-        `lighter` are those of the elastic contact at the same forces, where they are known.
-        """
+        """The answer at mean separations u [length]; `lighter` are those of the elastic contact at the same forces."""
         u, h_rms = np.asarray(mean_separation, dtype=float), np.asarray(surface.h_rms)
         at_force: Any = None
         if lighter is None:
-            elastic = self._elastic.answer(surface, u)
+            elastic = self.elastic.answer(surface, u)
         else:
-            both = self._elastic.answer(surface, np.stack([u, lighter]))
+            both = self.elastic.answer(surface, np.stack([u, lighter]))
             elastic, (_, at_force, *_) = (TheoryAnswer(*(part[k] for part in both)) for k in range(2))
         eta, gradient, endless = self._eta(surface), np.asarray(surface.rms_gradient), np.isinf(self.hardness)
         if endless.all():
             return Loaded(u, h_rms, eta, elastic.pressure / gradient, elastic, elastic, elastic.area)
-        pressure, stiffness = self._closed(surface, u, elastic.pressure, elastic.stiffness)
+        pressure, stiffness = self._closed(surface, eta)(u, elastic.pressure, elastic.stiffness)
         if at_force is None:
             needed = (pressure > 0) & ~endless
             # where nothing yields or touches, a force that the theory is sure to reach
             known = np.minimum(np.where(needed, pressure, elastic.pressure), np.where(needed, HEAVIEST, 1.0) * gradient)
-            at_force = np.where(needed, self._elastic.area_at(surface, known), 0.0)
+            at_force = np.where(needed, self.elastic.area_at(surface, known), 0.0)
         # both of the elastic errors, force and area at that force, may add up
         area = law.area(pressure / gradient, at_force, eta)
         capped = TheoryAnswer(pressure, area, stiffness, 2 * elastic.error)
@@ -182,24 +169,21 @@ class Yielding(Theory):
             capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
         return Loaded(u, h_rms, eta, capped.pressure / gradient, capped, elastic, at_force)
 
-    def _closed(
-        self, surface: AnySurface, u: FloatArray, pressure: Any, stiffness: Any
-    ) -> tuple[FloatArray, FloatArray]:
-        """Force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
-        gradient, bearing = np.asarray(surface.rms_gradient), self._elastic.bearing_share(surface, u)
-        load, steep = law.force(pressure / gradient, stiffness / gradient, *bearing, self._eta(surface))
-        return load * gradient, steep * gradient
+    def _closed(self, surface: AnySurface, eta: FloatArray) -> Callable[..., Any]:
+        """Force over A0 E* and its -d/du at mean separations, between the elastic ones and the bearing curve."""
+        sizes = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient), eta
+        return functools.partial(law.closed, self.elastic.heights(surface), *sizes)
 
     def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations [length] of the elastic contact at the forces of this one."""
-        pressure, _, _ = self.values(surface, mean_separation, "pressure")
+        pressure = self.curve(surface, "pressure")(mean_separation)[0]
         # one without end has no gap without force
         least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
-        return self._elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0]
+        return np.asarray(self.elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0])
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
-        low, high = self._elastic.interval(surface, "pressure")
+        low, high = self.elastic.interval(surface, "pressure")
         h_rms = np.asarray(surface.h_rms)
         # at zero, where a hardness leaves full contact, some theories have no finite force
         low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
@@ -207,19 +191,25 @@ class Yielding(Theory):
 
     def looks(self, surface: AnySurface) -> int:
         """Few at many hardnesses, too."""
-        return FEW_LOOKS if self.hardness.size > MANY else self._elastic.looks(surface)
+        return FEW_LOOKS if self.hardness.size > MANY else self.elastic.looks(surface)
 
-    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+    def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force without the area, which follows from it."""
         if quantity != "pressure":
-            return super().values(surface, mean_separation, quantity)
-        pressure, steep, exact = self._elastic.values(surface, mean_separation, quantity)
-        return *self._closed(surface, mean_separation, pressure, steep), exact
+            return super().curve(surface, quantity)
+        elastic, closed = self.elastic.curve(surface, quantity), self._closed(surface, self._eta(surface))
+
+        def values(u: FloatArray) -> tuple[Any, Any, bool]:
+            pressure, steep, exact = elastic(u)
+            return *closed(u, pressure, steep), exact
+
+        return values
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a "pressure" (over E*, below the hardness) or an "area"."""
-        asked: Theory = self._elastic if np.isinf(self.hardness).all() else super()  # type: ignore[assignment]
-        return asked.mean_separation_at(surface, quantity, wanted)
+        if np.isinf(self.hardness).all():
+            return np.asarray(self.elastic.mean_separation_at(surface, quantity, wanted))
+        return super().mean_separation_at(surface, quantity, wanted)
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """As of any theory; no force is beyond the hardness."""
@@ -234,9 +224,10 @@ class Yielding(Theory):
             return self.mean_separation_at(surface, "pressure", pressure), None
         shape = np.broadcast_shapes(pressure.shape, surface.shape, self.hardness.shape)
         cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
-        both = self.changed(hardness=np.stack([cap, np.full(cap.shape, np.inf)]))
+        both = Yielding(self.elastic, np.stack([cap, np.full(cap.shape, np.inf)]))
         u, missed = both.inverted(surface, "pressure", np.broadcast_to(pressure, (2, *shape)))
-        refuse_unfinished(~missed[0], "the separation at this pressure")
+        if missed[0].any():
+            raise unfinished(missed[0], "the separation at this pressure")
         return u[0], u[1]
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
@@ -245,15 +236,11 @@ class Yielding(Theory):
         Those of the calibrated law are measured; others are what the elastic theory's become, and the hardness law's
         own beside it. NaN where the elastic theory's is not known, and for a stiffness that was not measured.
         """
-        eta, elastic = self._eta(surface), self._elastic.scatter(surface, quantity, area)
-        return shipped().standard_deviation(self._elastic.scatter_name(surface), quantity, eta, area, elastic)
+        eta, elastic = self._eta(surface), self.elastic.scatter(surface, quantity, area)
+        return shipped().standard_deviation(self.elastic.scatter_name(surface), quantity, eta, area, elastic)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
-        soft = self._eta(surface) < TESTED_ETA * (1 - 1e-9)
-        return {
-            **self._elastic.concerns(surface, answer, mean_separation),
-            f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": np.broadcast_to(
-                soft, np.shape(answer.area)
-            ),
-        }
+        soft = np.broadcast_to(self._eta(surface) < TESTED_ETA * (1 - 1e-9), np.shape(answer.area))
+        own = {f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": soft}
+        return {**self.elastic.reasons(surface, answer, mean_separation), **own}

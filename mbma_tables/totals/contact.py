@@ -13,25 +13,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, grouped, require
+from mbma_tables.common.arguments import FloatArray, grouped
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.core import in_blocks
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, sums_by_table, totals_of
-from mbma_tables.totals.profile import Profile, profile
+from mbma_tables.totals.profile import profile
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
 FEW_SURFACES, MANY_GAPS = 16, 300
-BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
 LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 
 
@@ -51,37 +49,41 @@ class Totals:
     area_by: dict[str, Any] | None = None
 
 
+class Sums(NamedTuple):
+    """How islands are summed; options as of `contact`."""
+
+    model: AnyModel
+    variant: Variant
+    rtol: float
+    outside: str = "raise"
+    workers: int = 1
+
+
 def totals_at(
-    surface: AnySurface, gap: FloatArray, model: AnyModel, variant: Variant, rtol: float, modulus: Any = 1.0,
-    outside: str = "raise", derivatives: bool | str = False, which: int = BOTH, workers: int = 1,
-) -> Totals:  # fmt: skip
-    """Force and area at separations d of the surface's broadcast shape; `derivatives` "separation" are those alone."""
-    shape, h_max = gap.shape, surface.h_max
-    require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends at full compression")
-    depth = np.asarray(h_max - gap)
+    surface: AnySurface,
+    gap: FloatArray,
+    how: Sums,
+    modulus: Any = 1.0,
+    derivatives: bool | str = False,
+    which: int = BOTH,
+) -> Totals:
+    """Force and area at separations d >= -h_max of the surface's broadcast shape; `derivatives` "separation" alone."""
+    shape, variant = gap.shape, how.variant
+    depth = np.asarray(surface.h_max - gap)
     pressure_by = area_by = None
+    stress = modulus * surface.q0 * surface.s if isinstance(surface, Surface) else modulus
     try:
-        stress = modulus
-        if isinstance(surface, Surface):
-            stress, zeta_1 = modulus * surface.q0 * surface.s, np.asarray(surface.zeta_1)
-            allowed = f"greater than {variant.floor_u:g}, the variant's floor of zeta_u"
-            require("q1/q0", zeta_1, zeta_1 > variant.floor_u, allowed)
         if isinstance(surface, Surface) and derivatives is True:
             pairs = Pairs.of(surface, depth)
-            sums, error, islands, _ = sums_by_table(model, pairs, variant, rtol, outside, workers)
-            pressure, area = sums[:, 0, 0], sums[:, 1, 0]
-            pressure_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
+            columns, error, islands, _ = sums_by_table(how.model, pairs, variant, how.rtol, how.outside, how.workers)
+            pressure, area = columns[:, 0, 0], columns[:, 1, 0]
+            pressure_by, area_by = _by_parameter(surface, columns.reshape((*shape, *columns.shape[1:])), pairs, stress)
         else:
-            sums, error, islands = _totals(
-                model, surface, depth, variant, rtol, outside, which, bool(derivatives), workers
-            )
+            sums, error, islands = _sums(surface, depth, how, which, bool(derivatives))
             pressure, area = sums[:2]
             if derivatives:
                 force_slope, area_slope = sums[2:].reshape(2, *shape) / surface.h_rms
                 pressure_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
-        if area_by is not None and variant.addition == "cover":
-            kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
-            area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
     except (ConvergenceError, OutOfRangeError) as fault:
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
@@ -90,9 +92,14 @@ def totals_at(
     least = np.minimum(pressure, area)
     if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(pressure, area) > 0)).any():
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
+    if variant.addition == "cover":
+        if area_by is not None:
+            kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
+            area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
+        area = variant.area_of(area)
     return Totals(
         pressure=(pressure.reshape(shape) * stress)[()] if which != AREA else None,
-        area=variant.area_of(area).reshape(shape)[()] if which != FORCE else None,
+        area=area.reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
         islands=islands,
         pressure_by=pressure_by if which != AREA else None,
@@ -101,23 +108,18 @@ def totals_at(
 
 
 def _by_profiles(
-    model: AnyModel, surface: AnySurface, depth: FloatArray, variant: Variant, rtol: float, outside: str, slopes: bool,
-    workers: int,
-) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
-    """Sums, perhaps their slopes by the compression, error and islands, by profiles of the surfaces.
-
-    The last are the gaps that no profile answers.
-    """
-    compression = np.asarray(depth / surface.h_rms).ravel()
-    sums, error, islands = np.zeros((4 if slopes else 2, depth.size)), np.zeros(depth.size), 0
+    surface: AnySurface, depth: FloatArray, how: Sums, sums: FloatArray, error: FloatArray
+) -> tuple[int, NDArray[np.intp]]:
+    """Fill in sums, perhaps their slopes by the compression, and errors; the islands, and the gaps not answered."""
+    compression, islands = np.asarray(depth / surface.h_rms).ravel(), 0
     touching = np.flatnonzero(compression > 0)
     left, groups = [touching[:0]], {0: touching}
+    # what lies outside of the table is solved gap by gap
     shapes: list[Any] = [surface]
+    outside = how.outside
     if isinstance(surface, Surface):
-        # what lies outside of the table is solved gap by gap
-        outside = "nan"
         numbers = np.array([surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms])
-        shapes = list(map(tuple, numbers.reshape(3, -1).T.tolist()))
+        shapes, outside = list(map(tuple, numbers.reshape(3, -1).T.tolist())), "nan"
     if len(shapes) > 1:
         number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), depth.shape).ravel()[touching]
         groups = {k: touching[mine] for k, mine in grouped(number)}
@@ -125,7 +127,7 @@ def _by_profiles(
         if not places.size:
             continue
         try:
-            kept = profile(shapes[k], model, variant, QUADRATURE_SHARE * rtol, outside)
+            kept = profile(shapes[k], how.model, how.variant, QUADRATURE_SHARE * how.rtol, outside)
         except (ConvergenceError, OutOfRangeError):
             if not isinstance(surface, Surface):
                 raise
@@ -137,52 +139,45 @@ def _by_profiles(
             places = places[inside]
         islands += kept.islands
         # most often all gaps are of one surface and touch, and slices are faster
-        whole = places.size == compression.size
-        error[slice(None) if whole else places] = kept.error
-
-        def fill(block: slice, own: Any = None if whole else places, kept: Profile = kept) -> None:
-            chosen = block if own is None else own[block]
-            sums[:, chosen] = kept.totals(compression[chosen], slopes)
-
-        in_blocks(fill, places.size, BLOCK, workers)
-    return sums, error, islands, np.sort(np.concatenate(left))
+        chosen: Any = slice(None) if places.size == compression.size else places
+        error[chosen] = kept.error
+        sums[:, chosen] = kept.totals(compression[chosen], len(sums) > 2, how.workers)
+    return islands, np.sort(np.concatenate(left))
 
 
-def _totals(
-    model: AnyModel, surface: AnySurface, depth: FloatArray, variant: Variant, rtol: float, outside: str, which: int,
-    slopes: bool, workers: int,
-) -> tuple[FloatArray, FloatArray, int]:  # fmt: skip
+def _sums(
+    surface: AnySurface, depth: FloatArray, how: Sums, which: int, slopes: bool
+) -> tuple[FloatArray, FloatArray, int]:
     """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
 
     By profiles of islands where surfaces are few or have many gaps each, else gap by gap.
     """
-    count, size = math.prod(surface.shape), depth.size
-    own = not isinstance(surface, Surface)
-    if own or (isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS)):
-        sums, error, islands, left = _by_profiles(model, surface, depth, variant, rtol, outside, slopes, workers)
-    else:
-        sums, error, islands, left = np.empty((4 if slopes else 2, size)), np.empty(size), 0, np.arange(size)
-    if not left.size:
-        return sums, error, islands
+    size, islands, left = depth.size, 0, np.arange(depth.size)
+    sums, error = np.zeros((4 if slopes else 2, size)), np.zeros(size)
+    few = math.prod(surface.shape) <= max(FEW_SURFACES, size // MANY_GAPS)
+    if not isinstance(surface, Surface) or (isinstance(how.model, UniversalModel) and few):
+        islands, left = _by_profiles(surface, depth, how, sums, error)
+        if not left.size:
+            return sums, error, islands
     if not isinstance(surface, Surface):
         sums[:, left] = error[left] = np.nan
-        if outside == "raise":
+        if how.outside == "raise":
             raise OutOfRangeError(
-                f"islands of {left.size} of {size} entries lie outside of island model {model.name!r}, the first at "
-                f"h_max - d = {depth.ravel()[left[0]]:g}; outside='exact' solves these",
+                f"islands of {left.size} of {size} entries lie outside of island model {how.model.name!r}, the first "
+                f"at h_max - d = {depth.ravel()[left[0]]:g}; outside='exact' solves these",
                 np.isin(np.arange(size), left),
             )
         return sums, error, islands
-    # gap by gap, which also says what is wrong with which
+    # gap by gap, with errors for each
     rest = Pairs.of(surface, depth)
     rest = rest if left.size == size else rest.some(left)
+    options = how.variant, how.rtol, how.outside
     try:
         if slopes:
-            columns, error[left], more, _ = sums_by_table(model, rest, variant, rtol, outside, workers)
+            columns, error[left], more, _ = sums_by_table(how.model, rest, *options, how.workers)
             sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
         else:
-            found = totals_of(model, rest, variant, rtol, outside, which, workers)
-            sums[0, left], sums[1, left], error[left], more = found
+            sums[0, left], sums[1, left], error[left], more = totals_of(how.model, rest, *options, which, how.workers)
     except (ConvergenceError, OutOfRangeError) as fault:
         mask = np.zeros(size, dtype=bool)
         mask[left] = True if fault.mask is None else fault.mask

@@ -111,7 +111,7 @@ def island(
     E_star : array_like or str
         Effective modulus, perhaps with its unit, "100 GPa"; force is in that unit times length squared.
     rtol : float
-        Relative error asked of force and area.
+        Requested relative error of force and area.
 
     Returns
     -------
@@ -160,12 +160,17 @@ def islands_of(surface: AnySurface, delta: FloatArray, variant: Variant) -> tupl
     if isinstance(surface, MeasuredSurface):
         return measured_islands(surface, delta, variant), 1.0, 1.0
     assert isinstance(surface, Surface)
-    largest = np.asarray(surface.zeta_1)
-    allowed = f"above floor_u = {variant.floor_u:g} of the variant {variant.name!r}"
-    require("q1/q0", largest, largest > variant.floor_u, allowed)
+    check_band(surface, variant)
     hurst, zeta_1 = (np.broadcast_to(array, delta.shape) for array in (surface.hurst, surface.zeta_1))
     g = geometry(np.asarray(delta / surface.h_rms), hurst, zeta_1, variant)
     return g | {"hurst": hurst}, surface.s, surface.q0
+
+
+def check_band(surface: Any, variant: Variant) -> None:
+    """Refuse self-affine surfaces whose band of wavenumbers is no wider than a variant's islands need."""
+    largest = np.asarray(surface.zeta_1)
+    allowed = f"greater than {variant.floor_u:g}, the variant's floor of zeta_u"
+    require("q1/q0", largest, largest > variant.floor_u, allowed)
 
 
 def refuse_bands(model: AnyModel) -> None:

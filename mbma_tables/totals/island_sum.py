@@ -1,8 +1,14 @@
-"""The sum over islands (Eqs. 44-49): for any island model in numpy, for the universal table in the core."""
+"""The sum over islands (Eqs. 44-49): for any island model in numpy, for the universal table in the core.
+
+The rules of the adaptive quadrature are QUADPACK's (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983). scipy's
+adaptive rules work on one integral, or refine a batch together to an absolute tolerance; here each integral has its own
+interval, is refined on its own and is judged by its own value.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,15 +22,115 @@ from mbma_tables.models import AREA, BOTH, FORCE, AnyModel, answer_islands, exac
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.island import scale_area, scale_force
 
-QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
+QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
-BLOCK = 256  # pairs between two looks for Ctrl-C
+BLOCK = 256  # pairs between two checks for interrupts
 STRETCH = 8.0  # scale of the approach's map, in boundary layers zeta_1^(-H), as in the core
 # of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
 COLUMNS, BY_COMPRESSION = 5, 3
+
+
+Integrand = Callable[[NDArray[np.intp], FloatArray], FloatArray]
+
+
+def _rule(count: int) -> FloatArray:
+    """Nodes on [-1, 1], Kronrod weights, and Gauss weights, zero where that rule has no node."""
+    rule = np.empty((3, count))
+    core.kronrod(count, *rule)
+    return rule
+
+
+NODES_21, KRONROD_21, GAUSS_21 = _rule(21)
+BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
+DEPTH = 64  # halvings of an interval before giving up
+MOST = 1000  # intervals of an integral before giving up
+LEAST = 1e-290  # of integrals: smaller ones have lost digits that no halving brings back
+
+
+class Integrals(NamedTuple):
+    """Values and relative error estimates, shape (integrals, components), and the points evaluated."""
+
+    value: FloatArray
+    error: FloatArray
+    evaluations: int
+
+
+def _apply_rule(
+    integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Kronrod sums and error estimates of each interval, shape (intervals, components)."""
+    half = (high - low) / 2
+    points = (low + high)[:, None] / 2 + half[:, None] * NODES_21
+    values = integrand(owner, points) * half[:, None, None]
+    kronrod = np.einsum("kic,i->kc", values, KRONROD_21)
+    gauss = np.einsum("kic,i->kc", values, GAUSS_21)
+    spread = np.einsum("kic,i->kc", np.abs(values - kronrod[:, None, :] / 2), KRONROD_21)
+    difference = np.abs(kronrod - gauss)
+    # QUADPACK's estimate: the difference belongs to the Gauss rule, Kronrod's own error is far smaller
+    ratio = np.divide(difference, spread, out=np.zeros_like(spread), where=spread > 0)
+    return kronrod, np.where(spread > 0, spread * np.minimum(1, 200 * ratio) ** 1.5, difference)
+
+
+def integrate(
+    integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray, count: int, rtol: float
+) -> Integrals:
+    """Integrate `count` positive integrands, each over the intervals that it owns.
+
+    Parameters
+    ----------
+    integrand : callable
+        ``integrand(owner, points)`` with `owner` (n,) and `points` (n, 21) gives (n, 21, components).
+    owner : (n,) int array
+        Which integral an interval belongs to, 0 ... count - 1.
+    low, high : (n,) arrays
+        The intervals: break points, and whatever start suits the integrand.
+    count : int
+        Number of integrals; one that owns no interval is 0.
+    rtol : float
+        Relative tolerance, met by the estimates of every component of every integral.
+
+    Returns
+    -------
+    Integrals
+
+    Raises
+    ------
+    ConvergenceError
+        Where `DEPTH` halvings, or `MOST` intervals, did not suffice; `mask` is true for these integrals.
+    """
+    if owner.size == 0:
+        # one component stands for all
+        nothing = np.zeros((count, 1))
+        return Integrals(nothing, nothing, 0)
+    evaluations, kept = 0, list[Any]()
+    fresh: list[Any] = [owner, low, high]
+    for _ in range(DEPTH):
+        batches = [[part[k : k + BATCH] for part in fresh] for k in range(0, fresh[0].size, BATCH)]
+        fresh += map(np.concatenate, zip(*(_apply_rule(integrand, *batch) for batch in batches), strict=True))
+        evaluations += fresh[0].size * NODES_21.size
+        kept = [np.concatenate(both) for both in zip(kept, fresh, strict=True)] if kept else fresh
+        owner, low, high, value, error = kept
+        sums: Any = [np.stack([np.bincount(owner, x, count) for x in part.T], axis=1) for part in (value, error)]
+        total, bound = sums
+        relative = np.divide(bound, total, out=np.zeros_like(bound), where=total > 0)
+        unfinished = np.asarray(((relative > rtol) & (total > LEAST)).any(axis=1))
+        if not unfinished.any():
+            return Integrals(total, relative, evaluations)
+        # an interval is halved where it has more than its even share of the error allowed
+        counts = np.bincount(owner, minlength=count)
+        if (counts[unfinished] > MOST).any():
+            break
+        leaves = counts[owner, None]
+        split = unfinished[owner] & (error * leaves > rtol * total[owner]).any(axis=1)
+        middle = (low[split] + high[split]) / 2
+        halves = (low[split], middle), (middle, high[split])
+        fresh = [np.tile(owner[split], 2), *map(np.concatenate, halves)]
+        kept = [part[~split] for part in kept]
+    raise ConvergenceError(
+        f"quadrature did not reach {rtol:.1e} for {int(unfinished.sum())} of {count} integrals", unfinished
+    )
 
 
 class Pairs(NamedTuple):
@@ -49,7 +155,7 @@ class Pairs(NamedTuple):
 class Totals(NamedTuple):
     """F/(A0 E* q0 s) and A/A0 of pairs, the bound on their relative error, and the islands evaluated.
 
-    Of the two, one that was not asked for holds the other, or NaN.
+    Of the two, one that was not requested holds the other, or NaN.
     """
 
     force: FloatArray

@@ -15,11 +15,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.core import core
+from mbma_tables.core import core, in_blocks
 from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
@@ -28,15 +29,99 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
-from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels
 
-KEPT = 64  # profiles, for whoever asks the same surface again
+NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
+GAPS = 10  # of a panel, at most: a series has 2 GAPS terms
+CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])  # places where polynomials miss most
+# of delta, in which force, area, number of islands and Hertz area begin
+POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
+KEPT = 64  # profiles in the cache
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS = 30
+BLOCK = 1 << 14  # gaps between two checks for interrupts
 MOST = 1000  # panels to be answered anew at a time
 
 # of approaches and which of them count: rows of `Panels.fields`, and their error
 Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
+
+
+def _rule(n: int, power: int) -> tuple[FloatArray, Any]:
+    """`mbma_panel_rule` of mbma.h, and the places of its nodes and checks."""
+    x, weights = np.polynomial.legendre.leggauss(n)
+    nodes, gaps = (1 + x) / 2, (n + 4) // 2
+    points, terms = chebyshev.chebpts1(gaps), np.eye(2 * gaps)
+    to_series: Any = np.linalg.inv(chebyshev.chebvander(x, n - 1)).T
+    reach = np.append(((1 + points) / 2) ** (1 / power), 1.0)
+    places = (CHECKS, np.concatenate([nodes, 1 + nodes]) / 2, np.outer(reach, nodes).ravel(), reach[:-1])
+    matrices = [to_series @ chebyshev.chebvander(2 * at - 1, n - 1).T for at in places]
+    both = [chebyshev.chebval(points, terms), chebyshev.chebval(points, chebyshev.chebder(terms))]
+    series: Any = np.linalg.inv(np.concatenate(both, axis=1))
+    slopes: Any = np.linalg.inv(both[0][:gaps])
+    integrated = np.zeros_like(series)
+    integrated[:gaps, 0], integrated[gaps:, 1 : gaps + 1] = 1 / gaps, chebyshev.chebint(slopes, axis=1)[:, 1:]
+    vectors: list[tuple[int, ...]] = [(NODES,), (NODES,), (GAPS + 1,)]
+    columns = CHECKS.size, 2 * NODES, NODES * (GAPS + 1), GAPS
+    shapes = [*vectors, *((NODES, count) for count in columns), (2 * GAPS, 2 * GAPS), (2 * GAPS, 2 * GAPS)]
+    held = [np.array([power, n, gaps], float)]
+    for part, shape in zip((nodes, weights / 2, reach, *matrices, series, integrated), shapes, strict=True):
+        held.append(np.zeros(shape))
+        held[-1][tuple(slice(size) for size in part.shape)] = part
+    shares = np.ones(NODES + CHECKS.size)
+    shares[:n], shares[NODES:] = nodes**power, CHECKS**power
+    return np.concatenate([part.ravel() for part in held]), shares
+
+
+# of the panel from 0, where delta goes with the square of the place, of others, and of narrow ones
+_RULES = [_rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)]
+RULES = np.concatenate([rule for rule, _ in _RULES])
+# shares of panels at which islands are answered, nodes and then CHECKS, and which of them count
+SHARES = np.array([shares for _, shares in _RULES])
+COUNTED = SHARES < 1
+
+
+class Panels(NamedTuple):
+    """Panels in order; in the one from 0, weights lack the powers of delta that they begin with."""
+
+    kind: NDArray[np.int64]  # number of the rule
+    low: FloatArray
+    high: FloatArray
+    fields: (
+        FloatArray  # weights of force, area and so on, shift and rate of heights; (rows + 2, panels, NODES + checks)
+    )
+
+    def some(self, chosen: Any) -> Panels:
+        """Those at these places."""
+        fields = np.ascontiguousarray(self.fields[:, chosen])
+        return Panels(self.kind[chosen], self.low[chosen], self.high[chosen], fields)
+
+    def joined(self, other: Panels) -> Panels:
+        """These, and after them others."""
+        kind, low, high = (np.concatenate(pair) for pair in zip(self[:3], other[:3], strict=True))
+        return Panels(kind, low, high, np.concatenate([self.fields, other.fields], axis=1))
+
+    def missed(self, last: float) -> FloatArray:
+        """Bound on the relative error of each: of what it interpolates, against islands, and of its sums."""
+        error = np.empty(self.low.size)
+        core.profile_missed(RULES, *self, len(self.fields) - 2, last, error)
+        return error
+
+    def series(self) -> tuple[FloatArray, FloatArray, Nodes]:
+        """Chebyshev series of ln of each row's sum, (panels, rows, 2 GAPS), their errors, and the islands."""
+        count, rows = self.low.size, len(self.fields) - 2
+        series, error = np.empty((count, rows, 2 * GAPS)), np.empty(count)
+        weights, (shift, rate) = np.zeros((rows, NODES * count)), np.zeros((2, NODES * count))
+        stops = np.empty(count + 1, np.int64)
+        core.profile_series(RULES, *self, rows, series, error, weights, shift, rate, stops)
+        return series, error, Nodes(weights[:, : stops[-1]], shift[: stops[-1]], rate[: stops[-1]], stops)
+
+
+class Nodes(NamedTuple):
+    """Islands at the nodes of panels, in order, with weights as they count in sums."""
+
+    weights: FloatArray  # (rows, nodes)
+    shift: FloatArray
+    rate: FloatArray
+    stops: NDArray[np.int64]  # how many lie below each panel, and in all
 
 
 class Source(NamedTuple):
@@ -45,7 +130,7 @@ class Source(NamedTuple):
     islands: Callable[[FloatArray], dict[str, FloatArray]]  # `geometry.FIELDS`
     h_rms: float  # in their unit of height
     peak: float  # h_max/h_rms
-    layer: float  # where a band leaves the shortest wave
+    layer: float  # where a band leaves the shortest wavelength
     at_d: float  # where zeta_d reaches its floor
     breaks: FloatArray  # where anything changes
     jacobian: float  # K1 (47) below at_d
@@ -102,12 +187,15 @@ class Profile:
         """The largest compression that it answers."""
         return float(self.edges[-1]) * (1 + 1e-14)
 
-    def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
+    def totals(self, compression: FloatArray, slopes: bool = False, workers: int = 1) -> FloatArray:
         """Totals at (h_max - d)/h_rms > 0 within the profile, shape (rows, gaps), and slopes by the compression below.
 
         F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area and the Hertz area; of a
         measured surface F/(A0 E*).
         """
+        if compression.size > BLOCK:
+            parts = in_blocks(lambda block: self.totals(compression[block], slopes), compression.size, BLOCK, workers)
+            return np.concatenate(parts, axis=1)
         rows = self.series.shape[1]
         out = np.empty((2 * rows if slopes else rows, compression.size))
         core.profile_totals(np.ascontiguousarray(compression), self.edges, self.series, rows, int(slopes), out)
@@ -234,8 +322,7 @@ def _profile(
 ) -> Profile:
     """The profile of a surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
 
-    `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. The number
-    of islands and their Hertz area are the third and fourth of `rows`.
+    With `outside` not "exact" it ends with a table. Rows three and four are the islands' number and Hertz area.
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)

@@ -79,8 +79,6 @@ def recorded(using):
 def use():
     """Call every function, by the library where it does."""
     from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
-    from mbma_tables.laws import hardness
-    from mbma_tables.laws.bearing_curve import FRACTIONS
 
     core = package.core
     for which, first in enumerate([-700.0, -2.0, 1e-300, -0.9, -6.0]):
@@ -89,11 +87,10 @@ def use():
     core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
-    for form, inputs in (("pocket_phi", 2), ("standard_phi", 2), ("long_phi", 2), ("totals", 4)):
-        for ending in ("pressure", "area") if form == "totals" else ("F", "A"):
-            getattr(core, f"{form}_{ending}")(*[surfaces[2]] * inputs, np.empty(20))
+    for form in range(8):
+        more = [surfaces[2] if form > 5 else None] * 2
+        core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
     greenwood_tripp.radius(2.0, 0.5, 1e-6)
-    hardness.BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
     u = np.geomspace(2.9, 0.1, 12)
     core.gap_start(1, u, np.exp(-u), np.exp(-u), 1, surfaces[0], surfaces[2], np.full((6, 20), 0.5))
 

@@ -1,14 +1,10 @@
 """Many points for exported code, as a points' file: random islands, slopes, geometry and totals by the runtime."""
 
-from __future__ import annotations
-
 import functools
-import pathlib
 
 import numpy as np
 
 from mbma_tables.export.c_code import FORM
-from mbma_tables.export.code import Replay
 from mbma_tables.export.conformance import (
     calibrated_rows,
     formula_rows,
@@ -32,7 +28,7 @@ TOLERANCES |= {"calibrated": 1e-12, "separation": 1e-12}  # whose logarithm is t
 TOLERANCES |= {"total_by": 1e-12, "calibrated_by": 1e-8}
 
 
-def random_islands() -> tuple[np.ndarray, np.ndarray]:
+def random_islands():
     """X and mu over the whole range, ends included."""
     rng = np.random.default_rng(2008)
     axis_X, axis_mu = universal_model().content.axes
@@ -42,7 +38,7 @@ def random_islands() -> tuple[np.ndarray, np.ndarray]:
     return X, mu
 
 
-def random_formula_islands() -> tuple[np.ndarray, np.ndarray]:
+def random_formula_islands():
     """X and mu over the closed form's range, both ends and no roughness included."""
     rng = np.random.default_rng(26)
     (low, high), (_, mu_high) = (closed_form_certificates.RANGES[FORM][name] for name in ("X", "mu"))
@@ -51,7 +47,7 @@ def random_formula_islands() -> tuple[np.ndarray, np.ndarray]:
     return X, mu
 
 
-def random_approaches() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def random_approaches():
     """Approach, hurst and zeta_1; some with hurst = 1, where powers vanish."""
     rng = np.random.default_rng(1973)
     hurst = rng.uniform(0.1, 1.0, POINTS // 10)
@@ -60,7 +56,7 @@ def random_approaches() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.exp(rng.uniform(np.log(1e-9), np.log(12.0), hurst.size)), hurst, zeta_1
 
 
-def random_surfaces() -> list[tuple[float, ...]]:
+def random_surfaces():
     """Surfaces of any size: hurst, q0, q1, h_rms, h_max."""
     rng = np.random.default_rng(48)
     _, hurst, zeta_1 = random_approaches()
@@ -72,7 +68,7 @@ def random_surfaces() -> list[tuple[float, ...]]:
 
 
 @functools.cache
-def points_text(variant: str = "reported") -> str:
+def points_text(variant="reported"):
     """The points' file, made once."""
     model, rule = universal_model(), get_variant(variant)
     lines = [*phi_rows(model, *random_islands()), *status_rows(model), *formula_rows(*random_formula_islands())]
@@ -83,20 +79,20 @@ def points_text(variant: str = "reported") -> str:
 
 
 @functools.cache
-def calibrated_text() -> str:
+def calibrated_text():
     """Rows of the calibrated law, of the surfaces that its table holds."""
     held = [surface for surface in random_surfaces() if 3.01 < surface[2] / surface[1] < 9.9e4]
     return "\n".join(line for surface in held for line in calibrated_rows(surface, SHARES, 7.5)) + "\n"
 
 
-def write_points(folder: pathlib.Path, variant: str = "reported") -> pathlib.Path:
+def write_points(folder, variant="reported"):
     """The points' file in a folder."""
     path = folder / "many_points.csv"
     path.write_text(points_text(variant) + calibrated_text(), encoding="utf-8")
     return path
 
 
-def assert_equal_to_runtime(replay: Replay) -> None:
+def assert_equal_to_runtime(replay):
     """Every row was replayed, and the answers agree as closely as is asked."""
     assert replay.reason == ""
     islands = {"phi": POINTS, "slopes": POINTS, "geometry": POINTS // 10, "status": 10, "formula": POINTS}

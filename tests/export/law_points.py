@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import math
 import shutil
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ VALUES, TANGENTS = 1e-13, 1e-11  # what agreement is asked of exported laws
 CONDUCTIVITY = 3.0
 # h_max is a dyadic number, so that c = (h_max - d)/2 is exact
 ROAD = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="mm")
-ASKED: dict[str, tuple[Surface, dict[str, Any]]] = {
+ASKED = {
     "mbma": (ROAD, {}),
     "calibrated": (ROAD, {"theory": "calibrated"}),
     "hardened": (ROAD, {"theory": "calibrated", "hardness": 2.0}),
@@ -44,7 +43,7 @@ class Points:
     leakage: np.ndarray
     c_turn: float
 
-    def assert_equal(self, p: Any, tangent: Any, area: Any, energy: Any, leakage: Any, close: float = VALUES) -> None:
+    def assert_equal(self, p, tangent, area, energy, leakage, close=VALUES):
         """Values as the law's, tangents as its slopes, of which those about a maximum are relative to p/c."""
         pairs = (p, self.p), (area, self.area), (energy, self.energy), (leakage, self.leakage)
         for found, known in pairs:
@@ -52,11 +51,11 @@ class Points:
         slope = np.maximum(np.abs(self.tangent), 1e-2 * self.p / np.abs(self.c))
         assert np.abs((np.asarray(tangent) - self.tangent) / slope).max() <= max(TANGENTS, close)
 
-    def pressures(self) -> np.ndarray:
+    def pressures(self):
         """Pressures on the branch of first contact, but where pieces meet: they do so within the law's error alone."""
         return self.p[:POINTS][self.c[:POINTS] < self.c_turn]
 
-    def assert_inverse(self, c: Any) -> None:
+    def assert_inverse(self, c):
         """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""
         wanted = self.pressures()
         d, back = self.law.h_max - 2 * np.asarray(c), self.law.separation(pressure=wanted)
@@ -67,7 +66,7 @@ class Points:
 
 
 @functools.cache
-def points(name: str) -> Points:
+def points(name):
     surface, options = ASKED[name]
     law = contact_law(surface, E_star="13.3 MPa", **options)
     h, rng = law.h_max, np.random.default_rng(18)
@@ -86,11 +85,11 @@ def points(name: str) -> Points:
     return Points(law, c, found.pressure, found.stiffness, found.area, found.energy, flow, (h - turn) / 2)
 
 
-def text(target: str, law: str, **options: Any) -> str:
+def text(target, law, **options):
     surface, asked = ASKED[law]
     return law_text(target, surface, "13.3 MPa", **(asked | options))
 
 
-def needs(*programs: str) -> Any:
+def needs(*programs):
     missing = [program for program in programs if shutil.which(program) is None]
     return pytest.mark.skipif(bool(missing), reason=f"not installed: {', '.join(missing)}")

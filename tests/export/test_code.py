@@ -1,12 +1,11 @@
-"""Exported C, Fortran and JavaScript answer as the runtime does; warnings are errors and sanitizers are on."""
-
-from __future__ import annotations
+"""Exported C, Fortran and JavaScript: what is written and refused, and answers as the runtime's, under sanitizers."""
 
 import ctypes
 import importlib.util
 import json
 import math
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -15,13 +14,112 @@ import code_points
 import numpy as np
 import pytest
 
+import mbma_tables.core
+from mbma_tables import InputError, __version__
+from mbma_tables.export import CODE, code, conformance
 from mbma_tables.export.code import SOURCES, Replay, check, read_report, write_code
+from mbma_tables.models.tables import universal_model
+from mbma_tables.surfaces.variants import Variant
+
+
+@pytest.fixture
+def no_compiler(monkeypatch):
+    monkeypatch.setattr(code, "web_assembly", lambda *given: b"wasm")
+
+
+@pytest.mark.usefixtures("no_compiler")
+@pytest.mark.parametrize("target", CODE)
+def test_every_file_says_what_it_is(target, tmp_path):
+    attributes = universal_model().content.attributes
+    written = write_code(target, tmp_path / "code", variant="printed")
+    assert sorted(written) == sorted((tmp_path / "code").iterdir())
+    largest = max(attributes["largest_error_F"], attributes["largest_error_A"])
+    core = pathlib.Path(mbma_tables.core.__file__).parent
+    of_all = (f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause", "Variant: printed")
+    of_tables = ("-6.25 <= X <= 41", f"{largest:.2g} on", "zeta_1 in [3, 1e+05]", "of the table against the law")
+    for path in written:
+        if (core / path.name).is_file():
+            assert path.read_bytes() == (core / path.name).read_bytes()
+            continue
+        text = path.read_text(encoding="utf-8")
+        assert not re.search("@[A-Z_]+@", text)
+        # the opening comment without its marks
+        head = " ".join(word for word in text[:5000].split() if word not in ("*", "!", "#"))
+        assert attributes["values_sha256"] in head
+        for fact in (path.name, *of_all, *of_tables) if path.suffix != ".csv" else ():
+            assert fact in head, fact
+
+
+def test_headers_of_the_core_come_with_their_sources(tmp_path):
+    written = {path.name for path in write_code("c", tmp_path)}
+    included = {name for path in tmp_path.glob("*.[ch]") for name in re.findall(r'#include "(.*)"', path.read_text())}
+    assert included | set(code.SOURCES) | {"mbma_conformance.csv"} == written
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="cc is not installed")
+def test_a_wrong_number_is_seen(tmp_path):
+    write_code("c", tmp_path)
+    table = tmp_path / "mbma_data.c"
+    text = table.read_text(encoding="utf-8")
+    before, variant = text.split("mbma_variant MBMA_VARIANT")
+    assert variant.count(", 0.05, ") == 1
+    changed = variant.replace(", 0.05, ", ", 0.0500000001, ")
+    table.write_text(f"{before}mbma_variant MBMA_VARIANT{changed}", encoding="utf-8")
+    found = check("c", tmp_path)
+    assert found.failed > 0
+    assert "tolerance" in found.reason
+    assert 1e-11 < found.largest["geometry"] < 1e-7
+    (tmp_path / "points.csv").write_text("phi,1e-11,1.0\n", encoding="utf-8")
+    assert check("c", tmp_path, tmp_path / "points.csv").failed == 1
+    (tmp_path / "phi.c").write_text("int broken\n", encoding="utf-8")
+    assert "did not compile" in check("c", tmp_path).reason
+
+
+def test_check_names_what_is_missing(tmp_path, monkeypatch):
+    with pytest.raises(InputError, match="target must be one of"):
+        check("cobol", tmp_path)
+    with pytest.raises(InputError, match="does not exist"):
+        check("c", tmp_path)
+    write_code("fortran", tmp_path)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    assert check("fortran", tmp_path) == Replay("gfortran", {}, {}, 0, "gfortran is not installed", ran=False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("cobol", "code"), "target must be one of"),
+        (("c", "code", "guessed"), "variant must be one of"),
+        (("c", "code", "fitted"), "takes their cover"),
+        (("c", "a_file"), "a_file"),
+        (("c", "code", "reported", "island4d"), "universal"),
+    ],
+)
+def test_bad_requests_leave_no_file(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a_file").write_text("kept", encoding="utf-8")
+    with pytest.raises(InputError, match=message) as caught:
+        write_code(*arguments)
+    assert len(str(caught.value).splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["a_file"]
+    assert (tmp_path / "a_file").read_text(encoding="utf-8") == "kept"
+
+
+def test_points_of_a_variant_with_high_floors():
+    """A surface below a floor has no islands, and so no points."""
+    each = len(conformance.DEPTHS)
+    ratios = [surface[2] / surface[1] for surface in conformance.SURFACES]
+    for floor in (3.0, 150.0, 500.0):
+        text = conformance.points_text(universal_model(), Variant("high floors", floor_u=floor))
+        count = sum(line.startswith("total,") for line in text.splitlines())
+        assert count == each * sum(ratio > floor for ratio in ratios), floor
+
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
-def needs(*programs: str) -> pytest.MarkDecorator:
+def needs(*programs):
     linux = sys.platform.startswith("linux")
     # elsewhere, gcc and nm may be other programs of those names
     missing = [name for name in programs if shutil.which(name) is None or not (linux or name in ("cc", "node"))]
@@ -31,20 +129,20 @@ def needs(*programs: str) -> pytest.MarkDecorator:
 
 
 @pytest.fixture(scope="module")
-def c_folder(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+def c_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("c")
     write_code("c", folder)
     return folder
 
 
 @pytest.fixture(scope="module")
-def js_folder(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+def js_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("javascript")
     write_code("javascript", folder)
     return folder
 
 
-def build_and_replay(commands: list[list[str]], work: pathlib.Path, points: pathlib.Path) -> Replay:
+def build_and_replay(commands, work, points):
     """Build the file `selftest` in a folder without a word from the compiler, and replay the points."""
     for command in (*commands, ["./selftest", str(points)]):
         done = subprocess.run(command, cwd=work, capture_output=True, text=True, timeout=300, check=False)
@@ -52,25 +150,16 @@ def build_and_replay(commands: list[list[str]], work: pathlib.Path, points: path
     return read_report(commands[0][0], done)
 
 
-def c_command(compiler: str, options: tuple[str, ...], folder: pathlib.Path) -> list[str]:
+def c_command(compiler, options, folder):
     return [compiler, *options, *WARNINGS, *(f"{folder}/{name}" for name in SOURCES), "-lm"]
 
 
 @needs("cc")
-def test_c_replays_its_points(c_folder: pathlib.Path) -> None:
+def test_c_replays_its_points(c_folder):
     found = check("c", c_folder)
     assert found.reason == ""
-    fixed = {
-        "phi": 64,
-        "slopes": 64,
-        "geometry": 24,
-        "total": 12,
-        "status": 10,
-        "calibrated": 12,
-        "total_by": 12,
-        "calibrated_by": 12,
-        "separation": 12,
-    }
+    fixed = {"phi": 64, "slopes": 64, "geometry": 24, "status": 10}
+    fixed |= dict.fromkeys(("total", "calibrated", "total_by", "calibrated_by", "separation"), 12)
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
 
@@ -79,21 +168,21 @@ def test_c_replays_its_points(c_folder: pathlib.Path) -> None:
 @pytest.mark.parametrize(
     "options", [("-O1", *SANITIZERS), ("-O3", "-march=native", "-ffp-contract=fast")], ids=["sanitized", "fast"]
 )
-def test_c_equals_the_runtime(options: tuple[str, ...], c_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+def test_c_equals_the_runtime(options, c_folder, tmp_path):
     command = [*c_command("gcc", ("-std=c11", "-Wpedantic", *options), c_folder), "-o", "selftest"]
     found = build_and_replay([command], tmp_path, code_points.write_points(tmp_path))
     code_points.assert_equal_to_runtime(found)
 
 
 @needs("g++")
-def test_cpp_compiles_it(c_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+def test_cpp_compiles_it(c_folder, tmp_path):
     command = [*c_command("g++", ("-x", "c++", "-std=c++11", "-O1"), c_folder), "-o", "selftest"]
     assert build_and_replay([command], tmp_path, c_folder / "mbma_conformance.csv").failed == 0
 
 
 @pytest.mark.slow
 @needs("gcc", "gfortran")
-def test_fortran_equals_the_runtime(tmp_path: pathlib.Path) -> None:
+def test_fortran_equals_the_runtime(tmp_path):
     written = write_code("fortran", tmp_path)
     assert max(len(line) for path in written if path.suffix == ".f90" for line in path.read_text().splitlines()) <= 132
     (tmp_path / "message.f90").write_text(
@@ -112,13 +201,13 @@ def test_fortran_equals_the_runtime(tmp_path: pathlib.Path) -> None:
 
 @pytest.mark.slow
 @needs("node")
-def test_javascript_equals_the_runtime(js_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+def test_javascript_equals_the_runtime(js_folder, tmp_path):
     code_points.assert_equal_to_runtime(check("javascript", js_folder, code_points.write_points(tmp_path)))
 
 
 @pytest.mark.slow
 @needs("cc")
-def test_the_printed_variant(tmp_path: pathlib.Path) -> None:
+def test_the_printed_variant(tmp_path):
     write_code("c", tmp_path, variant="printed")
     found = check("c", tmp_path, code_points.write_points(tmp_path, "printed"))
     code_points.assert_equal_to_runtime(found)
@@ -127,7 +216,7 @@ def test_the_printed_variant(tmp_path: pathlib.Path) -> None:
 
 
 @needs("gcc", "nm")
-def test_nothing_is_allocated_or_kept(c_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+def test_nothing_is_allocated_or_kept(c_folder, tmp_path):
     sources = [str(c_folder / name) for name in SOURCES if name != "mbma_selftest.c"]
     # without tables of addresses that a loader would move
     subprocess.run(["gcc", "-std=c11", "-O0", "-fno-pie", "-c", *sources], cwd=tmp_path, check=True)
@@ -141,12 +230,12 @@ def test_nothing_is_allocated_or_kept(c_folder: pathlib.Path, tmp_path: pathlib.
     assert not [name for kind, name in kinds if kind in "BbDdC"]
 
 
-class Surface(ctypes.Structure):
+class CSurface(ctypes.Structure):
     _fields_ = [(name, ctypes.c_double) for name in ("hurst", "q0", "q1", "h_rms", "h_max")]
 
 
 @pytest.fixture(scope="module")
-def library(c_folder: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+def library(c_folder, tmp_path_factory):
     if shutil.which("gcc") is None or not sys.platform.startswith("linux"):
         pytest.skip("not installed: gcc")
     target = tmp_path_factory.mktemp("library") / "model.so"
@@ -158,12 +247,10 @@ def library(c_folder: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) ->
     return found
 
 
-def totals(
-    library: ctypes.CDLL, surface: tuple[float, ...], gaps: np.ndarray, E_star: float = 1.0, rtol: float = 1e-8
-) -> tuple:
+def totals(library, surface, gaps, E_star=1.0, rtol=1e-8):
     answers, status = np.empty((gaps.size, 4)), np.empty(gaps.size, dtype=np.int32)
     library.mbma_totals_of(
-        ctypes.byref(Surface(*surface)),
+        ctypes.byref(CSurface(*surface)),
         ctypes.c_size_t(gaps.size),
         gaps.ctypes.data_as(ctypes.c_void_p),
         ctypes.c_double(E_star),
@@ -183,31 +270,29 @@ INVALID = b"an argument is not finite, or is outside what the model allows"
 @pytest.mark.parametrize(
     ("surface", "gap", "E_star", "rtol", "message"),
     [
-        ((math.nan, *SOUND[1:]), 1.0, 1.0, 1e-8, INVALID),
-        ((1.1, *SOUND[1:]), 1.0, 1.0, 1e-8, INVALID),
-        ((0.8, 0.0, *SOUND[2:]), 1.0, 1.0, 1e-8, INVALID),
-        ((0.8, 1.0, 3.0, 1.0, 3.0), 1.0, 1.0, 1e-8, INVALID),
-        ((0.8, 1.0, 1e9, 1.0, 3.0), 1.0, 1.0, 1e-8, INVALID),
-        ((*SOUND[:4], math.inf), 1.0, 1.0, 1e-8, INVALID),
-        (SOUND, math.nan, 1.0, 1e-8, INVALID),
-        (SOUND, math.inf, 1.0, 1e-8, INVALID),
-        (SOUND, -3.1, 1.0, 1e-8, INVALID),
+        *(
+            (wrong, 1.0, 1.0, 1e-8, INVALID)
+            for wrong in (
+                *((hurst, *SOUND[1:]) for hurst in (math.nan, 1.1)),
+                (0.8, 0.0, *SOUND[2:]),
+                *((0.8, 1.0, q1, 1.0, 3.0) for q1 in (3.0, 1e9)),
+                (*SOUND[:4], math.inf),
+            )
+        ),
+        *((SOUND, gap, 1.0, 1e-8, INVALID) for gap in (math.nan, math.inf, -3.1)),
         (SOUND, 1.0, -1.0, 1e-8, INVALID),
-        (SOUND, 1.0, 1.0, 0.0, INVALID),
-        (SOUND, 1.0, 1.0, math.nan, INVALID),
+        *((SOUND, 1.0, 1.0, rtol, INVALID) for rtol in (0.0, math.nan)),
         ((0.5, 1.0, 1e6, 1.0, 30.0), -30.0, 1.0, 1e-8, b"X is above the range"),
         ((0.1, 1.0, 1e7, 1.0, 3.0), -3.0, 1.0, 1e-8, b"mu is above the range"),
     ],
 )
-def test_no_answer_has_a_status_and_nan(
-    library: ctypes.CDLL, surface: tuple[float, ...], gap: float, E_star: float, rtol: float, message: bytes
-) -> None:
+def test_no_answer_has_a_status_and_nan(library, surface, gap, E_star, rtol, message):
     answers, status = totals(library, surface, np.array([gap]), E_star, rtol)
     assert library.mbma_message(int(status[0])) == message
     assert np.isnan(answers).all()
 
 
-def test_no_contact_from_h_max_on(library: ctypes.CDLL) -> None:
+def test_no_contact_from_h_max_on(library):
     answers, status = totals(library, SOUND, np.array([3.0, 3.5]))
     assert not status.any()
     assert not answers.any()
@@ -216,12 +301,12 @@ def test_no_contact_from_h_max_on(library: ctypes.CDLL) -> None:
 @pytest.mark.parametrize(
     ("call", "more"), [("mbma_total_slopes_of", (1.0, 1e-8)), ("mbma_calibrated_slopes_of", (1.0,))]
 )
-def test_slopes_past_the_ends(call: str, more: tuple[float, ...], library: ctypes.CDLL) -> None:
+def test_slopes_past_the_ends(call, more, library):
     """Beyond first contact nothing changes; beyond full compression nothing is said."""
     for gap, ok, known in ((3.5, True, 0.0), (-3.1, False, math.nan)):
         answers = np.ones((3, 6))
         places = (ctypes.c_void_p(row.ctypes.data) for row in answers)
-        status = library[call](ctypes.byref(Surface(*SOUND)), *map(ctypes.c_double, (gap, *more)), *places)
+        status = library[call](ctypes.byref(CSurface(*SOUND)), *map(ctypes.c_double, (gap, *more)), *places)
         assert (status == 0) == ok
         assert np.array_equal(answers[1:], np.full((2, 6), known), equal_nan=True)
         assert np.array_equal(answers[0, :3], np.full(3, known), equal_nan=True)
@@ -253,18 +338,14 @@ INVALIDS = (
     "calibrated(surface, -1)",
 )
 VALID = (
-    "phi(3, 10)",
-    "phiSlopes(3, 10)",
-    "formula(3, 10)",
-    "islandGeometry(1, 0.8, 100)",
-    "total(surface, 1)",
-    "calibrated(surface, 1)",
+    *("phi(3, 10)", "phiSlopes(3, 10)", "formula(3, 10)"),
+    *("islandGeometry(1, 0.8, 100)", "total(surface, 1)", "calibrated(surface, 1)"),
 )
 
 
 @pytest.mark.slow
 @needs("node")
-def test_javascript_checks_its_arguments(js_folder: pathlib.Path) -> None:
+def test_javascript_checks_its_arguments(js_folder):
     asked = (*TYPE_ERRORS, *INVALIDS, *VALID)
     script = ASK.replace("ASKED", ", ".join(f"() => {ask}" for ask in asked))
     (js_folder / "ask.mjs").write_text(script, encoding="utf-8")

@@ -1,7 +1,5 @@
 """Nothing that a table, a variant or a user says becomes code: hostile text leaves the same code as plain text."""
 
-from __future__ import annotations
-
 import copy
 import csv
 import dataclasses
@@ -12,7 +10,7 @@ import pytest
 
 from mbma_tables import InputError, Surface
 from mbma_tables.export import CODE, SOLVERS, code, conformance, data, solvers
-from mbma_tables.export.law_rows import LawTable, describe_law
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.text import checked_name
 from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import UniversalModel
@@ -28,16 +26,16 @@ COMMENT_MARKS = {"calculix": "**", "abaqus": "**", "lsdyna": "$", "optistruct": 
 
 
 @pytest.fixture(scope="module")
-def law() -> LawTable:
+def law():
     return describe_law(Surface.named("concrete"), 13.3, length_unit="mm", stress_unit="MPa", rows=5)
 
 
-def hostile_law(law: LawTable) -> LawTable:
+def hostile_law(law):
     return dataclasses.replace(law, comments=(HOSTILE, *law.comments[1:], HOSTILE), x_unit=HOSTILE, y_unit=HOSTILE)
 
 
 @pytest.mark.parametrize("target", CODE)
-def test_source_code(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_source_code(target, monkeypatch):
     monkeypatch.setattr(code, "web_assembly", lambda *given: b"wasm")
     content = copy.copy(universal_model().content)
     # a certificate's numbers are numbers in any case; the rest is text of the file
@@ -46,7 +44,7 @@ def test_source_code(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
     model = UniversalModel(dataclasses.replace(content, attributes=attributes))
     variant = dataclasses.replace(get_variant("reported"), name=HOSTILE)
 
-    def live(texts: dict[str, str]) -> list[str]:
+    def live(texts):
         return [
             line
             for name, text in texts.items()
@@ -67,15 +65,15 @@ def test_source_code(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("target", SOLVERS)
-def test_solver_decks(target: str, law: LawTable) -> None:
-    def live(text: str) -> list[str]:
+def test_solver_decks(target, law):
+    def live(text):
         return [line for line in text.splitlines() if not line.startswith(COMMENT_MARKS[target])]
 
     write = getattr(solvers, target)
     assert live(write(hostile_law(law))) == live(write(law))
 
 
-def test_exponential_cards(law: LawTable) -> None:
+def test_exponential_cards(law):
     lines = solvers.exponential(Surface.named("concrete"), "13.3 MPa").splitlines()
     live = [line for line in lines if not line.startswith("**")]
     assert len(live) == 3
@@ -83,7 +81,7 @@ def test_exponential_cards(law: LawTable) -> None:
 
 
 @pytest.mark.parametrize("name", ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81, 3])
-def test_names_of_cards_and_functions(name: str, law: LawTable) -> None:
+def test_names_of_cards_and_functions(name, law):
     writers = (solvers.calculix, solvers.abaqus, solvers.modelica, data.matlab_reader)
     for write in writers:
         with pytest.raises(InputError, match="a name must be a letter"):
@@ -91,7 +89,7 @@ def test_names_of_cards_and_functions(name: str, law: LawTable) -> None:
     assert checked_name("Rough_2", 7) == "Rough_2"
 
 
-def test_matlab_reader(law: LawTable) -> None:
+def test_matlab_reader(law):
     lines = data.matlab_reader(hostile_law(law), "law").decode().splitlines()
     changed = dataclasses.replace(law, comments=(law.comments[0], HOSTILE))
     hostile = data.matlab_reader(changed, "law").decode().splitlines()
@@ -99,7 +97,7 @@ def test_matlab_reader(law: LawTable) -> None:
 
 
 @pytest.mark.parametrize("unit", ["mW/(mm, K)", 'a "quoted" unit', "=HYPERLINK(evil)", "µm"])
-def test_csv_cells(unit: str, law: LawTable) -> None:
+def test_csv_cells(unit, law):
     changed = dataclasses.replace(law, y_unit=unit, comments=(*law.comments, f"in {unit}\n=HYPERLINK(evil)"))
     lines = data.to_csv(changed).decode().splitlines()
     head = len(changed.comments)
@@ -110,14 +108,14 @@ def test_csv_cells(unit: str, law: LawTable) -> None:
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+1", "-1", "@SUM", "\tx"])
-def test_csv_cells_are_no_formulas(name: str, law: LawTable) -> None:
+def test_csv_cells_are_no_formulas(name, law):
     last = data.to_csv(dataclasses.replace(law, x_name=name)).decode().splitlines()[len(law.comments)]
     assert next(csv.reader([last]))[0] == f"'{name} [mm]"
 
 
 @pytest.mark.parametrize("unit", ["W\n*INCLUDE, INPUT=evil", "W\u2028"])
 @pytest.mark.parametrize("which", ["length_unit", "stress_unit", "conductivity_unit"])
-def test_units_are_printable(which: str, unit: str) -> None:
+def test_units_are_printable(which, unit):
     units = {"length_unit": "mm", "stress_unit": "MPa", "conductivity_unit": "mW/K"} | {which: unit}
     with pytest.raises(InputError, match=r"is no known unit|is not printable"):
         describe_law(Surface.named("concrete"), 13.3, quantity="conductance", conductivity=1.0, rows=5, **units)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from generate import timing
+from generate.boundary_elements import studies
 from generate.pages import cost, cost_distances, cost_rows, distances, page
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.scenes.costs import Row, read_costs, shipped_costs, shipped_distances
+from mbma_tables.scenes.costs import read_costs, shipped_costs, shipped_distances
 from mbma_tables.theories import THEORIES
 
 COST, SECONDS = 2.0, 1e-3
@@ -107,7 +109,8 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
         assert row.cost == pytest.approx(expected.cost, rel=1e-3, abs=0)
     text = (page.ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
     assert page.fill(text, parts).count("|") == text.count("|")
-    assert page.fill(text, cost.parts_of(shipped, shipped_distances())) == text
+    own = [(page.ROOT / "tables" / name).read_bytes() for name in ("cost.csv", "distance.csv")]
+    assert page.fill(text, cost.page_of(*own)[0]) == text
     for name in ("cost", "distance"):
         assert page.svg(files[f"docs/figures/{name}.svg"]).startswith(b"<?xml")
 
@@ -115,15 +118,12 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
 def test_the_pareto_front_is_what_nothing_dominates():
     rng = np.random.default_rng(0)
     for _ in range(50):
-        places = rng.integers(1, 6, (12, 2))
-        rows = [Row("exact", str(k), "both", float(error), float(time)) for k, (time, error) in enumerate(places)]
-        front = cost.pareto_front(rows)
-
-        def dominated(row, by):
-            return by.cost <= row.cost and by.error <= row.error and (by.cost, by.error) != (row.cost, row.error)
-
-        assert not any(dominated(row, by) for row in front for by in rows)
-        assert all(any(by.cost <= row.cost and by.error <= row.error for by in front) for row in rows)
+        rows = pd.DataFrame(rng.integers(1, 6, (12, 2)).astype(float), columns=["cost", "error"])
+        front = cost.pareto_front(rows).to_numpy()
+        at_least = (front[None] <= rows.to_numpy()[:, None]).all(axis=2)
+        assert at_least.any(axis=1).all()
+        # none of the front is better than another
+        assert (at_least[cost.pareto_front(rows).index].sum(axis=1) == 1).all()
 
 
 @pytest.mark.slow
@@ -142,7 +142,7 @@ def test_points_of_theories_are_priced(monkeypatch):
 
 def test_grids_converge_and_are_told_by_contact():
     rows = {row.way: row for row in cost_distances.grid_rows()}
-    by_grid = [rows[f"{grid} x {grid}, cold"] for grid in cost_distances.GRIDS]
+    by_grid = [rows[f"{grid} x {grid}, cold"] for grid in studies.GRIDS]
     for name in ("force_light", "force_deep"):
         values = [getattr(row, name) for row in by_grid]
         assert values == sorted(values, reverse=True), name

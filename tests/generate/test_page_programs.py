@@ -9,8 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from generate.__main__ import main
-from generate.pages import fidelity, maps
-from generate.pages import theories as theories_page
+from generate.pages import fidelity, introduction, maps
 from generate.pages.gallery import ratios
 from generate.pages.page import MARKED, ROOT, svg
 from generate.tables import height_coefficients
@@ -101,7 +100,7 @@ def test_the_page_of_theories_lists_them_all():
     text = (ROOT / "docs" / "theories.md").read_text(encoding="utf-8")
     for name in theories.THEORIES:
         assert f"\n| `{name}`" in text
-    parts, files = theories_page.measure()
+    parts, files = introduction.theories()
     assert f"<!-- measured: answers -->\n\n{parts['answers']}\n\n<!-- end -->" in text
     assert svg(files["docs/figures/theories.svg"]).startswith(SVG)
 

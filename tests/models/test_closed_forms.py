@@ -6,23 +6,15 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp, island
-from mbma_tables.models import AREA, FORCE
-from mbma_tables.models.closed_forms import (
-    CERTIFICATES,
-    FUNCTIONS,
-    ISLAND_FORMS,
-    RANGES,
-    RESULTS,
-    TOTALS,
-    FormulaModel,
-    closed_totals,
-)
+from mbma_tables.models import AREA, FORCE, closed_forms
+from mbma_tables.models.closed_forms import FUNCTIONS, RANGES, TOTALS, FormulaModel, closed_totals
 
+CERTIFICATES, RESULTS = closed_forms.CERTIFICATES, closed_forms.RESULTS
 BULK = pytest.param(20_000, marks=pytest.mark.slow)
 
 
 @pytest.mark.parametrize("count", [1500, BULK])
-@pytest.mark.parametrize("form", ISLAND_FORMS)
+@pytest.mark.parametrize("form", closed_forms.ISLAND_FORMS)
 def test_errors_of_islands_are_as_certified(form, count):
     rng = np.random.default_rng(77)
     X = rng.uniform(*RANGES[form]["X"], count)
@@ -71,14 +63,14 @@ def test_what_is_promised(form, largest, count):
         assert found.coefficients <= count
 
 
-@pytest.mark.parametrize("form", ISLAND_FORMS)
+@pytest.mark.parametrize("form", closed_forms.ISLAND_FORMS)
 def test_the_rigid_limit(form):
     X = np.linspace(*RANGES[form]["X"], 200)
     for name, rigid in zip(RESULTS, greenwood_tripp.rigid_sphere(X, np.full(200, 1e-12)), strict=True):
         assert np.abs(FUNCTIONS[form][name](X, np.full(200, 1e-12)) / rigid - 1).max() < 3e-3
 
 
-@pytest.mark.parametrize("form", ISLAND_FORMS)
+@pytest.mark.parametrize("form", closed_forms.ISLAND_FORMS)
 def test_positive_and_rising_down_to_no_load(form):
     X = np.linspace(*RANGES[form]["X"], 500)[:, None]
     mu = np.concatenate([[0.0, 5e-324, 1e-300], np.geomspace(1e-30, RANGES[form]["mu"][1], 500)])

@@ -1,5 +1,7 @@
-"""What scenes plan, compute and leave alone."""
+"""What scenes plan, compute and leave alone; beyond tables, without contact; contradictions between arguments."""
 
+import dataclasses
+import importlib
 import itertools
 import json
 import subprocess
@@ -9,12 +11,23 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mbma_tables import Scene, Surface, contact, contact_law, island, open_table
+from mbma_tables import (
+    ConvergenceError,
+    OutOfRangeError,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    greenwood_tripp,
+    island,
+    open_table,
+)
 from mbma_tables.common.errors import InputError
-from mbma_tables.models import answer_islands
+from mbma_tables.models import IslandAnswer, answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import statistics as islands
 from mbma_tables.scenes.problem import ELASTIC, OUTPUTS
+from mbma_tables.scenes.run import run_plan
 from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Persson
 from mbma_tables.theories.yielding import Yielding
@@ -30,11 +43,14 @@ PARTS = {
 }
 
 
-def scene_of(*effects, **more):
+def arguments_of(effects, more=()):
     parts = {name: value for effect in effects for name, value in PARTS.get(effect, {}).items()}
-    if set(effects) != {"pressure_profile"} and not {"pressures", "mean_separations"} & set(more):
-        parts["separations"] = GAPS
-    return Scene(CONCRETE, effects=effects, **(parts | more))
+    gaps = {} if set(effects) == {"pressure_profile"} or "pressures" in more else {"separations": GAPS}
+    return {"effects": effects, "rtol": 1e-3} | parts | gaps
+
+
+def scene_of(*effects, **more):
+    return Scene(CONCRETE, **(arguments_of(effects, more) | {"rtol": 1e-6} | more))
 
 
 @pytest.mark.parametrize("rtol", [1e-1, 1e-3, 1e-5, 1e-7, 1e-9])
@@ -63,12 +79,6 @@ def test_pressures_stiffness_and_energy(rtol):
         assert energy == pytest.approx(
             quad(lambda d: exact.pressure(separation=d), gap, exact.h_max, epsrel=1e-9)[0] / 2, rel=rtol + 1e-8, abs=0
         )
-
-
-def test_mean_separations_are_gaps():
-    average = (np.array(GAPS) + CONCRETE.h_max) / 2
-    found = scene_of("pressure", mean_separations=average).run()
-    np.testing.assert_allclose(found["separation"], GAPS, rtol=1e-13)
 
 
 class Hertz:
@@ -105,21 +115,16 @@ def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
 
 
 def test_island_statistics_add_up():
-    """Force is the sum over islands of their loads; numbers are the sum of their density."""
+    """Force is the sum over islands of their loads; numbers are the sum of their density; profiles carry the load."""
     found = scene_of("pressure", "island_statistics", points=4000).run()
-    delta = found["island_delta"].values
-    load = np.trapezoid(found["island_density"].values * found["island_force"].values, delta, axis=1)
+    delta, density = found["island_delta"].values, found["island_density"].values
+    load = np.trapezoid(density * found["island_force"].values, delta, axis=1)
     np.testing.assert_allclose(load, found["pressure"], rtol=2e-3)
-    number = np.trapezoid(found["island_density"].values, delta, axis=1)
-    np.testing.assert_allclose(number, found["island_number"], rtol=2e-2)
-
-
-def test_profiles_carry_the_islands_load():
+    np.testing.assert_allclose(np.trapezoid(density, delta, axis=1), found["island_number"], rtol=2e-2)
     found = scene_of("pressure_profile", deltas=[0.1, 0.4], E_star=3.0, rtol=1e-8).run()
-    single = island(CONCRETE, [0.1, 0.4], E_star=3.0)
     r, p = found["profile_radius"].values, found["profile_pressure"].values
     load = 2 * np.pi * np.trapezoid(r * p, r, axis=1)
-    np.testing.assert_allclose(load, single.force, rtol=5e-2)
+    np.testing.assert_allclose(load, island(CONCRETE, [0.1, 0.4], E_star=3.0).force, rtol=5e-2)
 
 
 @pytest.mark.parametrize("seconds", [0.002, 0.05, 10.0])
@@ -132,28 +137,25 @@ def test_a_time_budget_is_kept_by_the_measured_costs(seconds):
 
 def test_explain_names_steps_and_what_is_left_out():
     text = scene_of("pressure", "area", without=("subscale_area",)).explain()
-    assert text.splitlines()[0].startswith("Scene  (rtol=1.0e-06, error=")
-    assert "first use in a process" in text
-    assert "-> totals by universal" in text
-    assert "-> hertz area by universal" in text
-    assert "left out: stiffness, energy" in text
-    assert "switched off: subscale_area\n" in text
+    assert text.startswith("Scene  (rtol=1.0e-06, error=")
+    steps = "first use in a process", "-> totals by universal", "-> hertz area by universal"
+    for part in (*steps, "left out: stiffness, energy", "switched off: subscale_area\n"):
+        assert part in text
 
 
 def test_many_gaps_go_through_a_law():
+    def step_of(count, rtol, **more):
+        (step,) = scene_of("pressure", separations=np.linspace(0, 1, count), rtol=rtol, **more).plan().steps
+        return step.name, step.island_model
+
     for island_model in ("universal", "exact", "rigid"):
         fewest = plans.MIN_LAW_GAPS.get(island_model, plans.MIN_LAW_GAPS_OF_OTHERS)
-        for count, name in ((fewest - 1, "totals"), (fewest, "law")):
-            (step,) = (
-                scene_of("pressure", separations=np.linspace(0, 1, count), rtol=1e-6, island_model=island_model)
-                .plan()
-                .steps
-            )
-            assert (step.name, step.island_model) == (name, island_model)
-    fewest = plans.MIN_LAW_GAPS["universal"]
+        assert step_of(fewest - 1, 1e-6, island_model=island_model) == ("totals", island_model)
+        assert step_of(fewest, 1e-6, island_model=island_model) == ("law", island_model)
     # closer than a law can be
-    (step,) = scene_of("pressure", separations=np.linspace(0, 1, fewest), rtol=1.5e-10).plan().steps
-    assert (step.name, step.island_model) == ("totals", "exact")
+    assert step_of(plans.MIN_LAW_GAPS["universal"], 1.5e-10) == ("totals", "exact")
+    with pytest.raises(InputError, match="too tight for stiffness"):
+        scene_of("stiffness", rtol=1e-7).run()
 
 
 def test_the_certificate_decides_between_table_and_solver(monkeypatch):
@@ -212,110 +214,51 @@ def test_a_result_names_what_made_it():
     assert found["separation"].attrs["units"] == "mm"
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ({"effects": "pressure", "separations": 0.5}, "list of names"),
-        ({"separations": [[0.5]]}, "one number or a list"),
-        ({"separations": 0.5, "rtol": 1.0}, "rtol must be"),
-        ({"separations": 0.5, "points": 1}, "points must be"),
-    ],
-)
-def test_python_mistakes(more, words):
-    with pytest.raises(InputError, match=words):
-        Scene(CONCRETE, **more)
-    with pytest.raises(InputError, match="not a batch"):
-        Scene(Surface([0.5, 0.7], 1.0, 50.0, 0.1, 0.3), separations=0.1)
-
-
-WATCHED = {
-    "mbma_tables.answers.contact": {"pressure", "area", "validity", "yield", "leakage"},
-    "mbma_tables.law.make": {"stiffness", "energy", "conductance"},
-    "mbma_tables.answers.leakage": {"leakage"},
-    "mbma_tables.theories.yielding": {"yield"},
-    "mbma_tables.laws.hardness": {"yield"},
-    "mbma_tables.totals.conductance": {"conductance"},
-    "mbma_tables.theories.greenwood_williamson": {"comparison"},
-    "mbma_tables.theories.persson": set(),
-    "mbma_tables.scenes.statistics": {"island_statistics", "pressure_profile"},
-}
 COMBINATIONS = [
     names
     for names in [(name,) for name in OUTPUTS] + list(itertools.combinations(OUTPUTS, 2))
     if not ("yield" in names and set(names) & set(ELASTIC))
 ]
-COUNTED = """
-import json, sys
-import numpy as np
-from mbma_tables import Scene, Surface
-import mbma_tables.models as models
-surface, arguments = Surface.named("concrete"), json.loads(sys.argv[1])
-before = set(sys.modules)
-Scene(surface, **arguments).run()
-print(json.dumps(sorted(set(sys.modules) - before)))
-"""
-
-
-def arguments_of(effects):
-    parts = {name: value for effect in effects for name, value in PARTS.get(effect, {}).items()}
-    gaps = {} if set(effects) == {"pressure_profile"} else {"separations": list(GAPS)}
-    return {"effects": list(effects), "rtol": 1e-3, **parts, **gaps}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", OUTPUTS)
-def test_modules_of_an_effect_that_is_off_are_not_imported(name):
-    code = [sys.executable, "-W", "error", "-c", COUNTED, json.dumps(arguments_of([name]))]
-    done = subprocess.run(code, capture_output=True, text=True, check=True)
-    loaded = set(json.loads(done.stdout))
-    for module, effects in WATCHED.items():
-        assert (module in loaded) == (name in effects), module
 
 
 @pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
 def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
-    import mbma_tables.answers.contact as totals
-    import mbma_tables.law.make as laws
-
     calls = {}
 
-    def count(module, name, called=None):
+    def count(module, name, called):
         real = getattr(module, name)
 
         def counted(*arguments, **more):
-            calls.setdefault(called or name, []).append(more)
+            calls.setdefault(called, []).append(more)
             return real(*arguments, **more)
 
         monkeypatch.setattr(module, name, counted)
 
-    count(totals, "contact")
-    count(laws, "contact_law")
+    count(importlib.import_module("mbma_tables.answers.contact"), "contact", "contact")
+    count(importlib.import_module("mbma_tables.law.make"), "contact_law", "contact_law")
     for name in ("island_statistics", "profiles", "hertz_area"):
-        count(islands, name)
+        count(islands, name, name)
     for theory in (GreenwoodWilliamson, Persson):
         count(theory, "answer", theory.name)
     count(Yielding, "__init__", "yield")
     Scene(CONCRETE, **arguments_of(effects)).run()
-    asked = set(effects)
-    yields = "yield" in asked
+    asked, yields = set(effects), "yield" in effects
     of_law = bool(asked & {"stiffness", "energy", "conductance"}) and not yields
+    totals = bool(asked & {"pressure", "area"}) and not of_law
     expected = {
-        "contact": int(yields or (not of_law and bool(asked & {"pressure", "area"})))
-        + len(asked & {"validity", "leakage"}),
+        "contact": int(yields or totals) + len(asked & {"validity", "leakage"}),
         "contact_law": int(of_law),
         "island_statistics": int("island_statistics" in asked),
         "profiles": int("pressure_profile" in asked),
         "greenwood_williamson": int("comparison" in asked),
-        "persson": 0,
-        "hertz_area": 0,
     }
-    found = {name: len(calls.get(name, ())) for name in expected}
-    if yields:
+    found = {name: len(called) for name, called in calls.items() if name != "yield"}
+    if yields and "comparison" in asked:
         # the load at which heights yield is solved for
         found["greenwood_williamson"] = min(found["greenwood_williamson"], 1)
-    assert found == expected
+    assert found == {name: times for name, times in expected.items() if times}
     assert ("yield" in calls) == yields
-    if not of_law and not yields and asked & {"pressure", "area"}:
+    if totals and not yields:
         assert calls["contact"][0]["quantities"] == tuple(name for name in ("pressure", "area") if name in asked)
 
 
@@ -346,11 +289,131 @@ def test_stiffness_at_the_end_of_a_laws_piece(surface, gap, rtol):
     assert abs(float(found["stiffness"][0]) / truth - 1) <= found.attrs["error"] <= rtol
 
 
-def test_stiffness_beyond_a_law_is_refused():
-    with pytest.raises(InputError, match="too tight for stiffness"):
-        scene_of("stiffness", rtol=1e-7).run()
+# its islands at full compression lie beyond X = 41, where the tables end
+DEEP = Surface(0.8, 1.0, 200.0, 1.0, 45.0)
 
 
-def test_stiffness_of_bodies_apart_is_zero():
-    found = Scene(CONCRETE, effects=("stiffness",), separations=[2 * float(CONCRETE.h_max)], rtol=1e-4).run()
-    assert float(found["stiffness"][0]) == 0.0
+def scene_with(surface=CONCRETE, **given):
+    return Scene(surface, **({"effects": ("pressure",), "separations": (0.2, 0.5)} | given))
+
+
+def with_island_model(scene, island_model):
+    """The scene's plan with that island model in every step of the model."""
+    plan = scene.plan()
+    steps = tuple(
+        step if step.island_model is None else dataclasses.replace(step, island_model=island_model)
+        for step in plan.steps
+    )
+    return dataclasses.replace(plan, steps=steps)
+
+
+@pytest.mark.parametrize("island_model", ["universal", "island4d"])
+def test_beyond_a_table_totals_are_solved(island_model):
+    scene = scene_with(DEEP, separations=(-44.0, 44.0), rtol=1e-3)
+    with pytest.raises(OutOfRangeError):
+        contact(DEEP, separation=-44.0, island_model=island_model)
+    found = run_plan(scene, with_island_model(scene, island_model))
+    truth = contact(DEEP, separation=[-44.0, 44.0], island_model="exact", rtol=1e-6).pressure
+    np.testing.assert_allclose(found["pressure"], truth, rtol=1e-3, atol=0)
+
+
+def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
+    made = []
+
+    def law(surface, rtol, island_model, **rest):
+        made.append(island_model)
+        if island_model != "exact":
+            raise OutOfRangeError("islands outside", True)
+        # as good, and quicker
+        return contact_law(surface, rtol=rtol, island_model="universal", **rest)
+
+    monkeypatch.setattr("mbma_tables.law.make.contact_law", law)
+    scene = scene_with(effects=("energy",), rtol=1e-2)
+    found = run_plan(scene, with_island_model(scene, "universal"))
+    assert made == ["universal", "exact"]
+    assert found.attrs["island_models"] == '{"law": "exact"}'
+    np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2, atol=0)
+
+
+def test_progress_in_blocks():
+    calls = []
+    gaps = np.linspace(0.2, 1.0, 130)
+    scene = scene_with(separations=gaps, rtol=1e-2)
+    run_plan(scene, with_island_model(scene, "exact"), lambda *step: calls.append(step))
+    assert calls == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"without": ("pressure",)}, "is both on and off"),
+        ({"without": ("energy",)}, "'energy' is off unless it is asked for"),
+        (
+            {"effects": ("pressure_profile",), "separations": None, "deltas": (0.1,), "without": ("finite_height",)},
+            "does not touch single islands",
+        ),
+        (
+            {"effects": ("pressure", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
+            "pressure_profile is of the deformed sphere",
+        ),
+        ({"separations": None, "pressures": (-1.0,)}, "no adhesion in the model"),
+        ({"effects": ("conductance",), "conductivities": (1.0, 2.0, 3.0)}, "two numbers"),
+        ({"effects": ("conductance",), "conductivities": (1.0, -2.0)}, "positive"),
+        ({"effects": ("pressure_profile",), "deltas": (0.1,)}, "are not needed by any effect"),
+        ({"island_model": "exakt"}, "did you mean 'exact'"),
+        ({"island_model": "exact", "without": ("sphere_deformation",)}, "leave island model out"),
+        ({"island_model": object(), "seconds": 1.0}, "give rtol instead of seconds"),
+        ({"effects": "pressure"}, "list of names"),
+        ({"separations": [[0.5]]}, "one number or a list"),
+        ({"rtol": 1.0}, "rtol must be"),
+        ({"points": 1}, "points must be"),
+        ({"surface": Surface([0.5, 0.7], 1.0, 50.0, 0.1, 0.3)}, "not a batch"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_contradictions(given, said):
+    with pytest.raises(InputError, match=said):
+        scene_with(**given)
+
+
+def test_an_island_model_of_choice():
+    """Given by name it is taken as it is, and a bound above the tolerance is an error."""
+    found = scene_with(island_model="island4d", rtol=1e-3).run()
+    assert found.attrs["island_models"] == '{"totals": "island4d"}'
+    alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["pressure"])
+    np.testing.assert_array_equal(found["pressure"], alone.pressure)
+    with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
+        scene_with(island_model="formula", rtol=1e-6).run()
+
+
+class Hertzian:
+    """An island model of one's own: the exact solver, and a bound ten times its."""
+
+    name = "hertzian"
+
+    def answer(self, X, mu):
+        solved = greenwood_tripp.solve(X.ravel(), mu.ravel(), rtol=1e-9)
+        return IslandAnswer(*(part.reshape(X.shape) for part in (solved.phi_F, solved.phi_A, 10 * solved.error)))
+
+
+def test_island_models_as_objects():
+    effects = ("pressure", "area", "island_statistics")
+    scene = scene_with(effects=effects, island_model=Hertzian(), rtol=1e-5)
+    assert "by hertzian  (count=2, rtol=5.0e-06, error not certified, time=not measured)" in scene.explain()
+    found, truth = scene.run(), scene_with(effects=effects, island_model="exact", rtol=1e-8).run()
+    for name in ("pressure", "area", "island_number", "island_force"):
+        np.testing.assert_allclose(found[name], truth[name], rtol=1e-5)
+    assert found.attrs["island_models"] == '{"totals": "hertzian", "island statistics": "hertzian"}'
+    assert found.attrs["table_hashes"] == "{}"
+    law = scene_with(effects=("energy",), island_model=Hertzian(), rtol=1e-2).run()
+    np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2)
+
+
+def test_no_contact():
+    by_area = Scene(CONCRETE, effects=["pressure", "stiffness"], areas=[0.0]).run()
+    assert by_area.separation.values == pytest.approx(1.1)
+    assert (by_area.pressure.values, by_area.stiffness.values) == (0, 0)
+    assert scene_with(effects=("stiffness",), separations=(2 * CONCRETE.h_max,), rtol=1e-4).run()["stiffness"] == 0
+    found = scene_with(effects=("pressure", "island_statistics"), separations=(CONCRETE.h_max, 2.0), points=5).run()
+    for name in ("pressure", "island_number", "island_density", "island_force", "island_area", "island_delta"):
+        assert (found[name] == 0).all(), name

@@ -25,42 +25,26 @@ def axes(draw):
     return Axis("x", "a coordinate", transform, offset, low, high, draw(st.integers(2, 400)))
 
 
-@given(axes())
-def test_ends_are_exact(axis):
+@given(axes(), st.floats(0, 1))
+def test_positions_and_coordinates_are_inverse_and_as_the_formula_says(axis, share):
     last = axis.nodes - 1
-    assert axis.coordinate(0) == axis.low
-    assert axis.coordinate(last) == axis.high
+    # rounding of t, and of x, counted in steps
+    rounding = max(abs(axis.start), abs(axis.start + last * axis.step)) / axis.step + axis.nodes
+    assert (axis.coordinate(0), axis.coordinate(last)) == (axis.values[0], axis.values[-1]) == (axis.low, axis.high)
     assert axis.values.shape == (axis.nodes,)
-    assert axis.values[0] == axis.low
-    assert axis.values[-1] == axis.high
     assert (np.diff(axis.values) > 0).all()
     assert axis.position(axis.low) == 0
-    # within the rounding of t, counted in steps
-    largest = max(abs(axis.start), abs(axis.start + last * axis.step))
-    assert abs(axis.position(axis.high) - last) <= 8e-16 * (last + largest / axis.step)
-
-
-@given(axes(), st.floats(0, 1))
-def test_positions_and_coordinates_are_inverse(axis, share):
-    position = share * (axis.nodes - 1)
+    assert abs(axis.position(axis.high) - last) <= 8e-16 * rounding
+    position = share * last
     x = axis.coordinate(position)
-    assert axis.low <= x <= axis.high or 0 < position < axis.nodes - 1
-    # rounding of t and of x, each counted in steps
-    largest = max(abs(axis.start), abs(axis.start + (axis.nodes - 1) * axis.step))
+    assert axis.low <= x <= axis.high or 0 < position < last
     scale = 1 / (x + axis.offset) if axis.transform == "log" else 1.0
-    rounding = (largest + (abs(x) + axis.offset) * scale) / axis.step + axis.nodes
-    assert abs(axis.position(x) - position) <= 1e-15 * rounding
-
-
-@given(axes(), st.floats(0, 1))
-def test_the_formula_says_the_same(axis, share):
-    x = axis.coordinate(share * (axis.nodes - 1))
+    of_x = (abs(x) + axis.offset) * scale / axis.step
+    assert abs(axis.position(x) - position) <= 1e-15 * (rounding + of_x)
     name, _, right = axis.formula().partition(" = ")
     assert name == "position"
     stated = eval(right, {"__builtins__": {}}, {"log": math.log, "x": float(x)})
-    expected = axis.position(x)
-    largest = max(abs(axis.start), abs(axis.start + (axis.nodes - 1) * axis.step))
-    assert abs(stated - expected) <= 1e-15 * (largest / axis.step + axis.nodes)
+    assert abs(stated - axis.position(x)) <= 1e-15 * rounding
 
 
 def test_a_logarithmic_axis_by_hand():

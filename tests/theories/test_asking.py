@@ -1,6 +1,4 @@
-"""`contact` asked by separation, mean separation, pressure or area, of any theory."""
-
-from __future__ import annotations
+"""`contact` asked by separation, mean separation, pressure or area, of any theory, and differences for derivatives."""
 
 import dataclasses
 import re
@@ -10,10 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from benchmarks.request import traced
+from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
-from mbma_tables.theories import THEORIES, Calibrated, Mbma
+from mbma_tables.theories import THEORIES, Mbma
+from mbma_tables.theories.differences import HALVINGS, differences
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
 BATCH = Surface(hurst=[0.7, 0.9], q0=0.01, q1=[1.0, 2.0], h_rms=1.0, h_max=[3.0, 3.4])
@@ -27,20 +27,11 @@ def test_the_four_ways_to_ask_give_one_contact(surface, theory):
     u = np.array([[1.2], [1.9], [2.4]])
     first = contact(surface, mean_separation=u, E_star=MODULUS, theory=theory)
     assert first.separation == pytest.approx(2 * u - surface.h_max)
+    assert first.mean_pressure == pytest.approx(first.pressure / first.area, rel=1e-15)
     for known in ("separation", "pressure", "area"):
-        asked = {"pressure" if known == "pressure" else known: getattr(first, known)}
-        again = contact(surface, **asked, E_star=MODULUS, theory=theory)
+        again = contact(surface, **{known: getattr(first, known)}, E_star=MODULUS, theory=theory)
         for name in ("mean_separation", "separation", "pressure", "area", "stiffness", "mean_pressure", "energy"):
             assert getattr(again, name) == pytest.approx(getattr(first, name), rel=1e-8), (known, name)
-
-
-def test_stiffness_and_energy_are_those_of_the_law():
-    law = contact_law(SURFACE, E_star=MODULUS)
-    found = contact(SURFACE, pressure=[1e-3, 1.0, 30.0], E_star=MODULUS)
-    assert law.pressure(separation=found.separation) == pytest.approx([1e-3, 1.0, 30.0], rel=1e-7)
-    assert found.stiffness == pytest.approx(law.stiffness(separation=found.separation), rel=1e-5)
-    assert found.energy == pytest.approx(law.energy(separation=found.separation), rel=1e-7)
-    assert found.mean_pressure == pytest.approx(found.pressure / found.area, rel=1e-15)
 
 
 @pytest.mark.parametrize("island_model", ["exact", "formula", "island4d"])
@@ -52,19 +43,6 @@ def test_other_island_models_have_stiffness_and_validity_too(island_model):
     assert set(other.reasons) == set(table.reasons)
     rigid = contact(SURFACE, mean_separation=[1.0, 2.0], island_model="rigid")
     assert rigid.stiffness == pytest.approx(contact_law(SURFACE, island_model="rigid").stiffness([1.0, 2.0]), rel=1e-6)
-
-
-def test_surfaces_beyond_the_table_have_validity():
-    surface = Surface([0.05, 0.8], 1.0, 1e8, 1.0, 4.5)
-    assert contact(surface, mean_separation=[2.25, 0.5], outside="exact").valid.tolist() == [False, False]
-
-
-def test_no_load_is_first_contact():
-    found = contact(SURFACE, pressure=[0.0, 1e-9])
-    assert found.separation[0] == 3.0
-    assert found.pressure[0] == found.area[0] == found.stiffness[0] == 0
-    with pytest.raises(OutOfRangeError, match="positive"):
-        contact(SURFACE, pressure=0.0, theory="persson")
 
 
 @pytest.mark.parametrize("held", ["pressure", pytest.param("area", marks=pytest.mark.slow)])
@@ -93,7 +71,7 @@ def test_derivatives_at_a_held_quantity(held, theory):
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_derivatives_at_first_contact_are_refused(theory):
-    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are asked for") as caught:
+    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are requested") as caught:
         contact(SURFACE, pressure=[0.0, 0.001], theory=theory, derivatives=True)
     assert caught.value.mask.tolist() == [True, False]
 
@@ -121,15 +99,11 @@ def test_a_surface_that_is_its_own_spectrum_has_derivatives_by_what_is_known(the
 
 
 def test_scatter_of_stiffness_and_separation():
-    pressure = np.array([100.0, 400.0, 1500.0])
-    found = contact(SURFACE, pressure=pressure, E_star=MODULUS, theory="calibrated")
+    known, small = {"E_star": MODULUS, "theory": "calibrated"}, 1e-4
+    found = contact(SURFACE, pressure=[100.0, 400.0, 1500.0], **known)
     # a force that is off by its scatter moves the separation by this, to first order
-    small = 1e-4
-    u = [
-        contact(SURFACE, pressure=pressure * f, E_star=MODULUS, theory="calibrated").mean_separation
-        for f in (1, 1 + small)
-    ]
-    assert found.separation_scatter == pytest.approx(found.scatter * (u[0] - u[1]) / small, rel=1e-3)
+    moved = found.mean_separation - contact(SURFACE, pressure=found.pressure * (1 + small), **known).mean_separation
+    assert found.separation_scatter == pytest.approx(found.scatter * moved / small, rel=1e-3)
     # what was stated for stiffness at equal force, in the middle of a bin
     with netCDF4.Dataset(shipped_file("calibrated.nc")) as data:
         theories, middle = data.theories.split(), float(data["contact"][3])
@@ -140,30 +114,18 @@ def test_scatter_of_stiffness_and_separation():
     for theory in ("calibrated", "mbma", "persson"):
         stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
         assert stated == pytest.approx(row[theories.index(theory)], rel=1e-6)
-    caps = {"hardness": eta * float(SURFACE.rms_gradient), "area": contacts[:-1]}
-    for theory in ("calibrated", "persson"):
-        stated = contact(SURFACE, theory=theory, **caps).stiffness_scatter
-        assert stated == pytest.approx(cap[capped.index(theory)][:-1], rel=1e-6)
-    # MBMA ends before
-    light = caps | {"area": contacts[:3]}
-    stated = contact(SURFACE, theory="mbma", **light).stiffness_scatter
-    assert stated == pytest.approx(cap[capped.index("mbma")][:3], rel=1e-6)
-    # with a hardness that of other theories was not measured
-    assert np.isnan(contact(SURFACE, theory="greenwood_williamson", **light).stiffness_scatter).all()
+    g = float(SURFACE.rms_gradient)
+    # MBMA ends before; with a hardness that of Greenwood-Williamson was not measured
+    for theory, end in (("calibrated", -1), ("persson", -1), ("mbma", 3), ("greenwood_williamson", 3)):
+        stated = contact(SURFACE, theory=theory, hardness=eta * g, area=contacts[:end]).stiffness_scatter
+        expected = cap[capped.index(theory)][:end] if theory in capped else np.full(end, np.nan)
+        np.testing.assert_allclose(stated, expected, rtol=1e-6)
     # nor anything on surfaces unlike those simulated
     heights = np.minimum(np.random.default_rng(1).normal(size=(64, 64)), 0)
     worn = Surface.from_spectrum(*(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=heights)
     for given in ({}, {"hardness": 0.1 * float(worn.rms_gradient)}):
         off = contact(worn, mean_separation=0.5 * worn.h_max, theory="calibrated", **given)
         assert np.isnan([off.scatter, off.area_scatter, off.stiffness_scatter, off.separation_scatter]).all()
-
-
-def test_an_answer_of_mbma_points_to_the_theory_that_is_nearer():
-    for theory in THEORIES:
-        said = "advice theory='calibrated' for stiffness or separation" in repr(
-            contact(SURFACE, area=0.01, theory=theory)
-        )
-        assert said == (theory == "mbma")
 
 
 def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
@@ -190,57 +152,21 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
         contact(SURFACE, area=0.01).conductance("45 W/(m K)")
 
 
-def test_a_theory_is_asked_once(monkeypatch):
-    asked = []
-    own = Calibrated.answer
-
-    def counted(self, surface, mean_separation):
-        asked.append(np.shape(mean_separation))
-        return own(self, surface, mean_separation)
-
-    monkeypatch.setattr(Calibrated, "answer", counted)
-    found = contact(SURFACE, mean_separation=[1.2, 1.9], theory="calibrated")
-    _ = found.stiffness, found.scatter, found.area_scatter, found.valid, found.reasons, found.mean_pressure
-    assert asked == [(2,)]
-
-
 @each
 def test_labelled_arrays_keep_their_names(theory):
     pressure = xr.DataArray([1.0, 10.0], dims="load", coords={"load": [1.0, 10.0]})
     surface = Surface(hurst=xr.DataArray([0.7, 0.8], dims="hurst"), q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
-    found = contact(surface, pressure=pressure, E_star=MODULUS, theory=theory)
-    plain = contact(Surface([[0.7], [0.8]], 0.01, 2.0, 1.0, 3.0), pressure=[1.0, 10.0], E_star=MODULUS, theory=theory)
-    for name in ("separation", "mean_separation", "area", "stiffness", "mean_pressure", "valid"):
-        labelled = getattr(found, name)
-        assert set(labelled.dims) == {"load", "hurst"}
-        assert labelled.transpose("hurst", "load").values == pytest.approx(getattr(plain, name), rel=1e-13), name
-    assert found.area.attrs["units"] == "1"
-
-
-def test_labelled_derivatives_at_held_pressure():
-    pressure = xr.DataArray([1.0, 10.0], dims="load")
-    found = contact(SURFACE, pressure=pressure, E_star=MODULUS, derivatives=True)
-    plain = contact(SURFACE, pressure=[1.0, 10.0], E_star=MODULUS, derivatives=True)
+    asked = {"E_star": MODULUS, "theory": theory, "derivatives": theory == "mbma"}
+    found = contact(surface, pressure=pressure, **asked)
+    plain = contact(Surface([[0.7], [0.8]], 0.01, 2.0, 1.0, 3.0), pressure=[1.0, 10.0], **asked)
+    names = ("separation", "mean_separation", "area", "stiffness", "mean_pressure", "valid")
+    pairs = [(getattr(found, name), getattr(plain, name)) for name in names]
     for kind in ("separation_by", "area_by"):
-        for name, slope in getattr(plain, kind).items():
-            assert getattr(found, kind)[name].values == pytest.approx(slope, rel=1e-13)
-
-
-def test_mbma_says_where_it_is_not_to_be_trusted():
-    found = contact(SURFACE, mean_separation=[2.5, 0.3])
-    assert found.valid.tolist() == [True, False]
-    reasons = found.reasons
-    assert len(reasons) == 2
-    assert all(mask.tolist() == [False, True] for mask in reasons.values())
-    assert any("stiffness falls" in reason for reason in reasons)
-
-
-@each
-def test_units_that_do_not_fit_are_noticed(theory):
-    # heights in um, wavenumbers in 1/mm
-    found = contact(Surface(0.8, 10.0, 2000.0, 1.0, 3.0), mean_separation=2.0, theory=theory)
-    assert not found.valid
-    assert any("one unit?" in reason for reason in found.reasons)
+        pairs += [(getattr(found, kind)[name], slope) for name, slope in (getattr(plain, kind) or {}).items()]
+    for labelled, expected in pairs:
+        assert set(labelled.dims) == {"load", "hurst"}
+        assert labelled.transpose("hurst", "load").values == pytest.approx(expected, rel=1e-13)
+    assert found.area.attrs["units"] == "1"
 
 
 @pytest.mark.parametrize(
@@ -269,16 +195,38 @@ def test_a_theory_object_with_its_own_options():
     assert (by_object.island_model, by_object.variant, by_object.theory) == ("rigid", "printed", "mbma")
 
 
-@pytest.mark.parametrize("theory", ["persson", "greenwood_williamson"])
-def test_heights_without_an_end(theory):
-    found = contact(SURFACE, mean_separation=[2.5, 3.1], theory=theory)
+@each
+def test_ends_validity_and_advice(theory):
+    gw_or_persson = theory in ("persson", "greenwood_williamson")
+    if gw_or_persson:  # heights without an end
+        assert contact(SURFACE, mean_separation=[2.5, 3.1], theory=theory).valid.tolist() == [True, False]
+        with pytest.raises(OutOfRangeError, match="pressure must be positive"):
+            contact(SURFACE, pressure=0.0, theory=theory)
+    else:
+        found = contact(SURFACE, pressure=[0.0, 1e-9], theory=theory)
+        assert found.separation[0] == 3.0
+        assert found.pressure[0] == found.area[0] == found.stiffness[0] == 0
+        assert not np.signbit(contact(SURFACE, separation=3.0, theory=theory).energy)
+    said = repr(contact(SURFACE, area=0.01, theory=theory))
+    assert ("advice theory='calibrated' for stiffness or separation" in said) == (theory == "mbma")
+    # heights in um, wavenumbers in 1/mm
+    found = contact(Surface(0.8, 10.0, 2000.0, 1.0, 3.0), mean_separation=2.0, theory=theory)
+    assert not found.valid
+    assert any("one unit?" in reason for reason in found.reasons)
+    # what is asked is what a refusal names
+    with pytest.raises(OutOfRangeError, match=r"^separation must be at least -h_max"):
+        contact(SURFACE, separation=-3.1, theory=theory)
+    with pytest.raises(InputError, match="hardness is empty"):
+        contact(SURFACE, separation=0.5, theory=theory, hardness=[])
+
+
+def test_mbma_says_where_it_is_not_to_be_trusted():
+    found = contact(SURFACE, mean_separation=[2.5, 0.3])
     assert found.valid.tolist() == [True, False]
-    with pytest.raises(OutOfRangeError, match="pressure must be positive"):
-        contact(SURFACE, pressure=0.0, theory=theory)
-
-
-def test_energy_without_contact_is_no_negative_zero():
-    assert not np.signbit(contact(SURFACE, separation=3.0, theory="calibrated").energy)
+    assert [mask.tolist() for mask in found.reasons.values()] == [[False, True]] * 2
+    assert any("stiffness falls" in reason for reason in found.reasons)
+    beyond = Surface([0.05, 0.8], 1.0, 1e8, 1.0, 4.5)
+    assert contact(beyond, mean_separation=[2.25, 0.5], outside="exact").valid.tolist() == [False, False]
 
 
 def test_a_modulus_names_its_unit_in_lists_and_attributes():
@@ -297,14 +245,6 @@ def test_one_quantity_alone_has_a_mean_pressure_and_a_dataset():
     )
     assert one.mean_pressure == pytest.approx(both.mean_pressure, rel=1e-8)
     assert "mean_pressure" in one.to_dataset()
-
-
-@each
-def test_what_is_asked_is_what_a_refusal_names(theory):
-    with pytest.raises(OutOfRangeError, match=r"^separation must be at least -h_max"):
-        contact(SURFACE, separation=-3.1, theory=theory)
-    with pytest.raises(InputError, match="hardness is empty"):
-        contact(SURFACE, separation=0.5, theory=theory, hardness=[])
 
 
 def test_what_is_read_of_named_arrays_has_its_unit():
@@ -327,3 +267,67 @@ def test_energies_hold_where_the_force_bends():
         expected = law.energy(u[:, 0])
         assert found[:, k] == pytest.approx(expected, rel=1e-8)
         assert contact(law.surface, mean_separation=u[:, 0]).energy == pytest.approx(expected, rel=1e-8)
+
+
+FUNCTIONS = (np.exp, lambda x: 1 / (2 + x), lambda x: np.sqrt(1 + x) * np.cos(3 * x), lambda x: 5.0 + 0 * x)
+SLOPES = np.array([1.0, -0.25, 0.5, 0.0])
+
+
+def function(entry, x):
+    return np.choose(entry, [f(x) for f in FUNCTIONS])
+
+
+@pytest.mark.parametrize("side", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("step", [1e-4, 0.02, 0.3])
+def test_derivatives_and_their_errors(side, step):
+    found, error = differences(
+        lambda k, x: np.stack([function(k, x), 2 * function(k, x)]),
+        np.full(4, step), np.full(4, side), np.ones((2, 4)),
+    )  # fmt: skip
+    assert (np.abs(found - [SLOPES, 2 * SLOPES]) <= np.maximum(error, 1e-8)).all()
+    assert (error <= 1e-6).all()
+
+
+def test_steps_are_halved_where_that_is_needed_alone():
+    asked = []
+
+    def rough(k, x):
+        asked.append(np.unique(k))
+        return np.where(k == 1, np.tanh(300 * x), np.sin(x))[None]
+
+    found, error = differences(rough, np.full(3, 0.02), np.zeros(3), np.ones((1, 3)))
+    assert found[0] == pytest.approx([1, 300, 1], rel=1e-6)
+    assert (error < 1e-3).all()
+    assert [len(k) for k in asked] == [3] + [1] * (len(asked) - 1)
+    asked.clear()
+    found, error = differences(lambda k, x: 1.0 * (x[None] > 0), np.full(3, 0.02), np.zeros(3), np.ones((1, 3)))
+    assert (error > 0.1).all()
+    found, error = differences(lambda k, x: np.full((1, x.size), np.nan), np.ones(3), np.zeros(3), np.ones((1, 3)))
+    assert not (error <= 1).any()
+    assert len(asked) <= HALVINGS
+
+
+def test_a_force_without_bound_has_no_derivative():
+    surface = Surface(0.8, 0.01, 2.0, 1.0, 3.0)
+    with pytest.raises(ConvergenceError, match="no derivative of pressure by mean_separation was found") as caught:
+        contact(surface, mean_separation=[0.0, 1.0], theory="calibrated", derivatives=True)
+    assert caught.value.mask.tolist() == [True, False]
+
+
+@pytest.mark.parametrize("cap", [0.03, np.inf])
+def test_forces_that_no_gap_resolves_are_refused(cap):
+    surface, asked = Surface(0.8, 0.01, 2.0, 1.0, 3.0), {"pressure": [1e-150, 1e-3], "hardness": cap}
+    # lighter than what is left where h_max - u is rounding
+    with pytest.raises(ConvergenceError, match="the separation at this pressure was not found for 1 entries") as caught:
+        contact(surface, **asked, theory="mbma")
+    assert caught.value.mask.tolist() == [True, False]
+    found = contact(surface, **asked, theory="greenwood_williamson")
+    assert found.pressure == pytest.approx([1e-150, 1e-3], rel=1e-10)
+
+
+@pytest.mark.parametrize("options", [{}, {"theory": "calibrated", "hardness": "1.5 GPa"}], ids=["mbma", "hardness"])
+def test_a_request_takes_few_calls_in_few_files(options):
+    """Checks stand at the door, and inversions call what is bound to the surface."""
+    calls, _, places = traced(lambda: contact(SURFACE, pressure="10 MPa", E_star="100 GPa", **options))
+    assert calls <= 90
+    assert len({place.partition(":")[0] for place in places}) <= 9

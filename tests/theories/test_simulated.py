@@ -16,7 +16,7 @@ from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.theories import BoundaryElements
 from mbma_tables.theories.corrected import of_map
-from mbma_tables.theories.simulated import law_loads
+from mbma_tables.theories.own_map import law_loads
 
 pytest.importorskip("tamaas")
 LOADS = (4e-3, 0.01, 0.025, 0.06, 0.12, 0.25, 0.5, 0.9)
@@ -83,19 +83,27 @@ def test_between_loads_of_100_random_maps():
 
 
 def test_it_is_a_law_like_any_other(truth):
-    law = contact_law(truth.surface, theory=truth, E_star=10.0)
-    pressure = 10.0 * truth.rows[0, 3]
+    law, pressure = contact_law(truth.surface, theory=truth, E_star=10.0), 10.0 * truth.rows[0, 3]
     assert law.at_pressure(pressure).mean_separation == pytest.approx(truth.rows[2, 3], rel=0.02)
     direct = contact(truth.surface, pressure=pressure, theory=truth, E_star=10.0)
     assert law.at_pressure(pressure).stiffness == pytest.approx(direct.stiffness, rel=0.05)
-
-
-def test_a_law_of_light_loads_alone(truth):
+    # of light loads alone
     few = BoundaryElements(truth.surface, *truth.rows[:, :4], elements=truth.elements)
     law = contact_law(few.surface, theory=few)
     assert law.lowest == pytest.approx(2 * truth.rows[2, 3] - few.surface.h_max)
     assert 0.01 < law.error < 1
     np.testing.assert_allclose(law.pressure(truth.rows[2, 1:3]), truth.rows[0, 1:3], rtol=law.error)
+
+
+def test_what_was_not_simulated_is_refused(truth):
+    plain = Surface(0.8, 0.1, 2.0, 1.0, 3.0)
+    for surface, u, theory, match in (
+        (truth.surface, 10 * truth.rows[2, 0], truth, "which were simulated"),
+        (plain, 1.0, truth, "know that map alone"),
+        (plain, 1.0, "simulated", r"make it by Surface\.from_map"),
+    ):
+        with pytest.raises(OutOfRangeError if theory is truth else InputError, match=match):
+            contact(surface, mean_separation=u, theory=theory)
 
 
 def test_without_gaps_leakage_is_that_of_isotropic_ones(truth):
@@ -104,13 +112,6 @@ def test_without_gaps_leakage_is_that_of_isotropic_ones(truth):
     expected = truth.surface.h_rms**3 * flow(truth.surface, found.mean_separation, found.area)
     for own in (found.leakage.K, found.leakage.x, found.leakage.y):
         np.testing.assert_array_equal(own, expected)
-
-
-def test_what_was_not_simulated_is_refused(truth):
-    with pytest.raises(OutOfRangeError, match="which were simulated"):
-        contact(truth.surface, mean_separation=10 * truth.rows[2, 0], theory=truth)
-    with pytest.raises(OutOfRangeError, match="know that map alone"):
-        contact(Surface(0.8, 0.1, 2.0, 1.0, 3.0), mean_separation=1.0, theory=truth)
 
 
 def test_a_coarse_grid_is_not_valid():
@@ -130,26 +131,20 @@ def test_a_map_is_continued_by_its_mirror_images():
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("count", "change", "message"),
     [
-        ({"pressure": [1.0, 2.0, 3.0]}, "at least 4 loads"),
-        ({"pressure": [1.0, 2.0, 2.0, 3.0]}, "pressure must be rising"),
-        ({"area": [0.0, 0.1, 0.2, 0.3]}, "loads must be positive"),
-        ({"area": [0.2, 0.1, 0.2, 0.3]}, "area must be rising"),
-        ({"mean_separation": [1.0, 2.0, 3.0, 4.0]}, "mean_separation must be falling"),
+        (3, {}, "at least 4 loads"),
+        (4, {"pressure": [1.0, 2.0, 2.0, 3.0]}, "pressure must be rising"),
+        (4, {"area": [0.0, 0.1, 0.2, 0.3]}, "loads must be positive"),
+        (4, {"area": [0.2, 0.1, 0.2, 0.3]}, "area must be rising"),
+        (4, {"mean_separation": [1.0, 2.0, 3.0, 4.0]}, "mean_separation must be falling"),
     ],
 )
-def test_rows_that_make_no_law(truth, change, message):
-    rows = {
-        "pressure": [1e-3, 0.01, 0.02, 0.1],
-        "area": [0.01, 0.02, 0.1, 0.2],
-        "mean_separation": [4.0, 3.0, 2.0, 1.0],
-    }
-    columns = rows | {"energy": [1.0, 2.0, 3.0, 4.0]} | change
-    if len(columns["pressure"]) == 3:
-        columns = {name: column[:3] for name, column in columns.items()}
+def test_rows_that_make_no_law(truth, count, change, message):
+    rows = {"pressure": [1e-3, 0.01, 0.02, 0.1], "area": [0.01, 0.02, 0.1, 0.2], "energy": [1.0, 2.0, 3.0, 4.0]}
+    columns = rows | {"mean_separation": [4.0, 3.0, 2.0, 1.0]} | change
     with pytest.raises(InputError, match=message):
-        BoundaryElements(truth.surface, **columns)
+        BoundaryElements(truth.surface, **{name: column[:count] for name, column in columns.items()})
 
 
 def test_without_the_engine_says_what_to_install(monkeypatch):
@@ -229,11 +224,6 @@ class TestOfASurface:
         assert other.mean_separation == pytest.approx(1e-3 * point.mean_separation, rel=1e-3)
         with pytest.raises(InputError, match="this surface has none"):
             contact(surface.combined(surface), pressure=0.01, theory="simulated")
-
-
-def test_only_a_map_is_pressed():
-    with pytest.raises(InputError, match=r"make it by Surface\.from_map"):
-        contact(Surface(0.8, 0.1, 2.0, 1.0, 3.0), mean_separation=1.0, theory="simulated")
 
 
 def test_the_energy_gives_a_knot_between_two_loads():

@@ -65,72 +65,40 @@ def numbers_of(case):
     return hurst, 0.3, 0.3 * zeta_1, h_rms, top * h_rms, (top - reach) * h_rms
 
 
-def against_differences(numbers, variant, step):
+EVERY = [(case, variant, 4e-3) for case in CASES for variant in ("reported", "printed")]
+EVERY += [(CASES[k], variant, 4e-3) for k in (0, 2, 3) for variant in (OWN, LEVEL, NO_OFFSET, OF_HEIGHTS)]
+for hurst, zeta_1, which, share in AT_KINKS:
+    for variant in ("reported", OWN):
+        reach = share * kinks(hurst, zeta_1, get_variant(variant))[which]
+        EVERY.append(((hurst, zeta_1, 4.7, reach), variant, 2e-3))
+
+
+@pytest.mark.parametrize(("case", "variant", "step"), EVERY, ids=str)
+def test_against_differences(case, variant, step):
+    numbers = numbers_of(case)
     found = contact(Surface(*numbers[:5]), separation=numbers[5], variant=variant, rtol=1e-10, derivatives=True)
-    for value, by, true in zip(
-        (found.pressure, found.area),
-        (found.pressure_by, found.area_by),
-        differences(numbers, variant, step),
-        strict=True,
-    ):
+    by_both = (found.pressure, found.pressure_by), (found.area, found.area_by)
+    for (value, by), true in zip(by_both, differences(numbers, variant, step), strict=True):
         assert sorted(by) == sorted(NAMES)
         for name, parameter, slope in zip(NAMES, numbers, true, strict=True):
             scale = max(abs(slope), abs(value / parameter))
             assert abs(by[name] - slope) <= 1e-6 * scale, name
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("variant", ["reported", "printed"])
-def test_against_differences(case, variant):
-    against_differences(numbers_of(case), variant, 4e-3)
-
-
-@pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[3]])
-@pytest.mark.parametrize("variant", [OWN, LEVEL, NO_OFFSET, OF_HEIGHTS], ids=lambda variant: variant.name)
-def test_a_variant_of_ones_own_against_differences(case, variant):
-    against_differences(numbers_of(case), variant, 4e-3)
-
-
-@pytest.mark.parametrize(("hurst", "zeta_1", "which", "share"), AT_KINKS)
-@pytest.mark.parametrize("variant", ["reported", OWN], ids=["reported", "own"])
-def test_next_to_a_kink_against_differences(hurst, zeta_1, which, share, variant):
-    reach = share * kinks(hurst, zeta_1, get_variant(variant))[which]
-    against_differences(numbers_of((hurst, zeta_1, 4.7, reach)), variant, 2e-3)
-
-
 @pytest.mark.parametrize("variant", ["reported", "printed", OWN, LEVEL], ids=["reported", "printed", "own", "level"])
-def test_lengths_scale_out(variant):
-    """Force and area do not know the unit of length: Euler's identity for functions of degree 0."""
+def test_lengths_and_slopes_scale_out(variant):
+    """Euler's identity: force is of degree 1 in heights and in wavenumbers, area of degree 0, neither has lengths."""
     rng = np.random.default_rng(70)
     hurst, top = rng.uniform(0.3, 1, 60), rng.uniform(2.5, 4.7, 60)
     zeta_1, share = 10 ** rng.uniform(0.56, 4, 60), rng.uniform(-1, 1, 60)
     share[::4] = 1 - 10 ** rng.uniform(-6, -1, 15)
     surface = Surface(hurst, 0.3, 0.3 * zeta_1, 0.7, 0.7 * top)
     found = contact(surface, separation=share * surface.h_max, variant=variant, derivatives=True)
-    for by in (found.pressure_by, found.area_by):
-        terms = np.stack(
-            [
-                surface.h_rms * by["h_rms"],
-                surface.h_max * by["h_max"],
-                found.separation * by["separation"],
-                -surface.q0 * by["q0"],
-                -surface.q1 * by["q1"],
-            ]
-        )
-        assert (np.abs(terms.sum(axis=0)) <= 1e-13 * np.abs(terms).sum(axis=0)).all()
-
-
-def test_slopes_scale_out():
-    """Heights alone: force is of degree 1 in them, area of degree 0; wavenumbers likewise."""
-    surface = Surface([0.3, 0.7, 1.0], 0.3, [3.0, 60.0, 2e3], 0.7, 2.4)
-    gap = np.array([2.39, 1.0, -2.0])
-    found = contact(surface, separation=gap, derivatives=True)
     for value, by, degree in ((found.pressure, found.pressure_by, 1), (found.area, found.area_by, 0)):
-        heights = surface.h_rms * by["h_rms"] + surface.h_max * by["h_max"] + gap * by["separation"]
-        waves = surface.q0 * by["q0"] + surface.q1 * by["q1"]
-        size = np.abs(surface.h_max * by["h_max"]) + np.abs(surface.q0 * by["q0"])
+        terms = np.stack([np.asarray(getattr(found if n == "separation" else surface, n)) * by[n] for n in NAMES[1:]])
+        waves, heights, size = terms[:2].sum(axis=0), terms[2:].sum(axis=0), np.abs(terms).sum(axis=0)
+        assert (np.abs(heights - waves) <= 1e-13 * size).all()
         assert (np.abs(heights - degree * value) <= 1e-12 * size).all()
-        assert (np.abs(waves - degree * value) <= 1e-12 * size).all()
 
 
 def by_zeta_1(hurst, zeta_1, h_max, depth):
@@ -194,19 +162,16 @@ def test_next_to_the_floor_of_zeta_u(hurst, left, h_max, depth):
 
 
 def test_units_shapes_and_no_contact():
-    surface = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4)
-    gap = np.array([1.0, 2.4, 5.0])
-    found = contact(surface, separation=gap, derivatives=True)
-    stiff = contact(surface, separation=gap, E_star=[2.0, 3.0, 4.0], derivatives=True)
+    surface, gap = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4), np.array([1.0, 2.4, 5.0])
+    found, stiff = (contact(surface, separation=gap, E_star=e, derivatives=True) for e in (1.0, [2.0, 3.0, 4.0]))
+    one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), separation=1.0, derivatives=True)
     for name in NAMES:
         assert found.pressure_by[name].shape == found.area_by[name].shape == (2, 3)
         # no contact is flat
         assert (found.pressure_by[name][:, 1:] == 0).all()
         assert (found.area_by[name][:, 1:] == 0).all()
-        np.testing.assert_allclose(stiff.pressure_by[name][:, 0], 2 * found.pressure_by[name][:, 0], rtol=1e-15)
+        np.testing.assert_allclose(stiff.pressure_by[name], np.array([2, 3, 4]) * found.pressure_by[name], rtol=1e-15)
         np.testing.assert_array_equal(stiff.area_by[name], found.area_by[name])
-    one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), separation=1.0, derivatives=True)
-    for name in NAMES:
         assert np.shape(one.pressure_by[name]) == ()
         assert one.pressure_by[name] == found.pressure_by[name][0, 0]
 
@@ -217,9 +182,9 @@ def test_slopes_refine_as_totals_do(rtol):
     rng = np.random.default_rng(5)
     hurst, top, share = rng.uniform(0.3, 1, 40), rng.uniform(2.5, 4.5, 40), rng.uniform(-1, 1, 40)
     surfaces = Surface(hurst, 0.3, 0.3 * 10 ** rng.uniform(0.5, 4, 40), 0.7, 0.7 * top)
-    plain = contact(surfaces, separation=share * surfaces.h_max, rtol=rtol)
-    slopes = contact(surfaces, separation=share * surfaces.h_max, rtol=rtol, derivatives=True)
+    plain, slopes = (
+        contact(surfaces, separation=share * surfaces.h_max, rtol=rtol, derivatives=by) for by in (False, True)
+    )
     assert slopes.islands == plain.islands
-    np.testing.assert_allclose(slopes.error, plain.error, rtol=1e-6)
-    np.testing.assert_allclose(slopes.pressure, plain.pressure, rtol=1e-12)
-    np.testing.assert_allclose(slopes.area, plain.area, rtol=1e-12)
+    for name, close in (("error", 1e-6), ("pressure", 1e-12), ("area", 1e-12)):
+        np.testing.assert_allclose(getattr(slopes, name), getattr(plain, name), rtol=close)

@@ -1,5 +1,6 @@
 """Tangential stiffness, partial slip and unloading stiffness, against closed forms of spheres and of the normal law."""
 
+import dataclasses
 import pickle
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.materials import tangential_ratio
+from mbma_tables.surfaces.surface import MeasuredSurface
 
 FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
 RADIUS, FRICTION, NU = 5.0, 0.3, 0.25
@@ -92,35 +94,26 @@ def test_two_bodies_add_their_compliances():
     known = named.tangential()
     assert known.ratio == pytest.approx(tangential_ratio((0.29, 0.33), (205.0, 69.0)))
     assert known.stiffness == pytest.approx(named.unloading_stiffness / known.ratio)
-    for wrong in (
-        {"nu": (0.3, 0.3)},
-        {"nu": 0.6},
-        {"nu": (0.3, 0.3), "E": (1.0, -1.0)},
-        {"nu": 0.3, "E": (1.0, 1.0)},
-        {},
-    ):
+    two = {"nu": (0.3, 0.3)}
+    for wrong in (two, two | {"E": (1.0, -1.0)}, {"nu": 0.6}, {"nu": 0.3, "E": (1.0, 1.0)}, {}):
         with pytest.raises(InputError):
             contact(FACE, pressure="10 MPa", E_star="100 GPa").tangential(**wrong)
 
 
 def test_what_is_refused():
-    found = sheared()
-    for ask in (found.shear, found.displacement, found.energy_loss):
-        with pytest.raises(OutOfRangeError, match="at least 0"):
-            ask(-0.1)
-    with pytest.raises(OutOfRangeError, match="at most the friction times the pressure"):
-        found.displacement(1e9)
-    with pytest.raises(InputError, match="pressure= takes"):
-        found.shear("1 MPa")
-    for friction in (0.0, -1.0, np.nan):
-        with pytest.raises(InputError, match="friction"):
-            contact(FACE, mean_separation=2.5, theory=Spheres()).tangential(friction, NU)
-    with pytest.raises(InputError, match="slip needs friction"):
-        _ = contact(FACE, mean_separation=2.5, theory=Spheres()).tangential(nu=NU).gross_slip
-    law = contact_law(FACE, theory="calibrated")
-    for given in ({}, {"mean_separation": 2.0, "pressure": 1e-3}):
-        with pytest.raises(InputError, match="one of them"):
-            law.tangential(**given, nu=0.3)
+    found, apart, law = sheared(), contact(FACE, mean_separation=2.5, theory=Spheres()), contact_law(FACE, "calibrated")
+    cases = [(lambda ask=ask: ask(-0.1), "at least 0") for ask in (found.shear, found.displacement, found.energy_loss)]
+    cases += [(lambda mu=mu: apart.tangential(mu, NU), "friction") for mu in (0.0, -1.0, np.nan)]
+    cases += [
+        (lambda: found.displacement(1e9), "at most the friction times the pressure"),
+        (lambda: found.shear("1 MPa"), "pressure= takes"),
+        (lambda: apart.tangential(nu=NU).gross_slip, "slip needs friction"),
+        (lambda: law.tangential(nu=0.3), "one of them"),
+        (lambda: law.tangential(mean_separation=2.0, pressure=1e-3, nu=0.3), "one of them"),
+    ]
+    for ask, match in cases:
+        with pytest.raises(OutOfRangeError if match.startswith("at ") else InputError, match=match):
+            ask()
 
 
 def test_batches_and_data_arrays():
@@ -134,3 +127,32 @@ def test_batches_and_data_arrays():
     named = contact(FACE, mean_separation=xr.DataArray(u, dims="gap"), theory="calibrated").tangential(0.3, 0.3)
     np.testing.assert_allclose(named.shear(0.1).values, plain.shear(0.1), rtol=1e-12)
     assert named.stiffness.dims == ("gap",)
+
+
+# kappa k_t/k_n along and across a lay of 4:1 at nu = 0.3, by boundary elements of another code, at three contacts
+LAY_OF_FOUR = {0.03: (0.93, 1.09), 0.12: (0.914, 1.118), 0.4: (0.893, 1.157)}
+
+
+def test_a_lay_is_stiffer_across():
+    q = np.geomspace(0.1, 3.0, 50)
+    plain = MeasuredSurface(q, q**-3.6, h_max=8.0)
+    stretched = dataclasses.replace(plain, anisotropy=4.0)
+    for area, expected in LAY_OF_FOUR.items():
+        isotropic = contact(plain, area=area).tangential(nu=0.3).stiffness
+        found = contact(stretched, area=area)
+        for way, ratio in zip(("along", "across"), expected, strict=True):
+            assert found.tangential(nu=0.3, direction=way).stiffness / isotropic == pytest.approx(ratio, abs=0.02)
+    with pytest.raises(InputError, match="direction"):
+        found.tangential(nu=0.3)
+    with pytest.raises(InputError, match="anisotropy"):
+        contact(plain, area=0.1).tangential(nu=0.3, direction="along")
+    with pytest.raises(InputError, match="slip"):
+        found.tangential(0.2, nu=0.3, direction="along").shear(1e-9)
+    with pytest.raises(OutOfRangeError, match="area"):
+        contact(stretched, area=0.001).tangential(nu=0.3, direction="along")
+
+
+def test_two_unlike_bodies_with_a_lay():
+    """Their compliances add; bodies alike are one."""
+    c = lambda nu: 0.2 + 0.1 * nu  # noqa: E731
+    assert tangential_ratio((0.3, 0.3), (210.0, 70.0), c) == pytest.approx(tangential_ratio(0.3, share=c))

@@ -1,0 +1,152 @@
+"""Measured parts of README.md, docs/theories.md and docs/formula.md."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+from scipy.special import erf
+
+from generate.boundary_elements.design import TRAINING
+from generate.boundary_elements.evidence import MIN_WAVES
+from generate.formulas.printing import HEADER, latex_steps, read_functions
+from generate.pages.page import Measured, duration, evidence, table, unmarked
+from mbma_tables import Surface, contact
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.plots import Curve, draw_compression, theory_label
+from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
+from mbma_tables.scenes.costs import shipped_costs, shipped_distances
+from mbma_tables.scenes.steps import other_theory
+from mbma_tables.theories import THEORIES
+
+POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are compared with simulations
+SHOWN = ("self_affine", 0.7, 24.0, 5, 0.0)  # a held-out spectrum: kind, H, zeta_1, wavelengths a side, shape
+LOADS = np.geomspace(1e-4, 0.6, 60)  # F/(A0 E* g), g the rms gradient
+ROWS = {
+    ("calibrated", "law"): '`"calibrated"`: fitted to boundary-element (BEM) simulations',
+    ("calibrated, map", "map of 256 x 256"): '`"calibrated"`, from a measured map',
+    ("Persson", "law"): '`"persson"`: no fitted constants',
+    ("MBMA reported", "law"): '`"mbma"`: the paper\'s model',
+    ("boundary elements", "256 x 256, cold"): "for comparison: BEM on 256 x 256 points",
+}
+PRESSURES = (1e-4, 1e-3, 1e-2)  # over E*
+
+
+def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
+    """A/A0 at p/(E* g): the area law of the README."""
+    t = pressure / 0.33
+    s = (0.51 + 0.033 * math.log(alpha / 10) + t) / (1 + t)
+    return np.asarray(erf(pressure * np.sqrt(2 / s)))
+
+
+def pocket_pressure(u: FloatArray, nu: float) -> FloatArray:
+    """p/(E* q0 h_rms) at u/h_rms: the law of separation of the README, by the spectrum's narrowness."""
+    return np.asarray(u**-0.26 * np.exp(-1.91 * u - 2.8 * (nu - 0.63)))
+
+
+def pocket_errors() -> list[list[Any]]:
+    """Of both laws: name, median, 90% quantile and largest error [%] on held-out surfaces, number of surfaces."""
+    seen = [o for o in evidence() if o.split != TRAINING and o.kind == "self_affine" and o.waves >= MIN_WAVES]
+    found: dict[str, list[FloatArray]] = {"area at given pressure": [], "pressure at given separation": []}
+    for one in seen:
+        inside, spectrum = (one.area >= POCKET_AREAS[0]) & (one.area <= POCKET_AREAS[1]), one.spectrum
+        force, g = one.force[inside], float(spectrum.gradient)
+        pressure = pocket_pressure(one.u[inside], float(spectrum.narrowness)) / g
+        laws = pocket_area(force, float(spectrum.alpha)) / one.area[inside], pressure / force
+        for errors, law in zip(found.values(), laws, strict=True):
+            errors.append(100 * np.abs(law - 1))
+    return [[what, *np.quantile(np.concatenate(e), (0.5, 0.9, 1.0)), len(seen)] for what, e in found.items()]
+
+
+def pocket_laws() -> str:
+    """The same as a table."""
+    header = "pocket law | median error | 90% of errors below | largest | surfaces"
+    return table(header, pocket_errors(), "{} | {:.2g}% | {:.2g}% | {:.2g}% | {}")
+
+
+def formula() -> Measured:
+    """Certificates, ranges and equations of the closed forms."""
+    rows = []
+    for form, results in CERTIFICATES.items():
+        for result, found in results.items():
+            worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
+            rows.append([form, result, found.coefficients, found.largest, found.median, worst])
+    header = "form | function | coefficients | largest error | median | worst at"
+    parts = {"laws": pocket_laws(), "certificates": table(header, rows, "{} | {} | {} | {:g} | {:.2g}")}
+    parts["ranges"] = "\n".join(
+        f"- {form}: {', '.join(f'`{low:g} <= {name} <= {high:g}`' for name, (low, high) in limits.items())}"
+        for form, limits in RANGES.items()
+    )
+    functions = read_functions(HEADER.read_text(encoding="utf-8")).values()
+    for form in ("pocket", "standard", "totals"):
+        # steps that functions of a form share are printed once
+        steps = dict.fromkeys(line for function in functions if function.form == form for line in latex_steps(function))
+        parts[form] = "\n\n".join(f"$${line}$$" for line in steps)
+    return parts, {}
+
+
+def picture() -> Any:
+    """Force against separation and area against force by three theories, and simulated surfaces as dots."""
+    seen = [one for one in evidence() if one.node == SHOWN]
+    _, hurst, zeta_1, *_ = SHOWN
+    surface = Surface(float(hurst), 1.0, float(zeta_1), 1.0, float(np.mean([one.h_max for one in seen])))
+    u = contact(surface, pressure=LOADS * surface.rms_gradient, theory="calibrated").mean_separation
+    curves = []
+    for theory in ("calibrated", "mbma", "persson"):
+        curve = contact(surface, mean_separation=u, theory=theory).curve()
+        # three bands would hide one another
+        bands: dict[str, Any] = {} if theory == "calibrated" else {"scatter": None, "area_scatter": None}
+        curves.append(dataclasses.replace(curve, label=theory_label(theory), **bands))
+    figure = draw_compression(curves, f"H = {hurst:g}, q1/q0 = {zeta_1:g}: a spectrum that no constant was fitted to")
+    by_gap, by_force = unmarked(figure)
+    for number, one in enumerate(seen):
+        force = one.force * float(surface.rms_gradient)
+        by_gap.plot(one.u, force, "k.", label="_" if number else "boundary elements")
+        by_force.plot(force, one.area, "k.")
+    by_gap.legend()
+    return figure
+
+
+def readme() -> Measured:
+    """Theories with their deviation from simulations and their cost, the pocket laws' errors, the first picture."""
+
+    def off(*deviations: float) -> str:
+        return " / ".join(f"{100 * math.expm1(d):.2g}%" if d < 0.5 else f"factor {math.exp(d):.2g}" for d in deviations)
+
+    known, rows = {(row.theory, row.way): row for row in shipped_distances()}, []
+    for row, what in ((known[key], what) for key, what in ROWS.items()):
+        cells = off(row.area_light, row.area_deep), off(row.force_light, row.force_deep)
+        rows.append([what, *cells, duration(row.cost * shipped_costs().seconds)])
+    header = "theory | error of area at given pressure | error of pressure at given separation | time per point"
+    shares = "; ".join(
+        f"error of {what} below {nine:.2g}% in nine cases of ten, at most {most:.2g}%"
+        for what, _, nine, most, _ in pocket_errors()
+    )
+    pocket = f"On held-out surfaces at 1-97% contact: {shares} ([method](docs/formula.md#pocket-laws))."
+    return {"theories": table(header, rows), "pocket": pocket}, {"docs/figures/first.svg": picture()}
+
+
+def theories() -> Measured:
+    """Separation, area and stiffness at a few pressures, and curves of force and area, by every theory."""
+    road, rows, curves = Surface.named("concrete"), [], []
+    for pressure, name in itertools.product(PRESSURES, THEORIES):
+        found = contact(road, pressure=pressure, theory=name)
+        numbers = found.mean_separation / road.h_rms, 100 * found.area, found.stiffness * road.h_rms / pressure
+        spread = found.scatter if np.isfinite(found.scatter) else "not known"
+        rows.append([pressure, f"`{name}`", *numbers, "yes" if found.valid else "no", spread])
+    header = "F/(A0 E*) | theory | u/h_rms | A/A0 [%] | stiffness h_rms/F | valid | scatter of ln F"
+    text = table(header, rows, "{:g} | {} | {:.3g} | {:.3g} | {:.3g} | {} | {:.2g}")
+    gap = float(road.h_max) * (1 - 2 * np.linspace(0.002, 1.0, 121))
+    for name in THEORIES:
+        line = other_theory(name, road, gap, 1.0)
+        known, u = np.isfinite(line.pressure), (road.h_max + gap) / (2 * road.h_rms)
+        curves.append(Curve(theory_label(name), u[known], *(field[known] for field in line)))
+    figure = draw_compression(curves, "concrete road of Lorenz, by every theory")
+    by_gap, by_force = unmarked(figure)
+    by_gap.legend()
+    by_gap.set_ylim(1e-8, 20)
+    by_force.set(xlim=(1e-6, 10), ylim=(1e-6, 5))
+    return {"answers": text}, {"docs/figures/theories.svg": figure}

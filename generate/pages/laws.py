@@ -1,0 +1,217 @@
+"""Measured parts of docs/calibrated.md and docs/leakage.md: laws fitted to boundary elements."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from generate.boundary_elements.design import REFINEMENT, SPLITS, TRAINING
+from generate.calibrated_file import binned
+from generate.leakage_flow import Flow, cases
+from generate.leakage_law import EDGES, EVIDENCE, LARGE, errors, noise_floor, summary
+from generate.pages.page import DATA, Measured, dataset, panels, read_csv, spans, table
+from mbma_tables import Surface, contact
+from mbma_tables.answers.leakage_table import GROUP, shipped_flow
+from mbma_tables.common.files import shipped_file
+from mbma_tables.laws.calibrated import CONSTANTS
+from mbma_tables.theories import THEORIES, get_theory
+from mbma_tables.theories.calibrated_table import shipped, shipped_part
+
+# rows of the accuracy of the calibrated law, as its file names them
+SETS = (
+    *(f"held_out_{held}, {waves} waves, spectrum" for waves in ("2-3", "4") for held in ("surface", "spectrum")),
+    *("held_out_surface, 1 wave, spectrum", "held_out_surface, 4 waves, map", "held_out_spectrum, 4 waves, map"),
+    *(f"held_out_spectrum, {kind}, map" for kind in ("2-3 waves", "stretched", "transformed")),
+    *(f"self-affine, {name}" for name in ("mbma", "mbma_printed", "mbma_fitted", "persson", "greenwood_williamson")),
+)
+WORDS = {"held_out_": "new ", "4 wave": "4-8 wave", "wave": "wavelength", "stretched": "stretched 1:3 to 1:12"}
+QUANTITIES = ("force", "area", "stiffness")
+GRIDS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9)  # contacts at which grids are compared
+COLOURS = {"calibrated": "k", "calibrated_map": "0.5", "mbma": "C0", "mbma_printed": "C9", "mbma_fitted": "C1"}
+COLOURS |= {"persson": "C3", "persson_simplified": "C6", "greenwood_williamson": "C2"}
+
+BINS, HEADER = (0.004, 0.05, 0.15, 0.3, 0.4), "A {:.3g}-{:.3g}%"  # of leakage
+LEAKAGE_SETS = ("training", "plateaus", "stretched", "yielded", "zeta_1 32, two waves", "zeta_1 64 and 128")
+MANY_WAVES = 8  # longest wavelengths a side
+DRAWN = (0.4, 0.8)  # Hurst exponents
+
+
+def calibrated() -> Measured:
+    """Accuracy and constants that `python -m generate calibrated` stored, and a figure."""
+    data = dataset(shipped_file("calibrated.nc"))
+    edges, sets = (*data.contact_low.values, data.contact_high.values[-1]), data.attrs["sets"].split("; ")
+    parts, quantities = {}, data.attrs["quantities"].split()
+    for quantity in QUANTITIES:
+        rows = []
+        for name in SETS:
+            cells = data.accuracy.values[sets.index(name), quantities.index(quantity)]
+            words = functools.reduce(lambda text, pair: text.replace(*pair), WORDS.items(), name)
+            rows.append([words, *((100 * bias, 100 * spread) for bias, spread, *_ in cells)])
+        parts[quantity] = table(f"surfaces, and what is known of them | {spans(edges)}", rows, "{} | {:+.0f} ± {:.0f}")
+    parts |= {"numbers": numbers(data.attrs), "bars": bars(data), "refinement": refinement()}
+    return parts, {"docs/figures/calibrated.svg": draw_calibrated(data)}
+
+
+def numbers(facts: dict[str, Any]) -> str:
+    """Constants, the table's certificate, and the coverage of the stated scatter."""
+    rows = [(f"`{name}`", f"{facts[f'law_{name}']:.4g}") for name in vars(CONSTANTS)]
+    maps = {name.removeprefix("map_"): value for name, value in facts.items() if name.startswith("map_")}
+    rows += [(f"`{name}` (map)", f"{value:.4g}") for name, value in maps.items()]
+    evidence = json.loads(facts["evidence"])
+    rows += [("surfaces simulated, of which in the training set", f"{evidence['surfaces']}, {evidence['training']}")]
+    for what in QUANTITIES:
+        largest, most = facts[f"largest_error_{what}"], facts[f"p99_error_{what}"]
+        rows.append((f"largest (99%) error of {what} by the table", f"{largest:.1e} ({most:.1e})"))
+    for what, (one, two) in json.loads(facts["coverage"]).items():
+        rows.append((f"held-out errors of {what} within one and two of the stated", f"{one:.0%}, {two:.0%}"))
+    return table("quantity | value", rows)
+
+
+def bars(data: Any) -> str:
+    """Limits to nine errors in ten, what is reached, and the floor by surfaces of one spectrum."""
+    rows = []
+    for bar in json.loads(data.attrs["bars"]):
+        over, large = bar["found"] - bar["limit"], f"({bar['surfaces_large']})"
+        judged = "met" if over <= 0 else f"missed by {100 * over:.1f}" if over > 0 else "no load there"
+        found = f"{100 * bar['found']:.1f}%: {judged}" if np.isfinite(bar["found"]) else f"—: {judged}"
+        large = f"{100 * bar['large']:.1f}% {large}" if np.isfinite(bar["large"]) else f"— {large}"
+        what = bar["what"].replace("wave", "wavelength") + " a side"
+        rows.append([what, 100 * bar["limit"], found, 100 * bar["mean"], bar["surfaces"], large, 100 * bar["noise"]])
+    header = "case | limit | 90% quantile | mean | surfaces | 90% quantile on 512 and 1024 points a side | lower bound"
+    return table(header, rows, "{} | {:g}% | {} | {:+.1f}% | {} | {} | {:.1f}%")
+
+
+def refinement() -> str:
+    """Errors of raw and corrected areas on coarse grids against the finest, by points a shortest wave and contact."""
+    data = dataset(DATA / "boundary_elements.nc")
+    one = data.isel(surface=data.split.values == SPLITS.index(REFINEMENT))
+    finest, spacings = one.points.values == one.points.values.max(), one.points / (one.zeta_1 * one.waves)
+    rows = []
+    for spacing in np.unique(spacings.values[~finest]):
+        own = one.isel(surface=~finest & (spacings.values == spacing))
+        exact = np.array([one.area.values[finest & (one.seed.values == seed)][0] for seed in own.seed.values])
+        cells = []
+        for area in (own.area_raw.values, own.area.values):
+            # a grid may have no contact at a load
+            error = np.where(area > 0, np.log(np.maximum(area, 1e-300) / exact), np.nan)
+            cells.append(binned(exact.ravel(), 100 * error.ravel(), GRIDS))
+        pairs = zip(*cells, strict=True)
+        rows.append([spacing, *((a.mean(), b.mean()) if a.size and b.size else "—" for a, b in pairs)])
+    return table(f"grid points per shortest wavelength | {spans(GRIDS)}", rows, "{:g} | {:+.1f}, {:+.1f}")
+
+
+def draw_calibrated(data: Any) -> Any:
+    """One surface's curves with the stated scatter as a band, and every theory's scatter of force."""
+    figure, (left, right) = panels(1, 2, (10, 3.6))
+    simulated, surface = read_csv("bem_hurst0.8_zeta64.csv"), Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
+    gap, g = np.linspace(0.01, 3.38, 200), float(surface.rms_gradient)
+    for name in THEORIES:
+        found = get_theory(name).answer(surface, gap)
+        force = found.pressure / g
+        left.semilogy(gap, force, color=COLOURS[name], label=name)
+        if name == "calibrated":
+            spread = np.exp(get_theory(name).scatter(surface, "pressure", found.area))
+            left.fill_between(gap, force / spread, force * spread, color="0.8", label="its scatter")
+    left.semilogy(simulated.iloc[:, 3], simulated.iloc[:, 0], "ko", mfc="none", label="boundary elements")
+    left.set(xlabel="u/h_rms", ylabel="F/(A0 E* g)", ylim=(1e-5, 3), title="H 0.8, zeta_1 64, h_max 3.4 h_rms")
+    left.legend(fontsize="small")
+    number = data.attrs["quantities"].split().index("force")
+    for k, name in enumerate(data.attrs["theories"].split()):
+        right.loglog(data.contact, data.stated_scatter.values[k, number], "o-", color=COLOURS[name], label=name)
+    right.set(xlabel="A/A0", ylabel="rms of ln(F/simulated) at equal u", title="Stated scatter of force")
+    figure.legend(*right.get_legend_handles_labels(), fontsize="small", loc="outside right center")
+    return figure
+
+
+def leakage() -> Measured:
+    """Deviations of leakage laws from simulation, and their curves."""
+    seen = cases(dataset(EVIDENCE))
+    parts = {"accuracy": leakage_accuracy(), "cells": of_cells(seen), "floor": floor()}
+    return parts, {"docs/figures/leakage.svg": draw_leakage(seen)}
+
+
+def leakage_accuracy() -> str:
+    """Every law on held-out surfaces, and the law on every set."""
+    values, facts = shipped_part(GROUP)
+    sets, laws = facts["sets"].split("; "), facts["laws"].split("; ")
+    shown, lines = [(law, "held out") for law in laws], []
+    for name in LEAKAGE_SETS:
+        shown += [(law, name) for law in ("calibrated", "closed form")[: 2 if "zeta_1" in name else 1]]
+    for law, name in shown:
+        cells: list[Any] = []
+        for low, high in itertools.pairwise(BINS):
+            # wider bins than those of the file
+            inside = [low <= a and b <= high + 1e-9 for a, b in itertools.pairwise(EDGES)]
+            bias, rms, number = np.nan_to_num(values["accuracy"][sets.index(name), laws.index(law), inside]).T
+            total = number.sum()
+            cells.append((bias @ number / total, np.sqrt(rms**2 @ number / total), total) if total else None)
+        lines.append([f"{law}, {name}".replace("waves", "wavelengths a side"), *cells])
+    return table(f"law, set | {spans(BINS, HEADER)}", lines, "{} | {:+.2f}, {:.2f} ({:.0f})")
+
+
+def floor() -> str:
+    """Cell-to-cell scatter, stated scatter and share of directions that are blocked, by contact."""
+    values, facts = shipped_part(GROUP)
+    rows = {"cells of one spectrum differ by": values["noise"]}
+    theories = [f"stated scatter, `{name}`" for name in facts["theories"].split()]
+    rows |= dict(zip(theories, values["stated_scatter"], strict=True))
+    rows["share of directions blocked"] = values["share_blocked"]
+    lines = [[name, *(None if np.isnan(v) else v for v in row)] for name, row in rows.items()]
+    (one, two), flow = facts["coverage"], shipped_flow().constants
+    cells = table(f"A [%] | {spans(EDGES, '{:.3g}-{:.3g}')}", lines, "{} | {:.2f}")
+    return (
+        f"{cells}\n\nHeld-out errors up to 30% contact within one and two of the stated scatter: {one:.0%} and "
+        f"{two:.0%}. Constants: Ac = {flow.threshold:g}, m = {flow.obstruction:g}; closed form {flow.prefactor:g} u^3 "
+        f"(1 - A/Ac)^{flow.exponent:g}. The table is within {facts['largest_error_simulated']:.2g} of the medium in "
+        f"ln R up to zeta_1 = 64, and {facts['largest_error_log_factor']:.2g} beyond."
+    )
+
+
+def of_cells(seen: Sequence[Any]) -> str:
+    """Held-out errors, and the spread of cells of one spectrum, with many and with few longest wavelengths a side."""
+    isotropic = [one for one in seen if one.isotropic and one.zeta_1 < LARGE]
+    contact_constants, constants, lines = shipped().constants, shipped_flow().constants, list[list[Any]]()
+    for name, many in (("eight", True), ("four or five", False)):
+        own = [one for one in isotropic if (one.waves >= MANY_WAVES) == many]
+        flows = [Flow(one, contact_constants) for one in own if one.split != TRAINING]
+        laws = {
+            "calibrated": [errors(f, f.medium(constants)) for f in flows],
+            "medium, simulated area and gap": [errors(f, f.medium(constants, f.one.area, f.one.u)) for f in flows],
+        }
+        cells = {law: [f"{rms:.2f} ({n:.0f})" for _, rms, n in summary(misses, BINS)] for law, misses in laws.items()}
+        cells["cells of one spectrum"] = [f"{value:.2f}" for value in noise_floor(own, BINS)]
+        lines += [[f"{law}, {name} wavelengths a side", *row] for law, row in cells.items()]
+    return table(f"rms of ln k | {spans(BINS, HEADER)}", lines)
+
+
+def draw_leakage(seen: Sequence[Any]) -> Any:
+    """k against contact of simulated surfaces, and the laws."""
+    figure, axes_of = panels(1, 2, (10, 4.5), sharey=True)
+    area, flow = np.linspace(0.004, 0.405, 200), shipped_flow().constants
+    for axes, hurst in zip(axes_of, DRAWN, strict=True):
+        for one in seen:
+            if one.kind == "self_affine" and one.node[1] == hurst and (one.isotropic or one.zeta_1 >= 64):
+                colour, label = ("k", "simulated, zeta_1 < 64") if one.zeta_1 < 64 else ("r", "simulated, zeta_1 >= 64")
+                axes.plot(one.area, np.exp(one.log_k), ".", color=colour, ms=4, alpha=0.6, label=label)
+        for zeta, style in ((16.0, "-"), (64.0, "--"), (1024.0, ":")):
+            answer = contact(Surface(hurst, 1.0, zeta, 1.0, 4.0), area=area, theory="calibrated")
+            k = np.where(answer.leakage.blocked, np.nan, answer.leakage.K)
+            axes.plot(area, k, f"C0{style}", label=f"calibrated, zeta_1 {zeta:g}")
+            if zeta == 16:
+                spread, u = np.exp(answer.leakage.scatter), answer.mean_separation
+                axes.fill_between(area, k / spread, k * spread, color="C0", alpha=0.2, lw=0, label="its scatter")
+                closed = flow.closed_form(u, area)
+                axes.plot(area, np.where(closed > 0, closed, np.nan), "C1-", lw=1, label="closed form, zeta_1 16")
+                axes.plot(area, u**3, "C2-", lw=1, label="u^3, zeta_1 16")
+        axes.set(xlabel="real contact area  A/A0", yscale="log", ylim=(1e-7, 20), title=f"H = {hurst:g}")
+        axes.grid(alpha=0.3)
+    axes_of[0].set_ylabel("flow coefficient over h_rms^3,  k")
+    # one entry for all simulations of a colour
+    entries = {text: handle for handle, text in zip(*axes_of[0].get_legend_handles_labels(), strict=True)}
+    axes_of[0].legend(entries.values(), entries.keys(), fontsize="small")
+    return figure

@@ -1,0 +1,209 @@
+"""Flow factors, asperity pressure and contact area of a rough gap, before contact and in it, for lubrication codes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.answers.contact import contact
+from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.common.arguments import FloatArray, hinted, number_in, require
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import draw_panels
+from mbma_tables.common.units import unit_of
+from mbma_tables.laws.calibrated import TESTED_AREA
+from mbma_tables.laws.film import LAY, OPEN, SHEAR, WIDEST_LAY, factors
+from mbma_tables.materials import Metal, Pair
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.protocol import Theory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RANGE = (0.2, 50.0)  # u/h_rms
+USEFUL = 0.5  # standard deviation of ln phi above which a flow factor is not valid
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FlowFactors(Displayed):
+    """Patir and Cheng's factors of a rough gap, made by `flow_factors`; arrays of the shape of the gaps.
+
+    Attributes
+    ----------
+    mean_separation : ndarray
+        u, the mean gap [length].
+    phi_x, phi_y : ndarray
+        Pressure flow factors: flow is -phi u^3/(12 viscosity) dp/dx.
+    shear_x, shear_y : ndarray
+        Shear flow factors phi_s of the sliding face's roughness along x and y; of two rough faces they add, weighted by
+        their shares of h_rms^2 and signed (Patir and Cheng 1979).
+    pressure, area : ndarray
+        Asperity pressure F/A0 [stress] and A/A0.
+    scatter, shear_scatter : ndarray
+        Model uncertainty (1 sd) of ln phi and of ln phi_s.
+    valid : ndarray
+        Whether flow through such gaps was simulated.
+    reasons : dict
+        Why not, each with a mask.
+    peklenik : float
+        Length of the roughness along x over that along y.
+    """
+
+    mean_separation: FloatArray
+    phi_x: FloatArray
+    phi_y: FloatArray
+    shear_x: FloatArray
+    shear_y: FloatArray
+    pressure: FloatArray
+    area: FloatArray
+    scatter: FloatArray
+    shear_scatter: FloatArray
+    valid: Any
+    reasons: dict[str, Any]
+    peklenik: float
+    surface: AnySurface
+    units: dict[str, str]
+
+    @property
+    def K_x(self) -> FloatArray:
+        """Flow coefficient along x, phi_x u^3 [length^3]."""
+        return self.phi_x * self.mean_separation**3
+
+    @property
+    def K_y(self) -> FloatArray:
+        """Flow coefficient along y, phi_y u^3 [length^3]."""
+        return self.phi_y * self.mean_separation**3
+
+    def _facts(self) -> dict[str, str]:
+        held = ("mean_separation", "phi_x", "phi_y", "pressure", "area", "valid")
+        numbers = {name: shown(getattr(self, name), self.units.get(name, "1")) for name in held}
+        return numbers | {"peklenik": f"{self.peklenik:.3g}", "surface": repr(self.surface)}
+
+    def _variables(self) -> dict[str, Variable]:
+        meanings = {
+            "mean_separation": "mean gap u",
+            "phi_x": "pressure flow factor along x",
+            "phi_y": "pressure flow factor along y",
+            "shear_x": "shear flow factor along x",
+            "shear_y": "shear flow factor along y",
+            "pressure": "asperity pressure F/A0",
+            "area": "real over nominal contact area",
+            "K_x": "flow coefficient phi_x u^3",
+            "K_y": "flow coefficient phi_y u^3",
+            "scatter": "model uncertainty (1 sd) of ln phi",
+            "shear_scatter": "model uncertainty (1 sd) of ln phi_s",
+            "valid": "whether flow through such gaps was simulated",
+        }
+        return {
+            name: Variable(getattr(self, name), self.units.get(name, "1"), text, ("gap",))
+            for name, text in meanings.items()
+        }
+
+    def _figure(self) -> Figure:
+        order = np.argsort(self.mean_separation)
+
+        def at(name: str) -> FloatArray:
+            return np.asarray(getattr(self, name)[order], float)
+
+        panels: dict[str, list[tuple[str, FloatArray, FloatArray | None]]] = {
+            "pressure flow factor": [(name, at(name), at("scatter")) for name in ("phi_x", "phi_y")],
+            "shear flow factor": [(name, at(name), at("shear_scatter")) for name in ("shear_x", "shear_y")],
+            f"asperity pressure [{self.units['pressure']}]": [("pressure", at("pressure"), None)],
+            "real contact area  A/A0": [("area", at("area"), None)],
+        }
+        return draw_panels(at("mean_separation"), panels, f"mean gap u [{self.units['mean_separation']}]")
+
+
+@hinted
+def flow_factors(
+    surface: AnySurface,
+    mean_separation: ArrayLike,
+    *,
+    peklenik: float | None = None,
+    theory: str | Theory | None = None,
+    E_star: float | str = 1.0,
+    hardness: float | str | None = None,
+    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
+) -> FlowFactors:
+    """Pressure and shear flow factors and asperity pressure at mean gaps, for average Reynolds equations.
+
+    Before contact the factors are those of an effective medium of Gaussian gaps, in contact of that of the leakage law
+    (`mbma_tables.laws.film`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface, of both faces together (`combined`).
+    mean_separation : array_like or str
+        u [length], from 0.2 to 50 h_rms; above h_max there is no contact.
+    peklenik : float, optional
+        Length of the roughness along x over that along y, from 1/8.5 to 8.5. By default that of the map, x its first
+        axis; of a spectrum with an anisotropy that, x along the lay; else 1, isotropic.
+    theory, E_star, hardness, materials : optional
+        As for `contact`; the theory is "calibrated" by default.
+
+    Returns
+    -------
+    FlowFactors
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, flow_factors
+    >>> bearing = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
+    >>> film = flow_factors(bearing, ["1 um", "1.5 um", "3 um"], peklenik=3, E_star="110 GPa")
+    >>> print(film.phi_x.round(2), film.phi_y.round(2), film.shear_y.round(2))
+    [1.03 1.04 1.02] [0.51 0.72 0.9 ] [0.8  0.61 0.37]
+    """
+    one: Any = surface
+    if getattr(surface, "labelled", False) or surface.shape != ():
+        raise InputError("flow factors are of one surface, not of a batch")
+    theory = "calibrated" if theory is None else theory
+    found = contact(
+        surface, mean_separation=mean_separation, theory=theory, E_star=E_star, hardness=hardness, materials=materials
+    )
+    u = np.ravel(found.mean_separation)
+    low, high = (end * float(surface.h_rms) for end in RANGE)
+    require("mean_separation", u, (u >= low) & (u <= high), f"from {RANGE[0]:g} to {RANGE[1]:g} h_rms")
+    gamma = _peklenik(one) if peklenik is None else number_in("peklenik", peklenik, 1 / WIDEST_LAY, WIDEST_LAY)
+    area, leak = np.ravel(found.area), found.leakage
+    ratio, shear = factors(u / float(surface.h_rms), area, gamma, shipped_flow().constants)
+    power, steep = LAY
+    phi_x, phi_y = np.ravel(leak.K) / u**3 * ratio
+    touching = area > 0
+    of_contact = np.where(touching, np.nan_to_num(np.ravel(leak.scatter), nan=np.inf), 0.0)
+    scatter = np.sqrt(OPEN**2 + of_contact**2 + (power * area**steep * np.log(gamma)) ** 2)
+    # the lightest contacts were not pressed, but flow is nearly that before contact
+    light = f"A/A0 is below {TESTED_AREA[0]:g}"
+    reasons = {text: np.ravel(mask) for text, mask in leak.reasons.items() if text != light}
+    far = bool(gamma > WIDEST_LAY or gamma < 1 / WIDEST_LAY)
+    reasons |= {f"the lay is longer than {WIDEST_LAY:g} to 1, beyond simulated flow": np.full(u.shape, far)}
+    reasons |= {f"the model uncertainty of ln phi is above {USEFUL:g}": scatter > USEFUL}
+    reasons = {text: mask for text, mask in reasons.items() if np.any(mask)}
+    units = {name: found.units[name] for name in ("mean_separation", "pressure")}
+    units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units))
+    return FlowFactors(
+        u, phi_x, phi_y, shear[0], shear[1], np.ravel(found.pressure), area, scatter, np.full(u.shape, SHEAR),
+        ~np.logical_or.reduce([np.zeros(u.shape, bool), *reasons.values()]), reasons, float(gamma), surface, units,
+    )  # fmt: skip
+
+
+def _peklenik(surface: Any) -> float:
+    """gamma of the directions in which the height variance lies: (1 - c)/c, c the mean of cos^2 to the first axis."""
+    treated = getattr(surface, "map", None)
+    if treated is None:
+        return float(getattr(surface, "anisotropy", None) or 1.0)
+    power = np.abs(np.fft.fft2(treated.heights - treated.heights.mean())) ** 2
+    q = np.meshgrid(*map(np.fft.fftfreq, treated.heights.shape, treated.steps), indexing="ij")
+    squared = q[0] ** 2 + q[1] ** 2
+    squared[0, 0] = 1.0
+    c = float(np.sum(power * q[0] ** 2 / squared) / power.sum())
+    return (1 - c) / max(c, 1e-9)

@@ -1,0 +1,217 @@
+/* The core's functions as a table of what they take, for `binding.c` and for tests without Python: sizes of arrays are
+ * checked here, values in the core. */
+#ifndef MBMA_CALLS_H
+#define MBMA_CALLS_H
+
+#include "closed_forms.h"
+#include "elementary.h"
+#include "mbma.h"
+
+enum { MOST_ARGUMENTS = 24 };
+
+/* An argument: a number, or the items of an array; `data` is NULL where None was given. */
+typedef struct {
+    double d;
+    int64_t i;
+    void *data;
+    size_t n;
+} argument;
+
+/* Of an argument its items, how many, a double, a whole number; how many doubles a structure has. */
+#define P(k) a[k].data
+#define N(k) a[k].n
+#define X(k) a[k].d
+#define I(k) a[k].i
+#define WORDS(type) (sizeof(type) / sizeof(double))
+
+/* Elementary functions of an array, for their test against mpmath. */
+static size_t elementary(int64_t which, size_t n, const double *x, double *out) {
+    for (size_t k = 0; k < n; k++)
+        out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k])
+                 : which == 3 ? mbma_log1p(x[k]) : mbma_erf(x[k]);
+    return 0;
+}
+
+/* A closed form: of X and mu the first six, of d, h_max, zeta_1 and hurst the others. */
+static size_t closed_form(size_t which, size_t n, const double *x, const double *y, const double *z, const double *w,
+                          double *out) {
+    static double (*const OF_ISLANDS[])(double, double) = {mbma_pocket_phi_F,   mbma_pocket_phi_A, mbma_standard_phi_F,
+                                                           mbma_standard_phi_A, mbma_long_phi_F,   mbma_long_phi_A};
+    for (size_t k = 0; k < n; k++)
+        out[k] = which < 6 ? OF_ISLANDS[which](x[k], y[k])
+                           : (which == 6 ? mbma_totals_pressure : mbma_totals_area)(x[k], y[k], z[k], w[k]);
+    return 0;
+}
+
+/* The table from three arrays: cells, places, and X_low, X_high, X_rate, mu_high, first_bucket, buckets. */
+static mbma_cells cells_of(const argument *a) {
+    const double *const n = P(2);
+    return (mbma_cells){P(0), P(1), n[0], n[1], n[2], n[3], (int64_t)n[4], (int64_t)n[5]};
+}
+#define CELLS(k) ((const mbma_cells[]){cells_of(a + (k))})
+
+/* Whether places and cells lie inside their arrays; checked once for a table, by the function `table_fits`. */
+static bool is_table(const argument *a) {
+    const mbma_cells t = cells_of(a);
+    const double steps = (t.X_high - t.X_low) * t.X_rate;
+    if (N(0) % WORDS(mbma_cell) != 0 || !(steps >= 0.0 && steps < (double)N(1) && t.buckets > 0))
+        return false;
+    const size_t strips = (size_t)steps + 1, cells = N(0) / WORDS(mbma_cell);
+    for (size_t k = 0; k < N(1); k++) {
+        const int64_t place = t.places[k];
+        if (place < 0 || (k < strips ? (size_t)(place + t.buckets) > N(1) : (size_t)place >= cells))
+            return false;
+    }
+    return true;
+}
+
+/* From density_divisor, beta, phi, floor_d, floor_u, offset, summit_sigma, printed. */
+static mbma_variant variant_of(const argument *a) {
+    const double *const n = a->data;
+    return (mbma_variant){n[0], n[1], n[2], n[3], n[4], n[5] != 0.0, n[6] != 0.0, n[7] != 0.0};
+}
+#define VARIANT(k) ((const mbma_variant[]){variant_of(a + (k))})
+
+enum { PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS, SERIES_TERMS = 2 * MBMA_PANEL_GAPS };
+
+/* The rules as one array, kinds, low and high ends and fields of panels, and how many rows these have. */
+static bool are_panels(const argument *a) {
+    const size_t panels = N(1);
+    if (N(0) != 3 * WORDS(mbma_panel_rule) || I(5) < 2 || I(5) > MBMA_PANEL_ROWS || N(4) != (size_t)(I(5) + 2) * panels * PLACES)
+        return false;
+    for (size_t k = 0; k < panels; k++)
+        if (((const uint64_t *)P(1))[k] > 2)
+            return false;
+    return true;
+}
+#define NODES(k) ((const mbma_nodes[]){{(int64_t)N((k) + 1), P(k), P((k) + 1), P((k) + 2)}})
+
+/* How many coefficients a table of so many nodes has; 0 of one that cannot be. */
+static size_t coefficients_of(const argument *nodes) {
+    const int64_t *const count = (const int64_t *)nodes->data;
+    size_t product = 2;
+    for (size_t k = 0; k < 4; k++)
+        product *= count[k] >= 2 && count[k] < 4096 ? (size_t)(count[k] + 2) : 0;
+    return product;
+}
+
+#define BASIS(k) ((const mbma_basis[]){{N(k), P(k), P((k) + 1), P((k) + 2), P((k) + 3)}})
+#define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
+#define INVERSE(k) ((const mbma_inverse[]){mbma_inverse_open(P(k), N(k))})
+
+/* First in all calls: coefficients; first nodes, rates, ends of what is covered, three constants; cells; of surfaces
+ * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
+#define SPLINE "F D13 L3 Dn Dn "
+static bool fits_spline(const argument *a) {
+    const int64_t *const c = P(2);
+    for (int k = 0; k < 3; k++)
+        if (c[k] < 1 || c[k] > 100000)
+            return false;
+    const size_t coefficients = (size_t)(c[0] + 5) * (size_t)(c[1] + 5) * (size_t)(c[2] + 5) + 2;
+    return P(7) ? N(7) == N(3) * 6 * (size_t)c[2] : N(0) >= coefficients;
+}
+static mbma_spline spline_of(const argument *a) {
+    const int64_t *const c = P(2);
+    const double *const x = P(1);
+    return (mbma_spline){P(0), {(size_t)c[0], (size_t)c[1], (size_t)c[2]}, {x[0], x[1], x[2]}, {x[3], x[4], x[5]},
+                         {x[6], x[8]}, {x[7], x[9]}};
+}
+#define CONSTANT(k) ((const double *)P(1))[10 + (k)]
+#define LOG_FORCE ((const mbma_spline[]){spline_of(a)})
+#define CALIBRATED ((const mbma_calibrated_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1), CONSTANT(2)}})
+#define SURFACES ((const mbma_surfaces[]){{N(3), P(3), P(4), P(5), P(6), P(7)}})
+
+/* Of a law: gradient and alpha, seven constants and h_max. */
+#define WAVES ((const mbma_waves[]){{N(0), P(0), P(1), P(2), NUMBER(0), NUMBER(1)}})
+#define NUMBER(k) ((const double *)P(3))[k]
+#define CONSTANTS \
+    ((const mbma_law_constants[]){{NUMBER(2), NUMBER(3), NUMBER(4), NUMBER(5), NUMBER(6), NUMBER(7), NUMBER(8)}})
+
+/* Every function: its name, the kinds of its arguments, what else their sizes must be, and the call. */
+#define FUNCTIONS(FN) \
+    /* elementary.h */ \
+    FN(elementary, "i Dn wn", true, elementary(I(0), N(1), P(1), P(2))) \
+    /* closed_forms.h */ \
+    FN(closed_form, "i Dn Dn D?n D?n wn", (uint64_t)I(0) < 8 && (I(0) < 6 || (P(3) && P(4))), \
+       closed_form((size_t)I(0), N(1), P(1), P(2), P(3), P(4), P(5))) \
+    /* phi.c */ \
+    FN(table_fits, "D J D", true, N(2) == 6 && is_table(a)) \
+    FN(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3), \
+       mbma_phi(N(0), P(0), P(1), CELLS(2), (int)I(5), P(6), P(7))) \
+    /* totals.c */ \
+    FN(totals, "Dn Dn Dn Dn d D8 D J D6 i w wn bn l1", N(10) == N(0) * (I(9) ? 2 * MBMA_TOTALS_COLUMNS : 2), \
+       mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), (int)I(9), P(10), P(11), P(12), P(13))) \
+    FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
+       mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4))) \
+    FN(kronrod, "i wn wn wn", I(0) > 0 && I(0) < 32 && N(1) == (size_t)I(0), \
+       mbma_kronrod((int)I(0), P(1), P(2), P(3))) \
+    /* profile.c */ \
+    FN(profile_islands, "Dn d d d D8 D J D6 w4n w1", true, \
+       mbma_profile_islands(N(0), P(0), X(1), X(2), X(3), VARIANT(4), CELLS(5), P(8), P(9))) \
+    FN(profile_missed, "D Ln Dn Dn D i d wn", are_panels(a), \
+       (mbma_profile_missed(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), X(6), P(7)), 0)) \
+    FN(profile_series, "D Ln Dn Dn D i w wn w wm wm l", \
+       are_panels(a) && N(6) == N(1) * (size_t)I(5) * SERIES_TERMS && N(9) == N(1) * MBMA_PANEL_NODES && \
+       N(8) == (size_t)I(5) * N(9) && N(11) == N(1) + 1, \
+       (mbma_profile_series(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), P(6), P(7), NODES(8), P(11)), 0)) \
+    FN(profile_totals, "D D D i i w", \
+       N(1) > 1 && I(3) > 0 && I(3) <= MBMA_PANEL_ROWS && N(2) == (N(1) - 1) * (size_t)I(3) * SERIES_TERMS && \
+       N(5) == N(0) * (size_t)I(3) * (I(4) ? 2 : 1), \
+       (mbma_profile_totals(N(0), P(0), N(1) - 1, P(1), P(2), (int)I(3), (int)I(4), P(5)), 0)) \
+    /* spline4.c */ \
+    FN(spline4, "D D L4 i w", \
+       N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(4) == N(0) / 4 * (I(3) ? 10 : 2), \
+       mbma_spline4(N(0) / 4, P(0), P(1), P(2), I(3) != 0, P(4))) \
+    /* newton.c */ \
+    FN(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2))) \
+    FN(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0))) \
+    FN(solve_islands, "Dn Dn d Dk Dk Dkk Dkk Dm Dm Dmm Dmm w3n ln bn w?nk w?nk w?nk w", \
+       N(15) == N(14) && N(16) == N(14) && N(17) >= MBMA_ISLANDS_WORK(N(3)), \
+       mbma_solve_islands(N(0), P(0), P(1), X(2), BASIS(3), BASIS(7), P(11), P(12), P(13), P(14), P(15), P(16), \
+                          P(17))) \
+    FN(island_extents, "Dn Dn d wn", true, mbma_island_extents(N(0), P(0), P(1), X(2), P(3))) \
+    /* law.c */ \
+    FN(law_fill, "Dn D w?n w?n w?n w?n w?n", LAW(1)->head, \
+       mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \
+    FN(inverse_nodes, "Dn D i d wn wn", LAW(1)->head, \
+       mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
+    FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head, \
+       mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
+    /* calibrated.c */ \
+    FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \
+       mbma_spline_pieces(LOG_FORCE, SURFACES, P(8))) \
+    FN(calibrated_ends, SPLINE "Dn D D w2n", fits_spline(a), mbma_calibrated_ends(CALIBRATED, SURFACES, P(8))) \
+    FN(calibrated_contact, SPLINE "Dn D2n D Lm Dm wm wm wm", fits_spline(a) && N(3) > 0, \
+       mbma_calibrated_contact(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10), P(11), P(12))) \
+    FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm", fits_spline(a) && N(3) > 0, \
+       mbma_calibrated_separation(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10))) \
+    FN(spline_values, SPLINE "D D D Lm Dm wm wm", fits_spline(a) && N(3) > 0, \
+       mbma_spline_values(LOG_FORCE, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
+    FN(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3))) \
+    /* spectrum_laws.c */ \
+    FN(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law)) \
+    FN(spectrum_waves, "Dn Dn wm wm wm w4", true, mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5))) \
+    FN(spectrum_law_of, "Dn Dn Dn D10 w3n w", N(5) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_of(WAVES, CONSTANTS, NUMBER(9), P(4), P(5))) \
+    FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4))) \
+    FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4))) \
+    /* hardness.c */ \
+    FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
+       mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9))) \
+    FN(gap_start, "i Dm Dm Dm i Dn Dn w6n", \
+       I(0) > 0 && (I(0) == 1 || (uint64_t)I(0) == N(5)) && N(1) > 0 && N(1) % (size_t)I(0) == 0, \
+       mbma_gap_start(N(5), N(1) / (size_t)I(0), (size_t)I(0), P(1), P(2), P(3), I(4) != 0, P(5), P(6), P(7))) \
+    FN(gap_step, "Dn Dn i Ln Dm Dm w6m bn", true, \
+       mbma_gap_step(N(0), P(0), P(1), I(2) != 0, P(3), N(4), P(4), P(5), P(6), P(7)))
+
+/* A function of arguments: whether their sizes fit, and what was found. */
+#define DEFINE_CALL(name, kinds, fits, call) \
+    static bool do_##name(const argument *a, long long *found) { \
+        (void)a; \
+        return (fits) && (*found = (long long)(call), true); \
+    }
+FUNCTIONS(DEFINE_CALL)
+
+#endif

@@ -1,0 +1,258 @@
+"""`Joint`: two rough metal parts in contact, and the interface laws that follow from one pressure range."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import os
+import pathlib
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.answers.contact import contact
+from mbma_tables.answers.result import Contact
+from mbma_tables.answers.sensitivity import Sensitivity, sensitivity
+from mbma_tables.common.arguments import hinted, needed
+from mbma_tables.common.display import Displayed, Variable
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import draw_panels
+from mbma_tables.common.units import Units
+from mbma_tables.law.law import ContactLaw
+from mbma_tables.law.make import contact_law
+from mbma_tables.materials import Metal, Pair, hardness_in, pair
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.protocol import Theory
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+Part = AnySurface | Mapping[str, Any]
+CONDUCTANCE = "W/(m^2 K)"
+RANGE, POINTS = (1e-5, 0.3), 41  # of pressures over the hardness, in pictures
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Joint(Displayed):
+    """Two rough metal parts pressed together: stiffness, real area, gap and conductance by one description.
+
+    Parameters
+    ----------
+    part_a, part_b : Surface or mapping
+        Roughness of each part: a surface (from a map, a profile, a spectrum or five numbers); the arguments of
+        `Surface.from_roughness` without a highest point; or those of `Surface.from_map`, with the file under "map".
+        Without `part_b` the other face is smooth.
+    materials : str, Metal, or pair of them
+        Metals of the parts, of `mbma_tables.materials.METALS`; of one that is in contact with itself, one.
+    nominal_area : float or str, optional
+        A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`); needed for parts that are
+        mappings. Surfaces have their own highest point, and keep it without.
+    hardness : float or str, optional
+        Of the softer metal, as for `contact`; by default that of `materials`, whose temper must then be named.
+    friction : float, optional
+        Coefficient of friction, for friction cards of solvers.
+    gas : {"air", "helium", "vacuum"}
+    temperature : float
+        Of the gas [K].
+    gas_pressure : float or str
+        Of the gas [Pa].
+    theory : str or Theory
+        As for `contact`.
+
+    Attributes
+    ----------
+    surface : AnySurface
+        The one rough surface that stands for both.
+    pair : Pair
+        The metals.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+
+    Examples
+    --------
+    >>> from mbma_tables import Joint
+    >>> ground = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    >>> milled = ground | {"Rq": "0.7 um"}
+    >>> metals = ("steel 4140 hard", "aluminium 6061 hard")
+    >>> joint = Joint(ground, milled, materials=metals, nominal_area="4 cm^2")
+    >>> found = joint.at_pressure("10 MPa")
+    >>> f"{found.area:.2%}, {found.conductance():.3g} W/(m^2 K), {found.tangential().stiffness:.3g} GPa/um"
+    '1.17%, 3.99e+04 W/(m^2 K), 0.0273 GPa/um'
+    >>> table = joint.table(["10 MPa", "50 MPa"])
+    >>> [f"{value:.3g}" for value in table["total_conductance"].values]
+    ['5.75e+04', '2.08e+05']
+    """
+
+    part_a: Part
+    part_b: Part | None = None
+    _: dataclasses.KW_ONLY
+    materials: str | Metal | Pair | Sequence[str | Metal]
+    nominal_area: float | str | None = None
+    hardness: float | str | None = None
+    friction: float | None = None
+    gas: str = "air"
+    temperature: float = 300.0
+    gas_pressure: float | str = "1 atm"
+    theory: str | Theory = "calibrated"
+    surface: AnySurface = dataclasses.field(init=False)
+    pair: Pair = dataclasses.field(init=False)
+
+    def __post_init__(self) -> None:
+        parts = [self._part(part) for part in (self.part_a, self.part_b) if part is not None]
+        one: Any = parts[0]
+        if len(parts) == 2:
+            one = one.combined(parts[1], self.nominal_area)
+        elif self.nominal_area is not None and not isinstance(self.part_a, Mapping):
+            one = dataclasses.replace(one, h_max=None, nominal_area=self.nominal_area)
+        if one.shape != ():
+            raise InputError(f"a joint is of one surface, got a batch of shape {one.shape}")
+        object.__setattr__(self, "surface", one)
+        object.__setattr__(self, "pair", pair(self.materials))
+
+    def _part(self, part: Part) -> AnySurface:
+        if not isinstance(part, Mapping):
+            return part
+        if "map" in part:
+            return Surface.from_map(part["map"], **{name: value for name, value in part.items() if name != "map"})
+        if self.nominal_area is None:
+            raise InputError("parts by their roughness need nominal_area, from which their highest points follow")
+        return Surface.from_roughness(**part, nominal_area=self.nominal_area)
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Joint:
+        """The joint that a TOML file describes: the arguments by name, the parts as tables.
+
+        Paths of maps are relative to the file.
+
+        Raises
+        ------
+        InputError
+            For a file that is no TOML, and for arguments that are unknown or missing.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> Joint.from_toml("examples/joint.toml").pair.softer.name  # doctest: +SKIP
+        'aluminium 6061 hard'
+        """
+        path = pathlib.Path(path)
+        try:
+            content = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+            raise InputError(f"{path}: is no TOML file: {fault}") from None
+        for name in ("part_a", "part_b"):
+            if isinstance(content.get(name), Mapping) and "map" in content[name]:
+                content[name]["map"] = path.parent / content[name]["map"]
+        try:
+            return cls(**content)
+        except TypeError as fault:
+            raise InputError(f"{path}: {fault}") from None
+
+    @property
+    def _asked(self) -> dict[str, Any]:
+        return {"materials": self.pair, "hardness": self.hardness, "theory": self.theory}
+
+    def at_pressure(self, pressure: ArrayLike | str) -> Contact:
+        """The contact at pressures F/A0 ("10 MPa"; plain numbers in GPa), as of `contact`."""
+        return contact(self.surface, pressure=pressure, **self._asked)
+
+    def law(self) -> ContactLaw:
+        """The joint's contact law, for many gaps or pressures, as of `contact_law`."""
+        return self._law
+
+    @functools.cached_property
+    def _law(self) -> ContactLaw:
+        return contact_law(self.surface, **self._asked)
+
+    def sensitivity(self, pressure: float | str, ranges: Mapping[str, tuple[Any, Any]] | None = None) -> Sensitivity:
+        """How much each number of the joint matters at a pressure, as of `sensitivity`."""
+        return sensitivity(self.surface, pressure=pressure, ranges=ranges, **self._asked)
+
+    def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
+        """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""
+        needed("xarray", "xarray")
+        import xarray as xr
+
+        held = self.quantities(self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist()))
+        data = {
+            name: xr.Variable("pressure", np.atleast_1d(kept.values), {"units": kept.unit, "long_name": kept.meaning})
+            for name, kept in held.items()
+        }
+        return xr.Dataset(data, coords={"pressure": data.pop("pressure")}, attrs=dict(self.facts()))
+
+    def quantities(self, found: Contact) -> dict[str, Variable]:
+        """Values, units, meanings and model uncertainties of a contact of this joint, by name."""
+        units = found.units
+        stiff, gap = units["stiffness"], units["mean_separation"]
+        sheared, solid = found.tangential(self.friction), found.conductance()
+        gas = found.gap_conductance(self.gas, self.temperature, self.gas_pressure)
+        sd = "model uncertainty (1 sd) of ln"
+        return {
+            "pressure": Variable(found.pressure, units["pressure"], "force over nominal area"),
+            "area": Variable(found.area, "1", "real over nominal contact area"),
+            "area_scatter": Variable(found.area_scatter, "1", f"{sd} area"),
+            "mean_separation": Variable(found.mean_separation, gap, "mean gap"),
+            "separation_scatter": Variable(found.separation_scatter, gap, "model uncertainty (1 sd) of the mean gap"),
+            "stiffness": Variable(found.stiffness, stiff, "-dp/du of loading"),
+            "unloading_stiffness": Variable(found.unloading_stiffness, stiff, "-dp/du of a small unloading"),
+            "tangential_stiffness": Variable(sheared.stiffness, stiff, "shear stress over displacement before slip"),
+            "stiffness_scatter": Variable(
+                found.stiffness_scatter, "1", f"{sd} unloading and tangential stiffness and of the solid's conductance"
+            ),
+            "conductance": Variable(solid, CONDUCTANCE, "thermal, of the solid spots"),
+            "gas_conductance": Variable(gas, CONDUCTANCE, f"thermal, of {self.gas} in the gaps"),
+            "total_conductance": Variable(solid + gas, CONDUCTANCE, "thermal, of both in parallel"),
+            "yielded": Variable(found.yielded, "1", "share of the contact area at the hardness"),
+            "valid": Variable(found.valid, "1", "whether contacts of this kind were compared with simulations"),
+        }
+
+    def _range(self) -> Contact:
+        """The contact at pressures from 1e-5 to 0.3 of the softer metal's hardness."""
+        hardness = self.hardness or self.pair.hardness or f"{self.pair.softer.hardness[0]} GPa"
+        return self.at_pressure(np.geomspace(*RANGE, POINTS) * float(hardness_in(Units(stress="GPa"), hardness)))
+
+    def facts(self) -> dict[str, str]:
+        """What the joint was made of, by name."""
+        a, b = self.pair.metals
+        hardness = self.hardness or self.pair.hardness or f"not known: name the temper of {self.pair.softer.name}"
+        theory = self.theory if isinstance(self.theory, str) else self.theory.name
+        facts = {"metals": f"{a.name} on {b.name}", "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa"}
+        return facts | {"hardness": str(hardness), "theory": theory, "gas": self.gas, "surface": repr(self.surface)}
+
+    def _facts(self) -> dict[str, str]:
+        return self.facts()
+
+    def _variables(self) -> dict[str, Variable]:
+        return self.quantities(self._range())
+
+    def _figure(self) -> Figure:
+        held = self._variables()
+        x = held["pressure"]
+        panels = {
+            "real contact area  A/A0": [("area", "area_scatter")],
+            f"mean gap [{held['mean_separation'].unit}]": [("mean_separation", "separation_scatter")],
+            f"stiffness [{held['stiffness'].unit}]": [
+                ("unloading_stiffness", "stiffness_scatter"), ("tangential_stiffness", "stiffness_scatter"),
+                ("stiffness", ""),
+            ],
+            f"thermal conductance [{CONDUCTANCE}]": [
+                ("total_conductance", ""), ("conductance", "stiffness_scatter"), ("gas_conductance", ""),
+            ],
+        }  # fmt: skip
+        relative = held["separation_scatter"].values / held["mean_separation"].values
+        bands = {name: held[name].values for name in held} | {"separation_scatter": relative, "": None}
+        lines = {
+            label: [(name.replace("_", " "), held[name].values, bands[scatter]) for name, scatter in chosen]
+            for label, chosen in panels.items()
+        }
+        return draw_panels(x.values, lines, f"pressure F/A0 [{x.unit}]")
+
+
+Joint.__init__ = hinted(Joint.__init__)  # type: ignore[method-assign]

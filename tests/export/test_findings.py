@@ -1,0 +1,391 @@
+"""What running exports in their programs found, each as a test of its own."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import io
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import zipfile
+from typing import Any
+
+import law_points
+import numpy as np
+import pytest
+from law_points import needs, points
+from test_solver_runs import blocks
+
+from mbma_tables import InputError, Surface, contact, contact_law
+from mbma_tables.export import FMUS, solvers
+from mbma_tables.export.fmu import fmu
+from mbma_tables.export.law_code import law_files
+from mbma_tables.export.law_rows import LawTable, describe_law
+from mbma_tables.export.onnx import onnx
+
+SIDE, BLOCKS, CONDUCTIVITY = 10.0, 1e6, 50.0  # mm, MPa, mW/(mm K)
+ROUGH = Surface.named("challenge").to("mm")
+PRESSURES = np.geomspace(0.012, 1.9, 6)  # MPa
+HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
+
+
+def heat_law(**options: Any) -> LawTable:
+    asked = {"quantity": "conductance", "pressures": ("10 kPa", "2 MPa"), "rows": 20, **HEAT}
+    return describe_law(ROUGH, "25 MPa", **(asked | options))
+
+
+def calculix(deck: str, folder: pathlib.Path) -> tuple[subprocess.CompletedProcess[str], np.ndarray, np.ndarray]:
+    """What CalculiX says of a deck, and the pressures and heat fluxes at the ends of its steps."""
+    (folder / "joint.inp").write_text(deck)
+    said = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    rows = [
+        [abs(float(word)) / SIDE**2 for word in line.split()]
+        for line in (folder / "joint.dat").read_text().splitlines()
+        if re.fullmatch(r"(\s+-?\d\.\d+E[+-]\d+)+", line)
+    ]
+    return said, np.array([row[2] for row in rows if len(row) == 3]), np.array([r[0] for r in rows if len(r) == 1])
+
+
+def pressed(card: str, c: np.ndarray, p: np.ndarray, coupled: str = "*COUPLED") -> str:
+    """Two blocks pressed by displacements and heated, in one step for each overclosure."""
+    deck = blocks(None, card, [], SIDE, BLOCKS).replace("NODE TO SURFACE", "SURFACE TO SURFACE")
+    deck = deck.replace("*SOLID", f"*CONDUCTIVITY\n{CONDUCTIVITY!r}\n*EXPANSION\n0.\n*SOLID", 1)
+    ends = "".join(f"{node}, 1, 3\n{node}, 11, 11, 0.\n" for node in (1, 2, 3, 4))
+    ends += "".join(f"{node}, 1, 2\n" for node in range(5, 17))
+    ends += "".join(f"{node}, 11, 11, 100.\n" for node in (13, 14, 15, 16))
+    output = "".join(f"*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000\n{what}\n" for what in ("RF", "RFL"))
+    steps = "".join(
+        f"*STEP, INC=1000\n{coupled} TEMPERATURE-DISPLACEMENT, STEADY STATE\n1., 1.\n*BOUNDARY\n{ends}"
+        + "".join(f"{node}, 3, 3, {-down:.9e}\n" for node in (13, 14, 15, 16))
+        + f"{output}*END STEP\n"
+        for down in c + 2 * SIDE * p / BLOCKS
+    )
+    return f"{deck}*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 50.\n{steps}"
+
+
+def conductance(flux: np.ndarray) -> np.ndarray:
+    """That of the joint, in series with the blocks."""
+    joint: np.ndarray = 1 / (100 / flux - 2 * SIDE / CONDUCTIVITY)
+    return joint
+
+
+@needs("ccx")
+def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path: pathlib.Path) -> None:
+    law = contact_law(ROUGH, E_star="25 MPa")
+    card, c = solvers.calculix(heat_law()), law.h_max - law.at_pressure(PRESSURES).mean_separation
+    said, p, flux = calculix(pressed(card, c, PRESSURES), tmp_path)
+    assert len(p) == len(flux) == PRESSURES.size, said.stdout[-1000:]
+    # the pressure is the law's to what the card says of its closure, and the conductance is of that pressure
+    stated = float(re.search(r"within (\d+)% of the law", card.replace("\n**", ""))[1]) / 100
+    assert 0.1 < np.abs(np.log(p / PRESSURES)).max() < np.log1p(stated) + 0.06
+    expected = CONDUCTIVITY / 25 * law.at_pressure(p).stiffness
+    np.testing.assert_allclose(conductance(flux)[:-1], expected[:-1], rtol=1e-2)
+    # beyond the last row it is that of the last
+    assert p[-1] > heat_law().x[-1]
+    assert conductance(flux)[-1] == pytest.approx(heat_law().y[-1], rel=1e-2)
+
+
+@needs("ccx")
+def test_calculix_uncoupled_is_an_increment_late(tmp_path: pathlib.Path) -> None:
+    law = contact_law(ROUGH, E_star="25 MPa")
+    pressures = np.repeat([0.1, 0.5, 0.9], 2)
+    c = law.h_max - law.at_pressure(pressures).mean_separation
+    _, p, flux = calculix(pressed(solvers.calculix(heat_law()), c, pressures, "*UNCOUPLED"), tmp_path)
+    off = conductance(flux) * 25 / CONDUCTIVITY / law.at_pressure(p).stiffness - 1
+    # as the card says: loads must be held for one more increment
+    assert (off[::2] < -0.3).all()
+    assert np.abs(off[1::2]).max() < 1e-2
+    assert "loads must be held for one more" in " ".join(solvers.calculix(heat_law()).replace("**", "").split())
+
+
+@needs("ccx")
+@pytest.mark.parametrize("rows", [20, 50])
+def test_calculix_does_not_read_tabular_surface_to_surface(rows: int, tmp_path: pathlib.Path) -> None:
+    law = describe_law(ROUGH, "25 MPa", pressures=("10 kPa", "2 MPa"), rows=rows)
+    found = contact(ROUGH, pressure=PRESSURES, E_star="25 MPa")
+    deck = blocks(law, solvers.calculix(law), ROUGH.h_max - found.mean_separation, SIDE, 1e9)
+    said, p, _ = calculix(deck.replace("NODE TO SURFACE\nSLAVES", "SURFACE TO SURFACE\nSLAVES"), tmp_path)
+    assert (p < 1e-6).all()
+    assert (said.returncode != 0) == (rows == 50)  # of Debian's build, which finds that the stack was overwritten
+    text = " ".join(solvers.calculix(law).replace("**", "").split())
+    assert "no force at up to 41 rows, without a message, and from 50 rows on it aborts" in text
+
+
+def test_rows_of_conductance_are_where_it_is_used() -> None:
+    law = heat_law()
+    assert law.x[:2] == pytest.approx([0, 0.01], rel=1e-2)
+    assert law.largest_error < 3e-3
+
+
+def test_the_exponential_card_states_its_limits() -> None:
+    text = solvers.exponential(Surface.named("concrete"), "13.3 MPa")
+    for share, p in re.findall(r"(\d+)% up to p = ([\d.e-]+)", text):
+        c0, p0 = map(float, text.splitlines()[-1].split(", "))
+        found = contact(Surface.named("concrete"), pressure=float(p), E_star="13.3 MPa", theory="persson")
+        written = p0 * np.exp((1.1 - found.mean_separation) / (c0 / np.log(100)))
+        assert abs(written / float(p) - 1) == pytest.approx(float(share) / 100, rel=0.05)
+    assert text.count("up to p") == 2
+
+
+JAX = """
+import json
+import jax
+jax.config.update("jax_enable_x64", True)
+import road
+asked = [road.pressure, road.tangent, road.energy, road.area, road.leakage]
+beyond = [jax.value_and_grad(f)(x) for f in asked for x in (9.0, float("nan"))]
+beyond.append(jax.value_and_grad(road.overclosure)(100.0))
+slopes = [jax.grad(road.leakage)(c) for c in (-1e-9, 0.0, 1e-9)]
+print(json.dumps([[float(v) for pair in beyond for v in pair], [float(v) for v in slopes]]))
+"""
+
+
+@pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="not installed: jax")
+def test_jax_has_no_derivative_where_it_has_no_value(tmp_path: pathlib.Path) -> None:
+    (tmp_path / "road.py").write_text(law_points.text("jax-law", "calibrated", leakage=True))
+    said = subprocess.run([sys.executable, "-c", JAX], cwd=tmp_path, capture_output=True, text=True, check=True)
+    beyond, (below, at, above) = json.loads(said.stdout)
+    assert np.isnan(beyond).all()
+    assert at == pytest.approx(above, rel=1e-6)
+    assert at == pytest.approx(below, rel=0.2)
+
+
+OCTAVE = """
+law = road();
+printf('%.17g\\n', law.pressure([-Inf, int32(1)]), law.tangent(-Inf), law.area(-Inf), law.energy(-Inf));
+printf('%.17g\\n', law.leakage(-Inf));
+printf('%.17g\\n', law.pressure(int32([0 1])), law.leakage(int32(1)), law.overclosure(law.pressure(single(0.5))));
+"""
+
+
+@needs("octave-cli")
+def test_octave_takes_any_number(tmp_path: pathlib.Path) -> None:
+    (tmp_path / "road.m").write_text(law_points.text("matlab-law", "mbma", name="road", leakage=True))
+    command = ["octave-cli", "--no-init-file", "--eval", OCTAVE]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    law = points("mbma").law
+    p, flow = law.pressure(2.0), law.leakage(2.0)
+    # in Octave an array of mixed kinds is one of whole numbers
+    np.testing.assert_allclose(
+        [float(v) for v in said.stdout.split()], [0, p, 0, 0, 0, np.inf, 0, p, flow, 0.5], rtol=1e-12
+    )
+
+
+@needs("gcc")
+@pytest.mark.parametrize("name", law_points.ASKED)
+def test_c_is_finite_at_the_least_numbers(name: str, tmp_path: pathlib.Path) -> None:
+    (tmp_path / "road.c").write_text(law_points.text("c-law", name, name="road", leakage=True))
+    strict = ["-Wall", "-Wextra", "-Wconversion", "-Wfloat-conversion", "-Werror"]
+    subprocess.run(["gcc", *strict, "-shared", "-fPIC", "road.c", "-lm", "-o", "road.so"], cwd=tmp_path, check=True)
+    library = ctypes.CDLL(str(tmp_path / "road.so"))
+    for quantity in ("pressure", "tangent", "curvature", "area", "energy", "leakage"):
+        function = library[f"road_{quantity}"]
+        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
+        assert np.isfinite([function(c) for c in (5e-324, 1e-320, 1e-310, 2.3e-308)]).all(), quantity
+
+
+@needs("gcc", "g++")
+def test_the_header_of_a_law_in_c_and_cpp(tmp_path: pathlib.Path) -> None:
+    files = law_files("c-law", law_points.ROAD, "13.3 MPa", name="road", leakage=True, **HEAT)
+    (tmp_path / "road.c").write_text(files[""])
+    (tmp_path / "road.h").write_text(files[".h"])
+    program = '#include "road.h"\n#include "road.h"\n#include <stdio.h>\nint main(void) { double k; printf("%.17g", '
+    program += "road_with_tangent(1.0, &k) + road_leakage(1.0) + road_conductance(1.0) + road_overclosure(0.01)); }\n"
+    said = []
+    subprocess.run(["gcc", "-c", "road.c"], cwd=tmp_path, check=True)
+    for compiler, end in (("gcc", "c"), ("g++", "cpp")):
+        (tmp_path / f"ask.{end}").write_text(program)
+        strict = [compiler, "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+        subprocess.run([*strict, f"ask.{end}", "road.o", "-lm", "-o", "ask"], cwd=tmp_path, check=True)
+        said.append(subprocess.run(["./ask"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout)
+    law = points("mbma").law
+    expected = law.pressure(2.0) + law.leakage(2.0) + CONDUCTIVITY / 13.3 * law.stiffness(2.0) + 3
+    assert [float(one) for one in said] == pytest.approx(2 * [expected - float(law.at_pressure(0.01).mean_separation)])
+
+
+@pytest.mark.parametrize("more", [{}, {"leakage": True, **HEAT}])
+def test_types_of_a_law_in_javascript(more: dict[str, Any]) -> None:
+    files = law_files("javascript-law", law_points.ROAD, "13.3 MPa", name="road", **more)
+    exported = re.findall(r"^export (?:const|function) (\w+)", files[""], flags=re.M)
+    assert sorted(re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)) == sorted(
+        exported
+    )
+
+
+def test_onnx_states_what_it_takes() -> None:
+    runtime, library = pytest.importorskip("onnxruntime"), pytest.importorskip("onnx")
+    file = onnx(law_points.ROAD, "13.3 MPa")
+    session = runtime.InferenceSession(file, providers=["CPUExecutionProvider"])
+    c, law = np.linspace(0, 2.5, 24).reshape(2, 3, 4), points("mbma").law
+    found = session.run(None, {"overclosure": c.ravel()})[0].reshape(c.shape)
+    np.testing.assert_allclose(found, law.pressure(law.h_max - c), rtol=1e-12)
+    for refused in (c, c[0, 0].astype(np.float32)):
+        with pytest.raises(Exception, match=r"Unexpected input data type|Invalid rank"):
+            session.run(None, {"overclosure": refused})
+    said = library.load_from_string(file).graph.doc_string
+    assert "float64 of shape (n,); convert float32 and ravel before" in said
+
+
+@pytest.mark.parametrize(
+    "target", ["c-law", "javascript-law", "python-law", "matlab-law", "modelica-law", "fortran-law"]
+)
+def test_headers_name_functions_that_are_there(target: str) -> None:
+    text = law_points.text(target, "calibrated", name="road", **HEAT)
+    lines = " ".join(line.strip("*/!#%; ") for line in text.partition("Example: ")[2].splitlines()[:4])
+    called = re.findall(r"(?:road[._]|law\.)?(\w+)\([\d.]", lines)
+    assert len(called) >= 2
+    for name in called:
+        assert re.search(
+            rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text.partition("Example: ")[2]
+        )
+    assert "{{" not in text.partition("Example: ")[0]
+
+
+@pytest.mark.parametrize("name", law_points.ASKED)
+def test_a_turn_is_told_of_where_there_is_one(name: str) -> None:
+    text, law = law_points.text("c-law", name), points(name).law
+    turns = law.turning_point is not None and law.turning_point > law.lowest + 1e-9 * law.h_max
+    assert ("where pressure turns down" in text) == turns
+
+
+def test_units_of_modelica(tmp_path: pathlib.Path) -> None:
+    text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)
+    for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
+        assert f'type {kind} = Real(unit = "{unit}");' in text
+    assert 'output Real y(unit = "mm3");' in text
+
+
+GAPCON = """
+#include <stdio.h>
+void gapcon_();
+int main(void) {
+    double ak[5], d[2] = {0, 0};
+    for (int k = 0; k < 3; k++) {
+        d[1] = 1e3*k + 1e-3;
+        gapcon_(ak, d);
+        printf("%.17g %.17g\\n", ak[0], ak[2]);
+    }
+}
+"""
+
+
+@needs("gcc")
+@pytest.mark.parametrize("target", ["abaqus-gapcon", "calculix-gapcon"])
+def test_gapcon_keeps_its_last_value(target: str, tmp_path: pathlib.Path) -> None:
+    text = law_points.text(target, "calibrated", name="road", **HEAT)
+    (tmp_path / "road.c").write_text(text)
+    (tmp_path / "ask.c").write_text(GAPCON)
+    subprocess.run(["gcc", "-w", "-O1", "road.c", "ask.c", "-lm", "-o", "ask"], cwd=tmp_path, check=True)
+    done = subprocess.run(["./ask"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    law = points("calibrated").law
+    known = [law.at_pressure(1e-3).stiffness, *2 * [law.stiffness(separation=law.lowest)]]
+    np.testing.assert_allclose(found[:, 0], CONDUCTIVITY / 13.3 * np.array(known), rtol=1e-6)
+    assert (found[1:, 1] == 0).all()
+    assert done.stderr.count("beyond the law's range") == 1
+    if target == "calculix-gapcon":
+        said = " ".join(text.replace("\n *", " ").split())
+        for words in (
+            "TYPE=SURFACE TO SURFACE",
+            "PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR",
+            "-o gapcon.o, ar r ccx_",
+        ):
+            assert words in said
+
+
+@needs("cc")
+@pytest.mark.parametrize("target", FMUS)
+def test_an_fmu_runs_as_it_is(target: str, tmp_path: pathlib.Path) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    file = fmu(target, law_points.ROAD, "13.3 MPa", name="road", leakage=True)
+    (tmp_path / "road.fmu").write_bytes(file)
+    law = points("mbma").law
+    for c in (0.5, 2.0):
+        asked = {"start_values": {"overclosure": c}, "output": ["pressure", "tangent", "area", "energy", "leakage"]}
+        found = fmpy.simulate_fmu(str(tmp_path / "road.fmu"), stop_time=1.0, **asked)[-1]
+        known = law.values(3 - c)
+        expected = [known.pressure, known.stiffness, known.area, known.energy, law.leakage(3 - c)]
+        np.testing.assert_allclose(list(found)[1:], expected, rtol=1e-12)
+    said = fmpy.read_model_description(str(tmp_path / "road.fmu")).description
+    folders = {name.split("/")[1] for name in zipfile.ZipFile(tmp_path / "road.fmu").namelist() if "binaries/" in name}
+    assert f"binaries: {', '.join(sorted(folders))}" in said
+    assert len(folders) == 1
+    assert fmu(target, law_points.ROAD, "13.3 MPa", name="road", leakage=True) == file
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_an_fmu_without_a_compiler(fails: bool, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    (tmp_path / "cc").write_text("#!/bin/sh\nexit 1\n")
+    (tmp_path / "cc").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path / ("" if fails else "none")))
+    file = fmu("fmu", law_points.ROAD, "13.3 MPa")
+    archive = zipfile.ZipFile(io.BytesIO(file))
+    assert archive.namelist() == ["modelDescription.xml", "sources/law.c"]
+    assert "binaries: none, sources only" in archive.read("modelDescription.xml").decode()
+    with pytest.raises(InputError, match="compiled by ziglang: pip install"):
+        fmu("fmu", law_points.ROAD, "13.3 MPa", binaries="all")
+    with pytest.raises(InputError, match="binaries must be one of"):
+        fmu("fmu", law_points.ROAD, "13.3 MPa", binaries="linux")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang")
+def test_an_fmu_for_all_platforms() -> None:
+    archive = zipfile.ZipFile(io.BytesIO(fmu("fmu3", law_points.ROAD, "13.3 MPa", binaries="all")))
+    begins = {name.split("/")[1]: archive.read(name)[:4] for name in archive.namelist() if "binaries/" in name}
+    elf, mach, dll = b"\x7fELF", b"\xcf\xfa\xed\xfe", b"MZ"
+    expected = {"x86_64-linux": elf, "aarch64-linux": elf, "x86_64-darwin": mach, "aarch64-darwin": mach}
+    assert {name: begin for name, begin in begins.items() if "windows" not in name} == expected
+    assert begins["x86_64-windows"].startswith(dll)
+
+
+@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
+@pytest.mark.parametrize("pressures", [None, ("1 kPa", "0.5 MPa")])
+def test_a_law_continued_by_its_tangents(theory: str, pressures: Any) -> None:
+    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory=theory)
+    trial = law.continued(pressures)
+    inner = np.linspace(trial.heavy, trial.light, 50)
+    np.testing.assert_array_equal(trial.pressure(inner), law.pressure(inner))
+    np.testing.assert_array_equal(trial.stiffness(inner), law.stiffness(inner))
+    assert trial.inside(inner).all()
+    for end, side in ((trial.light, 1.0), (trial.heavy, -1.0)):
+        beyond = end + side * np.array([1e-9, 0.1, 1e3])
+        found, slope = trial.pressure_and_stiffness(beyond)
+        # the value and the slope of the law at its end, and so on
+        assert (slope == law.stiffness(end)).all()
+        np.testing.assert_allclose(found, law.pressure(end) - law.stiffness(end) * (beyond - end), rtol=1e-13)
+        assert not trial.inside(beyond).any()
+    # Newton's method from first contact, and from far beyond full compression
+    for u in (law.h_max, -5.0):
+        for _ in range(60):
+            p, k = trial.pressure_and_stiffness(u)
+            u += (p - 0.1) / k
+        assert law.pressure(u) == pytest.approx(0.1, rel=1e-12)
+    if pressures:
+        assert law.pressure([trial.light, trial.heavy]) == pytest.approx([1e-3, 0.5])
+
+
+@pytest.mark.parametrize("pressures", [("2 kPa", "1 kPa"), (0.0, 0.1), "12", (1, 2, 3)])
+def test_pressures_that_do_not_rise(pressures: Any) -> None:
+    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
+    with pytest.raises(InputError, match="two rising numbers"):
+        law.continued(pressures)
+    with pytest.raises(InputError, match="must be finite"):
+        law.continued().pressure(np.nan)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("skfem") is None, reason="not installed: scikit-fem")
+def test_newton_in_scikit_fem_from_zero_load() -> None:
+    example = pathlib.Path(__file__).parents[2] / "examples" / "newton.py"
+    said = subprocess.run(
+        [sys.executable, str(example)], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    residuals = [float(line.split()[1]) for line in said[:-1]]
+    assert residuals[-1] < 1e-12
+    assert len(residuals) <= 14
+    assert residuals[-2] < 1e-4 * residuals[-3]  # quadratic
+    assert "force 8.000000" in said[-1]

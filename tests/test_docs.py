@@ -1,0 +1,182 @@
+"""The documentation: its code runs, its measured parts are the generator's, and what it names exists."""
+
+import ast
+import doctest
+import importlib
+import io
+import math
+import pkgutil
+import re
+import tokenize
+import tomllib
+
+import click
+import netCDF4
+import pytest
+
+import mbma_tables
+from generate.pages import introduction
+from generate.pages import tables as table_page
+from generate.pages.page import MARKED, ROOT, fill, svg
+from mbma_tables.models.tables import shipped
+from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS
+
+PATHS = [*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")]
+PAGES = {path.name: path.read_text(encoding="utf-8") for path in PATHS}
+BLOCKS = {name: re.findall(r"```python\n(.*?)```", text, re.DOTALL) for name, text in PAGES.items()}
+MODULES = [m.name for m in pkgutil.walk_packages(mbma_tables.__path__, "mbma_tables.") if "__main__" not in m.name]
+README, TABLES = PAGES["README.md"], PAGES["tables.md"]
+PARTS = {match[2]: match[0] for match in MARKED.finditer(TABLES)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [name for name, blocks in BLOCKS.items() if blocks])
+def test_code_of_a_page_runs(page, monkeypatch):
+    pytest.importorskip("dask")
+    pytest.importorskip("tamaas")
+    monkeypatch.chdir(ROOT)
+    names = {"__name__": "__main__"}
+    for block in BLOCKS[page]:
+        exec(block, names)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_of_docstrings(name):
+    module = importlib.import_module(name)
+    found = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
+    assert found.failed == 0
+
+
+def test_public_names_and_first_pages_have_examples():
+    finder = doctest.DocTestFinder()
+    public = ("Surface", "contact", "contact_law", "island", "open_table", "Scene", "height_integral")
+    assert [n for n in public if not any(test.examples for test in finder.find(getattr(mbma_tables, n), n))] == []
+    assert {"README.md", "lookup.md", "scenes.md"} <= {name for name, blocks in BLOCKS.items() if blocks}
+
+
+def test_every_named_test_exists():
+    named = set(re.findall(r"`(tests/[a-z0-9_/]+(?:\.py)?)`", "".join(PAGES.values())))
+    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+    rows = [row for row in PAGES["guarantees.md"].splitlines() if re.match(r"\| (?!---|promise)", row)]
+    assert len(rows) > 15
+    assert [row for row in rows if "`tests/" not in row] == []
+
+
+def test_every_module_of_the_architecture_exists():
+    text = PAGES["architecture.md"]
+    named = set(re.findall(r"\b[a-z]+/[a-z_0-9]+\.py", text))
+    assert len(named) > 15
+    assert [name for name in sorted(named) if not (ROOT / "mbma_tables" / name).exists()] == []
+    path = re.findall(r"^\d\. `(\S+)`", text, re.MULTILINE)
+    lines = [len((ROOT / "mbma_tables" / name).read_text(encoding="utf-8").splitlines()) for name in path]
+    assert len(lines) == 7
+    assert 900 < sum(lines) < 1200
+
+
+def test_layers_are_those_of_the_import_contract():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    contract = [set(re.findall(r"\b[a-z]\w*", layer)) for layer in settings["contracts"][0]["layers"]]
+    cells = re.findall(r"^\| (`[a-z_]+`[^|]*) \|", PAGES["architecture.md"], re.MULTILINE)
+    assert [set(re.findall(r"`(\w+)`", cell)) for cell in cells if ".py" not in cell][: len(contract)] == contract
+
+
+NUMBER = r"(?:[BCD]\.)?\d+[ab]?"
+CITATION = re.compile(rf"Eqs?\.\s+({NUMBER}(?:(?:, | and |, and |-){NUMBER})*)")
+TAGS = re.findall(rf"\\tag{{({NUMBER})}}", PAGES["model.md"])
+
+
+def cited(path):
+    """Numbers of equations in the comments and strings of a module; a range stands for its members."""
+    text = path.read_text(encoding="utf-8")
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    prose = [token.string for token in tokens if token.type == tokenize.COMMENT]
+    values = (node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant))
+    for words in (*prose, *(value for value in values if isinstance(value, str))):
+        for listed in CITATION.findall(re.sub(r"\(|\)", "", words)):
+            for part in re.split(r", and |, | and ", listed):
+                ends = part.split("-")
+                yield from map(str, range(int(ends[0]), int(ends[1]) + 1)) if len(ends) == 2 else ends
+
+
+@pytest.mark.parametrize("package", ["mbma_tables", "generate"])
+def test_every_cited_equation_is_on_the_page_of_the_model_once(package):
+    assert len(TAGS) == len(set(TAGS))
+    assert {re.sub("[ab]", "", tag) for tag in TAGS} >= set(map(str, range(1, 52)))
+    found = {(path.name, number) for path in (ROOT / package).rglob("*.py") for number in cited(path)}
+    assert len(found) > 3
+    assert {(name, number) for name, number in found if number not in TAGS and f"{number}a" not in TAGS} == set()
+
+
+@pytest.mark.parametrize("part", ["sizes", "cells", "axes", "universal", "island4d"])
+def test_measured_parts_are_what_the_table_files_hold(part):
+    fresh = getattr(table_page, f"example_{part}" if part in KINDS else part)()
+    assert fresh in PARTS[part], "python -m generate pages tables"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_worked_example_meets_the_stored_answers(kind):
+    cells = (line.strip("|").split("|") for line in PARTS[kind].splitlines() if line.startswith("|"))
+    shown = [(key.strip(), value.strip()) for key, value in cells]
+    stored = [float(x) for x in dict(shown)["stored table_F, table_A"].split(", ")]
+    for f, wanted in zip("FA", stored, strict=True):
+        phi, scale = (
+            float(next((value for key, value in shown if key.startswith(start)), "1"))
+            for start in (f"Phi_{f}", f"{f}_hat")
+        )
+        # thirteen digits are printed of each factor
+        assert phi * scale == pytest.approx(wanted, rel=3e-12, abs=0)
+
+
+def test_marks_that_do_not_fit_are_refused():
+    with pytest.raises(click.ClickException, match="marks"):
+        fill("<!-- measured: nothing -->\n<!-- end -->", {"sizes": ""})
+
+
+def test_page_of_tables_names_what_files_hold():
+    names = set()
+    for kind in KINDS:
+        with netCDF4.Dataset(shipped(kind)) as dataset:
+            names |= set(dataset.ncattrs()) | set(dataset.variables)
+            names |= {n for variable in dataset.variables.values() for n in variable.ncattrs()}
+        assert f"{FORMAT_VERSIONS[kind]} of `{kind}.nc`" in TABLES
+    # f stands for F or A
+    words = re.findall(r"`([a-z]+[0-9]*(?:_[a-zA-Z0-9]+)+)`", TABLES)
+    quoted = {re.sub(r"_f(?=_|$)", "_F", word) for word in words}
+    # words of the library, of formulas and of the surface, not of a file
+    quoted -= {"mbma_tables", "zeta_d", "zeta_1", "h_d", "g_F", "g_A"}
+    assert len(quoted) > 15
+    assert quoted <= names
+
+
+def test_readme_is_short_and_begins_with_results():
+    assert len(README.splitlines()) <= 90
+    first = README.index("print(")
+    assert all(README.index(word) > first for word in ("island_model", "variant"))
+    assert len(BLOCKS["README.md"]) == 3
+
+
+def test_measured_parts_of_the_readme_are_the_generators():
+    parts, files = introduction.readme()
+    assert {match[2]: match[0] for match in MARKED.finditer(README)} == {
+        name: f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->" for name, part in parts.items()
+    }
+    for name, figure in files.items():
+        assert (ROOT / name).read_bytes()[:5] == svg(figure)[:5] == b"<?xml"
+    assert introduction.pocket_laws() in PAGES["formula.md"]
+
+
+@pytest.mark.parametrize("page", ["README.md", "formula.md"])
+def test_pocket_laws_are_printed_as_they_are_computed(page):
+    """The text's constants against the functions whose errors are stated."""
+    pocket = PAGES[page][PAGES[page].index("    t = p/(E* g)/") :]
+    names = {name: getattr(math, name) for name in ("log", "erf", "exp", "sqrt")}
+    names |= {"p": 0.04, "alpha": 30.0, "nu": 0.6, "x": 1.3}
+    for line in pocket.splitlines()[:4]:
+        name, _, text = line.strip().partition(" = ")
+        text = text.replace("E* q0 h_rms ", "").replace("u/h_rms", "x").replace("(E* g)", "1").replace("ln(", "log(")
+        text = re.sub(r"\((x)\)\^(-[\d.]+) exp", r"\1**\2*exp", text)
+        text = re.sub(r"([\d.]) (log|x|\()", r"\1*\2", text).replace("p/1 sqrt", "p*sqrt")
+        names[name] = eval(text, {}, names)
+        if name == "A/A0":
+            assert abs(names[name] / float(introduction.pocket_area(0.04, 30.0)) - 1) < 1e-12
+    assert abs(names["p"] / float(introduction.pocket_pressure(1.3, 0.6)) - 1) < 1e-12

@@ -1,0 +1,105 @@
+"""`Joint`: one description of two parts, the same numbers as the single calls, and no more work than they."""
+
+import pathlib
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, Joint, Surface, contact
+from mbma_tables.cli import main
+from mbma_tables.theories.calibrated import Calibrated
+
+FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+METALS = ("steel 4140 hard", "aluminium 6061 hard")
+EXAMPLE = pathlib.Path(__file__).parents[1] / "examples" / "joint.toml"
+
+
+@pytest.fixture(scope="module")
+def joint():
+    return Joint(FACE, FACE | {"Rq": "0.7 um"}, materials=METALS, nominal_area="4 cm^2", friction=0.2)
+
+
+def test_a_joint_is_the_contact_of_the_combined_surface(joint):
+    a, b = (Surface.from_roughness(**FACE | {"Rq": Rq}, nominal_area="4 cm^2") for Rq in ("0.4 um", "0.7 um"))
+    known = contact(a.combined(b, "4 cm^2"), pressure=["1 MPa", "50 MPa"], materials=METALS, theory="calibrated")
+    table = joint.table(["1 MPa", "50 MPa"])
+    np.testing.assert_array_equal(table["area"], known.area)
+    np.testing.assert_array_equal(table["conductance"], known.conductance())
+    np.testing.assert_array_equal(table["total_conductance"], known.conductance() + known.gap_conductance("air"))
+    np.testing.assert_array_equal(table["tangential_stiffness"], known.tangential().stiffness)
+    assert table["pressure"].attrs["units"] == "GPa"
+    assert table["conductance"].attrs["units"] == "W/(m^2 K)"
+    # variances of independent heights add
+    assert joint.surface.h_rms == pytest.approx(np.hypot(0.4, 0.7), rel=1e-6)
+
+
+def test_law_and_contact_agree(joint):
+    law, found = joint.law(), joint.at_pressure("10 MPa")
+    assert float(law.at_pressure(0.01).mean_separation) == pytest.approx(float(found.mean_separation), rel=1e-5)
+
+
+def test_sensitivity_has_the_hardness(joint):
+    assert joint.sensitivity("10 MPa").slopes["hardness"]["area"] == pytest.approx(-0.75, abs=0.02)
+
+
+def test_a_smooth_other_face_and_other_metals():
+    copper = Joint(FACE, materials="copper C11000 hard", nominal_area="1 cm^2", gas="vacuum")
+    table = copper.table("10 MPa")
+    assert float(table["gas_conductance"][0]) == 0
+    assert copper.surface.h_rms == 0.4
+    own = Surface.from_roughness(**FACE, nominal_area="1 cm^2")
+    assert Joint(own, materials="copper C11000 hard").surface is own
+    larger = Joint(own, materials="copper C11000 hard", nominal_area="100 cm^2")
+    assert larger.surface.h_max > own.h_max
+
+
+def test_all_effects_together_cost_at_most_three_elastic_answers(joint, monkeypatch):
+    calls = []
+    answer = Calibrated.answer
+    monkeypatch.setattr(Calibrated, "answer", lambda *given: calls.append(1) or answer(*given))
+    found = joint.at_pressure("10 MPa")
+    alone = len(calls)
+    joint.quantities(found)
+    assert len(calls) - alone <= 3
+
+
+def test_what_is_missing_is_named(tmp_path):
+    with pytest.raises(InputError, match="nominal_area"):
+        Joint(FACE, materials=METALS)
+    with pytest.raises(TypeError, match="hardness"):
+        Joint(FACE, materials=METALS, hardnes="1 GPa")
+    path = tmp_path / "joint.toml"
+    path.write_text("materials = 'steel 4140 hard'\nnominal_are = 1\n")
+    with pytest.raises(InputError, match="nominal_area"):
+        Joint.from_toml(path)
+
+
+def test_untempered_metals_are_not_valid():
+    found = Joint(FACE, materials=("steel 4140", "aluminium 6061"), nominal_area="4 cm^2").at_pressure("50 MPa")
+    assert not found.valid
+    assert any("hardness=" in reason for reason in found.reasons)
+
+
+def test_parts_may_be_maps(tmp_path):
+    rng = np.random.default_rng(0)
+    q = np.hypot(*np.meshgrid(np.fft.fftfreq(64), np.fft.fftfreq(64)))
+    phase = np.fft.fft2(rng.normal(size=(64, 64)))
+    heights = np.fft.ifft2(np.where((q > 0.03) & (q < 0.2), phase * np.maximum(q, 0.01) ** -1.8, 0)).real
+    np.save(tmp_path / "face.npy", heights / heights.std())
+    part = '{map = "face.npy", dx = 1.0, periodic = true, unit = "um"}'
+    (tmp_path / "joint.toml").write_text(f'materials = "steel 1020"\nhardness = "1.5 GPa"\npart_a = {part}\n')
+    mapped = Joint.from_toml(tmp_path / "joint.toml")
+    assert mapped.surface.bearing is not None
+    assert mapped.at_pressure("5 MPa").area > 0
+
+
+def test_command(tmp_path, capsys):
+    picture = tmp_path / "joint.svg"
+    with pytest.raises(SystemExit) as end:
+        main(["joint", str(EXAMPLE), "--pressure", "10MPa", "--csv", "--plot", str(picture)])
+    assert end.value.code == 0
+    assert picture.stat().st_size > 10_000
+    head, row = capsys.readouterr().out.splitlines()[-2:]
+    found = dict(zip(head.split(","), row.split(","), strict=True))
+    assert float(found["area"]) == float(Joint.from_toml(EXAMPLE).at_pressure("10 MPa").area)
+    assert found["valid"] == "yes"

@@ -1,0 +1,100 @@
+"""Flow factors: exact limits, Patir and Cheng's published curves, and Reynolds' equation on gaps that no fit saw."""
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, flow_factors
+from mbma_tables.laws.effective_medium import FlowConstants
+from mbma_tables.laws.film import factors
+from mbma_tables.laws.reynolds import flow_and_couette
+
+BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
+# phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978, Table 1
+PATIR_CHENG = {1 / 9: (1.48, 0.42), 1 / 6: (1.38, 0.42), 1 / 3: (1.18, 0.42), 1: (0.90, 0.56), 3: (0.225, 1.5),
+               6: (0.520, 1.5), 9: (0.870, 1.5)}  # fmt: skip
+
+
+def test_wide_gaps_have_the_known_expansion():
+    u = np.array([30.0, 60.0])
+    for gamma in (1 / 8, 0.5, 1.0, 4.0):
+        ratio, shear = factors(u, np.zeros(2), gamma, FlowConstants())
+        plain, _ = factors(u, np.zeros(2), 1.0, FlowConstants())
+        for k, c in enumerate((1 / (1 + gamma), gamma / (1 + gamma))):
+            np.testing.assert_allclose(
+                (1 - 1.5 / u**2) * ratio[k] / plain[k], 1 + 3 * (1 - 3 * c) / u**2, atol=30 / 30**4
+            )
+            np.testing.assert_allclose(shear[k] * u, 3 * c, rtol=0.01)
+
+
+def test_ridges_are_the_averages_of_one_dimension():
+    """Across ridges the mean of 1/h^3 and of 1/h^2 count, along them the mean of h^3 and h."""
+    h = 1 + 0.5 * np.sin(np.linspace(0, 2 * np.pi, 64, endpoint=False))
+    K, couette = flow_and_couette(np.repeat(h[:, None], 3, 1))
+    np.testing.assert_allclose(K, [1 / np.mean(h**-3.0), np.mean(h**3)])
+    np.testing.assert_allclose(couette, [np.mean(h**-2.0) / np.mean(h**-3.0), np.mean(h)])
+
+
+@pytest.mark.parametrize("gamma", PATIR_CHENG)
+def test_published_curves(gamma):
+    """Fits to simulations of 20 x 20 points; within 8% of theirs from h = 3 h_rms on."""
+    C, r = PATIR_CHENG[gamma]
+    H = np.array([3.0, 4.0, 6.0])
+    known = 1 + C * H**-r if gamma > 1 else 1 - C * np.exp(-r * H)
+    peklenik = min(max(gamma, 1 / 8.5), 8.5)
+    found = flow_factors(Surface(0.8, 0.05, 1.5, 1.0, 2.9), H, peklenik=peklenik).phi_x
+    np.testing.assert_allclose(found, known, rtol=0.08)
+
+
+def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
+    rng, n, lay = np.random.default_rng(5), 256, 3.0
+    q = np.meshgrid(*2 * [np.fft.fftfreq(n)], indexing="ij")
+    length = np.hypot(q[0] * lay, q[1])
+    amplitude = np.where((length > 1 / 32) & (np.hypot(*q) < 1 / 8), np.maximum(length, 1 / 32) ** -1.8, 0)
+    z = np.fft.ifft2(np.fft.fft2(rng.standard_normal((n, n))) * amplitude).real
+    z /= z.std()
+    surface = Surface.from_map(z - z.mean(), dx=1.0, periodic=True, detrend="mean")
+    u = np.array([1.01, 1.5]) * float(surface.h_max)
+    found = flow_factors(surface, u)
+    assert found.peklenik == pytest.approx(lay, rel=0.5)
+    for k, gap in enumerate(u):
+        K, couette = flow_and_couette(gap - z, (n, n))
+        assert abs(np.log([found.phi_x[k], found.phi_y[k]] / (K / gap**3))).max() < 0.1
+        assert abs(np.log([found.shear_x[k], found.shear_y[k]] / ((gap - couette) / z.std()))).max() < 0.35
+
+
+def test_isotropic_factors_are_those_of_the_leakage():
+    u = np.array([0.6, 1.0, 1.7, 4.0])
+    found, known = (
+        flow_factors(BEARING, u, E_star="110 GPa"),
+        contact(BEARING, mean_separation=u, E_star="110 GPa", theory="calibrated"),
+    )
+    np.testing.assert_allclose(found.phi_x, known.leakage.flow_factor)
+    np.testing.assert_array_equal(found.phi_x, found.phi_y)
+    np.testing.assert_array_equal(found.pressure, known.pressure)
+    assert found.pressure[-1] == 0
+    assert found.valid.all()
+
+
+def test_a_lay_turned_by_a_right_angle():
+    u = np.linspace(0.6, 4, 9)
+    one, other = (flow_factors(BEARING, u, peklenik=gamma) for gamma in (3.0, 1 / 3))
+    np.testing.assert_allclose(one.phi_x, other.phi_y, rtol=1e-9)
+    np.testing.assert_allclose(one.shear_y, other.shear_x, rtol=1e-9)
+    assert (one.phi_x > one.phi_y).all()
+
+
+def test_units_and_what_is_refused(tmp_path):
+    film = flow_factors(BEARING, ["1 um", "2000 nm"], E_star="110 GPa", peklenik=2.0)
+    data = film.to_dataset()
+    assert data["K_x"].attrs["units"] == "um^3"
+    assert data["pressure"].attrs["units"] == "GPa"
+    film.plot(tmp_path / "film.svg")
+    with pytest.raises(OutOfRangeError, match="mean_separation"):
+        flow_factors(BEARING, 0.01)
+    with pytest.raises(InputError, match="batch"):
+        flow_factors(Surface(0.8, 0.05, 1.5, [0.5, 0.6], 1.75), 1.0)
+    with pytest.raises(InputError, match="peklenik"):
+        flow_factors(BEARING, 1.0, peklenik=20.0)
+    deep = flow_factors(BEARING, [0.2], peklenik=8.0)
+    assert not deep.valid[0]
+    assert any("uncertainty" in reason for reason in deep.reasons)
