@@ -14,18 +14,12 @@ from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 GROUPS = {
+    **{name: f"generate.{name}" for name in ("calibrated", "coverage", "explorer", "leakage_law", "wheels")},
+    **dict.fromkeys(("gaps", "grids", "measured_maps"), "generate.boundary_elements.studies"),
     "boundary_elements": "generate.boundary_elements.run",
-    "calibrated": "generate.calibrated",
-    "coverage": "generate.coverage",
-    "leakage_law": "generate.leakage_law",
-    "explorer": "generate.explorer",
     "formulas": "generate.formulas.fit",
-    "gaps": "generate.boundary_elements.studies",
-    "grids": "generate.boundary_elements.studies",
     "machined": "generate.machined.campaign",
-    "measured_maps": "generate.boundary_elements.studies",
     "tables": "generate.tables.commands",
-    "wheels": "generate.wheels",
 }
 
 
