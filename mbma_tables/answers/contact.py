@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.derivatives import differentiate
+from mbma_tables.answers.derivatives import at_fixed, differentiate
 from mbma_tables.answers.result import Contact
 from mbma_tables.answers.source import Source, named
 from mbma_tables.common.arguments import (
@@ -79,8 +79,9 @@ def contact(
         A/A0, likewise.
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
-        `name` and ``answer(surface, u)``. Default: "calibrated" for a surface given by a spectrum or a map, unless
-        an option of MBMA is given, and "mbma" for one given by its five numbers.
+        `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or
+        where an option of MBMA is given; "corrected" for one given by a map, where Tamaas is installed (the extra
+        `maps`), and "calibrated" otherwise.
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1), or a
         text that `mbma_tables.materials.hardness` reads: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
@@ -166,15 +167,10 @@ def contact(
     )
     # an empty hardness is refused where it is checked
     yields = stated and (is_labelled(hardness) or not np.size(hardness) or not np.equal(hardness, np.inf).all())
-    options: dict[str, Any] = {
-        "by": by,
-        "source": Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated),
-        "derivatives": derivatives,
-        "quantities": quantities if quantities is QUANTITIES else wanted_quantities(quantities),
-    }
-    if any_labelled(surface, value, E_star, hardness):
-        return _of_labelled(surface, value, E_star, hardness, options)
-    return _contact(surface, value, E_star, hardness, **options)
+    source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
+    wanted = quantities if quantities is QUANTITIES else wanted_quantities(quantities)
+    make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
+    return make(surface, value, E_star, hardness, by, source, derivatives, wanted)
 
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
@@ -208,16 +204,9 @@ def one_known(**given: Any) -> tuple[str, Any]:
 
 
 def _contact(
-    surface: AnySurface,
-    value: Any,
-    E_star: Any,
-    hardness: Any,
-    *,
-    by: str,
-    source: Source,
-    derivatives: bool,
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
     quantities: tuple[str, ...],
-) -> Contact:
+) -> Contact:  # fmt: skip
     """`contact` of plain arrays."""
     asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
     cap = checked_hardness(hardness) if source.yields else np.asarray(np.inf)
@@ -243,9 +232,8 @@ def _contact(
         loaded = theory.loaded(surface, u, lighter) if source.yields else None
         found = theory.answer(surface, u) if loaded is None else loaded.answer
         source = dataclasses.replace(source, answer=found, loaded=loaded)
-        error = spread(found.error, np.shape(found.pressure))[()]
-        fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "error": error} | places
-        fields["islands"] = None
+        fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "islands": None} | places
+        fields["error"] = spread(found.error, np.shape(found.pressure))[()]
         if derivatives:
             pressure_by, area_by = differentiate(theory, surface, u, lighter)
             by_log_modulus = {"pressure": pressure_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
@@ -255,7 +243,7 @@ def _contact(
         slopes = {"pressure": fields["pressure_by"], "area": fields["area_by"]}
         by_modulus = {"pressure": fields["pressure"] / E_star + by_log_modulus["pressure"]}
         by_modulus["area"] = by_log_modulus["area"] / E_star
-        fields |= _at_fixed(held, by, slopes, by_modulus)
+        fields |= at_fixed(held, by, slopes, by_modulus)
     for name in QUANTITIES:
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}
@@ -310,35 +298,22 @@ def _refuse_pressures(
         require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
 
 
-def _at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
-    """Derivatives where pressure or area is held: of the separation, and of the quantity that is not held."""
-    other = "area" if held == "pressure" else "pressure"
-    steep, follows = slopes[held]["separation"], slopes[other]["separation"]
-    names = [name for name in slopes[held] if name != "separation"]
-    gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
-    free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
-    if held == "pressure":
-        gap["E_star"] = -by_modulus["pressure"] / steep
-        free["E_star"] = by_modulus["area"] + follows * gap["E_star"]
-    return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
-
-
-def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, options: dict[str, Any]) -> Contact:
+def _of_labelled(
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
+    wanted: tuple[str, ...],
+) -> Contact:  # fmt: skip
     """`contact` of DataArrays, lazily where they are."""
-    by, wanted, units = options["by"], options["quantities"], options["source"].units
-    names: tuple[str, ...] = (*wanted, "error")
+    units, held = source.units, by if by in QUANTITIES else None
+    names = (*(("separation", "mean_separation") if held else ()), *wanted, "error")
     fields: dict[str, Any] = {"pressure": None, "area": None, "islands": None}
-    if by not in ("separation", "mean_separation"):
-        names = ("separation", "mean_separation", *names)
     slopes: list[tuple[str, str]] = []
-    if options["derivatives"]:
-        held = by if by in QUANTITIES else None
+    if derivatives:
         kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
         free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, cap, **options)
+        found = _contact(block, asked, modulus, cap, by, source, derivatives, wanted)
         return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
 
     arrays = {by: value, "E_star": E_star, "hardness": hardness}
@@ -352,4 +327,4 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
     elif by == "mean_separation":
         fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
-    return _made(options["source"], fields)
+    return _made(source, fields)

@@ -155,3 +155,16 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
         up = 1.0 if name == "q1" else -1.0
         side = np.where(ratio * (1 - STEP) <= MIN_ZETA_1, up, np.where(ratio > MAX_ZETA_1 * (1 - STEP), -up, side))
     return step, side
+
+
+def at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
+    """Derivatives where pressure or area is held: of the separation, and of the quantity that is not held."""
+    other = "area" if held == "pressure" else "pressure"
+    steep, follows = slopes[held]["separation"], slopes[other]["separation"]
+    names = [name for name in slopes[held] if name != "separation"]
+    gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
+    free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
+    if held == "pressure":
+        gap["E_star"] = -by_modulus["pressure"] / steep
+        free["E_star"] = by_modulus["area"] + follows * gap["E_star"]
+    return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shipped_flow
-from mbma_tables.answers.source import Source
+from mbma_tables.answers.leakage_table import flow_of_spectrum, shipped_flow
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.units import unit_of
-from mbma_tables.laws.calibrated import spectrum_of
+from mbma_tables.laws.calibrated import self_affine_law, spectrum_of
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.labels import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -34,6 +33,16 @@ SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
 MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
 LIKE_GAUSSIAN, OTHERS = (0.29, 0.60, 0.89, 1.9, 6.3), (0.84, 1.3, 1.9, 3.0, 7.3)
 SIMULATED = 64.0  # zeta_1 up to which flow was simulated
+MEANINGS = {
+    "K": "flow coefficient",
+    "x": "flow coefficient along the first axis",
+    "y": "flow coefficient along the second axis",
+    "hydraulic_aperture": "K^(1/3)",
+    "flow_factor": "K over the cube of the mean separation",
+    "scatter": "standard deviation of ln K from simulation to simulation",
+    "valid": "whether flow through such contacts was simulated",
+    "blocked": "whether contact percolates",
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -58,29 +67,18 @@ class Leakage(Displayed):
     K: Numbers
     x: Numbers
     y: Numbers
-    _source: Source = dataclasses.field(repr=False)
     _contact: Any = dataclasses.field(repr=False)
-    _area: Any = dataclasses.field(repr=False)
 
     def _facts(self) -> dict[str, str]:
         known = {name: shown(value, unit) for name, (value, unit, *_) in self._variables().items()}
         return {"theory": self._contact.theory, **known}
 
     def _variables(self) -> dict[str, Variable]:
-        return {
-            "K": Variable(self.K, self.units["K"], "flow coefficient"),
-            "x": Variable(self.x, self.units["K"], "flow coefficient along the first axis"),
-            "y": Variable(self.y, self.units["K"], "flow coefficient along the second axis"),
-            "hydraulic_aperture": Variable(self.hydraulic_aperture, self.units["hydraulic_aperture"], "K^(1/3)"),
-            "flow_factor": Variable(self.flow_factor, "1", "K over the cube of the mean separation"),
-            "scatter": Variable(self.scatter, "1", "standard deviation of ln K from simulation to simulation"),
-            "valid": Variable(self.valid, "1", "whether flow through such contacts was simulated"),
-            "blocked": Variable(self.blocked, "1", "whether contact percolates"),
-        }
+        units = dict.fromkeys(("x", "y"), self.units["K"]) | self.units
+        return {n: Variable(getattr(self, n), units.get(n, "1"), meaning) for n, meaning in MEANINGS.items()}
 
-    def _origin(self) -> dict[str, str]:
-        origin: dict[str, str] = self._contact._origin()
-        return origin
+    def _origin(self) -> Any:
+        return self._contact._origin()
 
     def _figure(self) -> Figure:
         return draw_compression(
@@ -100,13 +98,12 @@ class Leakage(Displayed):
         return np.cbrt(self.K)
 
     @property
-    def flow_factor(self) -> Numbers:
+    def flow_factor(self) -> Any:
         """K/u^3, Patir and Cheng's pressure flow factor of the mean separation u."""
-        factor: Numbers = self.K / self._contact.mean_separation**3
-        return factor
+        return self.K / self._contact.mean_separation**3
 
     @functools.cached_property
-    def scatter(self) -> Numbers:
+    def scatter(self) -> Any:
         """Standard deviation of ln K from simulation to simulation, cells of four or more longest wavelengths a side.
 
         NaN where not known, and where blocked.
@@ -127,7 +124,7 @@ class Leakage(Displayed):
         return self._map(stated)
 
     @functools.cached_property
-    def closed_form(self) -> Numbers:
+    def closed_form(self) -> Any:
         """K/h_rms^3 by a closed form of gap and area alone, good to zeta_1 of 32: a second opinion."""
         constants = shipped_flow().constants
         return self._map(lambda theory, s, u, E, area: constants.closed_form(u / np.asarray(s.h_rms), area))
@@ -135,26 +132,24 @@ class Leakage(Displayed):
     @functools.cached_property
     def valid(self) -> Any:
         """Whether flow through contacts such as these was simulated; `reasons` has why not."""
-        return self._contact.valid & self._source.valid(self._contact, reasons_against, {"area": self._area})
+        contact = self._contact
+        return contact.valid & contact._source.valid(contact, reasons_against, {"area": contact._touching})
 
     @functools.cached_property
-    def reasons(self) -> dict[str, Any]:
+    def reasons(self) -> Any:
         """What is against entries, each with its mask; of plain arrays."""
-        own = self._source.reasons(self._contact, reasons_against, {"area": self._area})
-        reasons: dict[str, Any] = self._contact.reasons | own
-        return reasons
+        contact = self._contact
+        return contact.reasons | contact._source.reasons(contact, reasons_against, {"area": contact._touching})
 
-    def _map(self, function: Callable[..., FloatArray]) -> Numbers:
-        found: Numbers = self._source.map(lambda *given: (function(*given),), self._contact, 1, {"area": self._area})[0]
-        return found
+    def _map(self, function: Callable[..., FloatArray]) -> Any:
+        area = {"area": self._contact._touching}
+        return self._contact._source.map(lambda *given: (function(*given),), self._contact, 1, area)[0]
 
     @property
     def units(self) -> dict[str, str]:
         """Units of the quantities that have one."""
-        return {
-            "K": unit_of("leakage", self._source.units),
-            "hydraulic_aperture": unit_of("separation", self._source.units),
-        }
+        units = self._contact._source.units
+        return {"K": unit_of("leakage", units), "hydraulic_aperture": unit_of("separation", units)}
 
     def liquid(self, viscosity: ArrayLike | str, pressure_drop: ArrayLike | str, width: ArrayLike | str) -> Numbers:
         """Volume that leaks per time and length of seal [length^2/time].
@@ -217,12 +212,8 @@ class Leakage(Displayed):
         eta, high, low, length = self._positive(
             viscosity=viscosity, pressure_in=pressure_in, pressure_out=pressure_out, width=width
         )
-        require(
-            "pressure_in",
-            np.asarray(high + 0 * low),
-            np.asarray(high >= low),
-            "at least pressure_out: it is the larger, absolute pressure",
-        )
+        larger = "at least pressure_out: it is the larger, absolute pressure"
+        require("pressure_in", np.asarray(high + 0 * low), np.asarray(high >= low), larger)
         path = self._number("mean_free_path", mean_free_path)
         require("mean_free_path", np.asarray(path), np.asarray(path >= 0), "at least 0")
         channel = self.hydraulic_aperture
@@ -233,12 +224,10 @@ class Leakage(Displayed):
         return self.K * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
 
     def _positive(self, **given: Any) -> list[FloatArray]:
-        found = []
-        for name, value in given.items():
-            number = self._number(name, value)
+        found = {name: self._number(name, value) for name, value in given.items()}
+        for name, number in found.items():
             require(name, np.asarray(number), np.asarray(number > 0), "positive")
-            found.append(number)
-        return found
+        return list(found.values())
 
     def _number(self, name: str, value: Any) -> FloatArray:
         """A number in the units of surface and modulus."""
@@ -247,12 +236,12 @@ class Leakage(Displayed):
             if rest != "s" or not found:
                 raise InputError(f"viscosity = {value!r} must be a stress times seconds, such as '1e-3 Pa s'")
             value = plain
-        value = self._source.units.number(name, value)
+        value = self._contact._source.units.number(name, value)
         array = finite_array(name, value)
         return value if is_labelled(value) else array
 
 
-def leakage_of(source: Source, contact: Any, area: Any) -> Leakage:
+def leakage_of(contact: Any) -> Leakage:
     """The leakage of a contact."""
 
     def answer(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
@@ -262,8 +251,8 @@ def leakage_of(source: Source, contact: Any, area: Any) -> Leakage:
         K = flow(surface, u, share) * volume
         return K, K, K
 
-    K, x, y = source.map(answer, contact, 3, {"area": area})
-    return Leakage(K, x, y, source, contact, area)
+    K, x, y = contact._source.map(answer, contact, 3, {"area": contact._touching})
+    return Leakage(K, x, y, contact)
 
 
 def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
@@ -278,7 +267,8 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     out = table.flow(given, owner, u, contact)
     for row in np.flatnonzero(~table.covers(*given)):
         mine = owner == row
-        out[mine] = flow_of_spectrum(self_affine(*map(float, given[:, row])), u[mine], contact[mine])
+        law = self_affine_law(float(given[0, row]), float(np.exp(given[1, row])), None)
+        out[mine] = flow_of_spectrum(law.spectrum, u[mine], contact[mine])
     return out.reshape(shape)
 
 

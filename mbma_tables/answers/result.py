@@ -11,18 +11,18 @@ import numpy as np
 
 from mbma_tables.answers.interface import Interface
 from mbma_tables.answers.source import MEANINGS, Source, named, reasons_against
-from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled
+from mbma_tables.common.arguments import Numbers, any_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import TheoryAnswer
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mbma_tables.answers.contact_map import ContactMap
     from mbma_tables.answers.leakage import Leakage
 
 OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
@@ -115,14 +115,8 @@ class Contact(Interface, Displayed):
 
     def _variables(self) -> dict[str, Variable]:
         source = self._source
-        names = [name for name in MEANINGS if name not in OF_HARDNESS or source.yields]
-        names = [name for name in names if name != "energy" or not source.yields]
-        known = {name: getattr(self, name) for name in names}
-        return {
-            name: Variable(value, unit_of(name, source.units), MEANINGS[name])
-            for name, value in known.items()
-            if value is not None
-        }
+        known = {n: getattr(self, n) for n in MEANINGS if n not in (("energy",) if source.yields else OF_HARDNESS)}
+        return {n: Variable(v, unit_of(n, source.units), MEANINGS[n]) for n, v in known.items() if v is not None}
 
     def _origin(self) -> dict[str, str]:
         source = self._source
@@ -144,6 +138,33 @@ class Contact(Interface, Displayed):
             fields += [self.leakage.K, self.leakage.scatter]
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
         return Curve(label, *(np.ravel(field)[order] for field in fields))
+
+    def map(self) -> ContactMap:
+        """Pressure, gap and contact at every point of the surface's map at this pressure, simulated by Tamaas.
+
+        The map is pressed on its full grid, with the contact's pressure, whatever the theory that answered.
+
+        Raises
+        ------
+        InputError
+            For several contacts, one with a hardness, and surfaces without a map.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface, contact
+        >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
+        >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+        >>> heights = 0.1 * np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
+        >>> surface = Surface.from_map(heights, dx=1.0, periodic=True, unit="um")
+        >>> pressed = contact(surface, pressure="10 MPa", E_star="1 GPa").map()
+        >>> data = pressed.to_dataset()
+        >>> f"{float(data.pressure.mean()):.3f} {data.pressure.units} on {float(data.contact.mean()):.0%} of the points"
+        '0.010 GPa on 45% of the points'
+        """
+        from mbma_tables.answers.contact_map import contact_map
+
+        return contact_map(self)
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
@@ -175,14 +196,12 @@ class Contact(Interface, Displayed):
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
 
-    def _of_loading(self, name: str) -> Numbers:
+    def _of_loading(self, name: str) -> Any:
         """A number of `Loaded`, over E*."""
-
-        def number(theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray) -> tuple[Any, ...]:
-            return (getattr(theory.loaded(surface, u), name),)
-
         known = self._source.loaded
-        return self._source.map(number, self, 1)[0] if known is None else getattr(known, name)[()]
+        if known is not None:
+            return getattr(known, name)[()]
+        return self._source.map(lambda theory, s, u, E: (getattr(theory.loaded(s, u), name),), self, 1)[0]
 
     @described
     def yielded(self) -> Any:
@@ -202,17 +221,15 @@ class Contact(Interface, Displayed):
         return self._of_loading("plane_separation") if self._source.yields else self.mean_separation
 
     @property
-    def psi(self) -> Numbers:
+    def psi(self) -> Any:
         """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
         source = self._source
-        found: Numbers = (source.E_star * source.surface.rms_gradient / source.hardness)[()]
-        return found
+        return (source.E_star * source.surface.rms_gradient / source.hardness)[()]
 
     @property
-    def elastic_hardness(self) -> Numbers:
+    def elastic_hardness(self) -> Any:
         """Hardness from which the elastic area is within 5%, E* g/1.1 [stress]."""
-        found: Numbers = (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
-        return found
+        return (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
 
     @described
     def mean_pressure(self) -> Any:
@@ -250,7 +267,7 @@ class Contact(Interface, Displayed):
         """Flow through the gaps of the contact, `theories.leakage.Leakage`; computed when first read."""
         from mbma_tables.answers.leakage import leakage_of
 
-        return leakage_of(self._source, self, self._touching)
+        return leakage_of(self)
 
     @property
     def _against(self) -> tuple[Any, ...]:

@@ -77,7 +77,7 @@ enum { PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS, SERIES_TERMS = 2 * MBMA_PA
 /* The rules as one array, kinds, low and high ends and fields of panels, and how many rows these have. */
 static bool are_panels(const argument *a) {
     const size_t panels = N(1);
-    if (N(0) != WORDS(mbma_rules) || I(5) < 2 || I(5) > MBMA_PANEL_ROWS || N(4) != (size_t)(I(5) + 2) * panels * PLACES)
+    if (N(0) != 3 * WORDS(mbma_panel_rule) || I(5) < 2 || I(5) > MBMA_PANEL_ROWS || N(4) != (size_t)(I(5) + 2) * panels * PLACES)
         return false;
     for (size_t k = 0; k < panels; k++)
         if (((const uint64_t *)P(1))[k] > 2)

@@ -89,18 +89,12 @@ enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_
 /* Of panels of the approach with `count` nodes at places in [0, 1], over which delta rises like place^power. Matrices
  * take values at the nodes, their rows, to those at checks between the nodes, nodes of both halves, nodes of the part
  * below each of `gaps` gaps, and the gaps; and values and slopes at the gaps to a Chebyshev series, by both, or by the
- * slopes and the mean of the values. */
+ * slopes and the mean of the values. There are rules for the panel from 0, for others, and for narrow ones. */
 typedef struct {
     double power, count, gaps; /* whole numbers */
     double nodes[16], weights[16], reach[11];
     double checks[16][3], halves[16][32], inside[16][176], ends[16][10], series[20][20], integrated[20][20];
 } mbma_panel_rule;
-
-/* The rules of the panel from 0, of others, and of narrow ones; Chebyshev points, and values there to a series. */
-typedef struct {
-    mbma_panel_rule of[3];
-    double far_points[8], far_series[8][8];
-} mbma_rules;
 
 /* Islands as they count in sums: weights (rows, size), shift and rate of heights. */
 typedef struct {
@@ -116,12 +110,12 @@ int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, d
 /* Bounds on the relative error of panels [low, high] by rules `kind` up to the compression `last`. `fields` holds weights
  * of force, area and perhaps number of islands and Hertz area, then shift and rate, (rows + 2, panels, nodes + checks);
  * in the panel from 0 weights lack the power of delta that they begin with. */
-void mbma_profile_missed(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+void mbma_profile_missed(const mbma_panel_rule *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double last, double *error);
 
 /* Series of the logarithm of each row's sum over each panel, (panels, rows, 20), and their errors; the islands, and how
  * many lie below each panel and in all. */
-void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+void mbma_profile_series(const mbma_panel_rule *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double *series, double *error,
                          const mbma_nodes *islands, int64_t *stops);
 
@@ -331,8 +325,7 @@ typedef struct {
     double s0, t0, tail, h_max, end; /* end: ln F at h_max of a surface without end */
     double shift, lightest[2];       /* of ln F; u where panels begin, and its slope */
     uint64_t panels;
-    double edge[MBMA_MOST_PANELS + 1], log_u[MBMA_MOST_PANELS + 1];
-    double p[MBMA_MOST_PANELS][MBMA_ORDER];
+    double edge[MBMA_MOST_PANELS + 1], p[MBMA_MOST_PANELS][MBMA_ORDER];
 } mbma_spectrum_law;
 
 /* A quadrature rule for power laws between samples: q rising [1/length], a repeated one is a jump; C not negative

@@ -7,7 +7,7 @@
 #include "phi.h"
 
 enum { NODES = MBMA_PANEL_NODES, CHECKS = MBMA_PANEL_CHECKS, PLACES = NODES + CHECKS, GAPS = MBMA_PANEL_GAPS };
-enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, FAR_TERMS = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
+enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
 
 /* of errors of a panel */
 static const double AT_ENDS = 1.01;  /* times as much is missed at the ends as next to them */
@@ -20,24 +20,16 @@ static const double TAIL_SHARE = 5.0; /* of the last two terms, for all that fol
 static const double OLDER = 0.25;     /* of the two before them, for the last two may be small by chance */
 static const double SLOPES = 0.1;     /* of their relative error counts */
 static const double THIN = 1e-3;      /* width over gap of panels in which values round to more than slopes change */
-/* of sums over many islands far below a gap */
-enum { MANY = 1000 };                   /* islands from which those far below are summed by a series */
-static const double FAR_ERROR = 5e-11;  /* of such a series, or they are summed after all */
-static const double FAR_REACH = 0.06;   /* of the compression, or of h_rms, that one such series covers */
-static const double LEAST_LOG = -700.0; /* of ln F */
+static const double LEAST_LOG = -700.0; /* of ln F in subnormal numbers */
 
-/* out = values times the first `rows` rows of a matrix, a multiple of 4, of whose `stride` columns some count */
+/* out = values times the first `rows` rows of a matrix, of whose `stride` columns some count */
 MBMA_INLINE void combined(const double *restrict values, const double *restrict matrix, int rows, int columns,
                           int stride, double *restrict out) {
     for (int j = 0; j < columns; j++)
         out[j] = 0.0;
-    for (int k = 0; k < rows; k += 4) {
-        const double a = values[k], b = values[k + 1], c = values[k + 2], d = values[k + 3];
-        const double *const m = matrix + k * stride;
+    for (int k = 0; k < rows; k++)
         for (int j = 0; j < columns; j++)
-            out[j] = mbma_fma(d, m[j + 3 * stride], mbma_fma(c, m[j + 2 * stride], mbma_fma(b, m[j + stride],
-                                                                                          mbma_fma(a, m[j], out[j]))));
-    }
+            out[j] = mbma_fma(values[k], matrix[k * stride + j], out[j]);
 }
 
 /* The power of the compression that sums begin with: of force, area, number of islands, Hertz area. */
@@ -52,20 +44,10 @@ static double lead(double power, int row, double delta) {
 /* How delta rises over the width of a panel at a place in [0, 1]. */
 static double rise(double power, double at) { return power > 1 ? 2.0 * at : 1.0; }
 
-/* exp((least - height^2)/2) of islands at a gap. */
-MBMA_INLINE void fill_shares(int64_t n, const double *restrict shift, const double *restrict rate, double c,
-                             double least, double *restrict share) {
-    for (int64_t k = 0; k < n; k++) {
-        const double height = mbma_fma(-rate[k], c, shift[k]);
-        share[k] = mbma_exp(0.5 * mbma_fma(-height, height, least));
-    }
-}
-
-/* Adds to `out` the sums of rows, then their slopes by the compression, of islands begin:stop, times exp(least/2). */
-static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop,
-                     double *out) {
+/* Adds to `out` the sums of rows, then their slopes by the compression, of the first islands, times exp(least/2). */
+static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t stop, double *out) {
     double share[CHUNK], turned[CHUNK];
-    for (int64_t first = begin; first < stop; first += CHUNK) {
+    for (int64_t first = 0; first < stop; first += CHUNK) {
         const int64_t count = stop - first < CHUNK ? stop - first : (int64_t)CHUNK;
         const double *const shift = islands->shift + first, *const rate = islands->rate + first;
         for (int64_t k = 0; k < count; k++) {
@@ -118,28 +100,6 @@ static double tail(const double *series, int terms) {
     return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
 }
 
-/* Series over compressions in [low, high] of ln of sums of islands 0:stop, and of slopes; the error of the first. */
-static double fill_far(double low, double high, const mbma_rules *r, const mbma_nodes *islands, int rows, int64_t stop,
-                       double out[2 * ROWS][FAR_TERMS]) {
-    double values[2 * ROWS][FAR_TERMS], error = 0.0;
-    for (int k = 0; k < FAR_TERMS; k++) {
-        const double c = 0.5 * (low + high + (high - low) * r->far_points[k]);
-        const double least = least_square(stop, islands->shift, islands->rate, c);
-        double sums[2 * ROWS] = {0.0};
-        add_sums(c, least, islands, rows, 0, stop, sums);
-        for (int row = 0; row < rows; row++) {
-            values[row][k] = log(sums[row]) - 0.5 * least;
-            values[rows + row][k] = sums[rows + row] / sums[row];
-        }
-    }
-    for (int row = 0; row < 2 * rows; row++) {
-        combined(values[row], &r->far_series[0][0], FAR_TERMS, FAR_TERMS, FAR_TERMS, out[row]);
-        if (row < rows)
-            error = mbma_max(error, tail(out[row], FAR_TERMS));
-    }
-    return error;
-}
-
 /* Puts the islands of a panel up to the place `reach` behind `stop` others, by fields at its nodes from `first` on. */
 static void place(const mbma_panel_rule *r, double width, double reach, double fields[ROWS + 2][NODES * (GAPS + 1)],
                   int rows, int first, const mbma_nodes *islands, int64_t stop) {
@@ -153,31 +113,17 @@ static void place(const mbma_panel_rule *r, double width, double reach, double f
     }
 }
 
-void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+void mbma_profile_series(const mbma_panel_rule *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double *series, double *error,
                          const mbma_nodes *islands, int64_t *stops) {
-    double inside[ROWS + 2][NODES * (GAPS + 1)], ends[ROWS + 2][GAPS], far[2 * ROWS][FAR_TERMS];
-    int64_t begin = 0, stop = 0;
-    double missed = 0.0, start = 0.0, until = 0.0;
+    double inside[ROWS + 2][NODES * (GAPS + 1)], ends[ROWS + 2][GAPS];
+    int64_t stop = 0;
     stops[0] = 0;
     memset(series, 0, panels * (size_t)rows * TERMS * sizeof *series);
     for (size_t panel = 0; panel < panels; panel++) {
-        const mbma_panel_rule *const r = &rules->of[kind[panel]];
+        const mbma_panel_rule *const r = &rules[kind[panel]];
         const double width = high[panel] - low[panel];
         const int count = (int)r->count, gaps = (int)r->gaps;
-        if (high[panel] > until) {
-            /* as many panels as make both sums equal work */
-            const size_t ahead = panel + (size_t)sqrt((double)panels);
-            begin = 0;
-            missed = 0.0;
-            start = low[panel];
-            until = mbma_min(start + FAR_REACH * mbma_min(start, 1.0), high[ahead < panels ? ahead : panels - 1]);
-            if (stop > MANY && high[panel] <= until) {
-                const double off = fill_far(start, until, rules, islands, rows, stop, far);
-                begin = off <= FAR_ERROR ? stop : 0;
-                missed = off <= FAR_ERROR ? off : 0.0;
-            }
-        }
         for (int row = 0; row < rows + 2; row++) {
             const double *const own = fields + ((size_t)row * panels + panel) * PLACES;
             combined(own, &r->inside[0][0], count, count * (gaps + 1), NODES * (GAPS + 1), inside[row]);
@@ -191,16 +137,8 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             const double reach = r->reach[gap], c = low[panel] + width * (r->power > 1 ? reach * reach : reach);
             double sums[2 * ROWS] = {0.0};
             place(r, width, reach, inside, rows, gap * count, islands, stop);
-            double least = least_square(stop + count - begin, islands->shift + begin, islands->rate + begin, c);
-            if (begin > 0) {
-                series_at(far[0], 2 * rows, FAR_TERMS, (2.0 * c - start - until) / (until - start), sums, NULL);
-                least = mbma_min(least, -2.0 * sums[0]);
-                for (int row = 0; row < rows; row++) {
-                    sums[row] = exp(sums[row] + 0.5 * least);
-                    sums[rows + row] *= sums[row];
-                }
-            }
-            add_sums(c, least, islands, rows, begin, stop + count, sums);
+            const double least = least_square(stop + count, islands->shift, islands->rate, c);
+            add_sums(c, least, islands, rows, stop + count, sums);
             /* the island at the gap itself */
             const double height = ends[rows][gap] - ends[rows + 1][gap] * c;
             const double share = mbma_exp(0.5 * (least - height * height));
@@ -216,7 +154,7 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
         place(r, width, 1.0, inside, rows, gaps * count, islands, stop);
         stop += count;
         stops[panel + 1] = stop;
-        error[panel] = missed;
+        error[panel] = 0.0;
         const bool thin = width < THIN * high[panel];
         for (int row = 0; row < rows; row++) {
             double *const made = series + (panel * (size_t)rows + (size_t)row) * TERMS;
@@ -224,7 +162,7 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             const double rest = thin ? tail(made, gaps + 1)
                                      : mbma_max(tail(made, 2 * gaps), OLDER * tail(made, 2 * gaps - 2));
             const double leverage = 4.0 * gaps * high[panel] / (width * steepest[row]);
-            error[panel] = mbma_max(error[panel], missed + rest * (1.0 + SLOPES * leverage));
+            error[panel] = mbma_max(error[panel], rest * (1.0 + SLOPES * leverage));
         }
     }
 }
@@ -287,7 +225,7 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
 /* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */
 static double missed_by(const mbma_panel_rule *r, double low, double high, const double *fields, size_t stride,
                         int rows, double last) {
-    double finer[ROWS + 2][2 * NODES], seen[ROWS + 2][CHECKS + 1], coarse[NODES], fine_weight[2 * NODES];
+    double finer[ROWS + 2][2 * NODES], seen[ROWS + 2][CHECKS + 1], fine_weight[2 * NODES], coarse[3][NODES];
     double c[SPREAD + TOPS], least[SPREAD + TOPS];
     const double *const force = fields, *const shift = fields + (size_t)rows * stride, *const rate = shift + stride;
     const double width = high - low;
@@ -318,8 +256,12 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
     }
     for (int k = 0; k < count; k++) {
         const double at = r->nodes[k];
-        coarse[k] = r->weights[k] * force[k] * (rise(r->power, at) * lead(r->power, 0, width * at * at));
+        coarse[0][k] = r->weights[k] * force[k] * (rise(r->power, at) * lead(r->power, 0, width * at * at));
+        coarse[1][k] = shift[k];
+        coarse[2][k] = rate[k];
     }
+    const mbma_nodes all = {2 * count, fine_weight, finer[rows], finer[rows + 1]};
+    const mbma_nodes few = {count, coarse[0], coarse[1], coarse[2]};
     double lowest = INFINITY, most = 0.0, off = 0.0, alone = 0.0;
     for (int k = 0; k < SPREAD + TOPS; k++) {
         double top = low + (last - low) * k / (double)(SPREAD - 1);
@@ -336,24 +278,23 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
         lowest = mbma_min(lowest, least[k]);
     }
     for (int k = 0; k < SPREAD + TOPS; k++) {
-        double fine[2 * NODES], rough[NODES];
-        fill_shares(2 * count, finer[rows], finer[rows + 1], c[k], least[k], fine);
-        fill_shares(count, shift, rate, c[k], least[k], rough);
-        const double sum = dot(fine, fine_weight, (size_t)(2 * count)), other = dot(rough, coarse, (size_t)count);
+        double sum[2] = {0.0}, other[2] = {0.0};
+        add_sums(c[k], least[k], &all, 1, 2 * count, sum);
+        add_sums(c[k], least[k], &few, 1, count, other);
         const double scale = mbma_exp(0.5 * (lowest - least[k]));
         /* up to its own end the panel from 0 is all there is */
         if (k == 0 && r->power > 1)
-            alone = fabs(other / sum - 1.0);
-        most = mbma_max(most, scale * sum);
-        off = mbma_max(off, scale * fabs(other - sum));
+            alone = fabs(other[0] / sum[0] - 1.0);
+        most = mbma_max(most, scale * sum[0]);
+        off = mbma_max(off, scale * fabs(other[0] - sum[0]));
     }
     return AT_ENDS * relative + turned + BETWEEN * mbma_max(alone, off / most);
 }
 
-void mbma_profile_missed(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+void mbma_profile_missed(const mbma_panel_rule *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double last, double *error) {
     for (size_t panel = 0; panel < panels; panel++)
-        error[panel] = missed_by(&rules->of[kind[panel]], low[panel], high[panel], fields + panel * PLACES,
+        error[panel] = missed_by(&rules[kind[panel]], low[panel], high[panel], fields + panel * PLACES,
                                  panels * PLACES, rows, last);
 }
 

@@ -71,6 +71,8 @@ class Batch:
 
     def outside(self, owner: Any, loaded: Any = True) -> list[tuple[Law, Any]]:
         """Laws of the surfaces outside of the table, with their entries."""
+        if self.whole:
+            return []
         chosen = np.flatnonzero(~self.covered[owner] & loaded)
         return [(self._law(row), chosen[mine]) for row, mine in grouped(owner[chosen])]
 

@@ -33,7 +33,6 @@ from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
 GAPS = 10  # of a panel, at most: a series has 2 GAPS terms
 CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])  # places where polynomials miss most
-FAR_TERMS = 8
 # of delta, in which force, area, number of islands and Hertz area begin
 POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
 KEPT = 64  # profiles in the cache
@@ -74,10 +73,7 @@ def _rule(n: int, power: int) -> tuple[FloatArray, Any]:
 
 # of the panel from 0, where delta goes with the square of the place, of others, and of narrow ones
 _RULES = [_rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)]
-_FAR: Any = chebyshev.chebpts1(FAR_TERMS)
-RULES = np.concatenate(
-    [*(rule for rule, _ in _RULES), _FAR, np.linalg.inv(chebyshev.chebvander(_FAR, FAR_TERMS - 1).T).ravel()]
-)
+RULES = np.concatenate([rule for rule, _ in _RULES])
 # shares of panels at which islands are answered, nodes and then CHECKS, and which of them count
 SHARES = np.array([shares for _, shares in _RULES])
 COUNTED = SHARES < 1

@@ -40,7 +40,7 @@ def test_it_tells_what_was_found_and_done(map_file, tmp_path):
     said = run("fit", map_file, "--short-cutoff", "2um", "--E-star", "100GPa", "--plot", picture)
     for text in ("h_rms", "heights: skewness", "slopes: anisotropy", "a short cut-off at 2 um removes", "GPa/um"):
         assert text in said
-    assert "area is a matter of resolution" in said
+    assert "area depends on resolution" in said
     assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
@@ -68,7 +68,7 @@ def test_every_command_takes_maps_and_says_so(map_file):
     steps = [entry["step"] for entry in found["surface"]["provenance"]]
     assert "short_cutoff" in steps
     assert "resolution" in steps
-    assert "area is a matter of resolution" in run(*asked)
+    assert "area depends on resolution" in run(*asked)
 
 
 def test_the_same_in_toml(map_file, tmp_path):

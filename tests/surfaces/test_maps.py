@@ -131,7 +131,7 @@ class TestKnownMaps:
         found = from_map(bowl, STEP, detrend="quadratic")
         assert dataclasses.astuple(found.fit)[:3] == pytest.approx(dataclasses.astuple(plain.fit)[:3], rel=1e-6)
         assert found.h_max == pytest.approx(plain.h_max, rel=1e-9)
-        with pytest.raises(NotSelfAffineError, match="a wave stands out"):
+        with pytest.raises(NotSelfAffineError, match="a wavelength stands out"):
             from_map(bowl, STEP)
 
     def test_a_forced_band_is_taken(self):
@@ -287,11 +287,11 @@ class TestRefused:
             (WHITE, {"periodic": True}, r"exponent of -[01]\.\d+ .*not above 0"),
             (WHITE, {}, "not above 0"),
             (np.sin(10 * np.pi * X), {"periodic": True}, "only 1 spectral points"),
-            (np.sin(10.6 * np.pi * X), {}, "a wave stands out"),
-            (BASE + 5 * np.sin(40 * np.pi * X), {"periodic": True}, r"a wave stands out: at q = 20\.\d+ "),
+            (np.sin(10.6 * np.pi * X), {}, "a wavelength stands out"),
+            (BASE + 5 * np.sin(40 * np.pi * X), {"periodic": True}, r"a wavelength stands out: at q = 20\.\d+ "),
             (np.where(X > 0.37, 1.0, 0.0), {}, "few edges"),
             (np.where((X - 0.45) ** 2 + (Y - 0.5) ** 2 < 0.09, 1.0, 0.0), {}, "few edges"),
-            (-((X - 0.5) ** 2) - (Y - 0.5) ** 2, {}, "a wave stands out"),
+            (-((X - 0.5) ** 2) - (Y - 0.5) ** 2, {}, "a wavelength stands out"),
             (synthetic(ROUGH, 512, gaussian=True)[::2, :256], {}, "not isotropic"),
             (synthetic(Surface(0.8, 30.0, 91.0, 1.0, 3.0))[:, :], {"periodic": True, "band": (31, 90)}, "too narrow"),
             (np.where((np.arange(64)[:, None] + np.arange(64)) % 2, 1.0, -1.0), {"periodic": True}, "shorter than two"),
@@ -306,7 +306,7 @@ class TestRefused:
         [
             (SLOPED**0.0, "not above 0"),
             (SLOPED**-4.5, "exponent of 1.25 .*above 1"),
-            (SLOPED**-3.4 * np.where(np.arange(40) == 20, 50.0, 1.0), "a wave stands out|scatters by"),
+            (SLOPED**-3.4 * np.where(np.arange(40) == 20, 50.0, 1.0), "a wavelength stands out|scatters by"),
             (SLOPED**-3.4 * 10 ** (np.arange(40) % 2), "scatters by"),
             (SLOPED * 0, "zero everywhere"),
             (np.where(SLOPED < 2, SLOPED**-3.4, 0), "too narrow: q1/q0 = 1.805"),
@@ -541,5 +541,18 @@ def test_a_periodic_map_of_few_waves_keeps_its_height_and_gradient_or_tells(seed
         # no spectrum from so few
         return
     assert found.h_rms == pytest.approx(found.heights.h_rms, rel=1e-9)
-    told = any("waves are few" in entry.get("told", "") for entry in found.provenance)
+    told = any("wavelengths are few" in entry.get("told", "") for entry in found.provenance)
     assert told == (abs(found.rms_gradient / found.bearing.gradient - 1) > 0.05)
+
+
+@pytest.mark.parametrize("kind", ["txt", "csv"])
+def test_rows_of_a_matrix_of_text_are_x(tmp_path, kind):
+    pytest.importorskip("SurfaceTopography")
+    values = 0.1 * np.add.outer(np.sin(np.arange(64) / 3), 0.2 * np.cos(np.arange(48) / 7))
+    np.savetxt(tmp_path / f"own.{kind}", values, delimiter="," if kind == "csv" else " ")
+    np.save(tmp_path / "own.npy", values)
+    text, array = (Surface.from_map(tmp_path / name, dx=0.5, dy=0.8, unit="um") for name in (f"own.{kind}", "own.npy"))
+    assert text.map.heights.shape == (64, 48)
+    assert text.map.steps == pytest.approx((0.5, 0.8))
+    np.testing.assert_allclose(text.map.heights, array.map.heights, atol=1e-12)
+    assert text.rms_gradient == pytest.approx(array.rms_gradient)

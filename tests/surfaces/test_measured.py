@@ -220,7 +220,7 @@ def test_as_options_of_a_map():
 
 def test_every_answer_of_a_map_says_so():
     heights = 0.05 * random_map(64, 0.02, 0.4)
-    told = "area is a matter of resolution: waves are known down to"
+    told = "area depends on resolution: wavelengths are known down to"
     for model in ("measured", "self-affine"):
         surface = Surface.from_map(heights, 1.0, periodic=True, unit="um", model=model)
         rows = describe_law(surface, "1 GPa", rows=10, theory="calibrated")

@@ -130,7 +130,7 @@ class TestCutoff:
         ("options", "message"),
         [
             ({"short_cutoff": 5.0, "long_cutoff": 4.0}, "long_cutoff must be larger"),
-            ({"short_cutoff": 1e9}, "leaves no wave"),
+            ({"short_cutoff": 1e9}, "leaves no wavelength"),
             ({"short_cutoff": -1.0}, "short_cutoff must be a number"),
             ({"outliers": math.nan}, "outliers must be finite"),
             ({"fill": "zero"}, "fill must be one of harmonic"),
@@ -153,7 +153,7 @@ class TestReliability:
         assert found.waves[1] == pytest.approx(2 * np.pi / limit)
 
     def test_a_fine_tip_can(self):
-        assert "follows every wave" in told(treated(tip_radius=1e-3), "reliability")
+        assert "follows every wavelength" in told(treated(tip_radius=1e-3), "reliability")
 
     def test_what_the_file_says_counts_unless_told_otherwise(self):
         info = {"instrument": {"parameters": {"resolution": {"value": 2000.0, "unit": "nm"}}}}
