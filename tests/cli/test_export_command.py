@@ -28,12 +28,6 @@ def test_files_of_laws(target, tmp_path):
     assert {p.name for p in tmp_path.iterdir()} == {"law.mat"} | ({"law.m"} if target == "matlab" else set())
 
 
-def test_leakage_against_pressure(tmp_path):
-    asked = ("--surface", "concrete", "--E-star", "13.3MPa", "--theory", "calibrated", "--rows", "30", "--leakage")
-    assert run("csv", *asked, "--out", tmp_path / "seal.csv").exit_code == 0
-    assert "leakage [mm^3] against pressure [MPa]" in (tmp_path / "seal.csv").read_text()
-
-
 def test_pressures_asked_for_that_are_not_valid_are_told(tmp_path):
     law = [*LAW, "--theory", "calibrated", "--out", tmp_path / "law.csv", "--pressures"]
     # A/A0 = 0.001 is at 0.0046 MPa
