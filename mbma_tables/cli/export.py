@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbma_tables import __version__
 from mbma_tables.cli import options
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
+from mbma_tables.export.again import again, made_by
 from mbma_tables.export.targets import Target, group, names, targets
 from mbma_tables.scenes.specimen import Specimen
 
@@ -34,7 +36,17 @@ class _Target(click.ParamType[str]):
 
 
 class _Export(click.Command):
-    """The command, whose help lists the targets."""
+    """The command, whose help lists the targets, and which knows its words."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if "--again" in args:
+            if len(args) != 2:
+                raise click.UsageError("--again FILE stands alone: leave the rest out", ctx)
+            version, args = again(Path(args[1]))
+            if version != __version__:
+                echo(f"{ctx.command_path} --again: was written by version {version}, this is {__version__}", err=True)
+        ctx.meta["words"] = tuple(args)
+        return super().parse_args(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         formatter.write_paragraph()
@@ -43,6 +55,7 @@ class _Export(click.Command):
 
 @click.command("export", cls=_Export, short_help="A contact law, or the whole model, for other codes.")
 @click.argument("target", metavar="TARGET", type=_Target())
+@click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @options.optional_specimen_options
 @click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")
@@ -88,6 +101,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
     joint = {"surface": specimen.surface, "E_star": specimen.E_star, "stress_unit": specimen.stress_unit}
+    ctx = click.get_current_context()
+    joint["made_by"] = made_by(ctx.meta["words"], out, [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
     _write(_law_files(kind, out, joint, given))
 
 
@@ -169,6 +184,7 @@ def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
 
 
 @click.command("explore", short_help="A page to explore a surface in a browser.")
+@click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
 @options.specimen_options
 @click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")

@@ -18,7 +18,8 @@ import numpy as np
 from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.text import core_file, filled, opening
+from mbma_tables.export.again import written_by
+from mbma_tables.export.text import braces, core_file, filled, numerals, opening
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.universal import RECORD, UniversalModel
@@ -74,6 +75,7 @@ def c_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
     if variant.addition != "sum":
         raise InputError(f"exported code adds the areas of islands: variant {variant.name!r} takes their cover")
     about = about_model(model, variant) + about_theories()
+    about.append(written_by(["c", "--variant", variant.name, "--out", "."]))
     heads = {name: opening(header(f"{name}: {title}", USAGE, about), "/*") for name, title in MODEL.items()}
     return core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
 
@@ -122,10 +124,10 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
     spline = "MBMA_SPLINE", law.cells, law.first, 1 / law.step, law.covered[:2, 0], law.covered[:2, 1]
     theories = [np.array(dataclasses.astuple(constants)) for constants in (YANG_PERSSON, law.constants)]
     values = {
-        "mbma_cells CELLS": _braces("MBMA_CELLS", "MBMA_PLACES", *_numbers(X), *_numbers(buckets)),
-        "mbma_calibrated_table LAW": _braces(_braces(*spline), *_numbers(theories[1][:3])),
-        "mbma_law_constants THEORIES[]": _braces(*theories),
-        "mbma_variant MBMA_VARIANT": _braces(*_numbers(variant.numbers[:5]), *_numbers(flags)),
+        "mbma_cells CELLS": braces("MBMA_CELLS", "MBMA_PLACES", *numerals(X), *numerals(buckets)),
+        "mbma_calibrated_table LAW": braces(braces(*spline), *numerals(theories[1][:3])),
+        "mbma_law_constants THEORIES[]": braces(*theories),
+        "mbma_variant MBMA_VARIANT": braces(*numerals(variant.numbers[:5]), *numerals(flags)),
     }
     held = (f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};" for name, text in values.items())
     lines += [
@@ -140,18 +142,6 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
     return "\n".join([*lines, ""])
 
 
-def _braces(*parts: Any) -> str:
-    """An initialiser of texts and arrays."""
-    texts = (part if isinstance(part, str) else _braces(*_numbers(part)) for part in parts)
-    return f"{{{', '.join(texts)}}}"
-
-
-def _numbers(values: Any) -> list[str]:
-    """Numbers in the shortest decimals of their precision."""
-    flat = np.ravel(values)
-    return [f"{text}f" for text in flat.astype(str)] if flat.dtype == np.float32 else flat.astype(str).tolist()
-
-
 def _wrapped(items: Sequence[str], first: str = "", last: str = "") -> list[str]:
     text = f"{first}{', '.join(items)}{last}"
     return textwrap.wrap(text, 120, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
@@ -159,15 +149,15 @@ def _wrapped(items: Sequence[str], first: str = "", last: str = "") -> list[str]
 
 def _items(values: Any) -> list[str]:
     """Initialisers of numbers."""
-    return _wrapped(_numbers(values))
+    return _wrapped(numerals(values))
 
 
 def _cells(cells: FloatArray) -> Iterator[str]:
     """Initialisers of mbma_cell."""
     for cell in cells:
-        yield from _wrapped(_numbers(cell[:8]), "{", ",")
+        yield from _wrapped(numerals(cell[:8]), "{", ",")
         for name, powers in zip("FA", cell[8:].reshape(2, 8, 8), strict=True):
-            yield from _wrapped([_braces(*_numbers(row)) for row in powers], "{", "}," if name == "F" else "}},")
+            yield from _wrapped([braces(*numerals(row)) for row in powers], "{", "}," if name == "F" else "}},")
 
 
 def header(title: str, usage: str, about: list[str]) -> list[str]:

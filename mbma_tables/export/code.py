@@ -23,6 +23,7 @@ from typing import NamedTuple
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
+from mbma_tables.export.again import written_by
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
 from mbma_tables.export.targets import Target
 from mbma_tables.export.text import filled, opening, wrapped
@@ -118,6 +119,7 @@ def source_texts(target: str, model: UniversalModel, variant: Variant) -> dict[s
     c_texts = c_code.c_texts(model, variant)
     texts = {} if target == "javascript" else c_texts
     about = c_code.about_model(model, variant) + c_code.about_theories()
+    about.append(written_by([target, "--variant", variant.name, "--out", "."]))
     declarations = c_texts["mbma.h"] + c_texts["mbma_model.h"]
     for name, title in language.titles.items():
         lines = c_code.header(f"{name}: {title}", language.usage, about)

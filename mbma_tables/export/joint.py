@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
 
@@ -13,12 +15,15 @@ from mbma_tables.answers.contact import chosen_theory, contact
 from mbma_tables.answers.result import Contact
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, in_unit, resolve
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.materials import ELASTIC_PSI, hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import Variant
+from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 
@@ -40,6 +45,7 @@ class Joint:
     hardness: float  # infinite where the contact is elastic
     length: str  # unit of length,
     stress: str  # and of stress
+    made_by: tuple[str, ...] = ()  # lines of a file's head that say how to write it again
 
     @property
     def units(self) -> Units:
@@ -67,7 +73,7 @@ class Joint:
             f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
             what,
             f"surface: {numbers}; lengths in {self.length}",
-            *filter(None, [self.surface.resolution]),
+            *filter(None, [self.surface.resolution, self.theory.origin]),
             f"E* = {self.modulus:.10g} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
             "pressure is force over nominal area;",
             "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
@@ -77,6 +83,7 @@ class Joint:
             f"the law is within {law.error:.1e} of its theory, in pressure and area",
             plastic,
             *self._validity(end, leakage),
+            *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
         )
 
     def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
@@ -100,11 +107,19 @@ class Joint:
         lines.append(f"scatter of simulations about the theory, {spread}")
         if leakage:
             lines += self._of_leakage(found.leakage.scatter, pressure)
+        return (*lines, *self._hashes())
+
+    def _hashes(self) -> Iterator[str]:
+        """Of the table that the theory reads, and of a surface that is no five numbers."""
         if isinstance(self.theory, Mbma):
             from mbma_tables.models.tables import universal_model
 
-            lines.append(f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}")
-        return tuple(lines)
+            yield f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}"
+        elif self.theory.name == "calibrated":
+            yield f"table: {calibrated_table.NAME} {shipped_file(calibrated_table.NAME).read_bytes()[-65:-49].decode()}"
+        if isinstance(self.surface, MeasuredSurface):
+            values = hashlib.sha256(np.stack([self.surface.q, self.surface.C]).tobytes())
+            yield f"spectrum: values {values.hexdigest()[:16]}"
 
     def _not_valid(self, reason: str, u: FloatArray, bad: Any, leakage: bool) -> list[str]:
         """Ranges of pressure in which a reason holds, by the outermost pressures found valid, rounded away from it."""
@@ -177,6 +192,7 @@ def frozen_joint(
     variant: str | Variant = "reported",
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
+    made_by: tuple[str, ...] = (),
 ) -> Joint:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
     surface = in_unit(surface, length_unit)
@@ -189,7 +205,7 @@ def frozen_joint(
     own = chosen_theory(surface, theory, variant=variant)
     law = contact_law(surface, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    return Joint(surface, law, own, modulus, float(cap), length, stress)
+    return Joint(surface, law, own, modulus, float(cap), length, stress, made_by)
 
 
 def _known(name: str, unit: str | None) -> str:

@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,17 @@ from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
-from mbma_tables.export.text import checked_name, core_file, filled, opening, page_file, template, wrapped
+from mbma_tables.export.text import (
+    braces,
+    checked_name,
+    core_file,
+    filled,
+    numerals,
+    opening,
+    page_file,
+    template,
+    wrapped,
+)
 from mbma_tables.law import block as at
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -250,19 +260,14 @@ def block_rows(block: FloatArray) -> tuple[int, int]:
 def block_text(block: FloatArray) -> str:
     """A law's block as the initializer of head, rows and records in C, every number as it is."""
     rows, _ = block_rows(block)
-    whole = block.view(np.int64)
-    head = [*map(repr, block[: at.EXPONENT].tolist()), *map(str, whole[at.EXPONENT : at.HEAD].tolist())]
-    pairs = whole[at.HEAD : at.HEAD + 2 * rows].reshape(-1, 2).tolist()
-    records = block[at.HEAD + 2 * rows :].reshape(-1, at.RECORD)
-    lines = [f"{{{wrapped(head)}}},", f"{{{wrapped(f'{{{shift}, {base}}}' for shift, base in pairs)}}},"]
-    return "\n".join([*lines, "{", *(f"{wrapped(_record(row.tolist()))}," for row in records), "}"])
-
-
-def _record(row: list[float]) -> Iterator[str]:
-    """The numbers of a record with the braces of its structure."""
-    begins, ends = (at.CENTRE, at.FORCE_AT, at.AREA_AT), (at.AREA_AT - 1, at.ENERGY_AT - 1, at.ENERGY_AT)
-    for k, value in enumerate(row):
-        yield f"{'{' if k in begins else ''}{value!r}{'}' if k in ends else ''}"
+    whole, last = block.view(np.int64), at.HEAD + 2 * rows
+    head = braces(*numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD]))
+    records = [
+        braces(*numerals(row[: at.FORCE_AT]), *np.split(row[at.FORCE_AT : -1], 2), *numerals(row[-1]))
+        for row in block[last:].reshape(-1, at.RECORD)
+    ]
+    parts = head, braces(*whole[at.HEAD : last].reshape(-1, 2)), braces(*records)
+    return ",\n".join(wrapped([part]) for part in parts)
 
 
 TARGETS = tuple(

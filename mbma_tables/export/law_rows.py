@@ -110,6 +110,7 @@ def describe_law(
     evenly: bool = False,
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
+    made_by: tuple[str, ...] = (),
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -144,6 +145,8 @@ def describe_law(
         As for `contact`: the law of loading, and conductance by the stiffness of the frozen contact.
     evenly : bool
         Equally spaced rows instead, for comparison.
+    made_by : tuple of str
+        Lines for the header of a file that say how to write it again.
 
     Raises
     ------
@@ -160,7 +163,7 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness)
+    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
     law, units = joint.law, joint.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
     k_s, names = 1.0, (own := ("overclosure", "pressure", joint.length, joint.stress))

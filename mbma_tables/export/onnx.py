@@ -1,40 +1,97 @@
-"""A contact law as a graph of ONNX in float64, for batches in other languages."""
+"""A contact law as a graph of ONNX in float64, for batches in other languages: a trace of the law in Python."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder
 
 from mbma_tables import __version__
-from mbma_tables.common.arguments import FloatArray, needed
-from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law
-from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers
+from mbma_tables.common.arguments import needed
+from mbma_tables.export.law_code import MAX_NAME, asked_law, text_of
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import checked_name
 from mbma_tables.surfaces.any_surface import AnySurface
 
 OPSET, IR = 17, 8  # of 2022: what readers of that year and later know
+INT64 = 7  # of ONNX
+QUANTITIES = ("pressure", "tangent", "area", "energy")
+OPERATORS = {"add": "Add", "sub": "Sub", "mul": "Mul", "truediv": "Div", "pow": "Pow", "and": "And"}
+COMPARISONS = {"lt": "Less", "le": "LessOrEqual", "gt": "Greater", "ge": "GreaterOrEqual", "eq": "Equal"}
+
+
+class _Value:
+    """A value of the graph: operators add nodes to it. Of rows of polynomials it has the number of columns."""
+
+    __array_ufunc__ = None  # arrays leave operators to it
+
+    def __init__(self, graph: _Graph, name: str, kind: type, width: int) -> None:
+        self.graph, self.name, self.kind, self.shape = graph, name, kind, (width,)
+
+    def __getitem__(self, key: Any) -> _Value:
+        if isinstance(key, _Value):
+            return self.graph("Gather", self, key)
+        if key[1] is None:
+            return self.graph("Unsqueeze", self, np.array([-1]))
+        if isinstance(key[1], int):
+            return self.graph("Gather", self, np.array(key[1]), axis=-1)
+        return self.graph("Gather", self, np.arange(self.shape[0])[key[1]], axis=-1)
+
+
+def _operator(name: str, reflected: bool, kind: type | None) -> Any:
+    def apply(self: _Value, other: Any) -> _Value:
+        given: Any = other if isinstance(other, _Value) else np.asarray(other, self.kind)
+        return self.graph(name, *((given, self) if reflected else (self, given)), kind=kind or self.kind)
+
+    return apply
+
+
+for _name, _operation in OPERATORS.items():
+    setattr(_Value, f"__{_name}__", _operator(_operation, False, None))
+    setattr(_Value, f"__r{_name}__", _operator(_operation, True, None))
+for _name, _operation in COMPARISONS.items():
+    setattr(_Value, f"__{_name}__", _operator(_operation, False, bool))
 
 
 class _Graph:
-    """A graph under construction: nodes by their operator, which return the name of what they compute."""
+    """A graph under construction, which the law in Python takes for its module of arrays."""
+
+    nan, inf = np.nan, np.inf
+    arange = staticmethod(np.arange)
 
     def __init__(self, helper: Any) -> None:
         self.helper = helper
-        self.nodes: list[Any] = []
-        self.constants: dict[str, np.ndarray[Any, Any]] = {}
+        self.nodes: dict[tuple[Any, ...], Any] = {}
+        self.constants: dict[tuple[str, bytes], tuple[str, Any]] = {}
 
-    def __call__(self, operator: str, *inputs: Any, name: str = "", **attributes: Any) -> str:
-        name = name or f"v{len(self.nodes)}"
-        named = [given if isinstance(given, str) else self._constant(given) for given in inputs]
-        self.nodes.append(self.helper.make_node(operator, named, [name], **attributes))
-        return name
+    def __call__(self, operator: str, *inputs: Any, name: str = "", kind: type = float, **attributes: Any) -> _Value:
+        values = [given if isinstance(given, _Value) else self.array(given) for given in inputs]
+        names = [value.name for value in values]
+        # what is asked twice is computed once
+        key = (operator, *names, name, *attributes.items())
+        if key not in self.nodes:
+            self.nodes[key] = self.helper.make_node(operator, names, [name or f"v{len(self.nodes)}"], **attributes)
+        # rows gathered along their columns have as many as are asked for
+        asked = values[1].shape[0] if attributes.get("axis") == -1 else max(value.shape[0] for value in values)
+        return _Value(self, self.nodes[key].output[0], kind, asked)
 
-    def _constant(self, value: Any) -> str:
-        self.constants[f"k{len(self.constants)}"] = np.asarray(value)
-        return f"k{len(self.constants) - 1}"
+    def array(self, given: Any) -> _Value:
+        value = np.asarray(given)
+        name, _ = self.constants.setdefault(
+            (f"{value.dtype}{value.shape}", value.tobytes()), (f"k{len(self.constants)}", value)
+        )
+        return _Value(self, name, float, value.shape[-1] if value.ndim else 1)
+
+    def asarray(self, given: _Value, kind: type) -> _Value:
+        return given
+
+    def where(self, mask: Any, first: Any, second: Any) -> _Value:
+        return self("Where", mask, first, second)
+
+    def searchsorted(self, edges: _Value, x: _Value, side: str) -> _Value:
+        reached = self("Cast", self("GreaterOrEqual", x[..., None], edges), to=INT64)
+        found = self("ReduceSum", reached, np.array([-1]), keepdims=0, kind=int)
+        return _Value(self, found.name, int, 1)
 
 
 def onnx(surface: AnySurface, E_star: float | str, *, name: str = "law", **asked: Any) -> bytes:
@@ -69,88 +126,23 @@ def onnx(surface: AnySurface, E_star: float | str, *, name: str = "law", **asked
     library = needed("onnx", "onnx")
     helper, double = library.helper, library.TensorProto.DOUBLE
     found, graph = asked_law(surface, E_star, **asked), _Graph(helper)
-    outputs = _law(graph, found)
+    text = text_of("jax-law", checked_name(name, MAX_NAME), found).replace("import jax\nimport jax.numpy as jnp\n", "")
+    law: dict[str, Any] = {"jnp": graph}
+    exec(text, law)
+    c, outputs = _Value(graph, "overclosure", float, 1), [*QUANTITIES, *found.more]
+    for output in outputs:
+        graph("Identity", law[output](c), name=output)
     made = helper.make_graph(
-        graph.nodes,
-        checked_name(name, MAX_NAME),
+        list(graph.nodes.values()),
+        name,
         [helper.make_tensor_value_info("overclosure", double, ["n"])],
         [helper.make_tensor_value_info(output, double, ["n"]) for output in outputs],
-        [library.numpy_helper.from_array(value, key) for key, value in graph.constants.items()],
+        [library.numpy_helper.from_array(value, key) for key, value in graph.constants.values()],
         doc_string="\n".join((*found.said, "in and out: float64 of shape (n,); convert float32 and ravel before")),
     )
     known = {"opset_imports": [helper.make_opsetid("", OPSET)], "ir_version": IR}
     model = helper.make_model(made, producer_name="mbma_tables", producer_version=__version__, **known)
     return bytes(model.SerializeToString(deterministic=True))
-
-
-def _law(graph: _Graph, found: AskedLaw) -> list[str]:
-    """Nodes from overclosure to the quantities of a law, as `law_numbers` describes it."""
-    c, numbers = "overclosure", found.numbers
-    k = _record(graph, graph("Mul", c, numbers.scale), numbers.edges)
-    near = graph("Less", k, numbers.side)
-    x = graph("Mul", graph("Where", near, c, graph("Sub", c, numbers.h_max)), numbers.scale)
-    rate = graph("Gather", numbers.rate, k)
-    t = graph("Mul", graph("Sub", x, graph("Gather", numbers.centre, k)), rate)
-    rate = graph("Mul", rate, numbers.scale)
-    powered = graph("And", graph("Equal", k, 0), bool(numbers.ends))
-    base = graph("Where", powered, t, 1.0)
-    below = graph("And", graph("LessOrEqual", c, 0.0), bool(numbers.ends))
-    above = graph("GreaterOrEqual", c, numbers.c_least)
-    outside = graph("Not", graph("And", above, graph("LessOrEqual", c, numbers.c_most)))
-
-    def ended(value: str, to: str) -> str:
-        return graph("Where", outside, np.nan, graph("Where", below, 0.0, value), name=to)
-
-    value = _polynomial(graph, numbers.force, k, t)
-    slope = _polynomial(graph, np.asarray(polyder(numbers.force, axis=1), float), k, t)
-    power = graph("Where", powered, graph("Div", numbers.power_p, base), 0.0)
-    lead = graph("Pow", base, numbers.power_p)
-    slope = graph("Mul", lead, graph("Add", slope, graph("Mul", power, value)))
-    area = graph("Mul", graph("Pow", base, numbers.power_a), _polynomial(graph, numbers.area, k, t))
-    powers = np.tile(np.arange(1.0, 10.0), (numbers.rate.size, 1))
-    powers[0] += numbers.power_p
-    sum_ = graph("Mul", graph("Mul", lead, t), _polynomial(graph, numbers.force / powers, k, t))
-    energy = graph("Add", graph("Gather", numbers.energies, k), graph("Div", sum_, rate))
-    outputs = [
-        ended(graph("Mul", lead, value), "pressure"),
-        ended(graph("Mul", slope, rate), "tangent"),
-        ended(area, "area"),
-        ended(energy, "energy"),
-    ]
-    if "conductance" in found.more:
-        outputs.append(graph("Mul", "tangent", found.ratio, name="conductance"))
-    if found.flow:
-        outputs.append(graph("Where", outside, np.nan, _flow(graph, numbers, found.flow), name="leakage"))
-    return outputs
-
-
-def _flow(graph: _Graph, numbers: LawNumbers, flow: FlowNumbers) -> str:
-    """Nodes from overclosure to the flow coefficient within the law's range."""
-    c = "overclosure"
-    d = graph("Sub", numbers.h_max, graph("Mul", c, 2.0))
-    x = graph("Mul", graph("Sub", d, flow.blocked), flow.scale)
-    k = _record(graph, x, flow.edges)
-    t = graph("Mul", graph("Sub", x, graph("Gather", flow.centre, k)), graph("Gather", flow.rate, k))
-    blocked = graph("And", graph("LessOrEqual", x, 0.0), flow.power > 0)
-    base = graph("Where", graph("And", graph("Equal", k, 0), graph("Not", blocked)), t, 1.0)
-    value = graph("Mul", graph("Pow", base, flow.power), _polynomial(graph, flow.force, k, t))
-    u = graph("Sub", numbers.h_max, c)
-    wide = graph("Div", -1.5, graph("Add", graph("Pow", graph("Div", u, flow.h_rms), 2.0), 4.0))
-    apart = graph("Mul", graph("Pow", u, 3.0), graph("Add", wide, 1.0))
-    value = graph("Where", graph("And", graph("Less", c, 0.0), numbers.ends), apart, value)
-    return graph("Where", blocked, 0.0, value)
-
-
-def _record(graph: _Graph, x: str, edges: FloatArray) -> str:
-    """The number of edges reached."""
-    reached = graph("GreaterOrEqual", graph("Unsqueeze", x, [-1]), edges)
-    return graph("ReduceSum", graph("Cast", reached, to=7), [-1], keepdims=0)
-
-
-def _polynomial(graph: _Graph, rows: FloatArray, k: str, t: str) -> str:
-    """The polynomial of row k."""
-    powers = graph("Pow", graph("Unsqueeze", t, [-1]), np.arange(float(rows.shape[1])))
-    return graph("ReduceSum", graph("Mul", graph("Gather", rows.copy(), k), powers), [-1], keepdims=0)
 
 
 TARGETS = (Target("onnx", onnx, CODE, rows=False),)

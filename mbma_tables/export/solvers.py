@@ -101,6 +101,7 @@ def exponential(
     length_unit: str | None = None,
     stress_unit: str | None = None,
     name: str = "ROUGH",
+    made_by: tuple[str, ...] = (),
 ) -> str:
     """CalculiX's card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20).
 
@@ -130,6 +131,7 @@ def exponential(
         "overclosure c = h_max - u with the mean separation u: bodies touch where the mean planes are h_max apart;",
         "this law has no last contact: at c = 0 its pressure is p0. It holds for light loads alone:",
         f"within {', '.join(up_to)} {units.stress} of Persson's theory for all loads at the same overclosure.",
+        *made_by,
     )
     return comment(notes, "**") + _interaction(name, _exponential_card(u0, p0))
 

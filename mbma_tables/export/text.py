@@ -6,6 +6,9 @@ import importlib.resources
 import re
 import textwrap
 from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
 
 from mbma_tables.common.errors import InputError
 
@@ -53,7 +56,8 @@ def block_comment(lines: Iterable[str]) -> str:
 
 def opening(paragraphs: Iterable[str], mark: str) -> str:
     """What a source file begins with: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
-    lines = [line for text in paragraphs for line in textwrap.wrap(text, COMMENT_WIDTH, break_long_words=False)]
+    wrap = textwrap.TextWrapper(COMMENT_WIDTH, break_long_words=False, break_on_hyphens=False).wrap
+    lines = [line for text in paragraphs for line in wrap(text)]
     return (block_comment(lines) if mark == "/*" else comment(lines, mark)).rstrip()
 
 
@@ -103,3 +107,15 @@ def checked_name(name: str, max_length: int) -> str:
 def number(value: float) -> str:
     """A number of a law's file."""
     return f"{value:.{DIGITS}g}"
+
+
+def numerals(values: Any) -> list[str]:
+    """Numbers in the shortest decimals of their precision, as C has them."""
+    flat = np.ravel(values)
+    return [f"{text}f" for text in flat.astype(str)] if flat.dtype == np.float32 else flat.astype(str).tolist()
+
+
+def braces(*parts: Any) -> str:
+    """An initialiser in C of texts and arrays."""
+    texts = (part if isinstance(part, str) else braces(*numerals(part)) for part in parts)
+    return f"{{{', '.join(texts)}}}"

@@ -19,6 +19,7 @@ from mbma_tables.law.block import softening
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mbma_tables.law.continued import ContinuedLaw
     from mbma_tables.law.leakage import LeakageLaw
 
 
@@ -84,6 +85,34 @@ class Derived:
             self.h_max if math.isinf(self.highest) else math.inf, self.units,
             reason or (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
         )  # fmt: skip
+
+    def continued(self: Any, pressures: tuple[Any, Any] | None = None) -> ContinuedLaw:
+        """The law continued by its tangents beyond two pressures, for the trial steps of Newton's method.
+
+        From bodies that just touch, where the law has neither pressure nor stiffness, and from trial steps beyond full
+        compression, where it raises, Newton's method comes back by these lines. Check `inside` at the solution; where
+        bodies are apart there, iterate on from it with the law itself.
+
+        Parameters
+        ----------
+        pressures : pair of float or str, optional
+            Smallest and largest pressure of the law itself; else those at 1% and 99% of its compression, or where its
+            stiffness begins to fall.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
+        >>> trial, u = law.continued(), law.h_max
+        >>> for _ in range(12):  # the load is 0.1 MPa
+        ...     pressure, stiffness = trial.pressure_and_stiffness(u)
+        ...     u += (pressure - 0.1) / stiffness
+        >>> bool(trial.inside(u)), round(float(law.pressure(u)), 12)
+        (True, 0.1)
+        """
+        from mbma_tables.law.continued import continued_law
+
+        return continued_law(self, pressures)
 
     @functools.cached_property
     def softening(self: Any) -> float | None:

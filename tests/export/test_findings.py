@@ -341,3 +341,51 @@ def test_an_fmu_for_all_platforms() -> None:
     expected = {"x86_64-linux": elf, "aarch64-linux": elf, "x86_64-darwin": mach, "aarch64-darwin": mach}
     assert {name: begin for name, begin in begins.items() if "windows" not in name} == expected
     assert begins["x86_64-windows"].startswith(dll)
+
+
+@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
+@pytest.mark.parametrize("pressures", [None, ("1 kPa", "0.5 MPa")])
+def test_a_law_continued_by_its_tangents(theory: str, pressures: Any) -> None:
+    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory=theory)
+    trial = law.continued(pressures)
+    inner = np.linspace(trial.heavy, trial.light, 50)
+    np.testing.assert_array_equal(trial.pressure(inner), law.pressure(inner))
+    np.testing.assert_array_equal(trial.stiffness(inner), law.stiffness(inner))
+    assert trial.inside(inner).all()
+    for end, side in ((trial.light, 1.0), (trial.heavy, -1.0)):
+        beyond = end + side * np.array([1e-9, 0.1, 1e3])
+        found, slope = trial.pressure_and_stiffness(beyond)
+        # the value and the slope of the law at its end, and so on
+        assert (slope == law.stiffness(end)).all()
+        np.testing.assert_allclose(found, law.pressure(end) - law.stiffness(end) * (beyond - end), rtol=1e-13)
+        assert not trial.inside(beyond).any()
+    # Newton's method from first contact, and from far beyond full compression
+    for u in (law.h_max, -5.0):
+        for _ in range(60):
+            p, k = trial.pressure_and_stiffness(u)
+            u += (p - 0.1) / k
+        assert law.pressure(u) == pytest.approx(0.1, rel=1e-12)
+    if pressures:
+        assert law.pressure([trial.light, trial.heavy]) == pytest.approx([1e-3, 0.5])
+
+
+@pytest.mark.parametrize("pressures", [("2 kPa", "1 kPa"), (0.0, 0.1), "12", (1, 2, 3)])
+def test_pressures_that_do_not_rise(pressures: Any) -> None:
+    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
+    with pytest.raises(InputError, match="two rising numbers"):
+        law.continued(pressures)
+    with pytest.raises(InputError, match="must be finite"):
+        law.continued().pressure(np.nan)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("skfem") is None, reason="not installed: scikit-fem")
+def test_newton_in_scikit_fem_from_zero_load() -> None:
+    example = pathlib.Path(__file__).parents[2] / "examples" / "newton.py"
+    said = subprocess.run(
+        [sys.executable, str(example)], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    residuals = [float(line.split()[1]) for line in said[:-1]]
+    assert residuals[-1] < 1e-12
+    assert len(residuals) <= 14
+    assert residuals[-2] < 1e-4 * residuals[-3]  # quadratic
+    assert "force 8.000000" in said[-1]
