@@ -153,9 +153,10 @@ def closed(
     heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
 ) -> tuple[FloatArray, FloatArray]:
     """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
-    x, elastic = u / h_rms, (pressure / gradient, stiffness / gradient)
+    x, c = u / h_rms, CONSTANTS
     share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
-    load, steep = force(*elastic, share, slope / h_rms, eta)
+    given = pressure / gradient, stiffness / gradient, share, slope / h_rms, eta
+    load, steep = answered(core.capped_force, given, 2, c.force_light, c.force_eta, c.force_share)
     return load * gradient, steep * gradient
 
 
@@ -177,7 +178,7 @@ def plane_separation(u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: C
 def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
     gap, last = np.asarray(u, float), np.asarray(np.inf if h_max is None else h_max)
-    d, end = _levels(gap), _levels(last)
+    d, end = _levels(gap), _levels(last) if last.ndim else _level(float(last))
     below, whole = ndtr(d), ndtr(end)
     share = np.maximum(np.where(end > 0, ndtr(-d) - ndtr(-end), whole - below), 0.0)
     slope = np.where(gap <= LEAST_GAP, -np.inf, np.exp(-d * d / 2) / (-ROOT_TWO_PI * below))
@@ -198,6 +199,11 @@ def _levels(u: FloatArray) -> FloatArray:
     """Levels of Gaussian heights at mean gaps [h_rms], of gaps below `LEAST_GAP` as at that."""
     held = np.minimum(np.maximum(u, LEAST_GAP), LEVELS[1])
     return np.asarray(_level_spline()(np.log(held)) + np.maximum(u - LEVELS[1], 0.0))
+
+
+@functools.lru_cache(256)
+def _level(u: float) -> FloatArray:
+    return _levels(np.asarray(u))
 
 
 class BearingCurve:
