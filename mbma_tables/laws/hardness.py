@@ -153,9 +153,10 @@ def closed(
     heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
 ) -> tuple[FloatArray, FloatArray]:
     """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
-    x, elastic = u / h_rms, (pressure / gradient, stiffness / gradient)
+    x, c = u / h_rms, CONSTANTS
     share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
-    load, steep = force(*elastic, share, slope / h_rms, eta)
+    given = pressure / gradient, stiffness / gradient, share, slope / h_rms, eta
+    load, steep = answered(core.capped_force, given, 2, c.force_light, c.force_eta, c.force_share)
     return load * gradient, steep * gradient
 
 
