@@ -225,7 +225,7 @@ class SelfAffine(AnySurface):
         surface: Self = make(**case.numbers, unit=case.length_unit)
         return surface
 
-    @property
+    @functools.cached_property
     def labelled(self) -> bool:
         """Whether any parameter is an xarray DataArray."""
         return any(is_labelled(getattr(self, name)) for name in PARAMETERS)

@@ -20,7 +20,6 @@ import numpy as np
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import read_file
 from mbma_tables.tablefiles import schema
-from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
@@ -91,7 +90,7 @@ def verified(
     described = {name: _attributes_of(variable) for name, variable in dataset.variables.items()}
     for owner, attributes in {"": own, **described}.items():
         for name, value in attributes.items():
-            check_attribute(owner, name, value)
+            schema.check_attribute(owner, name, value)
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
             raise ValueError(f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}")
@@ -109,7 +108,7 @@ def verified(
 
 def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     """The table in an open file whose kind and format are known."""
-    own, described, values = verified(dataset, REQUIRED)
+    own, described, values = verified(dataset, schema.REQUIRED)
     names = [name for name, _ in schema.AXES[kind]]
     axes = tuple(
         schema.Axis(
@@ -154,7 +153,7 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.
             if version != schema.FORMAT_VERSIONS[found]:
                 raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
             content = _content(dataset, found)
-        check_content(content)
+        schema.check_content(content)
     except ValueError as fault:
         raise _refuse(source, str(fault), kind or "all") from None
     # what netCDF4 raises on bytes that are no netCDF file, or that lack a variable

@@ -72,9 +72,7 @@ def test_every_answer_of_a_map_says_so():
         for found in answers:
             assert told in repr(found)
             assert told in found.to_dataset().attrs["resolution"]
-    longer = Surface.from_map(
-        heights, 1.0, periodic=True, model="measured", extrapolate_to=0.5, extrapolate_hurst=0.8
-    )  # fmt: skip
+    longer = Surface.from_map(heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8)
     assert "which was not measured" in repr(contact(longer, pressure=0.01))
     assert "resolution" not in repr(contact(WHOLE, pressure=0.01))
 
