@@ -7,7 +7,7 @@ Each form states a standard deviation with a few constants, the same for all map
     calibrated   root of s^2 + c^2, s that of Gaussian maps, one c for maps that are valid and one for others
 
 They are the likeliest for errors that are distributed as Student's t with four degrees of freedom, times what makes
-them cover 70% of errors once and 93.5% twice. `left_out` states for each family what the others give.
+them cover 70% of errors once and 94.5% twice. `left_out` states for each family what the others give.
 """
 
 from __future__ import annotations

@@ -50,9 +50,9 @@ class Corrected(BoundaryElements):
 
     def __init__(self, surface: MeasuredSurface, half: Pressed, quarter: FloatArray) -> None:
         pressure, area, u, energy = half.rows
-        size = own_map.map_of(surface).heights.size
-        super().__init__(surface, pressure, area, u, energy, np.inf, size, half, True)
-        self.origin = f"corrected by {own_map.origin_of(own_map.map_of(surface), TOLERANCE)}"
+        whole = own_map.map_of(surface)
+        points, origin = own_map.steps_along(surface, whole), f"corrected by {own_map.origin_of(whole, TOLERANCE)}"
+        super().__init__(surface, pressure, area, u, energy, points, whole.heights.size, half, True, origin)
         law, other = own_law(surface), LoadCurve(quarter)
         x = self.fit.x
         inside = np.clip(x, other.x[0], other.x[-1])
@@ -80,6 +80,7 @@ class Corrected(BoundaryElements):
         everywhere = np.ones(answer.area.shape, bool)
         odd = dict.fromkeys(self.surface.outside(PRESSED, by_map=True), everywhere)
         low, high = (answer.area < LOWEST) & (answer.area > 0), answer.area > HIGHEST
+        odd |= own_map.unresolved(self.points, answer.area)
         return odd | {f"A/A0 is below {LOWEST:g}": low, f"A/A0 is above {HIGHEST:g}": high}
 
     def apart(self, quantity: str, area: FloatArray) -> list[FloatArray]:
@@ -140,8 +141,8 @@ def applies(surface: AnySurface) -> bool:
     if whole.heights.ndim != 2 or not importlib.util.find_spec("tamaas"):
         return False
     size = whole.heights.size * (1 if whole.periodic else 4)
-    points = 2 * np.pi / float(surface.q1) / max(whole.steps)
-    if size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or points < MIN_POINTS * (1 - ROUNDING):
+    resolved = own_map.steps_along(surface, whole) >= MIN_POINTS * (1 - ROUNDING)
+    if size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or not resolved:
         return False
     try:
         return of_map(Corrected.name, surface).ends_at_h_max

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
@@ -26,6 +27,17 @@ def continued(treated: Treated) -> tuple[FloatArray, tuple[float, float]]:
     values = treated.heights if treated.periodic else mirrored(treated.heights)
     sizes = values.shape[0] * treated.steps[0], values.shape[1] * treated.steps[1]
     return values - values.mean(), sizes
+
+
+def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
+    """Sampling steps along the shortest wavelength of a map."""
+    return 2 * np.pi / float(surface.q1) / max(whole.steps)
+
+
+def unresolved(points: float, area: FloatArray) -> dict[str, NDArray[np.bool_]]:
+    """The reason against grids with so few sampling steps along the shortest wavelength, and where it holds."""
+    text = f"the map's shortest wavelength has {points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
+    return {text: np.full(area.shape, points < MIN_POINTS * (1 - ROUNDING))}
 
 
 def reduced(values: FloatArray, points: float) -> tuple[FloatArray, float, float]:

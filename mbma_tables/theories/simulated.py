@@ -15,13 +15,13 @@ from scipy.interpolate import PchipInterpolator
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws.energy_spline import Continued, LoadCurve, left_out
-from mbma_tables.laws.pressing import HIGHEST, LOWEST, MIN_POINTS, ROUNDING, TOLERANCE, Pressed, Table, press
+from mbma_tables.laws.pressing import HIGHEST, LOWEST, ROUNDING, TOLERANCE, Pressed, Table, press
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories import own_map
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.calibrated_curves import own_law
-from mbma_tables.theories.own_map import AREAS, continued, law_loads, map_of, origin_of, reduced
 from mbma_tables.theories.own_table import read_surface, write_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
@@ -131,13 +131,13 @@ class BoundaryElements(Theory):
             table = surface.table
             F, A, u, U = table.rows
             return cls(surface, F, A, u, U, table.points, table.elements, table, True, table.origin)
-        whole = map_of(surface)
+        whole = own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        values, sizes = continued(whole)
-        values, points, cut = reduced(values, 2 * np.pi / float(surface.q1) / max(whole.steps))
+        values, sizes = own_map.continued(whole)
+        values, points, cut = own_map.reduced(values, own_map.steps_along(surface, whole))
         gradient = own_law(surface).gradient
         if loads is None:
-            wanted, law_area = law_loads(surface, AREAS), own_law(surface).area
+            wanted, law_area = own_map.law_loads(surface, own_map.AREAS), own_law(surface).area
         else:
             given = finite_array("loads", loads)
             require("loads", given, (given > 0) & (np.diff(given, prepend=0) > 0), "positive and rising")
@@ -145,7 +145,7 @@ class BoundaryElements(Theory):
         found = press(values, sizes, wanted, points, gradient, law_area, tolerance)
         found = dataclasses.replace(found, left_out=cut * max(whole.steps))
         pressure, area, u, energy = found.rows
-        size, origin = whole.heights.size, origin_of(whole, tolerance)
+        size, origin = whole.heights.size, own_map.origin_of(whole, tolerance)
         return cls(surface, pressure, area, u, energy, points, size, found, loads is None, origin)
 
     @classmethod
@@ -315,9 +315,8 @@ class BoundaryElements(Theory):
         """Reasons against grids that are too coarse, and contact areas that were not tested."""
         left_out = 0.0 if self.pressed is None else self.pressed.left_out
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
-        text = f"the map's shortest wave has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
         return {
-            text: np.full(answer.area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
+            **own_map.unresolved(self.points, answer.area),
             cut: np.full(answer.area.shape, left_out > 0),
             f"A/A0 is below {LOWEST:g}": (answer.area < LOWEST) & (answer.area > 0),
             f"A/A0 is above {HIGHEST:g}": answer.area > HIGHEST,

@@ -122,6 +122,12 @@ class TestDefaultTheory:
     def test_others_are_calibrated(self, surface):
         assert contact(surface(self), area=0.1).theory == "calibrated"
 
+    def test_a_map_that_is_not_resolved_is_not_valid(self):
+        noise = Surface.from_map(0.1 * np.random.default_rng(1).standard_normal((64, 64)), 1.0, periodic=True)
+        found = contact(noise, area=0.1, theory="corrected")
+        assert not found.valid
+        assert any("sampling steps, fewer than 4" in reason for reason in found.reasons)
+
     def test_without_the_engine_the_law_answers(self, monkeypatch):
         real = importlib.util.find_spec
         monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "tamaas" else real(name))
