@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -32,7 +31,6 @@ class Case(Simulated):
     area: FloatArray
     u: FloatArray
     log_k: FloatArray
-    log_ratio: FloatArray
     blocked: FloatArray
 
     @property
@@ -54,16 +52,12 @@ def cases(data: xr.Dataset) -> list[Case]:
     """Surfaces of a file by `python -m generate boundary_elements --of leakage`."""
     found = []
     for one, fields in simulated(data):
-        flow, known = one.flow.values, np.isfinite(one.force.values)
-        blocked = (flow[known] == 0).mean(axis=1)
-        kept = known.copy()
-        kept[known] = blocked == 0
-        with np.errstate(divide="ignore"):
-            log_flow = np.log(flow[kept])
-        loads = (one[name].values for name in ("force", "area", "mean_separation"))
-        own = log_flow.mean(axis=1), log_flow @ [1.0, -1.0], np.stack([one.area.values[known], blocked])
-        parts: list[Any] = [*fields, *(load[kept] for load in loads), *own]
-        found.append(Case(*parts))
+        known = np.isfinite(one.force.values)
+        force, area, u, flow = (one[n].values[known] for n in ("force", "area", "mean_separation", "flow"))
+        blocked = (flow == 0).mean(axis=1)
+        kept = blocked == 0
+        loads = {"force": force[kept], "area": area[kept], "u": u[kept], "log_k": np.log(flow[kept]).mean(axis=1)}
+        found.append(Case(**vars(fields), **loads, blocked=np.stack([area, blocked])))
     return found
 
 

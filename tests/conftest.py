@@ -12,6 +12,8 @@ settings.load_profile("untimed")
 
 # parallel workers share the cores, and threads of BLAS that wait for each other cost more than the work itself
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# simulations are not kept between tests
+os.environ["MBMA_TABLES_CACHE"] = "off"
 
 
 @pytest.fixture

@@ -102,6 +102,11 @@ CALLS = {
     "height_integral": (functools.partial(height_integral, 1.5), {"x": 1.0}),
     "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
     "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
+    **{
+        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1})
+        for theory in ("greenwood_williamson", "persson", "calibrated")
+        for known in ("separation", "mean_separation", "pressure", "area")
+    },
     "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),
     "island4d": (open_table("island4d").lookup, {"delta_over_h_rms": 1.5, "zeta_d": 2.0, "zeta_u": 20.0, "hurst": 0.7}),
     "effective_modulus": (effective_modulus, {"E1": 1.0, "nu1": 0.3, "E2": 2.0, "nu2": 0.3}),
@@ -112,8 +117,10 @@ CALLS = {
 def test_every_argument_is_refused_by_name(call, name):
     function, good = CALLS[call]
     for bad in (math.nan, math.inf, [0.5, -math.inf], [], "rough", None, [None], 1j, True):
-        with pytest.raises(InputError, match=f"^{name} "):
-            function(**{**good, name: bad})
+        # no pressure at all is another mistake
+        if bad is not None or " by " not in call:
+            with pytest.raises(InputError, match=f"^{name} "):
+                function(**{**good, name: bad})
 
 
 @pytest.mark.parametrize("call", [call for call, (_, good) in CALLS.items() if len(good) > 1])

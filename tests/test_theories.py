@@ -60,11 +60,7 @@ def printed_separation(hurst, zeta_1, slope, load, digits):
         return float(mpmath.sqrt(mpmath.pi) * mpmath.exp(-base) * mpmath.quad(outer, pieces) / h)
 
 
-def surface_of(hurst, zeta_1, slope):
-    return Surface(hurst, slope, slope * zeta_1, 1.0, 3.0)
-
-
-# printed_separation(..., digits=25), up to two minutes each
+# printed_separation(..., digits=25), up to two minutes each; the last two are computed here
 PRINTED = [
     (0.3, 4, 0.2, 2.0, 7.12986115868634175e-24),
     (0.3, 4, 0.1, 1e-8, 6.7802122365389193113),
@@ -74,18 +70,15 @@ PRINTED = [
     (0.8, 216, 0.18125, 1e-8, 7.6679623952348966113),
     (1.0, 4, 0.3, 2.0, 1.695791671698073388e-17),
     (1.0, 1e6, 0.05, 1e-3, 1.8002462214981889954),
+    (0.3, 4, 0.2, 2.0, None),
+    (0.9, 10, 0.3, 1.0, None),
 ]
 
 
 @pytest.mark.parametrize(("hurst", "zeta_1", "slope", "load", "expected"), PRINTED)
 def test_full_double_integral_equals_mpmath(hurst, zeta_1, slope, load, expected):
-    assert relative(separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
-
-
-@pytest.mark.parametrize(("hurst", "zeta_1", "slope", "load"), [(0.3, 4, 0.2, 2.0), (0.9, 10, 0.3, 1.0)])
-def test_full_double_integral_equals_mpmath_computed_here(hurst, zeta_1, slope, load):
-    expected = printed_separation(hurst, zeta_1, slope, load, digits=16)
-    assert relative(separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
+    known = expected or printed_separation(hurst, zeta_1, slope, load, digits=16)
+    assert relative(separation(Surface(hurst, slope, slope * zeta_1, 1.0, 3.0), load), known) < 1e-11
 
 
 def test_simplified_force_of_the_yang_persson_case():
@@ -139,23 +132,16 @@ def test_simplified_is_the_light_load_limit_of_full(hurst):
     assert relative(full / simplified, constant / 4.047) < 1e-9
 
 
-@given(
-    st.floats(0.1, 1.0),
-    st.floats(0.7, 6.0),
-    st.floats(-8, 0.5),
-    st.sampled_from([FULL, LIGHT]),
-)
+@given(st.floats(0.1, 1.0), st.floats(0.7, 6.0), st.floats(-8, 0.5), st.sampled_from([FULL, LIGHT]))
 def test_force_and_separation_are_inverse(hurst, log_zeta_1, log_load, theory):
     surface = Surface(hurst, 1e4, 1e4 * 10**log_zeta_1, 1e-5, 3e-5)
-    unit = np.sqrt(surface.m2)
-    load = unit * 10**log_load
+    load = np.sqrt(surface.m2) * 10**log_load
     try:
         u = separation(surface, load, theory)
     except OutOfRangeError:
         assert theory is LIGHT
         return
-    again = theory.answer(surface, u).pressure
-    assert relative(again, load) < 1e-10
+    assert relative(theory.answer(surface, u).pressure, load) < 1e-10
 
 
 def test_full_near_hurst_one_is_continuous():
@@ -222,14 +208,6 @@ def test_everything_broadcasts_and_keeps_scalars():
     assert np.all(x == [0.5, 1.0, 1.5])
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, [], "x", 1j, [1.0, np.nan]])
-@pytest.mark.parametrize("theory", [SPHERES, FULL, LIGHT])
-def test_bad_numbers_are_refused(theory, bad):
-    for known in ("separation", "mean_separation", "pressure", "area"):
-        with pytest.raises(InputError):
-            contact(YANG_PERSSON, **{known: bad}, theory=theory)
-
-
 def test_out_of_range_names_the_entries():
     with pytest.raises(OutOfRangeError, match="infinite at zero load"):
         separation(YANG_PERSSON, 0.0)
@@ -255,5 +233,4 @@ def test_extreme_loads_stay_numbers():
     assert (np.diff(vanishing) <= 0).all()
     assert vanishing[0] > 0 == vanishing[-1]
     loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
-    again = FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).pressure
-    assert relative(again, loads) < 1e-9
+    assert relative(FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).pressure, loads) < 1e-9

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import InputError, Scene, Surface, contact, contact_law, island
-from mbma_tables.common.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
+from mbma_tables.common.units import ALIASES, DIMENSIONS, SIZES, Units, known, read, resolve, unit_of
 from mbma_tables.export.law_rows import describe_law
 
 # in metres and pascals, written down again: 1 in = 25.4 mm, 1 lbf = 4.4482216152605 N
@@ -129,85 +129,76 @@ def test_resolve_takes_the_first_unit_or_the_one_asked_for():
 
 CONCRETE = Surface.named("concrete")
 PLAIN = Surface(0.8, 0.1, 10.0, 1.0, 3.0)
-PYTHON = {
-    "no unit": (lambda: PLAIN.to("mm"), "the surface's unit is not known: make it with unit="),
-    "no such unit": (lambda: Surface(0.8, 0.1, 10.0, 1.0, 3.0, unit="millimetre"), "no known unit of length"),
-    "no text": (lambda: CONCRETE.to(1.0), "a unit of length is a text"),
-    "stress for length": (lambda: CONCRETE.to("MPa"), "'MPa' is no known unit of length"),
-    "scene": (lambda: Scene(CONCRETE, separations=[0.5], length_unit="m"), r"ask for surface.to\('m'\)"),
-    "gap of a plain surface": (lambda: Scene(PLAIN, separations=["1 um"]), "give the surface its unit"),
-    "pressure without E*": (lambda: Scene(CONCRETE, pressures=["1 MPa"]), "needs a modulus"),
-    "pressure beside a plain E*": (lambda: Scene(CONCRETE, pressures=["1 MPa"], E_star=9.0), "give E\\* with its unit"),
-    "export without a length unit": (lambda: describe_law(PLAIN, "13 MPa", rows=9), "length_unit is missing"),
-    "export without a stress unit": (lambda: describe_law(CONCRETE, 13.0, rows=9), "stress_unit is missing"),
-    "export into a wrong unit": (lambda: describe_law(CONCRETE, "13 MPa", length_unit="kg", rows=9), "no known unit"),
-}
 
 
-@pytest.mark.parametrize("case", PYTHON)
-def test_conflicts_in_python(case):
-    make, said = PYTHON[case]
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: PLAIN.to("mm"), "the surface's unit is not known: make it with unit="),
+        (lambda: Surface(0.8, 0.1, 10.0, 1.0, 3.0, unit="millimetre"), "no known unit of length"),
+        (lambda: CONCRETE.to(1.0), "a unit of length is a text"),
+        (lambda: CONCRETE.to("MPa"), "'MPa' is no known unit of length"),
+        (lambda: Scene(CONCRETE, separations=[0.5], length_unit="m"), r"ask for surface.to\('m'\)"),
+        (lambda: Scene(PLAIN, separations=["1 um"]), "give the surface its unit"),
+        (lambda: Scene(CONCRETE, pressures=["1 MPa"]), "needs a modulus"),
+        (lambda: Scene(CONCRETE, pressures=["1 MPa"], E_star=9.0), "give E\\* with its unit"),
+        (lambda: describe_law(PLAIN, "13 MPa", rows=9), "length_unit is missing"),
+        (lambda: describe_law(CONCRETE, 13.0, rows=9), "stress_unit is missing"),
+        (lambda: describe_law(CONCRETE, "13 MPa", length_unit="kg", rows=9), "no known unit"),
+    ],
+)
+def test_conflicts_in_python(make, said):
     with pytest.raises(InputError, match=said) as caught:
         make()
     assert "\n" not in str(caught.value)
 
 
-SURFACE = '[surface]\nhurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = "800 um"\n'
+SURFACE = '[surface]\nhurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = "800 um"\nh_max = '
+NO_UNIT = "[surface]\nhurst = 0.8\nq0 = 0.1\nzeta_1 = 50\nh_rms = 1\nh_max = 3\n"
+IN_MM = SURFACE + '"3 mm"\n'
 REST = '[effects]\non = ["pressure"]\n'
-TOML = {
-    "plain beside a unit": (SURFACE + "h_max = 3\n" + REST, "h_max without a unit beside numbers in mm"),
-    "wrong power": (SURFACE + 'h_max = "3 1/mm"\n' + REST, "h_max|no known unit"),
-    "unit of a plain surface": (
-        "[surface]\nhurst = 0.8\nq0 = 0.1\nzeta_1 = 50\nh_rms = 1\nh_max = 3\n"
-        + REST
-        + '[prescribed]\nseparations = "1 mm"\n',
-        "give the surface its unit",
-    ),
-    "stress of no modulus": (
-        SURFACE + 'h_max = "3 mm"\n' + REST + '[prescribed]\npressures = "1 MPa"\n',
-        "needs a modulus",
-    ),
-    "unit of no modulus": (SURFACE + 'h_max = "3 mm"\n[material]\nstress_unit = "MPa"\n' + REST, "no modulus"),
-    "moduli without one": (
-        SURFACE + 'h_max = "3 mm"\n[material]\nE1 = "210 GPa"\nnu1 = 0.3\nE2 = 70\nnu2 = 0.3\n' + REST,
-        "E2 without a unit beside numbers in GPa",
-    ),
-    "length for stress": (
-        SURFACE + 'h_max = "3 mm"\n[material]\nE_star = "210 mm"\n' + REST,
-        "no known unit of stress",
-    ),
-}
 
 
-@pytest.mark.parametrize("case", TOML)
-def test_conflicts_in_toml(case, tmp_path):
-    content, said = TOML[case]
-    (tmp_path / "scene.toml").write_text(content)
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (SURFACE + "3\n", "h_max without a unit beside numbers in mm"),
+        (SURFACE + '"3 1/mm"\n', "h_max|no known unit"),
+        (NO_UNIT + '[prescribed]\nseparations = "1 mm"\n', "give the surface its unit"),
+        (IN_MM + '[prescribed]\npressures = "1 MPa"\n', "needs a modulus"),
+        (IN_MM + '[material]\nstress_unit = "MPa"\n', "no modulus"),
+        (
+            IN_MM + '[material]\nE1 = "210 GPa"\nnu1 = 0.3\nE2 = 70\nnu2 = 0.3\n',
+            "E2 without a unit beside numbers in GPa",
+        ),
+        (IN_MM + '[material]\nE_star = "210 mm"\n', "no known unit of stress"),
+    ],
+)
+def test_conflicts_in_toml(content, said, tmp_path):
+    (tmp_path / "scene.toml").write_text(content + REST)
     with pytest.raises(InputError, match=said) as caught:
         Scene.from_toml(tmp_path / "scene.toml")
     assert "\n" not in str(caught.value)
 
 
-BAND = ("--hurst", "0.8", "--q0", "0.1/mm", "--zeta-1", "50", "--h-rms", "800um")
-COMMANDS = {
-    "plain beside a unit": ((*BAND, "--h-max", "3", "-d", "1"), "--h-max without a unit beside numbers in mm"),
-    "gap without the surface's": (
-        ("--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3", "-d", "1mm"),
-        "give --length-unit",
-    ),
-    "pressure without E*": (("--surface", "concrete", "-p", "1MPa"), "needs a modulus"),
-    "pressure beside a plain E*": (("--surface", "concrete", "--E-star", "9", "-p", "1MPa"), "give E* with its unit"),
-    "no such unit": (("--surface", "concrete", "-d", "1", "--length-unit", "mn"), "'mn' is no known unit of length"),
-    "stress unit and no modulus": (("--surface", "concrete", "-d", "1", "--stress-unit", "MPa"), "no modulus"),
-    "multiples with a unit": (("--surface", "concrete", "-d", "1mm", "--over-h-rms"), "multiples of h_rms"),
-    "number with a unit": (("--surface", "concrete", "-a", "1mm"), "area has no unit"),
-}
-
-
-@pytest.mark.parametrize("case", COMMANDS)
-def test_conflicts_on_the_command_line(case):
-    arguments, said = COMMANDS[case]
-    assert said in refused("contact", *arguments)
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            "--hurst 0.8 --q0 0.1/mm --zeta-1 50 --h-rms 800um --h-max 3 -d 1",
+            "--h-max without a unit beside numbers in mm",
+        ),
+        ("--hurst 0.8 --q0 0.1 --zeta-1 50 --h-rms 1 --h-max 3 -d 1mm", "give --length-unit"),
+        ("--surface concrete -p 1MPa", "needs a modulus"),
+        ("--surface concrete --E-star 9 -p 1MPa", "give E* with its unit"),
+        ("--surface concrete -d 1 --length-unit mn", "'mn' is no known unit of length"),
+        ("--surface concrete -d 1 --stress-unit MPa", "no modulus"),
+        ("--surface concrete -d 1mm --over-h-rms", "multiples of h_rms"),
+        ("--surface concrete -a 1mm", "area has no unit"),
+    ],
+)
+def test_conflicts_on_the_command_line(arguments, said):
+    assert said in refused("contact", *arguments.split())
 
 
 def asked(*arguments):
@@ -227,15 +218,6 @@ def test_the_command_line_converts():
     assert (pascals["E_star"], pascals["stress_unit"], pascals["units"]["pressure"]) == (13.3e6, "Pa", "Pa")
 
 
-def test_h_rms_with_its_unit():
-    numbers = ("--hurst", "0.8", "--q0", "6.283/mm", "--zeta-1", "100", "--h-rms", "0.8um", "--h-max", "2.4um")
-    found = asked(*numbers, "-d", "1um", "--length-unit", "um")
-    assert found["surface"]["h_rms"] == 0.8
-    assert found["surface"]["q0"] == pytest.approx(6.283e-3, rel=1e-15)
-    assert found["columns"]["separation"] == [1.0]
-    assert asked(*numbers, "-d", "1um")["surface"]["length_unit"] == "mm"
-
-
 def test_a_surface_file_states_both_units(tmp_path):
     path = tmp_path / "s.toml"
     path.write_text('[surface]\nname = "concrete"\n[material]\nE_star = "0.0133 GPa"\nstress_unit = "MPa"\n')
@@ -244,54 +226,48 @@ def test_a_surface_file_states_both_units(tmp_path):
     # a modulus of the command line is in the file's unit, unless it has its own
     assert asked("--file", path, "--E-star", "20", "-d", "0.5")["E_star"] == 20
     assert asked("--file", path, "--E-star", "2GPa", "-d", "0.5")["stress_unit"] == "GPa"
-    assert asked("--file", path, "-d", "500", "--length-unit", "um", "--stress-unit", "Pa")["E_star"] == pytest.approx(
-        13.3e6
-    )
+    moved = asked("--file", path, "-d", "500", "--length-unit", "um", "--stress-unit", "Pa")
+    assert moved["E_star"] == pytest.approx(13.3e6)
 
 
 def test_a_scene_file_with_units(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(
-        SURFACE + 'h_max = "2.4 mm"\nlength_unit = "um"\n'
+        SURFACE + '"2.4 mm"\nlength_unit = "um"\n'
         '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", "200 kPa"]\n'
         '[effects]\non = ["pressure", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
     )
     found = Scene.from_toml(path).run()
     assert found["pressure"].values == pytest.approx([1e-4, 2e-4], rel=1e-4)
-    assert {name: found[name].attrs["units"] for name in ("pressure", "stiffness", "separation")} == {
-        "pressure": "GPa",
-        "stiffness": "GPa/um",
-        "separation": "um",
-    }
+    for name, unit in {"pressure": "GPa", "stiffness": "GPa/um", "separation": "um"}.items():
+        assert found[name].attrs["units"] == unit
     assert found.attrs["surface_h_rms"] == 800.0
 
 
 SOURCES = {
-    "named": ("--surface", "concrete"),
-    "numbers": tuple(
-        f"--{name.replace('_', '-')}={float(getattr(CONCRETE, name))!r}{unit}"
-        for name, unit in {"hurst": "", "q0": "/mm", "q1": "/mm", "h_rms": "mm", "h_max": "mm"}.items()
+    "named": ("--surface", "concrete", "--E-star", "13.3"),
+    "numbers": (
+        *("--hurst", CONCRETE.hurst, "--q0", f"{CONCRETE.q0}/mm", "--q1", f"{CONCRETE.q1}/mm"),
+        *("--h-rms", f"{CONCRETE.h_rms}mm", "--h-max", f"{CONCRETE.h_max}mm", "--E-star", "13.3"),
     ),
-    "file": ("--file", str(pathlib.Path(__file__).parents[1] / "examples" / "concrete.toml")),
+    "file": ("--file", pathlib.Path(__file__).parents[1] / "examples" / "concrete.toml"),
 }
 
 
 @pytest.mark.parametrize("source", SOURCES)
 def test_an_export_converts_what_knows_its_unit(source, tmp_path):
-    """A surface in mm, asked for in m: until now its numbers were written as metres."""
-    material = () if source == "file" else ("--E-star", "13.3")
-    laws = {}
-    for length, stress in (("mm", "MPa"), ("m", "MPa")):
-        path = tmp_path / f"{length}.json"
-        arguments = (*SOURCES[source], *material, "--length-unit", length, "--stress-unit", stress)
-        run("export", "json", *arguments, "--rows", 20, "--out", path)
-        laws[length] = json.loads(path.read_text())
-    assert any("h_max = 0.0011;" in line or "h_max = 0.0011 " in line for line in laws["m"]["comments"][2:3])
-    assert laws["m"]["x_unit"] == "m"
-    ends = {unit: law["columns"]["overclosure"][-1] for unit, law in laws.items()}
-    assert ends["m"] == pytest.approx(1e-3 * ends["mm"], rel=1e-6)
-    tops = {unit: law["columns"]["pressure"][-1] for unit, law in laws.items()}
-    assert tops["m"] == pytest.approx(tops["mm"], rel=1e-3)
+    """A surface in mm, asked for in m: once its numbers were written as metres."""
+    laws = []
+    for unit in ("mm", "m"):
+        path = tmp_path / f"{unit}.json"
+        units = ("--length-unit", unit, "--stress-unit", "MPa")
+        run("export", "json", *SOURCES[source], *units, "--rows", 20, "--out", path)
+        laws.append(json.loads(path.read_text()))
+    (_, in_m), columns = laws, [law["columns"] for law in laws]
+    assert any("h_max = 0.0011;" in line or "h_max = 0.0011 " in line for line in in_m["comments"][2:3])
+    assert in_m["x_unit"] == "m"
+    assert columns[1]["overclosure"][-1] == pytest.approx(1e-3 * columns[0]["overclosure"][-1], rel=1e-6)
+    assert columns[1]["pressure"][-1] == pytest.approx(columns[0]["pressure"][-1], rel=1e-3)
 
 
 def test_an_export_keeps_the_surfaces_unit():
@@ -301,12 +277,6 @@ def test_an_export_keeps_the_surfaces_unit():
     assert (other.x_unit, other.y_unit) == ("um", "kPa")
     np.testing.assert_allclose(other.x, 1e3 * law.x, rtol=2e-6)
     np.testing.assert_allclose(other.y, 1e3 * law.y, rtol=1e-5)
-
-
-def test_the_factor_is_rounded_once():
-    assert factor("um", "mm") == 1e-3
-    assert factor("nm", "mm", power=-2) == 1e12
-    assert factor("GPa", "MPa", "stress") == 1e3
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])

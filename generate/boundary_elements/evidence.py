@@ -12,7 +12,7 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from scipy.special import erf, erfinv
 
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, TRAINING
+from generate.boundary_elements.design import REFINEMENT, SPLITS
 from mbma_tables import Surface
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness
@@ -49,6 +49,11 @@ class Simulated:
     def zeta_1(self) -> float:
         """q1/q0."""
         return float(self.node[2])
+
+    @property
+    def gaussian(self) -> bool:
+        """Whether constants of the spectrum's law are fitted to surfaces like it."""
+        return self.kind in GAUSSIAN and self.waves >= MIN_WAVES
 
     @property
     def surface(self) -> AnySurface:
@@ -110,11 +115,6 @@ class Case(Simulated):
     area: FloatArray
     u: FloatArray
 
-    @property
-    def gaussian(self) -> bool:
-        """Whether constants of the spectrum's law are fitted to surfaces like it."""
-        return self.kind in GAUSSIAN and self.waves >= MIN_WAVES
-
     def at(self, kept: Any) -> Case:
         """The same at some of its loads."""
         return dataclasses.replace(self, force=self.force[kept], area=self.area[kept], u=self.u[kept])
@@ -126,38 +126,6 @@ class Case(Simulated):
     def map_law(self, constants: Constants, map_constants: MapConstants) -> MapLaw:
         """The map's law."""
         return MapLaw(self.own_spectrum, **self.curves, constants=constants, map_constants=map_constants)
-
-
-def simulated(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, tuple[Any, ...]]]:
-    """Surfaces of a file by `python -m generate`, refinements left out, and the fields of `Simulated`."""
-    kinds = data.kind.attrs["flag_meanings"].split()
-    for number in range(data.sizes["surface"]):
-        one = data.isel(surface=number)
-        if (split := SPLITS[int(one.split)]) not in (TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM):
-            continue
-        kind, hurst, zeta_1 = kinds[int(one.kind)], float(one.hurst), float(one.zeta_1)
-        share, x = one.band_variance.values, one.band_q.values
-        own = Spectrum.from_shares(x[share > 0], share[share > 0])
-        spectrum = Spectrum.self_affine(hurst, zeta_1) if kind in ("self_affine", "yielded") else own
-        node = (kind, hurst, zeta_1, int(one.waves), float(one["shape"]))
-        yield one, (kind, split, node, int(one.waves), int(one.points), spectrum, own, float(one.h_max))
-
-
-def curves_of(one: xr.Dataset) -> dict[str, Any]:
-    """What a map's law knows of a surface beside its spectrum."""
-    names = ("mean_height", "top_gradient", "tension_force", "tension")
-    return {name: one[name].values.astype(float) for name in names} | {"anisotropy": float(one.anisotropy)}
-
-
-def cases(data: xr.Dataset) -> list[Case]:
-    """Surfaces of a file by `python -m generate boundary_elements`, refinements left out."""
-    found = []
-    for one, known in simulated(data):
-        seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < MAX_AREA)
-        loads = (one[name].values[seen] for name in ("force", "area", "mean_separation"))
-        parts: list[Any] = [*known, curves_of(one), *loads]
-        found.append(Case(*parts))
-    return found
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -190,9 +158,9 @@ class Capped(Simulated):
     @functools.cached_property
     def elastic(self) -> tuple[FloatArray, FloatArray]:
         """Simulated force and stiffness at these gaps; by the law, fitted at its end, where not pressed so far."""
-        u, found = self.bare["mean_separation"], []
+        u, found = self.bare["u"], []
         laws = self.by_law, self.law.force_and_stiffness(u[-1:])
-        for name, beyond, end in zip(("force", "frozen_stiffness"), *laws, strict=True):
+        for name, beyond, end in zip(("force", "frozen"), *laws, strict=True):
             known = PchipInterpolator(u[::-1], np.log(self.bare[name][::-1]))
             inside = np.exp(known(np.maximum(self.u, u[-1])))
             found.append(np.where(self.u > u[-1], inside, beyond * self.bare[name][-1] / end[0]))
@@ -214,24 +182,55 @@ class Capped(Simulated):
         return self.heights(self.u)[0], hardness.bearing_share(self.u, self.h_max)[0]
 
 
+def simulated(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, Simulated]]:
+    """Surfaces of a file by `python -m generate`, refinements left out."""
+    kinds = data.kind.attrs["flag_meanings"].split()
+    for one in (data.isel(surface=number) for number in np.flatnonzero(data.split.values < SPLITS.index(REFINEMENT))):
+        kind, hurst, zeta_1 = kinds[int(one.kind)], float(one.hurst), float(one.zeta_1)
+        share, x = one.band_variance.values, one.band_q.values
+        own = Spectrum.from_shares(x[share > 0], share[share > 0])
+        spectrum = Spectrum.self_affine(hurst, zeta_1) if kind in ("self_affine", "yielded") else own
+        node, waves = (kind, hurst, zeta_1, int(one.waves), float(one["shape"])), int(one.waves)
+        split, points, h_max = SPLITS[int(one.split)], int(one.points), float(one.h_max)
+        yield one, Simulated(kind, split, node, waves, points, spectrum, own, h_max)
+
+
+def curves_of(one: xr.Dataset) -> dict[str, Any]:
+    """What a map's law knows of a surface beside its spectrum."""
+    names = ("mean_height", "top_gradient", "tension_force", "tension")
+    return {name: one[name].values.astype(float) for name in names} | {"anisotropy": float(one.anisotropy)}
+
+
+def cases(data: xr.Dataset) -> list[Case]:
+    """Surfaces of a file by `python -m generate boundary_elements`, refinements left out."""
+    found = []
+    for one, known in simulated(data):
+        seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < MAX_AREA)
+        loads = [one[name].values[seen] for name in ("force", "area", "mean_separation")]
+        found.append(
+            Case(**vars(known), curves=curves_of(one), **dict(zip(("force", "area", "u"), loads, strict=True)))
+        )
+    return found
+
+
 def capped(data: xr.Dataset) -> list[Capped]:
     """Surfaces of a file by `python -m generate boundary_elements --of hardness`, refinements left out."""
     found = []
-    names = ("force", "area", "area_yielded", "mean_separation", "plane_separation", "frozen_stiffness")
+    names = {"force": "force", "area": "area", "yielded": "area_yielded", "u": "mean_separation"}
+    names |= {"planes": "plane_separation", "frozen": "frozen_stiffness"}
     for one, known in simulated(data):
-        own, spectrum, h_max = Simulated(*known), known[5], known[7]
-        curves, u = curves_of(one), h_max * LEVELS[:-1]
-        law, by_map = Law(spectrum, h_max), Curve(MapLaw(own.own_spectrum, **curves), h_max)
-        heights = hardness.BearingCurve(curves["mean_height"], h_max)
+        curves, u = curves_of(one), known.h_max * LEVELS[:-1]
+        law, by_map = Law(known.spectrum, known.h_max), Curve(MapLaw(known.own_spectrum, **curves), known.h_max)
+        heights = hardness.BearingCurve(curves["mean_height"], known.h_max)
         force, _, stiffness = by_map.answer(u)
         levels = {
-            "calibrated": (*law.force_and_stiffness(u), hardness.bearing_share(u, h_max)[0]),
+            "calibrated": (*law.force_and_stiffness(u), hardness.bearing_share(u, known.h_max)[0]),
             "calibrated_map": (force, stiffness, heights(u)[0]),
         }
-        rows = {name: one[name].values.astype(float) for name in names}
-        elastic = {name: values[-1] for name, values in rows.items()}
+        rows = {own: one[name].values.astype(float) for own, name in names.items()}
+        fixed: dict[str, Any] = {"law": law, "map_curve": by_map, "heights": heights, "curves": levels}
+        fixed["bare"] = {own: values[-1] for own, values in rows.items()}
         for row, eta in enumerate(data.eta.values[:-1]):
-            loads = (rows[name][row] for name in names)
-            parts: list[Any] = [*known, float(eta), law, by_map, heights, levels, *loads, elastic]
-            found.append(Capped(*parts))
+            loads = {own: values[row] for own, values in rows.items()}
+            found.append(Capped(**vars(known), eta=float(eta), **fixed, **loads))
     return found

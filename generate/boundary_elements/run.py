@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-import concurrent.futures
 import functools
 import pathlib
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import click
 from tqdm import tqdm
 
-from generate.boundary_elements.capped import simulate_capped
+from generate.boundary_elements.capped import simulate_capped, solve_flow
 from generate.boundary_elements.collect import collect, dataset
 from generate.boundary_elements.design import Task, campaign
-from generate.boundary_elements.leakage import solve_flow
 from generate.boundary_elements.solve import simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe
+from generate.workers import Pool, attempts, executor
 
 SOLVERS = {"elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow}
 
 
 def run(
-    tasks: Sequence[Task],
-    folder: pathlib.Path,
-    pool: concurrent.futures.Executor | None = None,
-    solve: Callable[[Recipe, str], str] = simulate_to,
+    tasks: Sequence[Task], folder: pathlib.Path, pool: Pool = None, solve: Callable[[Recipe, str], str] = simulate_to
 ) -> None:
     """Solve what `folder` does not hold yet, one file a surface; no pool: here, one after the other.
 
@@ -33,26 +29,14 @@ def run(
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
-    futures = [] if pool is None else [pool.submit(solve, recipe, str(folder)) for recipe in missing]
-    if pool is None:
-        attempts: Iterator[Callable[[], str]] = (functools.partial(solve, r, str(folder)) for r in missing)
-    else:
-        attempts = (future.result for future in concurrent.futures.as_completed(futures))
-    # a terminal may say that it has no columns
-    width = shutil.get_terminal_size().columns
-    done = len(tasks) - len(missing)
-    failures = []
+    # a terminal may have no columns
+    width, done, failures = shutil.get_terminal_size().columns, len(tasks) - len(missing), list[str]()
     with tqdm(total=len(tasks), initial=done, desc="surfaces", unit="surface", ncols=width, disable=None) as bar:
-        for attempt in attempts:
+        for _, finish in attempts(pool, solve, {recipe.name: (recipe, str(folder)) for recipe in missing}):
             try:
-                attempt()
+                finish()
             except RuntimeError as fault:
                 failures.append(str(fault))
-            except BaseException:
-                # else leaving the pool waits for all of them
-                for future in futures:
-                    future.cancel()
-                raise
             bar.update()
     if failures:
         raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
@@ -80,8 +64,6 @@ def boundary_elements(
 
     Stopped and called again, it goes on where it was. Small grids come first, every kind of surface in turn.
     """
-    from generate.tables.commands import executor
-
     folder = folder or pathlib.Path("boundary_elements", kind)
     tasks = [task for task in campaign(kind) if task.recipe.points <= points]
     if target is not None:

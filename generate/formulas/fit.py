@@ -1,37 +1,69 @@
-"""What the fits of islands and of totals share: rounding, the least largest error, and the certificate.
+"""`python -m generate formulas`: fit the coefficients of the closed forms again, certify them on other samples.
 
-Terms are selected by comparing sums over thousands of samples, whose last digits depend on the processor. The same
-terms come out on all of them because samples are rounded to `DATA_DIGITS` first, the systems that are solved on the way
-are well conditioned, and scores are compared after rounding to `SCORE_DIGITS`; the first in a fixed order wins a tie.
+The terms are those of `core/closed_forms.h`; docs/formula.md says how they were chosen. Samples are rounded to
+`DATA_DIGITS`, so that the same coefficients come out on all processors.
+
+With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X, mu)), right as
+mu -> 0 whatever Q is. Log Q is its own limit at large X, which is the smooth sphere of Hertz, and a sum of terms that
+vanish there.
+
+Totals have two branches, which meet where the largest islands reach the floor of zeta_d, at r = k with
+r = (h_max - d)/h_rms. Their logarithms are a start, such as the power of first contact, and a sum of products.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Mapping
 from typing import Any
 
+import click
 import numpy as np
+import sympy
 
+from generate.formulas.printing import HEADER, MODULE, Function, Step, evaluate, read_functions, write_forms
+from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import Certificate
+from mbma_tables.models.closed_form_certificates import RANGES
 
 DATA_DIGITS = 10
-SCORE_DIGITS = 6
 MIN_DIGITS, MAX_DIGITS = 2, 15  # of a printed constant
 LAWSON_ROUNDS = 80
+SUMS = ("log_Q", "near", "far")  # steps that have fitted coefficients
+SLACK = {"phi": 1.02, "totals": 1.01}  # what rounding may add to the largest error
+
+# islands
+SOLVED = 1e-10
+MIN_MU = 1e-6
+POINTS, HELD_OUT = 3000, 20_000
+FIT_SEED, HELD_OUT_SEED = 31, 32
+GRID = 300  # a side, of the check that both rise with X
+# Phi_rigid mu^-1/(limit of Phi) at large X: (pi/5) X^(5/2) over (4/3) X^(3/2)/sqrt(2), and (pi/2) X^2 over
+# (3 pi/8) (3 sqrt(32)/(3 pi))^(2/3) X^(4/3) mu^(-2/3)
+HERTZ = (3 * math.sqrt(2) * math.pi / 20, (2 * math.pi**2) ** (1 / 3) / 3)
+
+# totals
+MIN_AREA = 1e-6
+MARGIN = 0.7  # samples of the fit go down to this share of it
+MIN_PENETRATION = 0.03  # r below which no surface of the range reaches MARGIN*MIN_AREA
+OVERLAP = 0.02  # of k, by which the samples of the branches overlap
+TOTAL_POINTS, TOTAL_HELD_OUT = 40_000, 60_000
+EDGE = 0.3  # share of each property that lies on an end of its range, where the error is largest
+TOTAL_SEED, TOTAL_HELD_OUT_SEED = 41, 42
+
+Samples = tuple[dict[str, FloatArray], dict[str, FloatArray]]  # arguments and results
 
 
-def rounded(values: FloatArray, digits: int) -> FloatArray:
+def rounded(values: FloatArray, digits: int = DATA_DIGITS) -> FloatArray:
     """Values with that many significant digits."""
     flat = [float(f"{value:.{digits}g}") for value in np.ravel(values).tolist()]
     return np.array(flat).reshape(np.shape(values))
-
-
-def score(error: float) -> float:
-    """An error as it is compared with others."""
-    return float(f"{error:.{SCORE_DIGITS}g}")
 
 
 def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS) -> tuple[float, FloatArray]:
@@ -44,8 +76,7 @@ def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS
     (2.0, 2.0)
     """
     weight: Any = np.ones(target.size)
-    best = math.inf
-    found = np.zeros(A.shape[1])
+    best, found = math.inf, np.zeros(A.shape[1])
     for _ in range(rounds):
         root = np.sqrt(weight)
         trial = np.linalg.lstsq(A * root[:, None], target * root, rcond=1e-13)[0]
@@ -58,14 +89,8 @@ def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS
     return best, found
 
 
-def fewest_digits(largest: Callable[[int], float], slack: float) -> int:
-    """Digits that constants need for an error of at most `slack` times that of constants in full."""
-    allowed = slack * largest(MAX_DIGITS)
-    return next(digits for digits in itertools.count(MIN_DIGITS) if largest(digits) <= allowed)
-
-
 def certificate(coefficients: int, error: FloatArray, given: Mapping[str, FloatArray]) -> Certificate:
-    """What held-out relative errors say; the largest is rounded up."""
+    """Certificate of held-out relative errors; the largest is rounded up."""
     worst = int(error.argmax())
     unit = 10.0 ** (math.floor(math.log10(error[worst])) - 2)
     return Certificate(
@@ -75,3 +100,163 @@ def certificate(coefficients: int, error: FloatArray, given: Mapping[str, FloatA
         points=error.size,
         worst_at={name: float(f"{values[worst]:.4g}") for name, values in given.items()},
     )
+
+
+@functools.cache
+def islands(form: str, count: int, seed: int) -> Samples:
+    """X and mu of the range, a twelfth of them on each edge but mu -> 0, and its corners; exact solves there."""
+    (min_X, max_X), (_, max_mu) = RANGES[form]["X"], RANGES[form]["mu"]
+    rng = np.random.default_rng(seed)
+    x = (min_X + 2) * ((max_X + 2) / (min_X + 2)) ** rng.uniform(size=count) - 2
+    mu = np.exp(rng.uniform(math.log(MIN_MU), math.log(max_mu), count))
+    share = count // 12
+    x[:share], x[share : 2 * share], mu[2 * share : 3 * share] = min_X, max_X, max_mu
+    # corners, where fits are worst
+    x[-4:], mu[-4:] = [min_X, max_X] * 2, [MIN_MU] * 2 + [max_mu] * 2
+    x, mu = rounded(np.clip(x, min_X, max_X)), rounded(mu)
+    found = greenwood_tripp.solve(x, mu, rtol=SOLVED)
+    rigid = greenwood_tripp.rigid_sphere(x, mu)
+    phi = rigid * np.exp(rounded(np.log(np.stack([found.phi_F, found.phi_A]) / rigid)))
+    return {"X": x, "mu": mu}, dict(zip(("phi_F", "phi_A"), phi, strict=True))
+
+
+@functools.cache
+def totals(count: int, seed: int, min_area: float = MIN_AREA) -> Samples:
+    """Random surfaces and gaps, a share of each property on the ends of its range, where contact is above `min_area`.
+
+    Force and area by the universal table (error 1e-8).
+    """
+    rng, ranges = np.random.default_rng(seed), RANGES["totals"]
+
+    def drawn(low: float, high: float) -> FloatArray:
+        place = rng.uniform(-EDGE / 2, 1 + EDGE / 2, count)
+        return low + (high - low) * np.clip(place, 0.0, 1.0)
+
+    hurst = drawn(*ranges["hurst"])
+    zeta_1 = np.clip(np.exp(drawn(*np.log(ranges["zeta_1"]))), *ranges["zeta_1"])
+    top = drawn(*ranges["h_max_over_h_rms"])
+    r = np.minimum(np.exp(rng.uniform(np.log(MIN_PENETRATION), np.log(2 * top))), 2 * top)
+    part = rng.uniform(size=count)
+    # full compression; evenly in d; and where the branches meet, which no random point hits
+    r = np.where(part < 0.03, 2 * top, np.where(part < 0.35, rng.uniform(0.1, 1.0, count) * 2 * top, r))
+    meet = 2.25 * np.sqrt(1.5 ** (-2 * hurst) - zeta_1 ** (-2 * hurst)) * rng.uniform(1 - OVERLAP, 1 + OVERLAP, count)
+    r = np.where(part > 0.9, meet, r)
+    top, zeta_1, hurst = (rounded(values) for values in (top, zeta_1, hurst))
+    # full compression stays within -h_max as top is rounded before r is taken off it
+    gap = np.maximum(rounded(top - r), -top)
+    found = contact(Surface(hurst, 1.0, zeta_1, 1.0, top), separation=gap)
+    kept = found.area > min_area
+    given = {"d_over_h_rms": gap, "h_max_over_h_rms": top, "zeta_1": zeta_1, "hurst": hurst}
+    results = {"pressure": np.asarray(found.pressure), "area": np.asarray(found.area)}
+    return {name: a[kept] for name, a in given.items()}, {name: a[kept] for name, a in results.items()}
+
+
+def log_Q(which: int, X: FloatArray, mu: FloatArray, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Log Q less its limit at large X, and how much of an error of log Q is one of log Phi."""
+    growth = np.expm1(rounded(np.log(greenwood_tripp.rigid_sphere(X, mu)[which] / phi)))
+    limit = np.log(HERTZ[which] * (X + 1)) - (np.log1p(mu * (X + 1)) / 3 if which else 0)
+    return np.log(growth / mu) - limit, growth / (1 + growth)
+
+
+def terms(name: str, value: sympy.Expr) -> tuple[sympy.Expr, list[sympy.Expr]]:
+    """Of a sum what is not fitted, and the fitted terms without their coefficients, which are Floats."""
+    kept, found = sympy.Integer(0), []
+    for term in sympy.Add.make_args(value):
+        coefficient, rest = term.as_coeff_Mul()
+        if coefficient.is_Float:
+            found.append(rest)
+        else:
+            kept += term
+    return kept, sorted(found, key=_order) if name == "log_Q" else found
+
+
+def _order(product: sympy.Expr) -> tuple[Any, ...]:
+    """Place of a term among those of an island; the last digits of a fit depend on it."""
+    powers = {str(symbol): int(power) for symbol, power in product.as_powers_dict().items()}
+    letters = "v" in powers, "z" in powers and "u" in powers, "z" not in powers
+    return (*letters, powers.get("u", 0), sum(powers.values()))
+
+
+def coefficients(function: Function, name: str, value: sympy.Expr) -> FloatArray:
+    """Coefficients of the terms of one sum of a function, of least largest error."""
+    start, products = terms(name, value)
+    if name == "log_Q":
+        given, truth = islands(function.form, POINTS, FIT_SEED)
+        which = ("phi_F", "phi_A").index(function.result)
+        target, weight = log_Q(which, given["X"], given["mu"], truth[function.result])
+        named = evaluate(function.steps, given)
+    else:
+        given, truth = totals(TOTAL_POINTS, TOTAL_SEED, MARGIN * MIN_AREA)
+        named = evaluate([*function.steps, ("start", start)], given)
+        place = named["r"] / named["k"]
+        mine = place > 1 - OVERLAP if name == "far" else place < 1 + OVERLAP
+        target = rounded((np.log(truth[function.result]) - named["start"])[mine])
+        used = {str(symbol) for product in products for symbol in product.free_symbols}
+        named, weight = {name: rounded(named[name][mine]) for name in used}, np.ones(target.size)
+    ones = np.ones_like(target)
+    columns = []
+    for product in products:
+        powers = (named[str(x)] ** int(n) for x, n in product.as_powers_dict().items() if x.is_Symbol)
+        columns.append(functools.reduce(np.multiply, powers, ones) * weight)
+    return least_largest(np.stack(columns, axis=1), target * weight)[1]
+
+
+def refitted(function: Function, fits: Mapping[str, FloatArray], digits: int) -> tuple[Step, ...]:
+    """The steps of a function with these coefficients, of so many digits."""
+
+    def value_of(name: str, value: sympy.Expr) -> sympy.Expr:
+        if name not in fits:
+            return value
+        start, products = terms(name, value)
+        pairs = zip(rounded(fits[name], digits).tolist(), products, strict=True)
+        return sympy.Add(start, *(sympy.Float(c) * product for c, product in pairs))
+
+    return tuple((name, value_of(name, value)) for name, value in function.steps)
+
+
+def rises(steps: tuple[Step, ...], result: str, ranges: Mapping[str, tuple[float, float]]) -> bool:
+    """Whether a function of islands is positive and rises with X, on a grid of the range."""
+    x, mu = np.linspace(*ranges["X"], GRID), np.geomspace(MIN_MU, ranges["mu"][1], GRID)
+    field = evaluate(steps, dict(zip(("X", "mu"), np.meshgrid(x, mu, indexing="ij"), strict=True)))[result]
+    return bool((field > 0).all() and (np.diff(field, axis=0) > 0).all())
+
+
+def certified(function: Function) -> tuple[Function, Certificate]:
+    """A function with coefficients fitted again, as short as its error allows, and its certificate."""
+    fits = {name: coefficients(function, name, value) for name, value in function.steps if name in SUMS}
+    is_total = function.form == "totals"
+    sets: list[Samples] = []
+    if is_total:
+        sets += totals(TOTAL_POINTS, TOTAL_SEED), totals(TOTAL_HELD_OUT, TOTAL_HELD_OUT_SEED)
+    else:
+        sets += (islands(function.form, *some) for some in ((POINTS, FIT_SEED), (HELD_OUT, HELD_OUT_SEED)))
+
+    def errors(steps: tuple[Step, ...], samples: Samples) -> FloatArray:
+        given, truth = samples
+        return np.asarray(np.abs(evaluate(steps, given)[function.result] / truth[function.result] - 1))
+
+    def largest(digits: int) -> float:
+        return float(errors(refitted(function, fits, digits), sets[0]).max())
+
+    allowed = SLACK["totals" if is_total else "phi"] * largest(MAX_DIGITS)
+    digits = next(digits for digits in itertools.count(MIN_DIGITS) if largest(digits) <= allowed)
+    steps = refitted(function, fits, digits)
+    if not is_total and not rises(steps, function.result, RANGES[function.form]):
+        raise RuntimeError(f"{function.result} of the {function.form} form does not rise with X everywhere")
+    # an island's c, and b and g where they are used, beside the coefficients
+    shape = 0 if is_total else 1 + sum(name in ("y", "v") for name, _ in steps)
+    found = certificate(shape + sum(map(len, fits.values())), errors(steps, sets[1]), sets[1][0])
+    title = re.sub(r"within .*", f"within {found.largest:g}.", function.title)
+    return dataclasses.replace(function, steps=steps, title=title), found
+
+
+@click.command()
+def formulas() -> None:
+    """Fit and certify the closed forms; write their C and the Python module of their certificates (a minute)."""
+    found = [certified(function) for function in read_functions(HEADER.read_text(encoding="utf-8")).values()]
+    certificates: dict[str, dict[str, Certificate]] = {form: {} for form in RANGES}
+    for function, one in found:
+        certificates[function.form][function.result] = one
+        click.echo(f"{function.name}: largest held-out error {one.largest:.2e}")
+    write_forms([function for function, _ in found], RANGES, certificates)
+    click.echo(MODULE)

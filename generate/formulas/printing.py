@@ -74,16 +74,6 @@ class Function:
         return f"{self.form}_{self.result}"
 
 
-@dataclasses.dataclass(frozen=True)
-class Form:
-    """Fitted functions of one form with their range and certificates."""
-
-    name: str
-    ranges: Ranges
-    functions: tuple[Function, ...]
-    certificates: dict[str, Certificate]
-
-
 class _Numpy(NumPyPrinter):  # type: ignore[misc]
     """Numpy functions by their bare names, literals in shortest decimals."""
 
@@ -199,17 +189,6 @@ def steps_of(assignments: Iterable[tuple[str, str]], arguments: Iterable[str]) -
     return tuple(steps)
 
 
-def needed(steps: list[Step]) -> tuple[Step, ...]:
-    """The steps that the last one needs, in their order."""
-    wanted = {steps[-1][0]}
-    kept: list[Step] = []
-    for name, value in reversed(steps):
-        if name in wanted:
-            kept.insert(0, (name, value))
-            wanted |= {symbol.name for symbol in value.free_symbols}
-    return tuple(kept)
-
-
 def read_functions(header: str) -> dict[str, Function]:
     """The functions of a header's text by name, their right-hand sides as sympy expressions."""
     found = {}
@@ -248,9 +227,9 @@ def latex_steps(function: Function) -> list[str]:
     return lines
 
 
-def write_forms(forms: Iterable[Form]) -> None:
+def write_forms(
+    functions: Iterable[Function], ranges: dict[str, Ranges], certificates: dict[str, dict[str, Certificate]]
+) -> None:
     """Write the header and the module."""
-    forms = list(forms)
-    write_file(HEADER, header_text(function for form in forms for function in form.functions).encode())
-    certificates = {form.name: form.certificates for form in forms}
-    write_file(MODULE, module_text({form.name: form.ranges for form in forms}, certificates).encode())
+    write_file(HEADER, header_text(functions).encode())
+    write_file(MODULE, module_text(ranges, certificates).encode())

@@ -18,7 +18,7 @@ from generate.boundary_elements.design import Task
 from generate.boundary_elements.run import run
 from generate.boundary_elements.solve import simulate_to
 from generate.machined.makers import FAMILIES, Part
-from generate.machined.solve import answered, solved, surface_of
+from generate.machined.solve import APART, answered, solved, surface_of
 from generate.provenance import source_digest, versions
 
 NUMBERS = 5  # parts of each family
@@ -37,6 +37,8 @@ MEANINGS = {
     "area_scatter": "of ln A at equal F",
     "stiffness_scatter": "of ln of the stiffness at equal F",
     "flow_scatter": "of ln of the flow coefficient",
+    **{f"{name}_by_law": f"what the law differs by, as an error of {name}" for name in APART},
+    **{f"{name}_by_quarter": f"what the quarter grid differs by, likewise of {name}" for name in APART},
     "valid": "1 where the contact is stated to be like those tested",
     "flow_valid": "1 where its flow is",
 }

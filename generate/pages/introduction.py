@@ -1,4 +1,4 @@
-"""Measured parts of README.md, docs/ten_minutes.md, docs/theories.md and docs/formula.md."""
+"""Measured parts of README.md, docs/theories.md and docs/formula.md."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.special import erf
 from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import MIN_WAVES
 from generate.formulas.printing import HEADER, latex_steps, read_functions
-from generate.pages.page import Measured, duration, evidence, panels, table, unmarked
+from generate.pages.page import Measured, duration, evidence, table, unmarked
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.plots import Curve, draw_compression, theory_label
@@ -33,7 +33,6 @@ ROWS = {
     ("boundary elements", "256 x 256, cold"): "for comparison: BEM on 256 x 256 points",
 }
 PRESSURES = (1e-4, 1e-3, 1e-2)  # over E*
-INK, BODY, PLANE = "#1f3b57", "#b8c7d6", "#c0392b"
 
 
 def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
@@ -151,43 +150,3 @@ def theories() -> Measured:
     by_gap.set_ylim(1e-8, 20)
     by_force.set(xlim=(1e-6, 10), ylim=(1e-6, 5))
     return {"answers": text}, {"docs/figures/theories.svg": figure}
-
-
-def ten_minutes() -> Measured:
-    """A rough profile under a rigid plane: undeformed, with d, h_max and islands, and pressed flat, with u."""
-    x, waves, rng = np.linspace(0, 1, 500), np.arange(2, 60)[:, None], np.random.default_rng(11)
-    phases = rng.uniform(0, 2 * np.pi, waves.size)[:, None]
-    z = np.sum(waves**-1.2 * np.cos(2 * np.pi * waves * x + phases), axis=0)
-    z = (z - z.mean()) / z.std()
-    highest, d = float(z.max()), 0.35 * float(z.max())
-    pressed = np.minimum(z, d)  # drawn, not solved
-    figure, (left, right) = panels(1, 2, (10.5, 3.0), sharey=True)
-
-    def level(axes: Any, height: float, text: str, colour: str, style: str) -> None:
-        axes.plot([-0.13, 1], [height, height], color=colour, ls=style, lw=1.2)
-        axes.text(1.01, height, text, color=colour, fontsize=8, va="center")
-
-    def arrow(axes: Any, place: float, low: float, high: float, text: str) -> None:
-        axes.annotate("", (place, high), (place, low), arrowprops={"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0})
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 1}
-        axes.text(place + 0.015, (low + high) / 2, text, fontsize=9, va="center", bbox=box)
-
-    titles = "undeformed profile", "deformed: summits flattened, the rest pushed down"
-    for axes, line, title in zip((left, right), (z, pressed), titles, strict=True):
-        axes.set_axis_off()
-        axes.set_xlim(-0.16, 1.25)
-        axes.set_title(title, fontsize=10)
-        axes.fill_between(x, line, -3.4, color=BODY, lw=0)
-        axes.plot(x, line, color=INK, lw=1)
-        level(axes, d, "rigid plane", PLANE, "-")
-    left.fill_between(x, d, z, where=(z > d).tolist(), color=PLANE, alpha=0.35, lw=0)
-    level(left, 0.0, "mid-plane", INK, "--")
-    level(left, highest, "first contact", INK, ":")
-    arrow(left, -0.055, 0, d, "d")
-    arrow(left, -0.125, 0, highest, "h_max")
-    arrow(left, float(x[z.argmax()]), d, highest, "delta")
-    left.text(0.65, highest * 0.65, "contact\nislands", fontsize=9, color=PLANE, ha="center", va="center")
-    mean = float(pressed.mean())
-    level(right, mean, "mean plane", INK, "--")
-    arrow(right, -0.055, mean, d, "u")
-    return {}, {"docs/figures/sketch.svg": figure}

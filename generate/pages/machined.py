@@ -2,48 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from generate.machined.campaign import FORMS
-from generate.machined.makers import FAMILIES
-from generate.pages.page import DATA, Measured, dataset, table
+from generate.machined.coverage import left_out
+from generate.machined.errors import QUANTITIES, coverage, errors, seen
+from generate.machined.makers import FAMILIES, Part, heights
+from generate.pages.page import DATA, Measured, dataset, panels, table
 from mbma_tables.common.arguments import FloatArray
 
-QUANTITIES = ("area", "pressure", "stiffness", "flow")
-RANGES = {"calibrated": (0.01, 0.6), "corrected": (0.01, 0.6), "simulated": (0.01, 0.9)}  # A/A0 whose errors are told
-FLOW_AREA = 0.2
-
-
-def errors(data: xr.Dataset, form: str, quantity: str) -> FloatArray:
-    """Of ln A and ln stiffness at equal F, of ln F at equal u, of ln flow along both axes, (surfaces, loads, axes)."""
-    if quantity == "pressure":
-        missed = data[f"{form}_mean_separation"] - data.mean_separation
-        found = np.asarray(missed * data.stiffness / data.pressure, float)
-        return found.reshape(*found.shape, 1)
-    names = ("flow_x", "flow_y") if quantity == "flow" else (quantity,)
-    pairs = [(data[f"{form}_{name}"].values, data[name].values) for name in names]
-    with np.errstate(all="ignore"):
-        ratio = np.stack([np.log(answer / truth) for answer, truth in pairs], axis=-1)
-    return np.where(np.isfinite(ratio), ratio, np.nan)
-
-
-def seen(data: xr.Dataset, form: str, quantity: str) -> FloatArray:
-    """Which entries count: of contact areas in range, of flow those where neither is blocked."""
-    low, high = RANGES[form] if quantity != "flow" else (0.0, FLOW_AREA)
-    inside = (data.area.values > low) & (data.area.values < high)
-    return np.asarray(inside[..., None] & np.isfinite(errors(data, form, quantity)))
-
-
-def coverage(data: xr.Dataset, form: str, quantity: str, valid: bool | None = None) -> tuple[float, float, int]:
-    """Shares of errors within one and two stated standard deviations, and their number; of `valid` entries alone."""
-    ratio = np.abs(errors(data, form, quantity)) / data[f"{form}_{quantity}_scatter"].values[..., None]
-    own = data[f"{form}_{'flow_' if quantity == 'flow' else ''}valid"].values > 0.5
-    kept = seen(data, form, quantity) & np.isfinite(ratio)
-    if valid is not None:
-        kept &= own[..., None] == valid
-    ratio = ratio[kept]
-    return (*(float(np.mean(ratio < by)) if ratio.size else np.nan for by in (1, 2)), ratio.size)
+SHOWN, THINNED = 1, 6  # number of the map that is drawn of each family, and of its points one in so many
 
 
 def _by_family(data: xr.Dataset, form: str) -> str:
@@ -59,6 +30,51 @@ def _by_family(data: xr.Dataset, form: str) -> str:
     return table("family (maps) | ln A | ln F at equal u | ln stiffness | ln flow, A < 20% | valid", lines)
 
 
+def _left_out(data: xr.Dataset, form: str) -> str:
+    columns = [left_out(data, form, quantity) for quantity in QUANTITIES]
+    pooled = [{"all": np.concatenate([*column.values()]), **column} for column in columns]
+    rows = [[name, *(_shares(column[name]) for column in pooled)] for name in pooled[0]]
+    rows = [row for row in rows if any(row[1:])]
+    return table("family | area | pressure | stiffness | flow", rows)
+
+
+def _shares(ratio: FloatArray) -> str:
+    return f"{np.mean(ratio < 1):.2f}, {np.mean(ratio < 2):.2f} ({ratio.size})" if ratio.size else ""
+
+
+def _figure(data: xr.Dataset) -> Any:
+    """One map of each family, its areas, and their errors."""
+    rows = -(-len(FAMILIES) // 2)
+    figure, axes = panels(rows, 6, (15, 2.2 * rows), gridspec_kw={"width_ratios": 2 * (1, 1.5, 1.5)})
+    places = axes.reshape(-1, 3)
+    for spare in places[len(FAMILIES) :].ravel():
+        spare.set_axis_off()
+    for row, family in zip(places, FAMILIES, strict=False):
+        part = Part(family, SHOWN)
+        own = data.sel(surface=part.name)
+        row[0].imshow(heights(part)[::THINNED, ::THINNED].T, origin="lower", interpolation="none")
+        row[0].set(xticks=(), yticks=(), ylabel=family)
+        row[1].loglog(own.pressure, own.area, "ko", mfc="none", label="full simulation")
+        for form in FORMS:
+            row[1].loglog(own.pressure, own[f"{form}_area"], label=form)
+            row[2].loglog(own.area, np.abs(np.log(own[f"{form}_area"] / own.area)), ".-", label=form)
+        row[1].set(xlim=(3e-5, 0.2), ylim=(2e-3, 1))
+        row[2].set(xlim=(2e-3, 1), ylim=(1e-4, 1))
+        for one in row[1:]:
+            one.minorticks_off()
+            one.tick_params(labelbottom=False, labelleft=False)
+    places[0, 1].legend(fontsize="x-small")
+    places[0, 1].set_title("A/A0")
+    places[0, 2].set_title("error of ln A")
+    for row in places[len(FAMILIES) - 2 : len(FAMILIES)]:
+        for one, label in zip(row[1:], ("pressure  F/(A0 E*)", "A/A0"), strict=True):
+            one.set_xlabel(label)
+            one.tick_params(labelbottom=True)
+    for one in axes[:, 1:3].ravel():
+        one.tick_params(labelleft=True)
+    return figure
+
+
 def measure() -> Measured:
     """The tables."""
     data, lines = dataset(DATA / "machined.nc"), []
@@ -67,4 +83,6 @@ def measure() -> Measured:
             found = [coverage(data, form, quantity, valid) for quantity in QUANTITIES]
             lines.append([form, name, *(f"{a:.2f}, {b:.2f} ({n})" if n else "" for a, b, n in found)])
     parts = {form: _by_family(data, form) for form in FORMS}
-    return parts | {"coverage": table("theory | entries | area | pressure | stiffness | flow", lines)}, {}
+    parts |= {f"left_out_{form}": _left_out(data, form) for form in FORMS}
+    parts["coverage"] = table("theory | entries | area | pressure | stiffness | flow", lines)
+    return parts, {"docs/figures/machined.svg": _figure(data)}

@@ -28,7 +28,7 @@ DATA = ROOT / "docs" / "data"
 _OWN = ("cost", "explorer", "export", "fidelity", "gallery", "machined", "maps", "stability", "tables")
 PAGES = {
     **{name: f"{name}:measure" for name in _OWN},
-    **{name: f"introduction:{name}" for name in ("formula", "readme", "ten_minutes", "theories")},
+    **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
     **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
 }
 Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files

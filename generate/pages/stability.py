@@ -7,12 +7,13 @@ gap in the middle, d(0), instead of X, and scales pressure by E* sqrt(sigma/8B),
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mpmath as mp
@@ -116,18 +117,6 @@ def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
         return mp.pi / 5 * force, mp.pi / 2 * area
 
 
-def island_truth(X: float, mu: float) -> Sequence[Any] | None:
-    """Phi_F and Phi_A, or None where the solver refuses."""
-    if mu <= RIGID_MU:
-        force, area = rigid_truth(X)
-        return force * mp.mpf(float(mu)), area
-    try:
-        solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
-    except MbmaError:
-        return None
-    return solved.phi_F, solved.phi_A
-
-
 def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
     """Every island model at every corner of (X, mu); maps of the larger error of both functions, NaN where refused."""
     tallies = {name: Tally(f"islands by {name}") for name in ISLAND_MODELS}
@@ -139,19 +128,19 @@ def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
         return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
 
     for (i, X), (j, mu) in itertools.product(enumerate(X_CORNERS), enumerate(MU_CORNERS)):
-        truth = island_truth(X, mu)
+        truth: Sequence[Any] | None = None
+        if mu <= RIGID_MU:
+            force, area = rigid_truth(X)
+            truth = force * mp.mpf(float(mu)), area
+        else:
+            with contextlib.suppress(MbmaError):
+                solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
+                truth = solved.phi_F, solved.phi_A
         for name, model in models.items():
             # rigid spheres do not claim to be elastic ones
             known = None if name == "rigid" else truth
             maps[name][i, j] = tallies[name].add(functools.partial(ask, model, X, mu), known)
     return list(tallies.values()), maps
-
-
-def _approaches(hurst: float, zeta_1: float, variant: str) -> Iterator[float]:
-    """Values of delta/h_rms: those of the map, then one ulp around the floors of zeta_d and zeta_u."""
-    yield from map(float, APPROACHES)
-    found = kinks(hurst, zeta_1, get_variant(variant))
-    yield from (float(kink) * (1 + side * ULP) for kink in found for side in (-1, 0, 1))
 
 
 def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
@@ -168,11 +157,14 @@ def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
     ways = {library: Tally("geometry, library"), direct: Tally("geometry, the paper's formulas as printed")}
     maps = {way.__name__: np.full((APPROACHES.size, BANDS.size), np.nan) for way in ways}
     for hurst, variant, (j, zeta_1) in itertools.product(HURSTS, VARIANTS, enumerate(map(float, BANDS))):
-        for i, approach in enumerate(_approaches(hurst, zeta_1, variant)):
+        # approaches of the map, then one ulp around the floors of zeta_d and zeta_u
+        floors = [float(kink) for kink in kinks(hurst, zeta_1, get_variant(variant))]
+        near = [kink * (1 + side * ULP) for kink in floors for side in (-1, 0, 1)]
+        for i, approach in enumerate([*map(float, APPROACHES), *near]):
             exact = exact_island(approach, hurst, zeta_1, divisor(variant))
             for way, tally in ways.items():
-                truth = [exact[field] for field in FIELDS]
-                error = tally.add(functools.partial(way, approach, hurst, zeta_1, variant), truth)
+                answer = functools.partial(way, approach, hurst, zeta_1, variant)
+                error = tally.add(answer, [exact[field] for field in FIELDS])
                 if hurst == MAP_HURST and variant == "reported" and i < APPROACHES.size:
                     maps[way.__name__][i, j] = error
     return list(ways.values()), maps
@@ -188,10 +180,9 @@ def totals() -> list[Tally]:
 
     for variant, hurst, zeta_1, depth in itertools.product(VARIANTS, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
         at = functools.partial(ask, Surface(hurst, 1.0, zeta_1, 1.0, TOP), depth, variant)
-        try:
+        truth = None
+        with contextlib.suppress(MbmaError):
             truth = at("exact", TOTAL_TRUTH)[0]
-        except MbmaError:
-            truth = None
         for name, tally in tallies.items():
             # the four-number table is of one variant
             if name != "island4d" or variant == "reported":

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from generate.pages.page import Measured, panels, table
-from generate.tables.build import evaluate
+from generate.tables.island4d import evaluate
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.islands.height_integrals import height_integral
@@ -28,9 +28,8 @@ def sizes() -> str:
     """Nodes, bytes and certified errors of the shipped files."""
     rows = []
     for kind, f in itertools.product(KINDS, "FA"):
-        content = read_table(shipped(kind), kind)
+        content, size = read_table(shipped(kind), kind), shipped(kind).stat().st_size / 1e6
         names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
-        size = shipped(kind).stat().st_size / 1e6
         rows.append([kind, content.size, size, f, *(content.attributes[name] for name in names)])
     header = "table | cells or nodes | file | of | largest error | 99% below | half below | largest at islands"
     return table(header, rows, "{} | {} | {:.2f} MB | {} | {:.1e}")
@@ -46,17 +45,16 @@ def axes() -> str:
     return table("axis | what it is | equally spaced in | first | last | nodes", rows, "{} | {} | {} | {:g}")
 
 
-def edges(content: TableContent) -> FloatArray:
-    """X_low, X_high, mu_low and mu_high of the cells."""
-    return np.stack([content.auxiliary[name][1] for name in CELL_EDGES])
+def _universal() -> tuple[TableContent, FloatArray]:
+    """The universal table, and X_low, X_high, mu_low and mu_high of its cells."""
+    content = read_table(shipped(UNIVERSAL), UNIVERSAL)
+    return content, np.stack([content.auxiliary[name][1] for name in CELL_EDGES])
 
 
 def cells() -> str:
     """The cells of the universal table."""
-    content = read_table(shipped(UNIVERSAL), UNIVERSAL)
-    X_low, X_high, mu_low, mu_high = edges(content)
-    first = mu_low == 0
-    X, mu = content.axes
+    content, (X_low, X_high, mu_low, mu_high) = _universal()
+    first, (X, mu) = mu_low == 0, content.axes
     widths, octaves = X_high - X_low, np.log2(mu_high[~first] / mu_low[~first])
     most = np.diff(np.flatnonzero(np.append(first, True))).max()
     rows = [
@@ -83,11 +81,9 @@ def _with_stored(content: TableContent, rows: dict[str, str]) -> str:
 
 def example_universal() -> str:
     """One conformance point of the universal table, step by step."""
-    content = read_table(shipped(UNIVERSAL), UNIVERSAL)
+    content, ends = _universal()
     X, mu = (float(content.conformance[name][EXAMPLE]) for name in ("X", "mu"))
-    ends = edges(content)
-    inside = (ends[0] <= X) & (ends[1] >= X) & (ends[2] <= mu) & (ends[3] >= mu)
-    cell = int(np.flatnonzero(inside)[0])
+    cell = int(np.flatnonzero((ends[0] <= X) & (ends[1] >= X) & (ends[2] <= mu) & (ends[3] >= mu))[0])
     X_low, X_high, mu_low, mu_high = ends[:, cell]
     x = (2 * X - X_low - X_high) / (X_high - X_low)
     a, b, c, d = fractions_of_mu(mu_low, mu_high)
@@ -118,7 +114,6 @@ def example_island4d() -> str:
     F_52, F_2 = (float(height_integral(n, -X)) for n in (2.5, 2.0))
     along = list(zip(content.axes, positions, content.local_error.shape, strict=False))
     where = tuple(int(error_cell(axis, count, p)) for axis, p, count in along)
-    bounds = numbers(*content.local_error[where], form=".2e")
     rows = {name: repr(float(value[0])) for name, value in raw.items()} | {
         "spread, sphere": numbers(spread, sphere),
         "sigma, mu, X": f"{numbers(sigma, mu)}, {X:.12f}",
@@ -128,6 +123,7 @@ def example_island4d() -> str:
     for axis, p, _ in along:
         node = min(int(p), axis.nodes - 2)
         rows[f"position, cell and u on {axis.name}"] = f"{p:.12f}, {node}, {p - node:.12f}"
+    bounds = numbers(*content.local_error[where], form=".2e")
     rows |= {
         "g_F, g_A": numbers(*g),
         "F_5/2(-X), F_2(-X)": numbers(F_52, F_2),
@@ -143,8 +139,7 @@ def draw() -> Any:
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
 
-    content = read_table(shipped(UNIVERSAL), UNIVERSAL)
-    X_low, X_high, mu_low, mu_high = edges(content)
+    content, (X_low, X_high, mu_low, mu_high) = _universal()
     bottom = np.maximum(mu_low, LEAST_DRAWN)
     corners = np.stack([X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high], axis=-1).reshape(-1, 4, 2)
     figure, plots = panels(1, 2, (9, 3.6), sharey=True)

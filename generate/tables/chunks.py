@@ -9,15 +9,15 @@ from __future__ import annotations
 import concurrent.futures
 import io
 import pathlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 from generate.provenance import SOLVER, source_digest, versions
+from generate.workers import Pool, WorkerError, attempts
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import MbmaError
 from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.netcdf import digest_arrays, digest_json
@@ -26,10 +26,6 @@ CHUNK = 2000
 Work = Callable[..., FloatArray]
 Job = tuple[Any, ...]
 CODE = (*SOLVER, "generate.tables.chunks", "generate.tables.universal")
-
-
-class WorkerError(MbmaError, RuntimeError):
-    """Worker processes that died, or that a scheduler lost."""
 
 
 def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
@@ -61,7 +57,7 @@ class ChunkedSolver:
         Folder of the finished chunks; without it nothing is kept.
     """
 
-    def __init__(self, executor: concurrent.futures.Executor | None = None, folder: pathlib.Path | None = None) -> None:
+    def __init__(self, executor: Pool = None, folder: pathlib.Path | None = None) -> None:
         self.executor = executor
         self.folder = folder
 
@@ -73,18 +69,28 @@ class ChunkedSolver:
         WorkerError
             Where a worker died; finished chunks are kept.
         """
-        keys = [chunk_key(work, job) for job in jobs]
-        results = {number: found for number, key in enumerate(keys) if (found := self._load(key)) is not None}
-        missing = {number: job for number, job in enumerate(jobs) if number not in results}
+        results, missing, paths = {}, {}, {}
+        for number, job in enumerate(jobs):
+            missing[number] = job
+            if self.folder is not None:
+                # written whole or not at all
+                paths[number] = self.folder / chunk_key(work, job)
+                if paths[number].exists():
+                    results[number] = np.asarray(np.load(paths[number]))
+                    del missing[number]
         # silent where stderr is not a terminal
         with tqdm(total=len(jobs), initial=len(results), desc=label, unit="chunk", disable=None) as bar:
-            for number, result in self._computed(work, missing):
-                if self.folder is not None:
-                    content = io.BytesIO()
-                    np.save(content, result)
-                    write_file(self.folder / keys[number], content.getvalue(), make_folders=True)
-                results[number] = result
-                bar.update()
+            try:
+                for number, finish in attempts(self.executor, work, missing):
+                    results[number] = finish()
+                    if number in paths:
+                        content = io.BytesIO()
+                        np.save(content, results[number])
+                        write_file(paths[number], content.getvalue(), make_folders=True)
+                    bar.update()
+            except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as fault:
+                text = f"a worker process died ({fault}); --resume continues from the finished chunks"
+                raise WorkerError(text) from None
         return [results[number] for number in range(len(jobs))]
 
     def phi(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
@@ -100,20 +106,3 @@ class ChunkedSolver:
         rigid = np.moveaxis(greenwood_tripp.rigid_sphere(X, mu), 0, -1)
         ratio: FloatArray = np.log(self.phi(label, X, mu, rtol, refinement) / rigid)
         return ratio
-
-    def _load(self, key: str) -> FloatArray | None:
-        """A kept chunk, which is written whole or not at all; None where there is none."""
-        path = None if self.folder is None else self.folder / key
-        return np.asarray(np.load(path)) if path is not None and path.exists() else None
-
-    def _computed(self, work: Work, missing: dict[int, Job]) -> Iterator[tuple[int, FloatArray]]:
-        """Numbers and results of chunks, as they finish."""
-        if self.executor is None:
-            yield from ((number, work(*job)) for number, job in missing.items())
-            return
-        try:
-            waiting = {self.executor.submit(work, *job): number for number, job in missing.items()}
-            for future in concurrent.futures.as_completed(waiting):
-                yield waiting[future], future.result()
-        except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as fault:
-            raise WorkerError(f"a worker process died ({fault}); --resume continues from the finished chunks") from None

@@ -2,52 +2,26 @@
 
 from __future__ import annotations
 
-import concurrent.futures
-import contextlib
-import multiprocessing
 import os
 import pathlib
 import shutil
-from collections.abc import Iterator
 
 import click
 
 from generate.tables import height_coefficients
-from generate.tables.build import UncertifiedError, build
-from generate.tables.chunks import ChunkedSolver, WorkerError
+from generate.tables.build import build
+from generate.tables.certificate import UncertifiedError
+from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
 from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
 from generate.tables.writing import write_table
+from generate.workers import Pool
+from generate.workers import executor as executor
 from mbma_tables.common.errors import InputError
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL, TableContent
 
 TABLES = pathlib.Path(__file__).parents[2] / "tables"
-
-
-Pool = concurrent.futures.Executor | None
-
-
-@contextlib.contextmanager
-def executor(workers: int, scheduler: str | None) -> Iterator[Pool]:
-    """Where chunks run: here, in processes of this machine, or on a dask scheduler."""
-    if scheduler is not None:
-        try:
-            from distributed import Client
-
-            client = Client(scheduler)
-        except ImportError:
-            raise InputError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
-        except (OSError, ValueError) as fault:
-            raise WorkerError(f"no dask scheduler at {scheduler}: {fault}") from None
-        with client:
-            yield client.get_executor()
-    elif workers == 1:
-        yield None
-    else:
-        # started afresh: threads and forks do not mix
-        with concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-            yield pool
 
 
 def destination(what: str, configuration: Configuration, out: pathlib.Path | None) -> pathlib.Path:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import pathlib
 import tomllib
 from typing import Any
 
+from generate.tables.writing import TEXTS
 from mbma_tables.common.arguments import number_in, whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
@@ -77,57 +79,53 @@ class Configuration:
         numbers = get_variant(self.variant).recorded if self.kind == ISLAND4D else []
         return digest_json([dataclasses.asdict(self), numbers])
 
-
-def _read(path: pathlib.Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(read_file(path, MAX_BYTES).decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as fault:
-        raise InputError(f"it is not a TOML file: {fault}") from None
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a table's file on what was wanted."""
+        text = json.dumps(dataclasses.asdict(self), sort_keys=True)
+        return {"target": self.target, "configuration": text, "configuration_sha256": self.digest()}
 
 
-def _check_keys(given: Any, known: Any, where: str) -> None:
+def _checked(given: Any, known: Any, where: str) -> dict[str, Any]:
+    """A table of a file that has no unknown keys."""
     if not isinstance(given, dict):
         raise InputError(f"{where} must be a table of {', '.join(known)}, got {given!r}")
     for key in given:
         if key not in known:
             raise InputError(f"{where}: unknown key {key!r}; known are {', '.join(known)}")
+    return given
 
 
 def _axis(kind: str, name: str, entry: dict[str, Any]) -> AxisRange:
-    bounds = LIMITS[name]
-    low, high = (number_in(f"axes.{name}.{end}", entry.get(end, 0.0), *bounds) for end in ("low", "high"))
+    low, high = (number_in(f"axes.{name}.{end}", entry.get(end, 0.0), *LIMITS[name]) for end in ("low", "high"))
     offset = number_in(f"axes.{name}.offset", entry.get("offset", 0.0), -1e12, 1e12)
-    ends: tuple[float, ...] = (low + offset, high + offset)
+    first, last = low + offset, high + offset
     if offset and name != "X":
         raise InputError(f"axes.{name} takes no offset, only axes.X does")
     if dict(AXES[kind])[name] == "log":
-        if ends[0] <= 0:
+        if first <= 0:
             raise InputError(f"axes.{name} is logarithmic and needs low + offset > 0, got {low!r} and {offset!r}")
-        ends = tuple(math.log(end) for end in ends if end > 0)
-    if not ends[-1] - ends[0] >= MIN_EXTENT or high <= low:
+        first, last = math.log(first), math.log(max(first, last))
+    if not last - first >= MIN_EXTENT or high <= low:
         raise InputError(f"axes.{name} must have low < high, far enough apart for its nodes to differ")
-    counts = {
-        key: whole_number_in(f"axes.{name}.{key}", entry[key], MIN_NODES, MAX_NODES)
-        for key in ("start", "nodes")
-        if key in entry
-    }
+    known = (key for key in ("start", "nodes") if key in entry)
+    counts = {key: whole_number_in(f"axes.{name}.{key}", entry[key], MIN_NODES, MAX_NODES) for key in known}
     return AxisRange(low, high, offset, **counts)
 
 
-def _configuration(kind: str, own: dict[str, Any], target: float | None) -> Configuration:
-    """The shipped configuration of a kind, changed by `own` and by `target`."""
-    given = _read(HERE / f"{kind}.toml")
-    shipped = given["target"]
-    _check_keys(own, list(given), "the file")
-    changed = own.get("axes", {})
-    _check_keys(changed, list(given["axes"]), "[axes]")
-    axes = {}
+def _configuration(kind: str, path: pathlib.Path | None, target: float | None) -> Configuration:
+    given, own = tomllib.loads((HERE / f"{kind}.toml").read_text(encoding="utf-8")), dict[str, Any]()
+    if path is not None:
+        try:
+            own = tomllib.loads(read_file(path, MAX_BYTES).decode("utf-8"))
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as fault:
+            raise InputError(f"it is not a TOML file: {fault}") from None
+    _checked(own, list(given), "the file")
+    changed, shipped, axes = _checked(own.get("axes", {}), list(given["axes"]), "[axes]"), given["target"], {}
     wanted = number_in("target", own.get("target", shipped) if target is None else target, 1e-11, 0.1)
     for name, entry in given["axes"].items():
-        changes = changed.get(name, {})
         # cells are as small as they must be, where nodes are counted
         known = [*entry] if kind == UNIVERSAL else ["low", "high", "offset", "start", "nodes"]
-        _check_keys(changes, known, f"[axes.{name}]")
+        changes = _checked(changed.get(name, {}), known, f"[axes.{name}]")
         # where the target is looser or the range another one, the shipped start is too fine or means nothing
         if wanted > shipped or changes.keys() & {"low", "high", "offset"}:
             entry.pop("start", None)
@@ -135,19 +133,12 @@ def _configuration(kind: str, own: dict[str, Any], target: float | None) -> Conf
     given |= own
     if given["kind"] != kind:
         raise InputError(f"kind must be {kind!r}, got {given['kind']!r}")
-    max_nodes = whole_number_in("max_nodes", given["max_nodes"], 1, MAX_NODES)
+    ranges = {"max_nodes": (1, MAX_NODES), "certificate_points": (MIN_POINTS, MAX_POINTS), "seed": (0, 2**63)}
+    numbers = {name: whole_number_in(name, given[name], *ends) for name, ends in ranges.items()}
     first = math.prod(axis.nodes or axis.start for axis in axes.values())
-    if first > max_nodes:
-        raise InputError(f"the axes have {first} nodes to begin with, max_nodes allows {max_nodes}")
-    return Configuration(
-        kind=kind,
-        target=wanted,
-        max_nodes=max_nodes,
-        variant=get_variant(given["variant"]).name,
-        certificate_points=whole_number_in("certificate_points", given["certificate_points"], MIN_POINTS, MAX_POINTS),
-        seed=whole_number_in("seed", given["seed"], 0, 2**63),
-        axes=axes,
-    )
+    if first > numbers["max_nodes"]:
+        raise InputError(f"the axes have {first} nodes to begin with, max_nodes allows {numbers['max_nodes']}")
+    return Configuration(kind=kind, target=wanted, variant=get_variant(given["variant"]).name, axes=axes, **numbers)
 
 
 def load(kind: str, path: pathlib.Path | None = None, target: float | None = None) -> Configuration:
@@ -159,12 +150,12 @@ def load(kind: str, path: pathlib.Path | None = None, target: float | None = Non
         For an unreadable file, unknown keys, or values that make no table.
     """
     try:
-        return _configuration(kind, {} if path is None else _read(path), target)
+        return _configuration(kind, path, target)
     except ValueError as fault:
         where = "" if path is None or str(path) in str(fault) else f"{path}: "
         raise InputError(f"{where}{fault}") from None
 
 
-def make_axis(name: str, long_name: str, transform: str, given: AxisRange, nodes: int) -> Axis:
+def make_axis(kind: str, name: str, given: AxisRange, nodes: int) -> Axis:
     """An axis over the configured range."""
-    return Axis(name, long_name, transform, given.offset, given.low, given.high, nodes)  # type: ignore[arg-type]
+    return Axis(name, TEXTS["axes"][name], dict(AXES[kind])[name], given.offset, given.low, given.high, nodes)  # type: ignore[arg-type]

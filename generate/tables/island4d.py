@@ -17,39 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generate.tables.build import ConformancePoints, UncertifiedError, evaluate
+from generate.tables.certificate import conformance, enough, require, visited_surfaces
 from generate.tables.configuration import Configuration, make_axis
-from generate.tables.universal import MAX_DRAWS, visited_surfaces
-from generate.tables.writing import SYMBOLS, numbered
+from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.models.island4d import at_places
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.tablefiles.schema import Axis, TableContent
+from mbma_tables.tablefiles.schema import ISLAND4D, Axis, TableContent
 
-LOOKUP = (
-    "given delta_over_h_rms, zeta_d, zeta_u, hurst; delta_over_h_rms is the approach read at zeta_1 without bound, "
-    "for any other zeta_1 it is (delta - h_d)/s + zeta_d^(-hurst), h_d = s sqrt(zeta_d^(-2 hurst) - zeta_1^(-2 hurst))",
-    "spread = (zeta_u - zeta_d)/zeta_d, w = log1p(spread), P = 4 - 2 hurst, sphere = ({floor}/zeta_d)^P",
-    "g(p) = expm1(p w)/(p w), or 1 where p w = 0",
-    "m0 = 2 hurst w g(-2 hurst), alpha = 1.5 g(-2 hurst) g(P)/g(2 - 2 hurst)^2, sigma = {sigma}",
-    "rate = 0.75 g(P)/g(2 - 2 hurst)/{divisor!r}",
-    "i = zeta_d^(-P), c = 0.75 hurst/P, m4_d = c (1 - i), m4_u = c (exp(P w) - i), R = 3 sqrt(pi)/8",
-    "mu = (8/3) rate sigma R sqrt(2)/(m4_d m4_u)^(1/4)",
-    "X = (delta_over_h_rms zeta_d^hurst - 1)/sigma",
-    "on each axis: p by its position_formula, j = min(floor(p), nodes - 2), u = p - j, w_k(u) of spline_weights; "
-    "for a spread below its first see out_of_range",
-    "g_F = sum over k, l, m, n = 0 ... 3 of w_k(u_X) w_l(u_spread) w_m(u_sphere) w_n(u_hurst) "
-    "spline_F[j_X + k, j_spread + l, j_sphere + m, j_hurst + n]; g_A the same of spline_A",
-    "Phi_F = exp(g_F) pi mu F_5/2(-X)/5 and Phi_A = exp(g_A) pi F_2(-X)/2, F_n as height_integrals says; "
-    "without the exponentials this is the limit of a rigid sphere, mu to 0",
-    "S = sigma zeta_d^(-hurst), D = rate zeta_d^2, R_d = R/sqrt(c expm1(P log(zeta_d))), "
-    "R_u = R/sqrt(c expm1(P (log(zeta_d) + w)))",
-    "F_hat = S sqrt(2 R_d S) Phi_F = force q0/(E* s), A_hat = 2 pi D R_u R_d S^2 Phi_A = contact area q0^2/eta",
-    "error_F and error_A, as error_field says, bound the relative error of F_hat and A_hat",
-)
 VISITED = {"hurst": (0.3, 1.0), "log10_zeta_1": (math.log10(3.001), 4.0), "log10_approach": (-8.0, 1.0)}
 COVER_TRIALS = 4096
 
@@ -60,41 +40,35 @@ def from_axes(sphere: Any, hurst: Any) -> Any:
         return SPHERE_FLOOR * np.asarray(sphere, dtype=float) ** (-1 / (4 - 2 * np.asarray(hurst)))
 
 
+def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
+    """The table's spline at positions in node units, shape (entries, 2)."""
+    return at_places(coefs, np.stack(positions)).T
+
+
 class Island4d:
-    """`build.Kind` of the four-parameter table."""
+    """The four-parameter table of a configuration."""
 
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
         self.variant = get_variant(configuration.variant)
 
     def axes(self, nodes: dict[str, int]) -> tuple[Axis, ...]:
-        """X and spread on logarithms, sphere and hurst as they are."""
-        given = self.configuration.axes
-        rows = (
-            ("X", "how deep the island is: (delta - h_d)/sigma", "log"),
-            ("spread", "width of the band of roughness: zeta_u/zeta_d - 1", "log"),
-            ("sphere", f"where the band begins: ({SPHERE_FLOOR}/zeta_d)^(4 - 2 hurst)", "linear"),
-            ("hurst", "Hurst exponent", "linear"),
-        )
-        return tuple(make_axis(name, text, transform, given[name], nodes[name]) for name, text, transform in rows)
+        """Axes with these node counts."""
+        return tuple(make_axis(ISLAND4D, name, self.configuration.axes[name], count) for name, count in nodes.items())
 
     def arguments(self, *coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """X is a coordinate, mu follows from the other three."""
+        """X and mu at coordinates of the axes: X is one of them, mu follows from the other three."""
         X, spread, sphere, hurst = (np.ascontiguousarray(c, dtype=float) for c in np.broadcast_arrays(*coordinates))
-        mu = band_fields(spread, sphere, hurst, self.variant)[0]
-        return X, mu
+        return X, band_fields(spread, sphere, hurst, self.variant)[0]
 
     def manifold(self, count: int) -> list[FloatArray]:
-        """Islands of random surfaces, as far as the table's axes reach."""
-        kept = [np.empty(0)] * 4
-        draw = 2 * count
-        while kept[0].size < count:
-            if draw > MAX_DRAWS * count:
-                raise UncertifiedError("island4d: hardly a surface visits these axes, so there is nothing to certify")
+        """Coordinates of `count` islands of random surfaces, as far as the table's axes reach."""
+
+        def drawn(draw: int) -> list[FloatArray]:
             places, inside = self._visited(draw)
-            kept = [place[inside] for place in places]
-            draw *= 2
-        return [place[:count] for place in kept]
+            return [place[inside] for place in places]
+
+        return [place[:count] for place in enough(ISLAND4D, count, 2 * count, drawn)]
 
     def _visited(self, draw: int) -> tuple[list[FloatArray], NDArray[np.bool_]]:
         """Coordinates of islands of random surfaces, and which of them the axes cover."""
@@ -103,124 +77,71 @@ class Island4d:
         hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, ranges)
         fields = geometry(approach, hurst, zeta_1, self.variant)
         spread = np.expm1(np.log(fields["zeta_u"]) - np.log(fields["zeta_d"]))
-        sphere = (SPHERE_FLOOR / fields["zeta_d"]) ** (4 - 2 * hurst)
-        places = [fields["X"], spread, sphere, hurst]
-        inside = np.ones(draw, dtype=bool)
-        for axis, place in zip(self.configuration.axes.values(), places, strict=True):
-            inside &= (place > axis.low) & (place < axis.high)
-        return places, inside
-
-    def _covers(self) -> str:
-        """Whether surfaces can leave the axes, by trial."""
-        axes = self.configuration.axes
-        places, _ = self._visited(COVER_TRIALS)
-        left = any(
-            (place > axis.high).any() or (name != "spread" and (place < axis.low).any())
-            for (name, axis), place in zip(axes.items(), places, strict=True)
-        )
-        return (
-            f"{'the islands within the axes, of those' if left else 'every island'} that the model visits for "
-            f"{axes['hurst'].low:g} <= H <= {axes['hurst'].high:g}, 3 < zeta_1 <= 1e4, 0 < delta/h_rms <= 10; "
-            "spreads below the first are answered to first order in mu"
-        )
+        places = [fields["X"], spread, (SPHERE_FLOOR / fields["zeta_d"]) ** (4 - 2 * hurst), hurst]
+        pairs = zip(self.configuration.axes.values(), places, strict=True)
+        return places, np.all([(place > axis.low) & (place < axis.high) for axis, place in pairs], axis=0)
 
     def auxiliary(self, axes: tuple[Axis, ...]) -> dict[str, Any]:
         """The raw parameters on the grid, and the numbers that turn a ratio into a force."""
         _, spread, sphere, hurst = (axis.values for axis in axes)
-        grid = np.meshgrid(spread, sphere, hurst, indexing="ij")
-        mu, sigma, _, _ = band_fields(*grid, self.variant)
-        zeta_d = from_axes(sphere[:, None], hurst)
-        names = tuple(axis.name for axis in axes)
+        mu, sigma, _, _ = band_fields(*np.meshgrid(spread, sphere, hurst, indexing="ij"), self.variant)
+        names, inverse = tuple(axis.name for axis in axes), 1 / from_axes(sphere[:, None], hurst)
         return {
-            "mu": (
-                names[1:],
-                mu,
-                {"long_name": "stiffness of the roughness: (8/3) D sigma sqrt(2 R_u R_d)", "units": "1"},
-            ),
-            "sigma": (
-                names[1:],
-                sigma,
-                {"long_name": "standard deviation of summit heights over s, times zeta_d^hurst", "units": "1"},
-            ),
-            "inverse_zeta_d": (
-                names[2:],
-                1 / zeta_d,
-                {"long_name": "1/zeta_d; zeta_u = zeta_d (1 + spread)", "units": "1"},
-            ),
+            "mu": (names[1:], mu, label(TEXTS["axes"]["mu"])),
+            "sigma": (names[1:], sigma, label("standard deviation of summit heights over s, times zeta_d^hurst")),
+            "inverse_zeta_d": (names[2:], inverse, label("1/zeta_d; zeta_u = zeta_d (1 + spread)")),
         }
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file."""
-        numbers = {
-            "floor": SPHERE_FLOOR,
-            "divisor": self.variant.density_divisor,
-            "sigma": f"sqrt((1 - {BROADENING}/alpha) m0)" if self.variant.summit_sigma else "sqrt(m0)",
-        }
+        sigma = f"sqrt((1 - {BROADENING}/alpha) m0)" if self.variant.summit_sigma else "sqrt(m0)"
+        axes, (places, _) = self.configuration.axes, self._visited(COVER_TRIALS)
+        # by trial; smaller spreads are covered too
+        left = any(
+            (place > axis.high).any() or (name != "spread" and (place < axis.low).any())
+            for (name, axis), place in zip(axes.items(), places, strict=True)
+        )
+        covers = (
+            f"{'the islands within the axes, of those' if left else 'every island'} that the model visits for "
+            f"{axes['hurst'].low:g} <= H <= {axes['hurst'].high:g}, 3 < zeta_1 <= 1e4, 0 < delta/h_rms <= 10; "
+            "spreads below the first are answered to first order in mu"
+        )
         return {
-            "title": "Contact islands of the MBMA model of rough contact over its four parameters",
-            "history": "made by python -m generate tables island4d",
-            "source": "numerical solution of the integral equation by mbma_tables",
-            "references": (
-                "Guo, Ma, Zhu: A magnification-based multi-asperity (MBMA) model of rough contact, Eqs. 26-40"
-            ),
-            "summary": (
-                "Force F_hat and area A_hat of a contact island by the paper's four parameters: the approach "
-                "delta_over_h_rms of the island, the magnifications zeta_d and zeta_u between which its "
-                "roughness lies, the Hurst exponent. The axes follow the physics: X, how deep; spread, the width of "
-                "the band; sphere, a power of 1/zeta_d; hurst. Variables mu, sigma, inverse_zeta_d are their "
-                "auxiliary coordinates"
-            ),
-            "symbols": SYMBOLS,
-            "hats": "heights in units of s = h_rms/sqrt(1 - zeta_1^(-2 hurst)), lengths in 1/q0, forces in E* s/q0",
-            **numbered("lookup", [line.format(**numbers) for line in LOOKUP]),
-            "delta_over_h_rms": "(1 + X sigma) inverse_zeta_d^hurst, at any node",
-            "zeta_u": "(1 + spread)/inverse_zeta_d, at any node; no bound at sphere = 0, where inverse_zeta_d = 0",
+            **about(ISLAND4D, floor=SPHERE_FLOOR, divisor=self.variant.density_divisor, sigma=sigma),
             "variant": self.variant.name,
             "variant_numbers": json.dumps(self.variant.recorded),
-            "variant_numbers_meaning": (
-                "density divisor n of the summit density m4/(n m2), beta, phi, floor of zeta_d, floor of zeta_u, "
-                "islands stand h_d below the top, sigma is the summits'"
-            ),
-            "covers": self._covers(),
+            "covers": covers,
         }
 
-    def conformance(self, places: list[FloatArray]) -> ConformancePoints:
-        """The four raw numbers, and the coordinates that these numbers as stored have."""
+    def conformance(self, axes: tuple[Axis, ...], coefs: FloatArray, places: list[FloatArray]) -> dict[str, FloatArray]:
+        """Points to replay near coordinates of the axes: the four raw numbers, and what these as stored give."""
         X, spread, sphere, hurst = places
         zeta_d = from_axes(sphere, hurst)
         sigma = band_fields(spread, sphere, hurst, self.variant)[1]
-        raw = {
-            "delta_over_h_rms": (X * sigma + 1) * zeta_d**-hurst,
-            "zeta_d": zeta_d,
-            "zeta_u": zeta_d * (1 + spread),
-            "hurst": hurst,
-        }
-        found = to_axes(raw["delta_over_h_rms"], zeta_d, raw["zeta_u"], hurst, self.variant)
-        conditioning = 1e-4 * (1 + found.X) / found.sigma
-        scales = np.stack([found.force, found.area])
-        return ConformancePoints(raw, found[:4], found.X, found.mu, scales, conditioning)
+        delta, zeta_u = (X * sigma + 1) * zeta_d**-hurst, zeta_d * (1 + spread)
+        raw = {"delta_over_h_rms": delta, "zeta_d": zeta_d, "zeta_u": zeta_u, "hurst": hurst}
+        found = to_axes(delta, zeta_d, zeta_u, hurst, self.variant)
+        scales, rigid = np.stack([found.force, found.area]), greenwood_tripp.rigid_sphere(found.X, found.mu)
+        positions = [axis.position(x) for axis, x in zip(axes, found[:4], strict=True)]
+        table = scales * np.exp(evaluate(coefs, positions).T) * rigid
+        return conformance(raw, found.X, found.mu, table, scales, 1e-4 * (1 + found.X) / found.sigma)
 
     def check(self, content: TableContent) -> None:
         """Force and area finite and positive, below the rigid sphere's, increasing in X, force increasing in mu."""
         places = [np.arange(2 * (axis.nodes - 1) + 1) / 2 for axis in content.axes[:2]]
-        places += [np.arange(axis.nodes - 0.5) for axis in content.axes[2:]]
-        places = [np.minimum(p, axis.nodes - 1) for p, axis in zip(places, content.axes, strict=True)]
+        places += [np.minimum(np.arange(axis.nodes - 0.5), axis.nodes - 1) for axis in content.axes[2:]]
         grid = np.meshgrid(*places, indexing="ij")
         ratio = evaluate(content.coefficients, [g.ravel() for g in grid]).reshape(*grid[0].shape, 2)
         X = content.axes[0].coordinate(places[0])[:, None, None, None]
-        coordinates = [axis.coordinate(g) for axis, g in zip(content.axes, grid, strict=True)]
-        _, mu = self.arguments(*coordinates)
+        _, mu = self.arguments(*(axis.coordinate(g) for axis, g in zip(content.axes, grid, strict=True)))
         force = ratio[..., 0] + np.log(height_integral(2.5, -X)) + np.log(mu)
         area = ratio[..., 1] + np.log(height_integral(2.0, -X))
-        target = self.configuration.target
-        checks = {
+        rules = {
             "force and area finite": np.isfinite(force).all() and np.isfinite(area).all(),
-            "force and area no larger than a rigid sphere's": (ratio <= target).all(),
+            "force and area no larger than a rigid sphere's": (ratio <= self.configuration.target).all(),
             "force increasing in X": (np.diff(force, axis=0) > 0).all(),
             "area increasing in X": (np.diff(area, axis=0) > 0).all(),
             "force increasing with the spread": (np.diff(force, axis=1) > 0).all(),
             "rigid limit at the smallest spread": (np.abs(ratio[:, 0]) <= 100 * mu[:, 0, ..., None]).all(),
         }
-        for rule, kept in checks.items():
-            if not kept:
-                raise UncertifiedError(f"island4d: between its nodes the table breaks: {rule}")
+        require(ISLAND4D, "between its nodes", rules)

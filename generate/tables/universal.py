@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from typing import Any
 
@@ -11,38 +10,28 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
-from generate.tables.build import (
+from generate.tables.certificate import (
     CONFORMANCE_POINTS,
-    ConformancePoints,
     UncertifiedError,
     certificate,
+    checked,
     conformance,
+    enough,
+    require,
     rtol_for,
+    visited_surfaces,
 )
 from generate.tables.chunks import ChunkedSolver, phi
-from generate.tables.configuration import Configuration
-from generate.tables.writing import SYMBOLS, labels_of_cells, numbered
+from generate.tables.configuration import Configuration, make_axis
+from generate.tables.writing import about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu
 from mbma_tables.surfaces.variants import VARIANTS
-from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, Axis, TableContent
+from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, UNIVERSAL, X_STEPS, TableContent
 
-LOOKUP = (
-    "X = (delta - h_d)/sigma and mu = (8/3) D sigma sqrt(2 R_u R_d) of the island, in any consistent units",
-    "its cell c has X_low[c] <= X <= X_high[c] and mu_low[c] <= mu <= mu_high[c]; on an edge any of its cells will do",
-    "x = (2 X - X_low - X_high)/(X_high - X_low) of the cell",
-    "y = 2 mu/mu_high - 1 where mu_low = 0; else, with m = sqrt(mu_low mu_high), "
-    "y = (sqrt(mu_high) + sqrt(mu_low))/(sqrt(mu_high) - sqrt(mu_low)) (mu - m)/(mu + m)",
-    "Phi_F = mu sum over i, j = 0 ... 7 of chebyshev_F[c, i, j] T_i(x) T_j(y), T_n(cos t) = cos(n t)",
-    "Phi_A = sum over i, j = 0 ... 7 of chebyshev_A[c, i, j] T_i(x) T_j(y)",
-    "the island's force is E* sigma L Phi_F, its contact area eta pi D R_u sigma L^2 Phi_A, L = sqrt(2 R_d sigma)",
-    "error_F and error_A bound the relative error of Phi_F and Phi_A in each cell",
-)
 VISITED = {"hurst": (0.05, 1.0), "log10_zeta_1": (0.4786, 8.0), "log10_approach": (-7.0, 1.0)}
-MAX_DRAWS = 400  # islands drawn for each that a narrow table covers
 
 AIM = 0.5  # of the target, for the tests of a cell
 AIM_IN_X = 0.4  # of that, for a line along X
@@ -145,13 +134,6 @@ def cells_of(low: float, high: float, mu_high: float, aim: float, rtol: float) -
     return np.concatenate([cells_of(*ends, mu_high, aim, rtol) for ends in ((low, middle), (middle, high))])
 
 
-def visited_surfaces(count: int, seed: int, ranges: dict[str, tuple[float, float]]) -> list[FloatArray]:
-    """H, zeta_1 and delta/h_rms of `count` islands, low-discrepancy over the ranges."""
-    low, high = np.array(list(ranges.values())).T
-    hurst, zeta_1, approach = qmc.scale(qmc.Halton(3, seed=seed).random(count), low, high).T
-    return [hurst, 10**zeta_1, 10**approach]
-
-
 class Universal:
     """Makes the universal table."""
 
@@ -195,39 +177,18 @@ class Universal:
         series = np.moveaxis(rows[:, 6:].reshape(-1, 2, TERMS, TERMS), 1, -1)
         content = TableContent(
             kind=configuration.kind,
-            axes=(
-                Axis("X", "how deep the island is: (delta - h_d)/sigma", "linear", 0.0, self.X.low, self.X.high, 2),
-                Axis(
-                    "mu",
-                    "stiffness of the roughness: (8/3) D sigma sqrt(2 R_u R_d)",
-                    "linear",
-                    0.0,
-                    0.0,
-                    self.mu.high,
-                    2,
-                ),
-            ),
+            axes=tuple(make_axis(UNIVERSAL, name, given, 2) for name, given in configuration.axes.items()),
             coefficients=np.ascontiguousarray(series),
             local_error=LOCAL_FACTOR * rows[:, 4:6] + self.rtol,
-            auxiliary=labels_of_cells(rows[:, :4].T),
+            auxiliary={n: (("cell",), r, label(t)) for (n, t), r in zip(CELL_EDGES.items(), rows.T, strict=False)},
             conformance={},
             attributes={},
         )
-        model = UniversalModel(content)
         X, mu = self.held_out(content, CONFORMANCE_POINTS, configuration.seed + 303)
-        table = np.stack(model.answer(X, mu)[:2])
-        points = ConformancePoints({"X": X, "mu": mu}, [], X, mu, np.ones((2, X.size)), np.zeros(X.size))
-        content = dataclasses.replace(
-            content,
-            conformance=conformance(points, table),
-            attributes={**self.attributes(), **self.certify(content, solver)},
-        )
-        try:
-            check_content(content)
-        except ValueError as fault:
-            raise UncertifiedError(f"universal: the table {fault}") from None
-        self.check(content)
-        return content
+        table = np.stack(UniversalModel(content).answer(X, mu)[:2])
+        points = conformance({"X": X, "mu": mu}, X, mu, table, 1.0, 0.0)
+        attributes = self.attributes() | self.certify(content, solver)
+        return checked(self, dataclasses.replace(content, conformance=points, attributes=attributes))
 
     def held_out(self, content: TableContent, count: int, seed: int) -> list[FloatArray]:
         """(X, mu) of points: half anywhere in any cell, half where surfaces really go."""
@@ -252,47 +213,22 @@ class Universal:
         return found
 
     def manifold(self, count: int) -> list[FloatArray]:
-        """(X, mu) of islands of random surfaces, both variants, as far as the table covers them."""
-        X = mu = np.empty(0)
-        draw = 4 * count
-        while X.size < count:
-            if draw > MAX_DRAWS * count:
-                raise UncertifiedError("universal: hardly a surface visits these axes, so there is nothing to certify")
+        """(X, mu) of islands of random surfaces, every variant, as far as the table covers them."""
+
+        def drawn(draw: int) -> list[FloatArray]:
             hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, VISITED)
             fields = [geometry(approach, hurst, zeta_1, variant) for variant in VARIANTS.values()]
             X, mu = (np.concatenate([f[name] for f in fields]) for name in ("X", "mu"))
             inside = (self.X.low < X) & (self.X.high > X) & (mu > 0) & (mu < self.mu.high)
-            X, mu = X[inside], mu[inside]
-            draw *= 2
+            return [X[inside], mu[inside]]
+
+        X, mu = enough(UNIVERSAL, count, 4 * count, drawn)
         chosen = np.linspace(0, X.size - 1, count).astype(int)
         return [X[chosen], mu[chosen]]
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file."""
-        return {
-            "title": "Island problem of the MBMA model of rough contact (Greenwood and Tripp 1967)",
-            "history": "made by python -m generate tables universal",
-            "source": "numerical solution of the integral equation by mbma_tables",
-            "references": (
-                "Guo, Ma, Zhu: A magnification-based multi-asperity (MBMA) model of rough contact, Eqs. 34-40; "
-                "Greenwood and Tripp (1967)"
-            ),
-            "summary": (
-                "Force Phi_F and area Phi_A of a contact island, a sphere covered with summits of normally distributed "
-                "heights, as functions of two numbers: X, how deep, and mu, how stiff the roughness is against "
-                "the sphere. With heights in units of sigma and radii rho in units of L: "
-                "d(rho) = rho^2 - X + w(rho), p(rho) = (mu/2) F_3/2(d), w(rho) = (4/pi) integral over t from 0 to "
-                "infinity of t/(t + rho) p(t) K(k) dt, K of modulus k = 2 sqrt(rho t)/(rho + t); "
-                "Phi_F = 2 pi integral of rho p, Phi_A = 2 pi integral of rho F_1(d)"
-            ),
-            "symbols": SYMBOLS,
-            **numbered("lookup", LOOKUP),
-            "variant": "any",
-            "variant_numbers": "[]",
-            "target": self.configuration.target,
-            "configuration": json.dumps(dataclasses.asdict(self.configuration), sort_keys=True),
-            "configuration_sha256": self.configuration.digest(),
-        }
+        return about(UNIVERSAL) | {"variant": "any", "variant_numbers": "[]"} | self.configuration.attributes()
 
     def check(self, content: TableContent) -> None:
         """Force and area positive and increasing in X, force increasing in mu, the rigid limit met."""
@@ -306,7 +242,7 @@ class Universal:
         at_zero = UniversalModel(content).slopes(X, np.zeros(X.size))
         limit = np.stack([at_zero[2].phi_F, at_zero[0].phi_A]) / still - 1
         target = self.configuration.target
-        checks = {
+        rules = {
             "force and area finite and positive": (np.isfinite(found) & (found > 0)).all(),
             "force and area no larger than a rigid sphere's": (found <= (1 + target) * rigid).all(),
             "force increasing in X": (by_X.phi_F > 0).all(),
@@ -314,6 +250,4 @@ class Universal:
             "force increasing in mu": (by_mu.phi_F > 0).all(),
             "rigid limit at mu = 0": (np.abs(limit) <= target).all(),
         }
-        for rule, kept in checks.items():
-            if not kept:
-                raise UncertifiedError(f"universal: in its cells the table breaks: {rule}")
+        require(UNIVERSAL, "in its cells", rules)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.answers.leakage_table import flow_of_spectrum, shipped_flow
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.units import unit_of
-from mbma_tables.laws.calibrated import spectrum_of
+from mbma_tables.laws.calibrated import self_affine_law, spectrum_of
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.labels import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -267,7 +267,8 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     out = table.flow(given, owner, u, contact)
     for row in np.flatnonzero(~table.covers(*given)):
         mine = owner == row
-        out[mine] = flow_of_spectrum(self_affine(*map(float, given[:, row])), u[mine], contact[mine])
+        law = self_affine_law(float(given[0, row]), float(np.exp(given[1, row])), None)
+        out[mine] = flow_of_spectrum(law.spectrum, u[mine], contact[mine])
     return out.reshape(shape)
 
 

@@ -108,12 +108,6 @@ def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
     return None, numbers, np.array([1, 1, OWN_NODES - 1]), anything, anything, None, None, pieces
 
 
-@functools.lru_cache(KEPT)
-def self_affine(hurst: float, log_zeta_1: float) -> Spectrum:
-    """The spectrum of a self-affine surface outside the table."""
-    return Spectrum.self_affine(hurst, math.exp(log_zeta_1))
-
-
 def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> FloatArray:
     """k of mean gaps [h_rms] and contact fractions of one spectrum; 0 where blocked."""
     return _flow(own_factor(spectrum), np.zeros(u.size, np.int64), u, area)

@@ -10,6 +10,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.common.plots import new_figure, theory_label
+from mbma_tables.surfaces.areal import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
@@ -34,6 +35,12 @@ def described(surface: MeasuredSurface) -> list[str]:
         f"({float(surface.h_max) / h_rms:.3g} h_rms), rms gradient {float(surface.rms_gradient):.4g}",
         f"waves from {shortest:.4g} to {longest:.4g} {unit}",
     ]
+    if (found := areal(surface)) is not None:
+        shown = {name: f"{name} {number:.4g}" for name, number in found.items()}
+        lines.append(f"ISO 25178 [{unit}]: " + ", ".join(shown[name] for name in ("Sq", "Sa", "Sp", "Sv", "Sz")))
+        lines.append(", ".join(shown[name] for name in ("Ssk", "Sku", "Sdq")) + f"; lay at {found['lay']:.0f} degrees")
+        heights = ", ".join(shown[name] for name in ("Sk", "Spk", "Svk"))
+        lines.append(f"core [{unit}]: {heights}; Smr1 {found['Smr1']:.1%}, Smr2 {found['Smr2']:.1%}")
     try:
         nearest = surface.fit()
         assert nearest.fit is not None
@@ -54,12 +61,20 @@ def described(surface: MeasuredSurface) -> list[str]:
     return lines + [entry["told"] for entry in surface.provenance if "told" in entry]
 
 
+def areal(surface: MeasuredSurface) -> dict[str, float] | None:
+    """Parameters of ISO 25178 of a surface's map; None where it has none."""
+    whole = surface.map
+    if whole is None or whole.heights.ndim != 2:
+        return None
+    return areal_parameters(whole.heights, (whole.steps[0], whole.steps[1]))
+
+
 def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str, FloatArray]]:
     """Force, area, mean separation and their scatter by the theories of the picture."""
     u = float(surface.h_max) * GAPS
     found = {}
     for name in DRAWN:
-        theory = get_theory(name)
+        theory = get_theory(name, surface)
         try:
             answer = answer_where_finite(theory, surface, u)
         except MbmaError:
@@ -182,25 +197,27 @@ def _by_pressure(
     axes.grid(True, which="major", alpha=0.3)
 
 
-def table_of_loads(surface: MeasuredSurface, E_star: float = 1.0) -> tuple[dict[str, Any], list[str]]:
-    """Columns by the calibrated law at a few contacts, and lines on what is left out of them or not valid."""
+def table_of_loads(
+    surface: MeasuredSurface, E_star: float = 1.0, theory: str = "calibrated"
+) -> tuple[dict[str, Any], list[str]]:
+    """Columns by a theory at a few contacts, and lines on what is left out of them or not valid."""
     from mbma_tables.answers.contact import contact
 
     areas, told = AREAS, []
     try:
-        found = contact(surface, area=areas, theory="calibrated", E_star=E_star)
+        found = contact(surface, area=areas, theory=theory, E_star=E_star)
     except OutOfRangeError as fault:
         if fault.mask is None or np.all(fault.mask):
             raise
         areas, told = AREAS[~fault.mask], [f"{_contacts(AREAS[fault.mask])} left out: {fault}"]
-        found = contact(surface, area=areas, theory="calibrated", E_star=E_star)
+        found = contact(surface, area=areas, theory=theory, E_star=E_star)
     # curves of odd maps jump over some contacts
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
     if not reached.all():
         told.append(f"{_contacts(areas[~reached])} left out: the map's curve jumps over it")
     names = ("area", "pressure", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
-    reasons, everywhere = found.reasons, surface.departures(by_map=surface.bearing is not None)
+    reasons, everywhere = found.reasons, get_theory(theory, surface).departures(surface)
     told += [
         f"not valid at {_contacts(areas[m])}: {reason}" for reason, m in reasons.items() if reason not in everywhere
     ]

@@ -22,6 +22,7 @@ from mbma_tables.theories.protocol import TheoryAnswer
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mbma_tables.answers.contact_map import ContactMap
     from mbma_tables.answers.leakage import Leakage
 
 OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
@@ -137,6 +138,33 @@ class Contact(Interface, Displayed):
             fields += [self.leakage.K, self.leakage.scatter]
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
         return Curve(label, *(np.ravel(field)[order] for field in fields))
+
+    def map(self) -> ContactMap:
+        """Pressure, gap and contact at every point of the surface's map at this pressure, simulated by Tamaas.
+
+        The map is pressed on its full grid, with the contact's pressure, whatever the theory that answered.
+
+        Raises
+        ------
+        InputError
+            For several contacts, one with a hardness, and surfaces without a map.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface, contact
+        >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
+        >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+        >>> heights = 0.1 * np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
+        >>> surface = Surface.from_map(heights, dx=1.0, periodic=True, unit="um")
+        >>> pressed = contact(surface, pressure="10 MPa", E_star="1 GPa").map()
+        >>> data = pressed.to_dataset()
+        >>> f"{float(data.pressure.mean()):.3f} {data.pressure.units} on {float(data.contact.mean()):.0%} of the points"
+        '0.010 GPa on 45% of the points'
+        """
+        from mbma_tables.answers.contact_map import contact_map
+
+        return contact_map(self)
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:

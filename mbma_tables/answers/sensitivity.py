@@ -23,6 +23,7 @@ from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
+from mbma_tables.theories import OF_MAPS, theory_name
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
@@ -116,7 +117,8 @@ def sensitivity(
     ranges : mapping of pairs, optional
         Between what a parameter may lie: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
     theory, island_model, variant, rtol, hardness, materials : optional
-        As for `contact`; a hardness is one of the parameters.
+        As for `contact`, but for maps "calibrated" by default, as simulations know one surface; a hardness is one of
+        the parameters.
 
     Returns
     -------
@@ -141,7 +143,10 @@ def sensitivity(
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.69'
     """
-    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
+    named = theory_name(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
+    # a simulation knows no surface but its own
+    named = "calibrated" if theory is None and named in OF_MAPS else named
+    chosen = chosen_theory(surface, named, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, hardness, _ = bodies(materials, E_star, hardness)
     modulus, units = modulus_and_units(E_star, surface)

@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import batch, commands, export, joint, scene, tables
+from mbma_tables.cli import batch, cache, commands, export, joint, scene, tables
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
 
@@ -126,6 +126,7 @@ for command in (
     commands.fit_command,
     batch.sensitivity_command,
     tables.tables_group,
+    cache.cache_command,
     joint.joint_command,
     scene.plan_command,
     scene.run_command,

@@ -16,11 +16,20 @@ from mbma_tables.cli.format import Column, Report, shown_unit, to_columns
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
 from mbma_tables.common.progress import doing
-from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, effective_modulus_of, from_name, from_numbers
+from mbma_tables.scenes.specimen import (
+    MATERIAL,
+    NUMBERS,
+    Specimen,
+    effective_modulus_of,
+    from_map,
+    from_name,
+    from_numbers,
+)
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 
 MAX_BYTES = 64 * 2**20
+OF_MAPS = ("dx", "dy", "detrend", "short_cutoff", "long_cutoff", "s_filter", "l_filter")
 LOADS = ("separation", "mean_separation", "pressure", "area")
 
 
@@ -45,9 +54,10 @@ def batch_command(
 ) -> None:
     """A row of the answer for each line of SURFACES.csv.
 
-    Its header names a surface's numbers as the options of `mbma contact` do, "surface" for named ones, moduli (E_star,
-    or E1, nu1, E2, nu2), and separation, mean_separation, pressure or area where these are not options; a column
-    "name" is repeated. Cells are numbers, perhaps with their unit, "0.8um".
+    Its header names a surface's numbers as the options of `mbma contact` do, "surface" for named ones, "map" for files
+    of maps with their dx, dy, detrend, cut-offs and filters, moduli (E_star, or E1, nu1, E2, nu2), and separation,
+    mean_separation, pressure or area where these are not options; a column "name" is repeated. Cells are numbers,
+    perhaps with their unit, "0.8um". Files are relative to SURFACES.csv.
 
     Example: mbma batch surfaces.csv --pressure 1MPa --theory calibrated --csv --out answers.csv
     """
@@ -66,29 +76,39 @@ def batch_command(
     for count, (number, row) in enumerate(lines):
         doing(f"batch: line {count} of {len(lines)}")
         try:
-            specimen = _specimen(row, E_star, *units)
+            specimen = _specimen(row, E_star, *units, file.parent)
             units = units[0] or specimen.surface.unit, units[1] or specimen.stress_unit
             if load not in loads and load not in row:
                 raise InputError(f"{load} is missing")
             values.append(specimen.units.number(load, row.get(load, loads.get(load))))
         except InputError as fault:
             raise InputError(f"{file}, line {number}: {fault}") from None
-        names.append(row.get("name", row.get("surface", f"line {number}")))
+        names.append(row.get("name", row.get("surface", row.get("map", f"line {number}"))))
         specimens.append(specimen)
     if len({specimen.units for specimen in specimens}) > 1:
         raise InputError(f"{file}: some lines know their units and some do not: give --length-unit and --stress-unit")
-    first, moduli = specimens[0], [specimen.E_star for specimen in specimens]
-    columns: dict[str, Any] = {name: [getattr(specimen.surface, name) for specimen in specimens] for name in PARAMETERS}
-    surface = Surface(**columns, unit=first.surface.unit)
+    first = specimens[0]
+    moduli = [1.0 if specimen.E_star is None else specimen.E_star for specimen in specimens]
     doing(f"batch of {len(lines)} lines")
     keywords = contact_keywords(model, first)
-    keywords["E_star"] = [1.0 if modulus is None else modulus for modulus in moduli]
-    keywords[load] = values
-    answer = contact(surface, **keywords)
+    fields = (*COLUMNS[:-1], "stiffness", "scatter", "valid", "error")
     found: dict[str, Any] = {"name": names}
-    found |= {name: getattr(answer, name) for name in (*COLUMNS[:-1], "stiffness", "scatter", "valid", "error")}
+    if all(isinstance(specimen.surface, Surface) for specimen in specimens):
+        columns: dict[str, Any] = {
+            name: [getattr(specimen.surface, name) for specimen in specimens] for name in PARAMETERS
+        }
+        surface = Surface(**columns, unit=first.surface.unit)
+        answer = contact(surface, **keywords | {"E_star": moduli, load: values})
+        found |= {name: getattr(answer, name) for name in fields}
+    else:
+        # one after the other: maps make no batch
+        rows = zip(specimens, moduli, values, strict=True)
+        each = [contact(one.surface, **keywords | {"E_star": modulus, load: at}) for one, modulus, at in rows]
+        answer, found["theory"] = each[0], [one.theory for one in each]
+        found |= {name: [getattr(one, name) for one in each] for name in fields}
     notes = [
-        f"theory {answer.theory}" + (f", rtol {model.rtol:g}" if answer.theory == "mbma" else ""),
+        ", ".join(dict.fromkeys(f"theory {name}" for name in found.get("theory", [answer.theory])))
+        + (f", rtol {model.rtol:g}" if answer.theory == "mbma" else ""),
         "scatter: of ln force at a separation, by simulations",
     ]
     shown = {name: shown_unit(name, first.units) for name in found}
@@ -99,8 +119,8 @@ def batch_command(
 def _lines(file: Path) -> Any:
     """Number and filled cells of each line below the header."""
     text = read_file(file, MAX_BYTES).decode("utf-8-sig", "replace")
-    rows = csv.DictReader(line for line in io.StringIO(text, newline=""))
-    known = {"name", "surface", *NUMBERS, *MATERIAL, *LOADS}
+    rows = csv.DictReader(io.StringIO(text, newline=""))
+    known = {"name", "surface", "map", *OF_MAPS, *NUMBERS, *MATERIAL, *LOADS}
     names = [name.strip() for name in rows.fieldnames or ()]
     if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"{file}: more than one column {', '.join(repeated)}")
@@ -119,11 +139,19 @@ def _lines(file: Path) -> Any:
         raise InputError(f"{file} has no line of a surface below its header")
 
 
-def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: str | None) -> Specimen:
+def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: str | None, folder: Path) -> Specimen:
     numbers: dict[str, Any] = {name: row[name] for name in NUMBERS if name in row}
+    treatment: dict[str, Any] = {name: row[name] for name in OF_MAPS if name in row}
     if "surface" in row and numbers:
         raise InputError("a named surface and numbers: one of them")
-    specimen = from_name(row["surface"]) if "surface" in row else from_numbers(numbers, length)
+    if "map" in row and ("surface" in row or numbers):
+        raise InputError("a map and a named surface or numbers: one of them")
+    if treatment and "map" not in row:
+        raise InputError(f"{', '.join(treatment)}: about a map, which is missing")
+    if "map" in row:
+        specimen = from_map(folder / row["map"], treatment | {"unit": length})
+    else:
+        specimen = from_name(row["surface"]) if "surface" in row else from_numbers(numbers, length)
     material = {name: row[name] for name in MATERIAL if name in row}
     modulus, unit = effective_modulus_of(material or ({} if E_star is None else {"E_star": E_star}), stress)
     return Specimen(specimen.surface, specimen.title, modulus, unit).in_units(length, stress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,6 +31,7 @@ EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
 MIN_POINTS = 5
 DRAWN = ("calibrated", "persson")  # theories beside the chosen one in a picture, where they are there
 COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
+MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotropy")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
@@ -79,7 +81,7 @@ def contact_command(
     model = model.of(specimen.surface)
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
-    (name, numbers), *_ = loads.items()
+    ((name, numbers),) = loads.items()
     if over_h_rms and name in ("pressure", "area"):
         raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
     from mbma_tables.answers.contact import contact
@@ -222,13 +224,19 @@ def surfaces_command(output: options.Output) -> None:
 
 
 @click.command("fit", short_help="What a measured map or line scan says, and how it touches.")
-@click.argument("measurement", metavar="MAP", type=click.Path(path_type=Path))
+@click.argument("measurements", metavar="MAP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
 @options.plot_option
+@click.option("--simulate", is_flag=True, help="Press the map by boundary elements; --out OWN.nc keeps them.")
 @options.map_options
 @options.output_options
 def fit_command(
-    measurement: Path, E_star: Any, plot: Path | None, treatment: dict[str, Any], output: options.Output
+    measurements: tuple[Path, ...],
+    E_star: Any,
+    plot: Path | None,
+    simulate: bool,
+    treatment: dict[str, Any],
+    output: options.Output,
 ) -> None:
     """Read a map or line scan, say what was found in it and done to it, and how it touches a flat.
 
@@ -236,37 +244,40 @@ def fit_command(
     a pressure and of ln F at a separation). The picture has the map, its spectrum, its heights, and area and
     separation against pressure.
 
+    Several maps are scans of one surface: spectra, heights and curves are averaged, and the picture shows the first.
+
+    With --simulate the table is by boundary elements on the map itself, and --out OWN.nc writes them, a table of the
+    surface that --map OWN.nc of other commands reads in place of the map.
+
     Example: mbma fit wafer.sur --short-cutoff 2um --plot wafer.png
     """
     options.check_plot(plot, output.out)
-    from mbma_tables.answers.measurement import curves, described, draw, table_of_loads
-    from mbma_tables.common.plots import to_picture
-    from mbma_tables.common.units import Units, unit_of
+    from mbma_tables.answers.measurement import areal, curves, described, draw, table_of_loads
+    from mbma_tables.common.plots import pressure_label, to_picture
+    from mbma_tables.common.units import Units
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
+    from mbma_tables.surfaces.averages import average
+    from mbma_tables.theories import BoundaryElements
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
-    treated, surface = measured(measurement, treatment)
+    scans = [measured(path, treatment) for path in measurements]
+    treated = scans[0][0]
+    surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
-    columns, told = table_of_loads(surface, scale)
+    columns, told = table_of_loads(surface, scale, "simulated" if simulate else "calibrated")
+    if simulate and output.out is not None and output.out.suffix == ".nc":
+        BoundaryElements.of(surface).to_netcdf(output.out)
+        told, output = [*told, f"{output.out} has the simulation"], dataclasses.replace(output, out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
-    facts = {
-        "length_unit": surface.unit,
-        "stress_unit": stress_unit,
-        "h_rms": float(surface.h_rms),
-        "h_max": float(surface.h_max),
-        "rms_gradient": float(surface.rms_gradient),
-        "skewness": surface.skewness,
-        "kurtosis": surface.kurtosis,
-        "anisotropy": surface.anisotropy,
-        "provenance": list(surface.provenance),
-        "notes": told,
-    }
-    title = measurement.name
+    facts: dict[str, Any] = {"length_unit": surface.unit, "stress_unit": stress_unit}
+    facts |= {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
+    facts |= {"provenance": surface.provenance, "notes": told}
+    title = ", ".join(path.name for path in measurements)
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
     report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
     picture = b""
     if plot is not None:
-        label = "pressure  F/(A0 E*)" if modulus is None else f"pressure [{stress_unit or 'stress'}]"
+        label = pressure_label(unit_of("pressure", units))
         picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
     report.write(output, plot, picture)
 

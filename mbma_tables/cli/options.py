@@ -12,6 +12,8 @@ from typing import Any
 import click
 
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import KINDS
+from mbma_tables.models import ISLAND_MODELS
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -22,8 +24,7 @@ from mbma_tables.theories import OF_MAPS, THEORIES
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
-ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
-PICTURES = (".png", ".svg", ".pdf")
+PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -162,6 +163,8 @@ _MAP_OPTIONS = (
     _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
     _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
     _option("long_cutoff", "Longest wavelength to keep [length]."),
+    _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
+    _option("l_filter", "and of an L-filter [length]."),
     _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
     _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
     _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
@@ -201,8 +204,8 @@ _SPECIMEN_OPTIONS = (
     _option("Rdq", "rms slope of a profile,"),
     _option("Sdq", "or rms gradient of a map,"),
     _option("Rsm", "or mean spacing of a profile's elements [length];"),
-    _option("longest", "longest wave [length],"),
-    _option("shortest", "or shortest wave [length],"),
+    _option("longest", "longest wavelength [length],"),
+    _option("shortest", "or shortest wavelength [length],"),
     _option("Sds", "or summits per area [1/length^2],"),
     _option("Spd", "the same by its newer name;"),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),
@@ -251,7 +254,8 @@ _MODEL_OPTIONS = (
 )
 theory_option = _option(
     "theory",
-    "Theory; only mbma has an island model, variant and rtol. Default: calibrated for a spectrum or a map, else mbma.",
+    "Theory; only mbma has an island model, variant and rtol. Default: mbma for numbers, else calibrated, of maps "
+    "corrected where Tamaas is installed.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
 # of islands, which MBMA alone has

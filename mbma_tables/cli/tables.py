@@ -1,27 +1,42 @@
-"""The command group `mbma tables`: which tables there are, what their files say, whether they are sound."""
+"""The command group `mbma tables`: which tables there are, what their files hold, whether they are sound."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbma_tables.cli.options import json_option
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
+from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL
+
+if TYPE_CHECKING:
+    from mbma_tables.tablefiles.schema import TableContent
 
 
-def _path(name: str) -> Path:
-    """A table by kind, or a file."""
+def _place(name: str) -> tuple[Path, str | None]:
+    """Path and kind of a table by its kind, or of a file, whose kind is not known."""
     from mbma_tables.models.tables import shipped
-    from mbma_tables.tablefiles.schema import KINDS
 
     if name in KINDS:
-        return shipped(name)
+        return shipped(name), name
     if not Path(name).exists():
         raise InputError(f"no table and no file is called {name!r}: the tables are {' and '.join(KINDS)}")
-    return Path(name)
+    return Path(name), None
+
+
+def _read(name: str) -> TableContent:
+    from mbma_tables.tablefiles.netcdf import read_table
+
+    return read_table(*_place(name))
+
+
+def _show(content: Any, lines: Iterable[str], as_json: bool) -> None:
+    echo(json.dumps(content, indent=2) if as_json else "\n".join(lines))
 
 
 @click.group("tables", no_args_is_help=False)
@@ -30,77 +45,53 @@ def tables_group() -> None:
 
 
 @tables_group.command("list")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+@json_option("lines")
 def list_command(as_json: bool) -> None:
     """Kind, size, nodes and largest held-out error of the shipped tables."""
-    from mbma_tables.tablefiles.netcdf import read_table
-    from mbma_tables.tablefiles.schema import KINDS
-
-    rows: list[dict[str, Any]] = []
+    rows, lines = [], []
     for kind in KINDS:
-        path = _path(kind)
-        content = read_table(path, kind)
-        rows.append(
-            {
-                "kind": kind,
-                "path": str(path),
-                "bytes": path.stat().st_size,
-                "size": content.size,
-                "variant": content.attributes["variant"],
-                "data_version": content.attributes["data_version"],
-                "largest_error": {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")},
-            }
+        (path, _), content = _place(kind), _read(kind)
+        errors = {f: content.attributes[f"largest_error_{f}"] for f in FUNCTIONS}
+        row = {"kind": kind, "path": str(path), "bytes": path.stat().st_size, "size": content.size}
+        row |= {name: content.attributes[name] for name in ("variant", "data_version")}
+        rows.append(row | {"largest_error": errors})
+        largest = ", ".join(f"{f} {error:.2g}" for f, error in errors.items())
+        lines.append(
+            "{kind}: {size}; variant {variant}; largest held-out error {largest}; {bytes} bytes; data {data_version}; "
+            "{path}".format(**row, largest=largest)
         )
-    if as_json:
-        echo(json.dumps({"tables": rows}, indent=2))
-        return
-    for row in rows:
-        errors = ", ".join(f"{f} {error:.2g}" for f, error in row["largest_error"].items())
-        echo(
-            f"{row['kind']}: {row['size']}; variant {row['variant']}; largest held-out error {errors}; "
-            f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}"
-        )
+    _show({"tables": rows}, lines, as_json)
 
 
 @tables_group.command("info")
 @click.argument("table")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+@json_option("lines")
 def info_command(table: str, as_json: bool) -> None:
     """Axes and attributes of TABLE (a kind or a file)."""
-    from mbma_tables.tablefiles.netcdf import read_table
-    from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
-
-    content = read_table(_path(table), table if table in KINDS else None)
+    content = _read(table)
     axes = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
-    if as_json:
-        echo(json.dumps({"axes": axes, "attributes": content.attributes}, indent=2))
-        return
-    for name, attributes in axes.items():
-        # the universal table has cells, not nodes
-        nodes = "" if content.kind == UNIVERSAL else f", {attributes['nodes']} nodes, {attributes['position_formula']}"
-        echo(f"axis {name}: {attributes['long_name']}, {attributes['first']:g} to {attributes['last']:g}{nodes}")
-    for name, value in content.attributes.items():
-        echo(f"{name}: {value}")
+    # the universal table has cells, not nodes
+    nodes = "" if content.kind == UNIVERSAL else ", {nodes} nodes, {position_formula}"
+    text = "axis {name}: {long_name}, {first:g} to {last:g}" + nodes
+    lines = [text.format(name=name, **attributes) for name, attributes in axes.items()]
+    lines += [f"{name}: {value}" for name, value in content.attributes.items()]
+    _show({"axes": axes, "attributes": content.attributes}, lines, as_json)
 
 
 @tables_group.command("verify")
 @click.argument("tables", nargs=-1)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+@json_option("lines")
 def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     """Check hashes and conformance points of TABLES (kinds or files; all shipped ones if none is named).
 
     The conformance points are answered by the table and by the exact solver, and compared with the stored answers.
     """
     from mbma_tables.models.tables import verify
-    from mbma_tables.tablefiles.schema import KINDS
 
-    verdicts = [verify(_path(t), t if t in KINDS else None) for t in tables or KINDS]
-    if as_json:
-        echo(json.dumps({"tables": [v._asdict() for v in verdicts]}, indent=2))
-        return
-    for v in verdicts:
-        found = f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"
-        echo(
-            f"{v.path}: hashes match; {v.points} conformance points: table within {v.table_error:.1e}, "
-            f"exact solver {found}"
-        )
+    verdicts = [verify(*_place(table)) for table in tables or KINDS]
+    lines = [
+        f"{v.path}: hashes match; {v.points} conformance points: table within {v.table_error:.1e}, exact solver "
+        + (f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit")
+        for v in verdicts
+    ]
+    _show({"tables": [v._asdict() for v in verdicts]}, lines, as_json)

@@ -6,6 +6,7 @@ import difflib
 import functools
 import importlib
 import inspect
+import itertools
 import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -107,7 +108,8 @@ def is_labelled(value: Any) -> bool:
 
 def any_labelled(surface: Any, *values: Any) -> bool:
     """Whether a surface or any value is of DataArrays."""
-    return "xarray" in sys.modules and (surface.labelled or any(map(is_labelled, values)))
+    xarray: Any = sys.modules.get("xarray")
+    return xarray is not None and (surface.labelled or any(map(isinstance, values, itertools.repeat(xarray.DataArray))))
 
 
 def finite_array(name: str, value: ArrayLike) -> FloatArray:

@@ -53,7 +53,9 @@ DIMENSIONS = {
     **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest"), (1, 0)),
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
-    **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "extrapolate_to"), (1, 0)),
+    **dict.fromkeys(
+        ("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter", "extrapolate_to"), (1, 0)
+    ),
     **dict.fromkeys(("width", "mean_free_path", "displacement"), (1, 0)),
     **dict.fromkeys(("viscosity", "pressure_drop", "pressure_in", "pressure_out"), (0, 1)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
@@ -76,14 +78,7 @@ _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.D
 
 
 def known(unit: Any, kind: str = "length") -> str:
-    """A unit's name as this package writes it; what is no unit of that kind is refused with the nearest ones.
-
-    Examples
-    --------
-    >>> from mbma_tables.common.units import known
-    >>> known("µm"), known("N/mm^2", "stress")
-    ('um', 'MPa')
-    """
+    """A unit's name as this package writes it; what is no unit of that kind is refused with the nearest ones."""
     if not isinstance(unit, str):
         raise InputError(f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}")
     plain = ALIASES.get(unit.strip(), unit.strip().translate(_ASCII))
@@ -98,27 +93,13 @@ def known(unit: Any, kind: str = "length") -> str:
 
 @functools.lru_cache(1024)
 def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
-    """By what a number in one unit is multiplied to be in another, rounded once.
-
-    Examples
-    --------
-    >>> from mbma_tables.common.units import factor
-    >>> factor("um", "mm"), factor("GPa", "MPa", "stress"), factor("mm", "m", power=-1)
-    (0.001, 1000.0, 1000.0)
-    """
+    """By what a number in one unit is multiplied to be in another, rounded once."""
     return float((SIZES[kind][known(have, kind)] / SIZES[kind][known(want, kind)]) ** power)
 
 
 @functools.lru_cache(1024)
 def read(name: str, text: str) -> tuple[float, str | None]:
-    """A number and the unit of length or stress that a text gives it, None where it gives none.
-
-    Examples
-    --------
-    >>> from mbma_tables.common.units import read
-    >>> read("h_rms", "0.8um"), read("q0", "6.28/mm"), read("m4", "62 1/mm^2"), read("E1", "210 GPa")
-    ((0.8, 'um'), (6.28, 'mm'), (62.0, 'mm'), (210.0, 'GPa'))
-    """
+    """A number and the unit of length or stress that a text gives it, None where it gives none."""
     found = _NUMBER.fullmatch(text)
     if found is None:
         raise InputError(f"{name} must be a number, or one with its unit, got {text!r}")
@@ -193,14 +174,7 @@ class Units:
         return number * factor(unit, own, kind, length or power)
 
     def conductivities(self, *given: Any) -> tuple[list[Any], str]:
-        """Conductivities and the unit that they have over this unit of length, which is an SI unit of texts.
-
-        Examples
-        --------
-        >>> from mbma_tables.common.units import Units
-        >>> Units("mm").conductivities(45.0, 167.0), Units("mm").conductivities("45 W/(m K)", "167 W/(m K)")
-        (([45.0, 167.0], 'conductivity/mm'), ([45000.0, 167000.0], 'W/(m^2 K)'))
-        """
+        """Conductivities and the unit that they have over this unit of length, which is an SI unit of texts."""
         if not any(isinstance(value, str) for value in given):
             return list(given), f"conductivity/{unit_of('separation', self)}"
         numbers, units = [], set()
@@ -228,14 +202,7 @@ UNKNOWN = Units()
 def resolve(
     given: Mapping[str, Any], asked: str | None = None, kind: str = "length"
 ) -> tuple[dict[str, Any], str | None]:
-    """Numbers in one unit of length or stress, and that unit: the one asked for, else the first that is named.
-
-    Examples
-    --------
-    >>> from mbma_tables.common.units import resolve
-    >>> resolve({"hurst": 0.8, "h_rms": "0.8 um", "h_max": "3e-3 mm"})
-    ({'hurst': 0.8, 'h_rms': 0.8, 'h_max': 3.0}, 'um')
-    """
+    """Numbers in one unit of length or stress, and that unit: the one asked for, else the first that is named."""
     named = {name: _named(name, value, kind) for name, value in given.items()}
     unit = known(asked, kind) if asked else next((u for u in named.values() if u is not None), None)
     if unit is not None and not asked and any(isinstance(value, str) for value in given.values()):

@@ -3,19 +3,13 @@
  * The same sources are compiled for each generation of processor, as modules of different names; `core/__init__.py`
  * imports the best one that the processor can run. Sizes are checked here, values in the core.
  */
-#define Py_LIMITED_API 0x030B0000
-#define PY_SSIZE_T_CLEAN
-#if __has_include(<Python.h>)
-#include <Python.h>
-#else
-#include "stable_abi.h"
-#endif
 #if defined(__x86_64__) || defined(_M_X64)
 #include <cpuid.h>
 #include <immintrin.h>
 #endif
 
 #include "calls.h"
+#include "stable_abi.h"
 
 static void release(Py_buffer *views, Py_ssize_t count) {
     for (Py_ssize_t k = 0; k < count; k++)

@@ -325,8 +325,7 @@ typedef struct {
     double s0, t0, tail, h_max, end; /* end: ln F at h_max of a surface without end */
     double shift, lightest[2];       /* of ln F; u where panels begin, and its slope */
     uint64_t panels;
-    double edge[MBMA_MOST_PANELS + 1], log_u[MBMA_MOST_PANELS + 1];
-    double p[MBMA_MOST_PANELS][MBMA_ORDER];
+    double edge[MBMA_MOST_PANELS + 1], p[MBMA_MOST_PANELS][MBMA_ORDER];
 } mbma_spectrum_law;
 
 /* A quadrature rule for power laws between samples: q rising [1/length], a repeated one is a jump; C not negative

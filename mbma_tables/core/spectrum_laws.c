@@ -38,34 +38,26 @@ static const double RULE[NODES / 2][2] = {{0.1252334085114689, 0.249147045813402
 
 /* ---- polynomials through Chebyshev nodes of [-1, 1] -------------------------------------------------------------- */
 
-typedef struct {
-    double node[ORDER], chebyshev[ORDER][ORDER], powers[ORDER][ORDER];
-} fit;
-
-static void make_fit(fit *f) {
-    for (int m = 0; m < ORDER; m++)
-        for (int j = 0; j < ORDER; j++) {
-            const double step = 1.0 / (double)ORDER, angle = MBMA_PI * (j + 0.5) * step;
-            const double twice = m > 1 && j > 0 ? 2.0 * f->powers[m - 1][j - 1] : 0.0;
-            f->node[j] = cos(angle);
-            f->chebyshev[m][j] = (m == 0 ? 1.0 : 2.0) * step * cos(m * angle);
-            f->powers[m][j] = m > 1 ? twice - f->powers[m - 2][j] : (double)(m == j);
-        }
-}
+static double node(int j) { return cos(MBMA_PI * (j + 0.5) / ORDER); }
 
 /* Powers from values at the nodes; the last two Chebyshev coefficients, which tell the error. */
-static double powers_of(const fit *f, const double value[ORDER], double p[ORDER]) {
-    double c[ORDER];
+static double powers_of(const double value[ORDER], double p[ORDER]) {
+    double before[ORDER] = {0.0}, term[ORDER] = {1.0}, last[2] = {0.0};
+    memset(p, 0, ORDER * sizeof *p);
     for (int m = 0; m < ORDER; m++) {
-        c[m] = 0.0;
-        p[m] = 0.0;
+        double c = 0.0;
         for (int j = 0; j < ORDER; j++)
-            c[m] += f->chebyshev[m][j] * value[j];
+            c += (m == 0 ? 1.0 : 2.0) / ORDER * cos(m * (MBMA_PI * (j + 0.5) / ORDER)) * value[j];
+        last[m % 2] = fabs(c);
+        /* the next Chebyshev polynomial is 2 x times this one less the one before */
+        for (int j = ORDER - 1; j >= 0; j--) {
+            const double next = (m == 0 ? 1.0 : 2.0) * (j > 0 ? term[j - 1] : 0.0) - before[j];
+            p[j] += c * term[j];
+            before[j] = term[j];
+            term[j] = next;
+        }
     }
-    for (int m = 0; m < ORDER; m++)
-        for (int j = 0; j <= m; j++)
-            p[j] += c[m] * f->powers[m][j];
-    return fabs(c[ORDER - 1]) + fabs(c[ORDER - 2]);
+    return last[0] + last[1];
 }
 
 /* ---- inner integrals I(y), times exp(2 y^2) ---------------------------------------------------------------------- */
@@ -87,7 +79,7 @@ static double integrated_down(double from, double to, const double weight[3], do
     return inner;
 }
 
-static void inner_integral(const fit *f, const double weight[3], double p[CELLS][ORDER]) {
+static void inner_integral(const double weight[3], double p[CELLS][ORDER]) {
     const double z = 2.0 * exp(2.0 * HIGHEST);
     double series = 1.0, at = HIGHEST, value[ORDER];
     /* exp(z) z E1(z) */
@@ -96,11 +88,11 @@ static void inner_integral(const fit *f, const double weight[3], double p[CELLS]
     double own = 0.5 * ROOT_8_PI / z * series * (weight[0] + 3.0 * weight[1] + 16.0 * weight[2]);
     for (int cell = CELLS - 1; cell >= 0; cell--) {
         for (int j = 0; j < ORDER; j++) {
-            const double next = LOWEST + (cell + 0.5 * (1.0 + f->node[j])) / CELL_RATE;
+            const double next = LOWEST + (cell + 0.5 * (1.0 + node(j))) / CELL_RATE;
             value[j] = own = integrated_down(at, next, weight, own);
             at = next;
         }
-        (void)powers_of(f, value, p[cell]);
+        (void)powers_of(value, p[cell]);
     }
     p[0][1] = -0.5 * ROOT_8_PI / CELL_RATE * weight[0];
     for (int m = 2; m < ORDER; m++)
@@ -134,14 +126,14 @@ static double sum_at(const wave_sum *w, double log_force) {
 }
 
 /* Panels from `start` to `end`, halved until polynomials hold. */
-static bool fill_panels(const wave_sum *w, const fit *f, double start, double end, mbma_spectrum_law *law) {
+static bool fill_panels(const wave_sum *w, double start, double end, mbma_spectrum_law *law) {
     while (start < end && law->panels < MBMA_MOST_PANELS) {
         double width = 2.0 * (end - start), value[ORDER], tail;
         do {
             width *= 0.5;
             for (int j = 0; j < ORDER; j++)
-                value[j] = sum_at(w, start + 0.5 * width * (1.0 + f->node[j]));
-            tail = powers_of(f, value, law->p[law->panels]);
+                value[j] = sum_at(w, start + 0.5 * width * (1.0 + node(j)));
+            tail = powers_of(value, law->p[law->panels]);
         } while (tail > TINY && width > NARROWEST);
         start = end - start > width ? start + width : end;
         law->edge[++law->panels] = start;
@@ -164,18 +156,20 @@ static double log_u_in(const mbma_spectrum_law *law, size_t panel, double log_fo
 
 /* ln F at a mean separation before the tail's factor, by Newton's method in a bracket, and d ln u/d ln F. */
 static double log_force_of(const mbma_spectrum_law *law, double u, double *slope) {
-    const double log_u = log(u), *edge = law->edge, *ends = law->log_u;
+    const double log_u = log(u), *edge = law->edge;
     size_t panel = 0;
     if (u >= law->lightest[0]) {
         *slope = law->lightest[1] / u;
         return edge[0] + (u - law->lightest[0]) / law->lightest[1];
     }
-    if (!(log_u >= ends[law->panels]))
+    double from = log(law->lightest[0]), to = log_u_in(law, 0, edge[1], slope);
+    while (to > log_u && ++panel < law->panels) {
+        from = to;
+        to = log_u_in(law, panel, edge[panel + 1], slope);
+    }
+    if (!(log_u >= to))
         return NAN;
-    while (panel + 1 < law->panels && ends[panel + 1] >= log_u)
-        panel++;
-    double low = edge[panel], high = edge[panel + 1], x = low, step = NAN;
-    x += (high - low) * (ends[panel] - log_u) / (ends[panel] - ends[panel + 1]);
+    double low = edge[panel], high = edge[panel + 1], x = low + (high - low) * (from - log_u) / (from - to), step;
     for (int k = 0; k < MOST_STEPS; k++) {
         const double miss = log_u_in(law, panel, x, slope) - log_u;
         *(miss > 0.0 ? &low : &high) = x;
@@ -213,7 +207,6 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
     double mean = 0.0, inverse = 0.0, slope;
     wave_sum w = {{{0.0}}, n, work, work + n, work + 2 * n};
     bool good = n > 0 && h_max > 0.0 && waves->gradient > 0.0 && waves->gradient < INFINITY && waves->alpha > 0.0;
-    fit f;
     memset(law, 0, sizeof *law);
     for (size_t k = 0; k < n && good; k++) {
         const double below = waves->below[k], last = waves->below[n - 1];
@@ -229,8 +222,7 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
         return MBMA_INVALID;
     const double narrowness = 1.0 / (mean * inverse), a = c->weight + c->weight_slope * (narrowness - NARROWNESS);
     const double weight[3] = {a, c->cubic, 1.0 - a - c->cubic};
-    make_fit(&f);
-    inner_integral(&f, weight, w.p);
+    inner_integral(weight, w.p);
     law->s0 = mbma_min(c->area_s0 + c->area_slope * log(waves->alpha / 10.0), 1.0);
     law->t0 = c->area_t0;
     law->tail = c->tail * (1.0 - narrowness);
@@ -238,10 +230,7 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
     law->shift = 0.5 * log(waves->below[n - 1]);
     law->edge[0] = EDGES[0];
     for (size_t k = 0; k + 1 < sizeof EDGES / sizeof *EDGES; k++)
-        good = good && fill_panels(&w, &f, EDGES[k], EDGES[k + 1], law);
-    for (size_t k = 0; k < law->panels; k++)
-        law->log_u[k] = log_u_in(law, k, law->edge[k], &slope);
-    law->log_u[law->panels] = log_u_in(law, law->panels - 1, law->edge[law->panels], &slope);
+        good = good && fill_panels(&w, EDGES[k], EDGES[k + 1], law);
     law->lightest[0] = exp(log_u_in(law, 0, law->edge[0], &slope));
     /* without the first power in W, u is constant there */
     law->lightest[1] = fmin(slope * law->lightest[0], -1e-300);

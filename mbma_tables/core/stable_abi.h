@@ -1,5 +1,5 @@
-/* The part of CPython's stable ABI that binding.c uses, for builds without Python's own headers: on machines that have
- * none, and for other platforms. Layouts and names are fixed for every CPython from 3.11 on with a global lock
+/* The part of CPython's stable ABI that binding.c uses: Python's own headers are not needed, on machines that have none
+ * and for other platforms. Layouts and names are fixed for every CPython from 3.11 on with a global lock
  * (https://docs.python.org/3/c-api/stable.html); tests/core/test_core_builds.py compares them with Python.h. */
 #ifndef MBMA_STABLE_ABI_H
 #define MBMA_STABLE_ABI_H

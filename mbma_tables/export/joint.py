@@ -73,7 +73,7 @@ class Joint:
             f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
             what,
             f"surface: {numbers}; lengths in {self.length}",
-            *filter(None, [self.surface.resolution]),
+            *filter(None, [self.surface.resolution, self.theory.origin]),
             f"E* = {self.modulus:.10g} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
             "pressure is force over nominal area;",
             "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",

@@ -25,7 +25,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.power_laws import Place
-from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
+from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, moment_of, summit_rate
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import Variant
 
@@ -74,10 +74,10 @@ def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Variant) ->
     # a and b may underflow where their roots do not
     m0_root = np.sqrt(root_a - root_b) * np.sqrt(root_a + root_b)
     sigma = m0_root * summit_sigma(1.0, alpha_of(hurst, width), variant.summit_sigma)
-    R_d, R_u, R_top = (RADIUS / np.sqrt(m4_of(hurst, 0.0, log)) for log in (log_d, log_u, log_zeta_1))
+    R_d, R_u, R_top = (RADIUS / np.sqrt(moment_of(4, hurst, 0.0, log)) for log in (log_d, log_u, log_zeta_1))
     D_top = summit_rate(hurst, 0.0, log_zeta_1) / variant.density_divisor
     D_d = summit_rate(hurst, 0.0, log_d) / variant.density_divisor
-    sigma_d = summit_sigma(m0_of(hurst, 0.0, log_d), alpha_of(hurst, log_d), variant.summit_sigma)
+    sigma_d = summit_sigma(moment_of(0, hurst, 0.0, log_d), alpha_of(hurst, log_d), variant.summit_sigma)
     bands = zeta_d, zeta_u, R_d, R_u, D, sigma, root_a, root_b, D_d, sigma_d, width
     return _fields(h_rms * approach, bands, D_top, R_top, variant)
 
@@ -85,7 +85,7 @@ def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Variant) ->
 def _fields(
     delta: FloatArray, bands: tuple[FloatArray, ...], D_top: Any, R_top: Any, variant: Variant
 ) -> dict[str, FloatArray]:
-    """`FIELDS` of islands from their bands, and the summits of all waves (top)."""
+    """`FIELDS` of islands from their bands, and the summits of all wavelengths (top)."""
     _, _, R_d, R_u, D, sigma, root_a, root_b, _, _, _ = bands
     h_d = root_a if variant.offset else np.zeros_like(root_a)
     return dict(zip(BANDS, bands, strict=True)) | {
@@ -124,7 +124,7 @@ def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:
     if not surface.q1 > variant.floor_u * surface.longest:
         raise OutOfRangeError(
             f"the spectrum ends at q = {surface.q1:.4g}, and MBMA's smallest band at {variant.floor_u:g} times "
-            f"{surface.longest:.4g}, where most height is: measure shorter waves, or ask another theory"
+            f"{surface.longest:.4g}, where most height is: measure shorter wavelengths, or ask another theory"
         )
     at_d, at_u = (surface.laws.place(floor * surface.longest) for floor in (variant.floor_d, variant.floor_u))
     root_d, root_u = (float(np.sqrt(surface.laws.above(place))) for place in (at_d, at_u))

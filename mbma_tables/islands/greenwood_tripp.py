@@ -71,14 +71,14 @@ class IslandSolution:
         if self.method == "newton":
             profiles = np.empty((3, np.size(self.X), count))
             _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles)
-            rho, pressure, gap = profiles
         else:
             rows = [
                 solve_classical(x, m, count, self.damping, self.rtol, self.max_iterations)[4:]
                 for x, m in zip(np.ravel(self.X), np.ravel(self.mu), strict=True)
             ]
-            rho, pressure, gap = (np.array(column) for column in zip(*rows, strict=True))
-        return rho.reshape(shape), pressure.reshape(shape), gap.reshape(shape)
+            profiles = np.stack([np.stack(row) for row in rows], axis=1)
+        rho, pressure, gap = (rows.reshape(shape) for rows in profiles)
+        return rho, pressure, gap
 
     @property
     def rho(self) -> FloatArray:
@@ -159,13 +159,12 @@ def _solve_classical(
     steps = np.zeros(X.size, dtype=np.int64)
     failed = np.ones(X.size, dtype=bool)
     for k in range(X.size):
-        fine = solve_classical(X[k], mu[k], rings, damping, rtol, max_iterations)
-        coarse = solve_classical(X[k], mu[k], rings // 2, damping, rtol, max_iterations)
-        steps[k] = fine[0]
-        phi[k, :2] = fine[2:4]
+        fine, coarse = (
+            solve_classical(X[k], mu[k], count, damping, rtol, max_iterations) for count in (rings, rings // 2)
+        )
         change = [abs(c / f - 1) if f else 0.0 for f, c in zip(fine[2:4], coarse[2:4], strict=True)]
-        phi[k, 2] = max(change) + rtol
-        failed[k] = not (fine[1] and coarse[1])
+        phi[k] = *fine[2:4], max(change) + rtol
+        steps[k], failed[k] = fine[0], not (fine[1] and coarse[1])
     return phi, steps, np.full(X.size, rings), failed
 
 

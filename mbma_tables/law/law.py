@@ -150,15 +150,12 @@ class ContactLaw(Law, Derived, Displayed):
             require(name, gaps, d <= most * (1 + ROUNDING), f"at most {shown_most:.17g}, where the law ends")
         return gaps, d
 
-    def _ask(
-        self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]
-    ) -> tuple[Any, ...]:
+    def _ask(self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]) -> Any:
         """What `fill` writes, in blocks, where it returns that all is in range; else `check` raises."""
         if is_labelled(given):
             from mbma_tables.surfaces.labels import apply
 
-            found: tuple[Any, ...] = apply(lambda block: self._ask(block, count, check, fill), (given,), count)
-            return found
+            return apply(lambda block: self._ask(block, count, check, fill), (given,), count)
         # entries of plain arrays are checked as they are answered
         plain = type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
         known = given if plain else check(given)
@@ -168,7 +165,7 @@ class ContactLaw(Law, Derived, Displayed):
             check(given)
         return tuple(values.reshape(known.shape)[()] for values in out)
 
-    def _values(self, wanted: tuple[str, ...], mean_separation: Any, separation: Any) -> tuple[Any, ...]:
+    def _values(self, wanted: tuple[str, ...], mean_separation: Any, separation: Any) -> Any:
         """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
         name, given = self._known(mean_separation, separation)
 
@@ -225,7 +222,7 @@ class ContactLaw(Law, Derived, Displayed):
         point.units = self.units
         return point
 
-    def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
+    def _inverse(self, name: str, given: Any, count: int = 1) -> Any:
         """Gaps of pressures or areas, and with a `count` of 3 area and -dF/du there."""
         which, inverse = (FORCE if name == "pressure" else AREA), self._inverse_block(name)
         least, most, end = inverse[at.Y_LEAST], inverse[at.Y_HIGH], inverse[at.END]

@@ -212,10 +212,8 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
     facts |= {"theory": theory.name, "variant": "", "island_model": ""}
 
-    def own_error() -> float:
-        return max(float(each.max()) for each in errors)
-
-    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, own_error, 0.0, facts)
+    worst = lambda: float(np.concatenate(errors).max())  # noqa: E731
+    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, worst, 0.0, facts)
 
 
 def _finish(
@@ -272,9 +270,7 @@ def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> f
             return False
         return math.isfinite(pressure) and pressure > 0
 
-    for share in shares:
-        if answers(u := share * float(surface.h_max)):
+    for u in (*(share * float(surface.h_max) for share in shares), float(theory.interval(surface)[0])):
+        if answers(u):
             return u
-    if answers(u := float(theory.interval(surface)[0])):
-        return u
     raise OutOfRangeError(f"theory {theory.name!r} has no finite force on this surface up to u = {u:.6g}")

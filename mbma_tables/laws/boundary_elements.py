@@ -38,14 +38,23 @@ class Contact:
         self._solver.max_iter = MAX_ITERATIONS
         self._tolerance = tolerance
 
+    @property
+    def traction(self) -> FloatArray:
+        """Pressures of the last load over E*."""
+        return np.asarray(self.model.traction)
+
     def press(self, force: float) -> dict[str, float]:
         """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map."""
         started = time.process_time()
-        residual = self._solver.solve(force)
+        try:
+            residual = self._solver.solve(force)
+        except (ArithmeticError, RuntimeError) as fault:
+            # of a single element in contact, for instance
+            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}") from None
         if not residual <= self._tolerance:
             raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
         seconds = time.process_time() - started
-        pressure, moved = np.asarray(self.model.traction), np.asarray(self.model.displacement)
+        pressure, moved = self.traction, np.asarray(self.model.displacement)
         touching = pressure > 0
         edges = sum(int(np.count_nonzero(touching != np.roll(touching, 1, axis))) for axis in (0, 1))
         raw = float(touching.mean())

@@ -8,6 +8,13 @@ exactly, ::
 so a cubic spline of u over ln F has a knot between each two loads, whose value follows from that. A/A0 = erf(F exp(s))
 with a natural cubic spline s of ln(erfinv(A)/F) over ln F. Where a spline is not monotone, as of few loads far apart,
 monotone cubics through the loads take its place.
+
+`Continued` goes on beyond the loads, with the stiffness at the first and the last, ::
+
+    light: F ~ (H - u)^n       heavy: F^2 linear in ln u       both: erfinv(A) ~ F
+
+H being the height of the highest point: area and force in proportion at light load, and the area of Gaussian pressures
+near full contact.
 """
 
 from __future__ import annotations
@@ -43,17 +50,21 @@ class LoadCurve:
         self.work = energy + force * mean_separation
         fine = self.x[:-1, None] + np.diff(self.x)[:, None] * np.arange(FINE) / FINE
         self._fine = np.append(fine, self.x[-1])
-        self.separation: Any = _constrained(self.x, mean_separation, np.diff(self.work), apart)
-        self._slope = self.separation.derivative()
+        self._spline: Any = _constrained(self.x, mean_separation, np.diff(self.work), apart)
+        self._slope = self._spline.derivative()
         if not (self._slope(self._fine) < 0).all():
-            self.separation = PchipInterpolator(self.x, mean_separation)
-            self._slope = self.separation.derivative()
-        self._fine_u = np.minimum.accumulate(self.separation(self._fine))
+            self._spline = PchipInterpolator(self.x, mean_separation)
+            self._slope = self._spline.derivative()
+        self._fine_u = np.minimum.accumulate(self._spline(self._fine))
         root = np.log(erfinv(np.minimum(area, LARGEST_AREA)))
         self._root: Any = CubicSpline(self.x, root - self.x, bc_type="natural")
         self._line = 1.0  # the spline is of what is left beside ln F
         if not (self._root(self._fine, 1) > -1).all():
             self._root, self._line = PchipInterpolator(self.x, root), 0.0
+
+    def separation(self, x: FloatArray) -> FloatArray:
+        """Mean separation [length] at ln F."""
+        return np.asarray(self._spline(x))
 
     def stiffness(self, x: FloatArray) -> FloatArray:
         """-dF/du at ln F; infinite where u does not change."""
@@ -70,7 +81,7 @@ class LoadCurve:
         low, high = self._fine[place], self._fine[place + 1]
         x = (low + high) / 2
         for _ in range(HALVINGS):
-            over = self.separation(x) - u
+            over = self._spline(x) - u
             low, high = np.where(over > 0, x, low), np.where(over > 0, high, x)
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = x - over / self._slope(x)
@@ -95,13 +106,106 @@ class LoadCurve:
         force, start, end = np.exp(x), np.exp(self.x[k]), np.exp(self.x[k + 1])
         missed = np.diff(self.work)[k] - self._integral(self.x[k], self.x[k + 1])
         work = self.work[k] + self._integral(self.x[k], x) + missed * (force - start) / (end - start)
-        return np.asarray(work - force * self.separation(x))
+        return np.asarray(work - force * self._spline(x))
 
     def _integral(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """Integral of u over F; the knot between two loads costs no accuracy that matters."""
         half = (high - low)[..., None] / 2
         t = low[..., None] + half * (1 + NODES)
-        return np.asarray((self.separation(t) * np.exp(t) * half) @ WEIGHTS)
+        return np.asarray((self._spline(t) * np.exp(t) * half) @ WEIGHTS)
+
+
+class Continued(LoadCurve):
+    """The same beyond the loads, from full compression at u = 0 to first contact at u = `top` [length]."""
+
+    def __init__(self, rows: FloatArray, apart: int, top: float) -> None:
+        super().__init__(rows, apart)
+        self.top, self.u = top, (float(rows[2, 0]), float(rows[2, -1]))
+        first, last = (float(part) for part in super().stiffness(self.x[[0, -1]]))
+        self.power = max(first * (top - self.u[0]) / float(rows[0, 0]), 1.0)
+        self.rate = last * self.u[1] / float(rows[0, -1])  # -d ln F/d ln u
+        self._energies = super().energy(self.x[[0, -1]])
+
+    def _joined(self, x: FloatArray, inside: Any, light: Any, heavy: Any) -> FloatArray:
+        """A curve of ln F by its three parts; the outer ones know how far beyond the loads they are."""
+        x = np.asarray(x, float)
+        low, high = self.x[[0, -1]]
+        with np.errstate(all="ignore"):
+            beyond = np.where(x < low, light(np.minimum(x - low, 0)), heavy(np.maximum(x - high, 0)))
+        return np.asarray(np.where((x >= low) & (x <= high), inside(np.clip(x, low, high)), beyond))
+
+    def _light_gap(self, beyond: FloatArray) -> FloatArray:
+        return self.top - (self.top - self.u[0]) * np.exp(beyond / self.power)
+
+    def _heavy_gap(self, beyond: FloatArray) -> FloatArray:
+        return self.u[1] * np.exp(-np.expm1(2 * beyond) / (2 * self.rate))
+
+    def separation(self, x: FloatArray) -> FloatArray:
+        """Mean separation [length] at ln F."""
+        return self._joined(x, super().separation, self._light_gap, self._heavy_gap)
+
+    def stiffness(self, x: FloatArray) -> FloatArray:
+        """-dF/du at ln F; zero at first contact."""
+        (low, high), n = self.x[[0, -1]], self.power
+        return self._joined(
+            x,
+            super().stiffness,
+            lambda beyond: n * np.exp(low + beyond * (1 - 1 / n)) / (self.top - self.u[0]),
+            lambda beyond: np.where(
+                beyond < np.inf, self.rate * np.exp(high - beyond) / self._heavy_gap(beyond), np.inf
+            ),
+        )
+
+    def area(self, x: FloatArray) -> FloatArray:
+        """A/A0 at ln F."""
+        first, last = super().area(self.x[[0, -1]])
+        return self._joined(
+            x,
+            super().area,
+            lambda beyond: erf(erfinv(first) * np.exp(beyond)),
+            lambda beyond: erf(erfinv(min(last, LARGEST_AREA)) * np.exp(beyond)),
+        )
+
+    def log_force(self, u: FloatArray) -> FloatArray:
+        """ln F at mean separations from 0 to `top`: infinite at either."""
+        (low, high), (top, bottom) = self.x[[0, -1]], self.u
+        with np.errstate(divide="ignore"):
+            light = low + self.power * np.log(np.maximum(self.top - u, 0) / (self.top - top))
+            heavy = high + np.log1p(-2 * self.rate * np.log(np.minimum(u, bottom) / bottom)) / 2
+        inside = super().log_force(np.clip(u, bottom, top))
+        return np.where(u > top, light, np.where(u < bottom, heavy, inside))
+
+    def log_force_at(self, area: FloatArray) -> FloatArray:
+        """ln F at A/A0 from 0 to below 1."""
+        ends = super().area(self.x[[0, -1]])
+        known = np.clip(area, *ends)
+        with np.errstate(divide="ignore"):
+            beyond = np.log(erfinv(area) / erfinv(np.minimum(known, LARGEST_AREA)))
+        return np.asarray(super().log_force_at(known) + np.where(known == area, 0.0, beyond))
+
+    def energy(self, x: FloatArray) -> FloatArray:
+        """U/(A0 E*) at ln F."""
+        light, heavy = self._energies
+
+        def pressed(beyond: FloatArray) -> FloatArray:
+            gap = self._heavy_gap(beyond)
+            half = (self.u[1] - gap)[..., None] / 2
+            force = np.exp(self.log_force(gap[..., None] + half * (1 + NODES)))
+            return np.asarray(heavy + np.sum(force * half * WEIGHTS, axis=-1))
+
+        return self._joined(x, super().energy, lambda beyond: light * np.exp(beyond * (1 + 1 / self.power)), pressed)
+
+
+def left_out(rows: FloatArray, apart: int) -> FloatArray:
+    """Change of ln F and ln A that one of the four loads nearest to an interval makes, at most, shape (2, n - 1)."""
+    changes = np.zeros((2, rows.shape[1] + 2))
+    for k in range(1, rows.shape[1] - 1):
+        # the interval across the load that is missing is of two grids where one beside it is
+        less = LoadCurve(np.delete(rows, k, axis=1), apart if apart < k else apart - 1)
+        x = less.log_force(rows[2, k])
+        found = np.array([x, np.log(less.area(x))])
+        changes[:, k + 1] = np.abs(found - np.log(rows[:2, k]))
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(changes, 4, axis=1).max(axis=-1))
 
 
 def _constrained(x: FloatArray, u: FloatArray, work: FloatArray, apart: int) -> CubicSpline:

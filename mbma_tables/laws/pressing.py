@@ -2,16 +2,22 @@
 
 Grids of eight or more sampling steps along the shortest wavelength are halved for the heavier loads. Flow is solved on
 gaps of the full grid: displacements of a coarser one are smooth, the heights are not, so the former are interpolated.
+
+Each load, and each flow, is kept in `mbma_tables.common.cache` as soon as it is found.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import hashlib
 from typing import Any
 
 import numpy as np
 
+from mbma_tables.common import cache
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.reynolds import flow_conductance
@@ -23,6 +29,7 @@ TOLERANCE = 1e-3
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
 ROUNDING = 1e-6
+KEPT = "pressed 1"  # of what is cached: another text where this file finds other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
 
 
@@ -55,15 +62,23 @@ class Pressed:
     rows: FloatArray
     coarse_from: int
     gaps: tuple[FloatArray, ...]
+    names: tuple[str, ...]  # under which loads are cached
+    left_out: float = 0.0  # wavelength [length] below which a large map was cut off; 0 if it was not
     cut: float = 0.0  # sampling steps of the coarse grid along its shortest waves, where shorter ones were left out
 
     def flow(self) -> FloatArray:
         """Flow coefficient along both axes [length^3], shape (n, 2); 0 where blocked."""
-        found = np.zeros((len(self.gaps), 2))
+        found, scale = np.zeros((len(self.gaps), 2)), float(np.abs(self.heights).max())
+        own = _digest(self.heights / scale)
         with shown("flow through the gaps"):
             for k in range(len(self.gaps)):
-                doing(f"flow through the gaps, load {k + 1} of {len(self.gaps)}")
-                found[k] = flow_conductance(self.gap(k), self.sizes)
+                doing(f"flow through the gaps {_bar(k, len(self.gaps))}")
+                name = _digest(self.names[k], own, f"{self.rows[2, k] / scale:.9g}")
+                kept = cache.load(name, flow=(2,))
+                if kept is None:
+                    kept = {"flow": flow_conductance(self.gap(k), self.sizes) / scale**3}
+                    cache.keep(name, **kept)
+                found[k] = kept["flow"] * scale**3
                 # once blocked both ways, heavier loads are
                 if not found[k].any():
                     break
@@ -87,6 +102,51 @@ class Pressed:
         return np.asarray(np.maximum(gap - level, 0.0))
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Table:
+    """What was found of a map, without the map and its gaps: rows and flow as of `Pressed`.
+
+    Attributes
+    ----------
+    points, elements : float
+        Sampling steps along the shortest wavelength, and elements of the map that do not repeat each other.
+    left_out : float
+        As of `Pressed`.
+    origin : str
+        What it was found of, and by what.
+    """
+
+    rows: FloatArray
+    flows: FloatArray
+    coarse_from: int
+    points: float
+    elements: float
+    left_out: float = 0.0
+    origin: str = ""
+
+    def flow(self) -> FloatArray:
+        """Flow coefficient along both axes [length^3], shape (n, 2); 0 where blocked."""
+        return self.flows
+
+    def resized(self, up: float, along: float) -> Table:
+        """Of the surface with its heights `up` times as large, and its lengths along the plane `along` times."""
+        by = np.array([[up / along], [1.0], [up], [up**2 / along]])
+        return dataclasses.replace(self, rows=self.rows * by, flows=self.flows * up**3, left_out=self.left_out * along)
+
+
+def _digest(*parts: Any) -> str:
+    """SHA-256 of arrays and numbers; of arrays in single precision, which another unit of length leaves as they are."""
+    digest = hashlib.sha256(KEPT.encode())
+    for part in parts:
+        array = isinstance(part, np.ndarray)
+        digest.update(np.ascontiguousarray(part, "<f4").tobytes() if array else f";{part!r};".encode())
+    return digest.hexdigest()
+
+
+def _bar(done: int, number: int) -> str:
+    return f"[{'#' * done}{'.' * (number - done)}] {done} of {number}"
+
+
 def press(
     heights: FloatArray,
     sizes: tuple[float, float],
@@ -106,29 +166,41 @@ def press(
     stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
     halved = area is not None and points >= HALVED * (1 - ROUNDING)
     engines: dict[bool, Contact] = {}
-    found: dict[float, tuple[bool, dict[str, float], FloatArray]] = {}
+    found: dict[float, tuple[bool, FloatArray, FloatArray]] = {}
+    names: dict[float, str] = {}
+    own = _digest(heights / scale, heights.shape, *(f"{side:.9g}" for side in stretched), tolerance)
 
-    def add(load: float, coarse: bool, told: str) -> float:
-        doing(f"boundary elements, {told}")
-        if coarse not in engines:
-            values = coarser(heights) if coarse else heights
-            engines[coarse] = Contact(values / scale, stretched, tolerance)
-        result = engines[coarse].press(load / gradient)
-        found[load] = coarse, result, engines[coarse].gap.astype(np.float32)
-        return result["area"]
+    def add(load: float, coarse: bool) -> None:
+        # loads of a map are added after those asked for
+        doing(f"boundary elements {_bar(len(found), max(len(loads), len(found) + 1))}")
+        name = _digest(own, coarse, f"{load / gradient:.9g}")
+        shape = tuple(count // (1 + coarse) for count in heights.shape)
+        names[load] = name
+        kept = cache.load(name, row=(len(QUANTITIES),), gap=shape)
+        if kept is None:
+            if coarse not in engines:
+                engines[coarse] = Contact((coarser(heights) if coarse else heights) / scale, stretched, tolerance)
+            result = engines[coarse].press(load / gradient)
+            row = np.array([result[name] for name in QUANTITIES])
+            kept = {"row": row, "gap": engines[coarse].gap.astype(np.float32)}
+            cache.keep(name, **kept)
+        found[load] = coarse, kept["row"], kept["gap"]
 
     with shown("boundary elements"):
-        for number, load in enumerate(map(float, loads)):
-            add(load, halved and float(area(np.array(load))) > LIGHT, f"load {number + 1} of {len(loads)}")
+        for load in map(float, loads):
+            add(load, halved and float(area(np.array(load))) > LIGHT)
         for _ in range(MORE if area is not None else 0):
             low, high = min(found), max(found)
-            if found[low][1]["area"] > LOWEST:
-                add(low * LIGHTER, False, "one more load")
-            if found[high][1]["area"] < HIGHEST:
-                add(high * HEAVIER, halved, "one more load")
+            # where one element touches, the solver may fail
+            if found[low][1][0] > LOWEST:
+                with contextlib.suppress(ConvergenceError):
+                    add(low * LIGHTER, False)
+            if found[high][1][0] < HIGHEST:
+                add(high * HEAVIER, halved)
+    cache.trim()
     order = sorted(found)
-    rows = np.array([[load, *(found[load][1][name] for name in QUANTITIES)] for load in order]).T
+    rows = np.array([[load, *found[load][1]] for load in order]).T
     rows[2:] *= np.array([[scale], [gradient * scale]])
     fine = sum(not found[load][0] for load in order)
     gaps = tuple(found[load][2] * np.float32(scale) for load in order)
-    return Pressed(heights, sizes, rows, fine, gaps)
+    return Pressed(heights, sizes, rows, fine, gaps, tuple(names[load] for load in order))

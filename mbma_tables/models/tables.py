@@ -97,26 +97,9 @@ def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
 
 
 def verify(path: os.PathLike[str] | str, kind: str | None = None) -> Verdict:
-    """Check a table file offline: hashes, types and shapes, then its conformance points, by table and by solver.
+    """Check a table file, which must be of a `kind` where one is given: hashes, types, shapes and conformance points.
 
-    Parameters
-    ----------
-    path : path
-        The file.
-    kind : str, optional
-        The kind that it must be.
-
-    Raises
-    ------
-    TableFileError
-        Where the file cannot be used, or an answer is further from the stored one than its tolerance.
-
-    Examples
-    --------
-    >>> from mbma_tables.models.tables import shipped, verify
-    >>> verdict = verify(shipped("universal"))
-    >>> verdict.points, verdict.table_error < 1e-11, verdict.solver_error < 1e-11
-    (64, True, True)
+    Answers by the table or by the solver further from the stored ones than their tolerance raise `TableFileError`.
     """
     content = read_table(path, kind)
     points = content.conformance

@@ -11,16 +11,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbma_tables.common.errors import InputError
+from mbma_tables.models import AnyModel
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.problem import INVERTED, OF_LAW, OUTPUTS, REFINEMENTS, Problem
-
-if TYPE_CHECKING:
-    from mbma_tables.models import AnyModel
 
 ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is asked of its quadrature or law
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;

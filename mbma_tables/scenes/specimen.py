@@ -26,6 +26,7 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
+from mbma_tables.tablefiles.own import is_own
 
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
@@ -79,8 +80,16 @@ def from_name(name: str) -> Specimen:
 
 
 def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
-    """The surface of a measured map or line scan, with options of `Surface.from_map`."""
+    """The surface of a measured map or line scan, with options of `Surface.from_map`, or of its simulation's table."""
     options = dict(treatment)
+    if is_own(path):
+        unit = options.pop("unit", None)
+        if options:
+            raise InputError(f"{_printable(path)} is a table of a simulated map: leave {', '.join(options)} out")
+        from mbma_tables.theories import BoundaryElements
+
+        surface = BoundaryElements.from_netcdf(path).surface
+        return Specimen(in_unit(surface, unit), f"simulated map: {_printable(path)}")
     if options.pop("model", "measured") == "measured":
         return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
     surface = Surface.from_map(path, model="self-affine", **options)
@@ -91,6 +100,8 @@ def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated,
     """Treated heights of a map or line scan, and the surface that they are."""
     from mbma_tables.surfaces.maps import measured_surface, prepared
 
+    if is_own(path):
+        raise InputError(f"{_printable(path)} is a table of a simulated map, not the map: mbma curve --map reads it")
     options = dict(treatment)
     further = [options.pop(name, None) for name in ("extrapolate_to", "extrapolate_hurst")]
     treated = prepared(path, options, None)

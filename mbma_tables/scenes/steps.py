@@ -229,7 +229,7 @@ def other_theory(
 
         theory: Theory = Persson("simplified")
     else:
-        theory = get_theory(name)
+        theory = get_theory(name, surface)
     if hardness < math.inf:
         from mbma_tables.theories.yielding import Yielding
 
@@ -242,18 +242,18 @@ def other_theory(
 
 def comparison(run: Run, step: Step) -> None:
     """Another theory, or a correlation of conductance, beside the scene's own."""
+    problem = run.problem
+    cap = math.inf if problem.hardness is None else problem.hardness
     if step.name in CORRELATIONS:
         from mbma_tables.totals import conductance
 
-        problem = run.problem
         assert problem.conductivities is not None
         pressure = (run.found.get("nominal_pressure") or run.found["pressure"])[1]
-        k_s, cap = conductance.mean_conductivity(*problem.conductivities), problem.hardness or np.inf
+        k_s = conductance.mean_conductivity(*problem.conductivities)
         found = getattr(conductance, step.name)(problem.surface, pressure, k_s, problem.E_star, cap)
         run.found[f"{step.name}_conductance"] = (("gap",), found)
         return
-    cap = math.inf if run.problem.hardness is None else run.problem.hardness
-    other = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star, cap)
+    other = other_theory(step.name, problem.surface, run.gap, problem.E_star, cap)
     run.found |= {f"{step.name}_pressure": (("gap",), other.pressure), f"{step.name}_area": (("gap",), other.area)}
 
 

@@ -107,7 +107,7 @@ class AnySurface(Displayed, abc.ABC):
 
     @property
     def resolution(self) -> str:
-        """Of a measured surface, down to which waves it is known and what shorter ones would change; else empty."""
+        """Shortest wavelength of a measured surface, and what shorter ones would change; empty for other surfaces."""
         told = [entry["told"] for entry in self.provenance if entry["step"] in ("resolution", "extrapolated")]
         return "; ".join(told)
 

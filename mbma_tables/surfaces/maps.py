@@ -1,7 +1,4 @@
-"""Height maps: their radial power spectrum, the surface that is its own spectrum, and the one fitted to it.
-
-Also what a power law beyond the shortest waves of a map or a line scan would change: area is a matter of resolution.
-"""
+"""Height maps: radial spectrum, the surface given by it or fitted to it, extrapolation to shorter wavelengths."""
 
 from __future__ import annotations
 
@@ -29,7 +26,7 @@ from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, Treated, Treatmen
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
-WINDOW_OVERLAP = (35 / 18) ** 2  # waves under that window that carry what one independent wave does
+WINDOW_OVERLAP = (35 / 18) ** 2  # Fourier components under that window that count as one independent component
 MAX_KURTOSIS = 50.0  # all slopes on 2% of the points; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
 S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
@@ -41,8 +38,8 @@ def radial_spectrum(
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.complex128]]:
     """C(q) of a map, averaged over narrow rings up to the Nyquist circle pi/max(dx, dy) (Eqs. 4, 5).
 
-    Returns mean wavenumber of each ring, mean C, number of wavevectors, and power-weighted means of exp(2 i theta) and
-    exp(4 i theta), shape (2, n). C times waves times (2 pi)^2/(nx dx ny dy) is the variance of height in the ring.
+    Returns each ring's mean wavenumber, mean C, number of wavevectors, and power-weighted means of exp(2 i theta) and
+    exp(4 i theta), shape (2, n). C times that number times (2 pi)^2/(nx dx ny dy) is the ring's variance of height.
     """
     nx, ny = heights.shape
     step_x, step_y = 2 * math.pi / (nx * dx), 2 * math.pi / (ny * dy)
@@ -52,7 +49,7 @@ def radial_spectrum(
     inside = (q > 0) & (q <= math.pi / max(dx, dy) * (1 + 1e-12))
     measured = q[inside & (power > MIN_POWER * power.max())]
     if measured.size == 0:
-        raise InputError("every wave of the map is shorter than two sampling steps")
+        raise InputError("every wavelength of the map is shorter than two sampling steps")
     inside &= (q >= measured.min()) & (q <= measured.max())
     q, strength = q[inside], power[inside]
     ring = np.rint(RINGS * q / min(step_x, step_y)).astype(int)
@@ -134,15 +131,15 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
     return _with_anisotropy(fitted, q, C * waves, directions)
 
 
-# grid steps in wavenumber: waves below are few, and a window weighs them by chance; no wave lies at a rounding's mercy
+# grid steps in wavenumber: below are few wavelengths, which a window weighs by chance; none lies on this limit
 LONG = 4.0 * (1 - 1e-9)
-RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest waves under a window may change; sums that are met
+RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest wavelengths under a window may change; sums that are met
 STEEPEST = 30.0  # by which `matched` may tilt a spectrum
 TOLD = 0.05  # relative difference of rms gradients that is told, and half of that of h_rms
 
 
 def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
-    """C of averaged samples, tilted a little to the variance and mean square wavenumber of all waves."""
+    """C of averaged samples, tilted a little to the variance and mean square wavenumber of all wavelengths."""
     from scipy.optimize import brentq
 
     def excess(tilt: float) -> float:
@@ -158,10 +155,10 @@ def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> Flo
 
 
 def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> FloatArray:
-    """C with another variance and mean squared gradient, by waves that are few: the longest, of a rough surface."""
+    """C with another variance and mean squared gradient, by its few longest wavelengths."""
     from scipy.optimize import least_squares
 
-    # the likeliest change, where ln C is known as the inverse of the number of waves: it goes like C times 1 and q^2
+    # the likeliest change, where ln C is known as the inverse number of samples: it goes like C times 1 and q^2
     ways = np.stack([C / C.max(), C * q**2 / (C * q**2).max()])
 
     def misses(by: FloatArray) -> FloatArray:
@@ -171,10 +168,10 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
     with np.errstate(all="ignore"):
         known = np.isfinite(misses(np.zeros(2))).all()
     if not known:
-        # one wave, or moments beyond what numbers hold
+        # one wavelength, or moments beyond what numbers hold
         return C
     found = least_squares(misses, np.zeros(2), bounds=(-RAISED, RAISED), xtol=1e-12)
-    # not where heights are of a trend, of which the window shows no wave
+    # not where heights are of a trend, of which the window shows no wavelength
     changed = C * np.exp(found.x @ ways)
     return np.asarray(changed * (variance / PowerLaws(q, changed).moment(0)) if np.abs(found.fun).max() < MET else C)
 
@@ -182,7 +179,7 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
 def _unwindowed(
     q: FloatArray, C: FloatArray, variance: float, slopes: float, seen: float, parts: tuple[float, float]
 ) -> tuple[FloatArray, dict[str, Any]]:
-    """C under a window as that of the whole map, and what was done; `parts` are those of short waves."""
+    """C under a window as that of the whole map, and what was done; `parts` are those of short wavelengths."""
     rougher = parts[1] / parts[0] if min(parts) > 0 else 1.0
     under = math.sqrt(PowerLaws(q, C).moment(0) / variance)
     C = raised(q, C * rougher, variance, slopes)
@@ -190,12 +187,13 @@ def _unwindowed(
     told = []
     if abs(math.sqrt(rougher) - 1) > TOLD:
         told.append(
-            f"roughness differs from place to place: the rms gradient of short waves is {math.sqrt(rougher):.2f} times "
-            "that under the window of the spectrum, which is scaled to it"
+            f"roughness differs from place to place: the rms gradient of short wavelengths is {math.sqrt(rougher):.2f} "
+            "times that under the window of the spectrum, which is scaled to it"
         )
     if abs(under - 1) > 2 * TOLD:
         told.append(
-            f"few long waves carry the heights: under the window of the spectrum h_rms is {under:.2f} times the map's"
+            "most of the height variance lies in a few long wavelengths (check for residual form): under the window of "
+            f"the spectrum h_rms is {under:.2f} times the map's"
         )
     told += _disagreement(q, C, variance, slopes)
     return C, record | ({"told": "; ".join(told)} if told else {})
@@ -208,17 +206,17 @@ def _disagreement(q: FloatArray, C: FloatArray, variance: float, slopes: float) 
     if max(abs(h_rms - 1), abs(gradient - 1)) <= TOLD:
         return []
     return [
-        "spectrum and heights disagree, as where a trend is left or waves are few: h_rms of the spectrum is "
+        "spectrum and heights disagree, as where a trend is left or wavelengths are few: h_rms of the spectrum is "
         f"{h_rms:.2f} times the map's, its rms gradient {gradient:.2f} times"
     ]
 
 
 def _within_band(treated: Treated, scale: float, spectrum: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Entries of a radial spectrum, lengths over `scale`, whose waves were kept: a window smears some beyond."""
+    """Entries of a radial spectrum, lengths over `scale`, whose wavelengths were kept: a window smears some beyond."""
     q = spectrum[0] / scale
     held = (q >= treated.waves[0] * (1 - 1e-9)) & (q <= treated.waves[1] * (1 + 1e-9))
     if not held.any():
-        raise InputError("no wave of the map lies between its cut-offs")
+        raise InputError("no wavelength of the map lies between its cut-offs")
     return tuple(part[..., held] for part in spectrum)
 
 
@@ -229,21 +227,21 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
     q, C, waves, _ = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
     bins = log_bins(q, C, waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP))
-    # of ridges, or of a few cosines, some hold no wave
+    # of ridges, or of a few cosines, some hold no wavelength
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
     values = values if treated.periodic else mirrored(values)
     grid = [2 * math.pi / (n * step) for n, step in zip(treated.heights.shape, (unit_x, unit_y), strict=True)]
 
     def slopes(low: float) -> float:
-        """Mean squared gradient of the map's own waves above a wavenumber, as far as the spectrum's last ring goes."""
+        """Mean squared gradient of the map itself from a wavenumber to the spectrum's last ring."""
         return squares(values, (unit_x, unit_y), (low, float(q[-1]) + min(grid) / RINGS))[1]
 
     notes: list[dict[str, Any]] = []
     C_bins, variance, whole = np.exp(bins.log_c), own.h_rms**2, slopes(0.0)
     if treated.plain:
         changed = raised(bins.q, C_bins, variance, whole)
-        # a tilt where no waves are the few longest, as of a step
+        # a tilt where the longest wavelengths are not few, as of a step
         C_bins = matched(bins.q, C_bins, variance, whole / variance) if changed is C_bins else changed
         few = _disagreement(bins.q, C_bins, variance, whole) if bins.q.size > 1 else []
         notes += [{"step": "few waves", "told": line} for line in few]
@@ -257,8 +255,8 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     rougher = curves.gradient / math.sqrt(whole)
     if rougher > 1 + TOLD:
         told = (
-            "waves that only one axis or the diagonals sample are left out of the spectrum: with them the rms gradient "
-            f"would be {rougher:.2f} times as large"
+            "wavelengths that only one axis or the diagonals sample are left out of the spectrum: with them the rms "
+            f"gradient would be {rougher:.2f} times as large"
         )
         notes.append({"step": "corners", "rms_gradient": rougher, "told": told})
     known = SpectralSurface(
@@ -279,10 +277,10 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
 def _with_anisotropy(
     fitted: dict[str, Any], q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
 ) -> dict[str, Any]:
-    """The same with its anisotropy noted; refused where its fitted waves favour a direction."""
+    """The same with its anisotropy noted; refused where its fitted wavelengths favour a direction."""
     fit = fitted["fit"]
     inside = (q >= fit.q_low) & (q <= fit.q_high)
-    # whitened by the law, and between every wave alike (the shortest decide) and every octave alike (the longest)
+    # whitened by the law; weights between equal ones of each wavevector and of each octave
     weight = strength[inside] * q[inside] ** (1 + 2 * fitted["hurst"])
     anisotropy = float(np.abs(directions[:, inside] @ weight).max() / weight.sum())
     if anisotropy > MAX_ANISOTROPY:
@@ -322,16 +320,16 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     level = float(np.mean(np.log(known[known > 0]) + slope * np.log(octave[known > 0])))
     q = np.geomspace(last, end, max(2, math.ceil(math.log2(end / last) * STEPS_PER_OCTAVE) + 1))
     samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
-    # curves of the map's tops and valleys are not known of the waves added
+    # curves of the map's summits and valleys are not known with the wavelengths added
     C = np.append(surface.C, np.exp(level - slope * np.log(q)))
-    plain = dataclasses.replace(surface, bearing=None, bands=None, map=None)
+    plain = dataclasses.replace(surface, bearing=None, bands=None, map=None, table=None)
     longer = dataclasses.replace(plain, q=np.append(surface.q, q), C=C, samples=samples)
     area = float(surface.rms_gradient / longer.rms_gradient)
     stiffness = float(surface.h_rms / longer.h_rms)
     told = (
-        f"continued to waves of {wave:.4g} {surface.unit or ''}".rstrip()
+        f"continued to wavelengths of {wave:.4g} {surface.unit or ''}".rstrip()
         + f" by a power law with H = {exponent:g}, which was not measured: area at light load is {area:.3g} times "
-        f"that of the measured waves, stiffness and conductance at a pressure {stiffness:.3g} times"
+        f"that of the measured wavelengths, stiffness and conductance at a pressure {stiffness:.3g} times"
     )
     record = {"step": "extrapolated", "shortest": wave, "hurst": exponent, "area": area, "stiffness": stiffness}
     return dataclasses.replace(longer, provenance=(*surface.provenance, record | {"told": told}))

@@ -41,7 +41,8 @@ def read_measurement(
     """The topography or line scan in a file: any format of SurfaceTopography, and text with commas; "-" is stdin.
 
     Sampling steps [length], in `unit`, are of files that have none, and so is the unit; without a channel it is the
-    file's own default. A list of points may name units in the header of its columns, like "x [um]".
+    file's own default. A list of points may name units in the header of its columns, like "x [um]". Rows of a matrix
+    without lengths are x, as those of an array.
     """
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"
@@ -112,6 +113,8 @@ def _channel_of(
         raise InputError(f"{path.name} has channels 0 to {len(channels) - 1}, not {channel}")
     chosen = reader.default_channel if channel is None else channels[channel]
     given: dict[str, Any] = {} if channel is None else {"channel_index": channel}
+    # a plain matrix of text, whose rows are x as those of an array; that library takes its columns
+    turned = type(reader).__name__ == "AscReader" and chosen.physical_sizes is None and len(chosen.nb_grid_pts) == 2
     own = chosen.unit
     if own is None and named:
         *lateral, height = named
@@ -130,15 +133,16 @@ def _channel_of(
             )
         if dx is None:
             raise InputError(f"{path.name} has no lengths: give the sampling step dx")
-        steps = (dx, dx if dy is None else dy)
+        steps = (dx, dx if dy is None else dy)[:: -1 if turned else 1]
         scale = 1.0 if own is None or unit is None else factor(unit, own)
         given["physical_sizes"] = tuple(
             count * scale * sampling_step(name, step)
-            for name, count, step in zip(("dx", "dy"), chosen.nb_grid_pts, steps, strict=False)
+            for name, count, step in zip(("dx", "dy")[:: -1 if turned else 1], chosen.nb_grid_pts, steps, strict=False)
         )
     elif dx is not None or dy is not None:
         raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit=... says what they are in)")
-    return reader.topography(**given)
+    found = reader.topography(**given)
+    return found.transpose() if turned else found
 
 
 def sampling_step(name: str, value: Any) -> float:

@@ -59,7 +59,7 @@ class PowerLaw:
 
 
 def _profile_damping(q: FloatArray, slope: float, end: float) -> FloatArray:
-    """How far ln C_1D lies below its power law as waves beyond `end` are missing; exact for Eq. (6)."""
+    """How far ln C_1D lies below its power law as wavelengths beyond `end` are missing; exact for Eq. (6)."""
     with np.errstate(divide="ignore"):
         damping: FloatArray = np.log(betaincc(slope / 2, 0.5, np.minimum(q / end, 1.0) ** 2))
     return damping

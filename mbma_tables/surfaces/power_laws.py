@@ -1,7 +1,7 @@
 """An isotropic spectrum as power laws between its samples: moments of any band in closed form, and where one begins.
 
 A place in the spectrum is a piece and a distance ln(upper end/q) below its upper end, so that bands that run into the
-shortest wave keep their digits.
+shortest wavelength keep their digits.
 """
 
 from __future__ import annotations
@@ -68,11 +68,11 @@ class PowerLaws:
             for order in SHARES:
                 content = self._up(order, everything, self.width)
                 self._before[order] = np.append(0.0, np.cumsum(content))
-            # summed from the shortest wave, which small sums are about
+            # summed from the shortest wavelength, which small sums are about
             self._after = np.append(np.cumsum(self._up(0, everything, self.width)[::-1])[::-1], 0.0)
 
     def moment(self, order: int) -> float:
-        """m_0, m_2 or m_4 of all waves."""
+        """m_0, m_2 or m_4 of all wavelengths."""
         return float(self._before[order][-1])
 
     def _up(self, order: int, piece: Any, width: Any) -> FloatArray:
@@ -99,7 +99,7 @@ class PowerLaws:
         return np.asarray(self.log_high[place.piece] - place.rest)
 
     def above(self, place: Place) -> FloatArray:
-        """T(q) = m_0 of all shorter waves [length^2]."""
+        """T(q) = m_0 of all shorter wavelengths [length^2]."""
         return np.asarray(self._after[place.piece + 1] + self._down(0, place, place.rest))
 
     def where_above_is(self, variance: Any) -> Place:
@@ -117,12 +117,12 @@ class PowerLaws:
         return Place(piece, np.minimum(rest, self.width[piece]))
 
     def below(self, order: int, place: Place) -> FloatArray:
-        """m_n of all longer waves."""
+        """m_n of all longer wavelengths."""
         rise = self.width[place.piece] - place.rest
         return np.asarray(self._before[order][place.piece] + self._up(order, place.piece, rise))
 
     def between(self, order: int, start: Place, end: Place) -> FloatArray:
-        """m_n of the waves from one place to a higher one."""
+        """m_n of the wavelengths from one place to a higher one."""
         inside = self._down(order, start, np.where(start.piece == end.piece, start.rest - end.rest, start.rest))
         whole = self._before[order][end.piece] - self._before[order][np.minimum(start.piece + 1, end.piece)]
         last = self._up(order, end.piece, self.width[end.piece] - end.rest)

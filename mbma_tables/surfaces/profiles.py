@@ -1,9 +1,9 @@
 """Line scans: the isotropic surface whose profile was measured.
 
 A profile's spectrum C_1D, with h_rms^2 = integral C_1D dq/pi, is the isotropic one seen from the side:
-C_1D(q) = 4 pi integral from q of C q' dq'/sqrt(q'^2 - q^2), an Abel transform. Its inverse is sought as a spectrum that
-is a power law between nodes, as straight in its logarithms as the scatter of the measured waves allows. Height variance
-and gradient need no inverse, the profile has them, and the spectrum found is held to both.
+C_1D(q) = 4 pi integral from q of C q' dq'/sqrt(q'^2 - q^2), an Abel transform. Its inverse is sought as a power law
+between nodes, as straight in its logarithms as the scatter of the measurement allows, with the profile's variance of
+height and gradient.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # between two nodes
 STRAIGHT = 1.0  # change of slope, d ln C/d ln q, from node to node that is as likely as one standard deviation
 HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
-OVERLAP = 35 / 18  # waves under a Hann window that carry what one independent wave does
-END = 1e-3  # share of the squared gradient in the waves above the surface's last
-LONGEST, ROLLED_OFF = 4, 0.5  # longest waves of a trace: where they hold half of the variance there is no roll-off
+OVERLAP = 35 / 18  # Fourier components under a Hann window that count as one independent component
+END = 1e-3  # share of the squared gradient in the wavelengths above the surface's last
+LONGEST, ROLLED_OFF = 4, 0.5  # longest wavelengths of a trace: with half of the variance there is no roll-off
 MIN_NODES = 5
 
 
@@ -37,17 +37,17 @@ class ProfileSpectrum:
 
     edges: FloatArray  # wavenumbers between bins, shape (n + 1,) [1/length]
     mean: FloatArray  # C_1D of each bin [length^3],
-    count: FloatArray  # and its number of waves
+    count: FloatArray  # and its number of Fourier components
     kernel: FloatArray  # C_1D of each bin for C = 1 on each panel, shape (n, PANELS n)
     h_rms: float  # of the surface, if isotropic [length],
     gradient: float
     h_rms_error: float  # and relative standard errors, if Gaussian
     gradient_error: float
-    longest: float  # share of the height variance in the LONGEST longest waves
+    longest: float  # share of the height variance in the LONGEST longest wavelengths
 
     @classmethod
     def of(cls, treated: Treated) -> ProfileSpectrum:
-        """Of a treated line scan; errors are those of the waves that were kept."""
+        """Of a treated line scan; errors are those of the wavelengths that were kept."""
         heights, step = treated.heights, treated.steps[0]
         length = heights.size * step
         unit = 2 * math.pi / length
@@ -64,7 +64,7 @@ class ProfileSpectrum:
         q, C = q[held], C[held]
         bins = math.ceil(PER_DECADE * math.log10(q[-1] / q[0])) if q.size > 1 else 0
         if bins < MIN_NODES:
-            raise InputError(f"the line scan holds {q.size} waves: too few for a spectrum")
+            raise InputError(f"the line scan holds {q.size} wavelengths: too few for a spectrum")
         edges = np.geomspace(q[0] - unit / 2, q[-1] + unit / 2, bins + 1)
         filled = np.unique(np.searchsorted(edges, q, side="right") - 1)
         edges = np.append(edges[filled], edges[-1])
@@ -73,7 +73,7 @@ class ProfileSpectrum:
         sides = 4 * np.pi * np.sqrt(np.maximum(_panels(edges) ** 2 - q[:, None] ** 2, 0))
         kernel = np.add.reduceat(np.diff(sides, axis=1), np.searchsorted(number, np.arange(count.size)), axis=0)
         slopes, kept = C * q**2, q <= high * (1 + 1e-9)
-        # a wave's power is exponentially distributed: its square's mean is twice its mean's square
+        # powers are exponentially distributed: the mean of squares is twice the square of the mean
         errors = [math.sqrt(each @ each / 2) / each.sum() / 2 for each in (C[kept], slopes[kept])]
         return cls(
             edges,
@@ -96,10 +96,10 @@ class ProfileSpectrum:
         middle = np.log(fine[1:] * fine[:-1]) / 2
         between = np.stack([np.interp(middle, log_q, row) for row in np.eye(log_q.size)], axis=1)
         independent = np.maximum(self.count, 1.0)
-        # bins that hold no wave, as of a square one, tell nothing
+        # bins without power, as of a square wave, are left out
         lit = self.mean > MIN_POWER * self.mean.max()
         weight, mean = np.sqrt(independent) * lit, np.where(lit, self.mean, 1.0)
-        # the logarithm of a mean of few waves lies low
+        # the logarithm of a mean of few samples lies low
         wanted = np.log(mean) - digamma(independent) + np.log(independent)
         bend = np.diff(np.diff(np.eye(log_q.size), axis=0) / np.diff(log_q)[:, None], axis=0) / STRAIGHT
         sums = np.stack([np.pi * np.diff(fine**2), np.pi / 2 * np.diff(fine**4)])
@@ -133,12 +133,12 @@ def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
     scale = float(np.abs(treated.heights).max())
     steps, waves = (treated.steps[0] / scale,), (scale * treated.waves[0], scale * treated.waves[1])
     scaled = dataclasses.replace(treated, heights=treated.heights / scale, steps=steps, waves=waves)
-    # oblique waves shorter than a cut-off are seen longer along the line: the spectrum is cut, not the trace
+    # oblique wavelengths shorter than a cut-off are seen longer along the line: the spectrum is cut, not the trace
     uncut = scaled.heights if treated.uncut is None else treated.uncut / scale
     found = ProfileSpectrum.of(dataclasses.replace(scaled, heights=uncut))
     heights = Heights.of(scaled.heights)
     if found.longest > ROLLED_OFF:
-        # a few waves have no distribution
+        # a few wavelengths have no distribution
         heights = Heights.gaussian(found.h_rms, heights.h_max)
     end = min(waves[1], float(found.edges[-1]))
     q = np.append(found.edges[found.edges < end], end)
@@ -173,8 +173,8 @@ def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]
     ]
     if found.longest > ROLLED_OFF:
         told = (
-            f"the {LONGEST} longest waves of the trace hold {found.longest:.0%} of its variance: h_rms grows with its "
-            "length, its error is larger than stated, and heights are taken as Gaussian"
+            f"the {LONGEST} longest wavelengths of the trace hold {found.longest:.0%} of its variance: "
+            "h_rms grows with its length, its error is larger than stated, and heights are taken as Gaussian"
         )
         notes.append({"step": "no roll-off", "share": found.longest, "told": told})
     return tuple(notes)

@@ -97,7 +97,7 @@ def fit_psd(q: ArrayLike, C: ArrayLike, h_max: Any, convention: str, band: Any) 
     C_1D of Eq. (6) is 2 pi B(H + 1/2, 1/2) q C(q), exactly so where q1 is infinite; towards q1 it drops (by 7%
     at q1/2, to zero at q1). Where that drop describes the spectrum better than a plain power law it is fitted
     too; the surface's q1 is where it ends if that is within 1.25 of the largest wavenumber, which else is q1.
-    A profile mixes long waves with longer ones, so its roll-off is placed to a factor of 1.5 only.
+    A profile shows oblique wavelengths longer than they are: its roll-off is placed to a factor of 1.5 only.
     """
     if h_max is None:
         raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
@@ -194,7 +194,7 @@ def fit_spectrum(
     law, hurst, error = _law_of(bins, unit, profile, breaks=band is None)
     used = bins[law.start : law.stop]
     residual = math.sqrt(np.average((used.log_c - law.log_at(used.q, unit)) ** 2, weights=used.weight))
-    # a map without roll-off reaches to its own size, though its longest waves are too few to be fitted
+    # a map without roll-off reaches to its own size, though its longest wavelengths are too few to be fitted
     q0, q1 = band or band_of(bins, law, unit, (unit, float(q.max())))
     fit = SpectrumFit(
         hurst=hurst,
@@ -258,14 +258,14 @@ def _binned(q: FloatArray, C: FloatArray, counts: FloatArray, usable: tuple[floa
 
 
 def _refuse_peak(bins: Bins) -> None:
-    """Refuse a wave so strong that the pieces would be laid around it."""
+    """Refuse a wavelength so strong that a break would be fitted beside it."""
     y, side = bins.log_c, MIN_PIECE
     rise = y[side:-side] - np.maximum(y[: -2 * side], y[2 * side :])
     if rise.size and rise.max() > math.log(MAX_PEAK):
         worst = int(np.argmax(rise))
         raise NotSelfAffineError(
-            f"a wave stands out: at q = {bins.q[side + worst]:.4g} the spectrum is {math.exp(rise[worst]):.3g} times "
-            f"what it is on either side, more than {MAX_PEAK:g}"
+            f"a wavelength stands out: at q = {bins.q[side + worst]:.4g} the spectrum is {math.exp(rise[worst]):.3g} "
+            f"times what it is on either side, more than {MAX_PEAK:g}"
         )
 
 
@@ -289,7 +289,7 @@ def _refuse_poor(fit: SpectrumFit, every: Bins, below: NDArray[np.bool_], excess
     if strong.any():
         worst = int(np.argmax(np.where(strong, excess, -np.inf)))
         raise NotSelfAffineError(
-            f"a wave stands out: at q = {every.q[worst]:.4g} the spectrum is {math.exp(excess[worst]):.3g} "
+            f"a wavelength stands out: at q = {every.q[worst]:.4g} the spectrum is {math.exp(excess[worst]):.3g} "
             f"times the power law {band}, more than {MAX_EXCESS:g}"
         )
     if not forced and fit.variance_share < MIN_VARIANCE_SHARE:

@@ -25,9 +25,9 @@ TOPS = ("h_max", "Sp", "nominal_area")
 ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, *TOPS[1:])
 ASSUMED = "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled or worn face"
 SAID = {
-    "Rq": "h_rms = Rq: the profile is long and held no filter that takes out waves of the surface",
+    "Rq": "h_rms = Rq: the profile is long and held no filter that takes out wavelengths of the surface",
     "Ra": "h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered",
-    "Sq": "h_rms = Sq: the map is large and held no filter that takes out waves of the surface",
+    "Sq": "h_rms = Sq: the map is large and held no filter that takes out wavelengths of the surface",
     "Sa": "h_rms = sqrt(pi/2) Sa: heights are Gaussian; the map is large and unfiltered",
     "Rdq": "m2 = Rdq^2: the surface is isotropic, and Rdq was measured down to the shortest wave",
     "Sdq": "m2 = Sdq^2/2: the surface is isotropic, and Sdq was measured down to the shortest wave",
@@ -68,8 +68,8 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     band = [name for name in (slope, summits, *(wave for wave in WAVES if wave in given)) if name is not None]
     if len(band) != 2 or band[0] in SUMMITS or (summits and not slope):
         raise InputError(
-            "the band of waves needs a slope (Rdq, Sdq or Rsm) with one of longest, shortest and Sds, or longest and "
-            f"shortest; got {' and '.join(band) or 'none'}"
+            "the band of wavelengths needs a slope (Rdq, Sdq or Rsm) with one of longest, shortest and Sds, or longest "
+            f"and shortest; got {' and '.join(band) or 'none'}"
         )
     arrays = {name: finite_array(name, value) for name, value in given.items()}
     for name, array in arrays.items():

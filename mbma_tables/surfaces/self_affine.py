@@ -24,7 +24,7 @@ from mbma_tables.common.display import shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.surfaces import spectrum
-from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.any_surface import AnySurface, frozen
 from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.extremes import of_area
 from mbma_tables.surfaces.roughness import surface_of_roughness
@@ -53,7 +53,7 @@ class SelfAffine(AnySurface):
 
     def __post_init__(self, nominal_area: Any) -> None:
         units = Units(self.unit)
-        object.__setattr__(self, "unit", units.length)
+        vars(self).update(unit=units.length)
         if nominal_area is not None:
             self._reach(nominal_area)
         elif self.h_max is None:
@@ -68,10 +68,7 @@ class SelfAffine(AnySurface):
         for name in ("q0", "q1", "h_rms", "h_max"):
             require(name, given[name], given[name] > 0, "positive")
         shape = broadcast_shape(**given)
-        for name, array in given.items():
-            kept = np.array(spread(array, shape))
-            kept.setflags(write=False)
-            object.__setattr__(self, name, kept[()])
+        vars(self).update({name: frozen(np.array(spread(array, shape)))[()] for name, array in given.items()})
         zeta_1 = np.asarray(self.zeta_1)
         require("q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3: q1 is the largest wavenumber")
         require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
@@ -82,9 +79,8 @@ class SelfAffine(AnySurface):
         numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
         # what follows from the other numbers, checked as they are
         like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
-        found = of_area(like, nominal_area, self.h_max)
-        for name, value in zip(("h_max", "provenance"), found, strict=True):
-            object.__setattr__(self, name, value)
+        h_max, provenance = of_area(like, nominal_area, self.h_max)
+        vars(self).update(h_max=h_max, provenance=provenance)
 
     def __repr__(self) -> str:
         numbers = [f"{name}={_shown(getattr(self, name))}" for name in PARAMETERS]
@@ -92,8 +88,9 @@ class SelfAffine(AnySurface):
 
     def scaled(self, factor: float, unit: str | None) -> Self:
         """The same surface in another length unit, of which the old one is `factor`."""
-        waves, lengths = (self.q0 / factor, self.q1 / factor), (self.h_rms * factor, self.h_max * factor)
-        return dataclasses.replace(self, q0=waves[0], q1=waves[1], h_rms=lengths[0], h_max=lengths[1], unit=unit)
+        numbers = {name: getattr(self, name) / factor for name in ("q0", "q1")}
+        numbers |= {name: getattr(self, name) * factor for name in ("h_rms", "h_max")}
+        return dataclasses.replace(self, **numbers, unit=unit)
 
     @classmethod
     @hinted
@@ -165,10 +162,9 @@ class SelfAffine(AnySurface):
     ) -> Self:
         """The self-affine surface that numbers of a drawing or a profilometer describe.
 
-        One height, one highest point, a Hurst exponent, and two of slope, longest wave and shortest wave (or slope and
-        density of summits). What a drawing does not tell is to be given: nothing is filled in. `provenance` holds
-        what each number was taken to mean; docs/surfaces.md has typical values. Lengths are numbers in one unit, or
-        texts with theirs.
+        One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength (or slope
+        and density of summits); nothing is filled in. `provenance` holds the meaning assumed for each number;
+        docs/surfaces.md has typical values. Lengths are numbers in one unit, or texts with their unit.
 
         Parameters
         ----------
@@ -200,8 +196,8 @@ class SelfAffine(AnySurface):
         --------
         >>> from mbma_tables import Surface
         >>> ground = Surface.from_roughness(Ra="0.4 um", Rdq=0.1, longest="100 um", hurst=0.8, h_max="1.8 um")
-        >>> print(f"h_rms = {ground.h_rms:.3f} {ground.unit}, shortest wave {6.2832 / ground.q1:.2f} {ground.unit}")
-        h_rms = 0.501 um, shortest wave 1.12 um
+        >>> print(f"h_rms = {ground.h_rms:.3f} um, shortest wavelength {6.2832 / ground.q1:.2f} {ground.unit}")
+        h_rms = 0.501 um, shortest wavelength 1.12 um
         >>> ground.provenance[0]["assumed"][2]
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
@@ -229,7 +225,7 @@ class SelfAffine(AnySurface):
         surface: Self = make(**case.numbers, unit=case.length_unit)
         return surface
 
-    @property
+    @functools.cached_property
     def labelled(self) -> bool:
         """Whether any parameter is an xarray DataArray."""
         return any(is_labelled(getattr(self, name)) for name in PARAMETERS)

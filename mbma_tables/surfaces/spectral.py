@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,12 +16,15 @@ from mbma_tables.common.display import Variable
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
-from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.any_surface import AnySurface, frozen
 from mbma_tables.surfaces.extremes import of_area
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.treatment import Treated
+
+if TYPE_CHECKING:
+    from mbma_tables.laws.pressing import Table
 
 # of the surfaces of docs/data/boundary_elements.nc. As isotropic Gaussian ones they give area within 20% between 1% and
 # 10% contact, and beyond these it is wrong by 30% to factors
@@ -43,7 +46,7 @@ PRESSED = {"skewness of heights": (-3.1, 3.3), "kurtosis of slopes": (2.6, 16.5)
 WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried
 SAME_LAW = 0.01  # of ln C about one power law: a spectrum this straight counts as self-affine
 FINE = 1.02  # between wavenumbers of a sum of spectra: a sum of power laws is none, by 1e-4 at most
-NO_POWER = 1e-3  # share of the squared gradient beyond the last waves that count
+NO_POWER = 1e-3  # share of the squared gradient beyond the last wavelengths that count
 SIDE = 1e-12  # beside a wavenumber, relative
 
 
@@ -68,6 +71,8 @@ class SpectralSurface(AnySurface):
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
     map : Treated, optional
         The treated heights themselves, which `theory="simulated"` presses.
+    table : Table, optional
+        What boundary elements found of them already (`mbma_tables.laws.pressing`).
     samples : array_like, shape (n,), optional
         Independent samples behind each entry of C, as weights of a fit.
     anisotropy : float, optional
@@ -91,7 +96,7 @@ class SpectralSurface(AnySurface):
     >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
     >>> surface = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1, unit="um")
     >>> surface
-    MeasuredSurface(200 waves from q = 0.2 to 50, h_rms=0.2634, h_max=1.1, rms gradient 0.7808, unit='um')
+    MeasuredSurface(200 samples from q = 0.2 to 50, h_rms=0.2634, h_max=1.1, rms gradient 0.7808, unit='um')
     """
 
     q: Any
@@ -101,6 +106,7 @@ class SpectralSurface(AnySurface):
     bearing: Bearing | None = None
     bands: RadialSpectrum | None = None
     map: Treated | None = None
+    table: Table | None = None
     samples: Any = None
     anisotropy: float | None = None
     unit: str | None = None
@@ -114,43 +120,35 @@ class SpectralSurface(AnySurface):
         require("C", C, C >= 0, "zero or positive")
         held = np.flatnonzero(C > 0)
         inside = slice(held[0], held[-1] + 1) if held.size else slice(0)
-        keep = {"q": q[inside].copy(), "C": C[inside].copy()}
+        keep = {"q": q, "C": C}
         if self.samples is not None:
-            samples = positive_array("samples", self.samples)
-            keep["samples"] = np.broadcast_to(samples, q.shape)[inside].copy()
-        for name, array in keep.items():
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            keep["samples"] = np.broadcast_to(positive_array("samples", self.samples), q.shape)
+        vars(self).update({name: frozen(array[inside].copy()) for name, array in keep.items()})
         if held.size < 2 or not self.laws.width.size:
             raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
         numbers = {"q0": self.q[0], "q1": self.q[-1], "h_rms": math.sqrt(self.laws.moment(0))}
         numbers |= {f"m{order}": self.laws.moment(order) for order in (2, 4)}
-        for name, number in numbers.items():
-            object.__setattr__(self, name, np.float64(number))
-        require(
-            "largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3 (more waves)"
-        )
+        vars(self).update({name: np.float64(number) for name, number in numbers.items()})
+        require("largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3")
         if not all(math.isfinite(m) and m > 0 for m in (self.m0, self.m2, self.m4)):
             raise OutOfRangeError("the spectrum's moments overflow or vanish: choose another length unit")
-        object.__setattr__(self, "unit", Units(self.unit).length)
+        vars(self).update(unit=Units(self.unit).length)
+        heights, top, provenance = self.heights, self.h_max, tuple(self.provenance)
         if nominal_area is not None:
-            for name, value in zip(("h_max", "provenance"), of_area(self, nominal_area, self.h_max), strict=True):
-                object.__setattr__(self, name, value)
-            if self.heights is not None and self.heights.is_gaussian:
-                object.__setattr__(self, "heights", None)
-        if self.heights is None:
-            if self.h_max is None:
-                raise InputError(
-                    "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
-                )
-            object.__setattr__(self, "heights", Heights.gaussian(self.h_rms, one_height(self.h_max)))
-        object.__setattr__(self, "h_max", self.heights.h_max if self.h_max is None else one_height(self.h_max))
-        object.__setattr__(self, "provenance", tuple(self.provenance))
+            top, provenance = of_area(self, nominal_area, top)
+            heights = None if heights is None or heights.is_gaussian else heights
+        if heights is None and top is None:
+            raise InputError(
+                "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
+            )
+        top = heights.h_max if top is None else one_height(top)
+        heights = Heights.gaussian(self.h_rms, top) if heights is None else heights
+        vars(self).update(heights=heights, h_max=top, provenance=provenance)
 
     def __repr__(self) -> str:
         numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
         unit = "" if self.unit is None else f", unit={self.unit!r}"
-        return f"{type(self).__name__}({self.q.size} waves from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
+        return f"{type(self).__name__}({self.q.size} samples from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
 
     def _variables(self) -> dict[str, Variable]:
         length = self.unit or "length"
@@ -206,7 +204,7 @@ class SpectralSurface(AnySurface):
         if self.anisotropy is not None:
             known["anisotropy"] = self.anisotropy
         beyond = "beyond, only 'calibrated' by a map was tested"
-        mend = "theory='simulated' presses the map itself" if by_map else beyond
+        mend = "theory='simulated' simulates the map" if by_map else beyond
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()
@@ -253,10 +251,11 @@ class SpectralSurface(AnySurface):
             bearing=known,
             bands=bands,
             map=whole,
+            table=None if self.table is None else self.table.resized(up, along),
         )
 
     def between(self, low: float, high: float) -> Self:
-        """The waves from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
+        """The wavelengths from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
         inside = (self.q > low) & (self.q < high)
         q = np.concatenate([[low], self.q[inside], [high]])
         less = dataclasses.replace(
@@ -267,6 +266,7 @@ class SpectralSurface(AnySurface):
             bearing=None,
             bands=None,
             map=None,
+            table=None,
         )
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 
@@ -290,7 +290,9 @@ class SpectralSurface(AnySurface):
         kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
         told = []
         if self.bearing is not None or other.bearing is not None:
-            told = ["curves of a map's tops and valleys are left out, since how the two lie on each other is not known"]
+            told.append(
+                "curves of the maps' summits and valleys are left out: how the two lie on each other is not known"
+            )
         if (stretch := _anisotropy(self, other)) is not None:
             told.append(f"lays are taken to be parallel: anisotropy {stretch:.3g} at most")
         record = {"step": "combined", "of": [list(self.provenance), list(other.provenance)]}
@@ -318,7 +320,7 @@ def resolution(surface: SpectralSurface) -> dict[str, Any]:
     shortest, unit = 2 * math.pi / end, f" {surface.unit}" if surface.unit else ""
     finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
     told = (
-        f"area is a matter of resolution: waves are known down to {shortest:.4g}{unit}{finer}, and without the last "
+        f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the last "
         f"octave of them area at light load would be {factor:.2f} times larger"
     )
     return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}

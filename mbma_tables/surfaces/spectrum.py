@@ -18,6 +18,7 @@ NAYAK = 6 * math.pi * math.sqrt(3)  # summit density is m4 / (NAYAK m2), Eq. (2)
 RADIUS = 3 * math.sqrt(math.pi) / 8  # summit radius is RADIUS / sqrt(m4), Eq. (2)
 BROADENING = 0.8968  # summit variance is (1 - BROADENING/alpha) m0, Eq. (2)
 MIN_ZETA_1, MAX_ZETA_1 = 3.0, 1e8  # of a whole surface; above 3 for the floors 1.5 and 3 of (27), (30)
+SHARES = {0: 2.0, 2: 1.0, 4: 0.75}  # of moments of order n, Eq. (7)
 BISECTIONS = 56  # of log(zeta_1), to rounding
 TINY = 1e-300  # in place of 0, where a quotient tends to 1
 
@@ -29,21 +30,10 @@ def growth(power: Any, log_ratio: Any) -> Any:
     return np.expm1(x) / x
 
 
-def m0_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
-    """Variance of height over the band, Eq. (7), in s^2."""
-    return 2.0 * hurst * np.exp(-2.0 * hurst * log_za) * log_ratio * growth(-2.0 * hurst, log_ratio)
-
-
-def m2_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
-    """Variance of a profile's slope over the band, Eq. (7), in (s q0)^2."""
-    power = 2.0 - 2.0 * hurst
-    return hurst * np.exp(power * log_za) * log_ratio * growth(power, log_ratio)
-
-
-def m4_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
-    """Variance of a profile's second derivative over the band, Eq. (7), in (s q0^2)^2."""
-    power = 4.0 - 2.0 * hurst
-    return 0.75 * hurst * np.exp(power * log_za) * log_ratio * growth(power, log_ratio)
+def moment_of(order: int, hurst: Any, log_za: Any, log_ratio: Any) -> Any:
+    """Variance of height, of a profile's slope or of its curvature over the band, Eq. (7), in (s q0^(n/2))^2."""
+    power = order - 2.0 * hurst
+    return SHARES[order] * hurst * np.exp(power * log_za) * log_ratio * growth(power, log_ratio)
 
 
 def alpha_of(hurst: Any, log_ratio: Any) -> Any:
@@ -63,8 +53,7 @@ def band_moment(order: int, hurst: Any, zeta_a: Any, zeta_b: Any) -> Any:
     """Spectral moment m_n, n = 0, 2, 4, over the band [zeta_a, zeta_b]; arrays broadcast (Eq. 31)."""
     start = np.asarray(zeta_a, dtype=float)
     width = np.asarray(zeta_b, dtype=float) - start
-    moment = {0: m0_of, 2: m2_of, 4: m4_of}[order]
-    return moment(np.asarray(hurst, dtype=float), np.log(start), np.log1p(width / start))
+    return moment_of(order, np.asarray(hurst, dtype=float), np.log(start), np.log1p(width / start))
 
 
 def band_from_moments(

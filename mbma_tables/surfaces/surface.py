@@ -152,6 +152,8 @@ class Surface(SelfAffine):
         fill: str | None = None,
         short_cutoff: Any = None,
         long_cutoff: Any = None,
+        s_filter: Any = None,
+        l_filter: Any = None,
         tip_radius: Any = None,
         reliable: bool = True,
         window: str | None = None,
@@ -184,7 +186,7 @@ class Surface(SelfAffine):
         extrapolate_to, extrapolate_hurst : float, optional
             Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; what
             that changes is told.
-        outliers, fill, short_cutoff, long_cutoff, tip_radius, reliable, window : optional
+        outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter, tip_radius, reliable, window : optional
             As in `mbma_tables.surfaces.treatment.Treatment`; what was done is the surface's `provenance`.
         unit : str, optional
             Unit of the answer and of plain lengths, to which lengths of a file are converted, or which they have where
@@ -208,8 +210,6 @@ class Surface(SelfAffine):
 
         Examples
         --------
-        A periodic map of side 1 with random phases and H = 0.8:
-
         >>> import numpy as np
         >>> from mbma_tables import Surface
         >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((128, 128)))
@@ -248,6 +248,8 @@ class Surface(SelfAffine):
         fill: str | None = None,
         short_cutoff: Any = None,
         long_cutoff: Any = None,
+        s_filter: Any = None,
+        l_filter: Any = None,
         tip_radius: Any = None,
         reliable: bool = True,
         window: str | None = None,
@@ -276,7 +278,7 @@ class Surface(SelfAffine):
         Raises
         ------
         InputError, OutOfRangeError
-            For input that is no line scan, holds too few waves, or is flat.
+            For input that is no line scan, holds too few wavelengths, or is flat.
 
         Examples
         --------

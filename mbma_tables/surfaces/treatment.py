@@ -16,6 +16,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError
+from mbma_tables.surfaces.filters import gaussian, last_wave, without_polynomial
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
@@ -25,8 +26,13 @@ MIN_GRID = 32  # points along each side: 16 wavenumbers, of which a window spoil
 FREE_HOLES = 0.05  # share of undefined points that is filled unasked
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
-MIN_POWER = 1e-24  # of the strongest wave: below it rounding, not a measured wave
-LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius")  # options that are lengths
+MIN_POWER = 1e-24  # of the strongest wavelength: below it rounding, not a measured wavelength
+LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter")  # options that are lengths
+FORM = 0.5  # share of the height variance in a tilt or a bow from which on it is told
+USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier, and share of the points up to which they are told
+CUTS = {"long_cutoff": "longcut", "short_cutoff": "shortcut"}  # by that library
+CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
+CALLED |= {"s_filter": "an S-filter", "l_filter": "an L-filter"}
 Provenance = tuple[Mapping[str, Any], ...]
 
 
@@ -45,11 +51,14 @@ class Treatment:
         Mode of `detrend`: mean, median, height (or plane), mad-tilt, slope, curvature (or quadratic), mad-curvature.
         By default the mean of periodic data, the plane of any other.
     short_cutoff, long_cutoff : float, optional
-        Wavelengths [length]: shorter waves are below the instrument's resolution, longer ones form, and left out
+        Wavelengths [length]: shorter ones, below the instrument's resolution, and longer ones, form, are left out
         (`shortcut`, `longcut`). Data that are not periodic are continued by their mirror images for that.
+    s_filter, l_filter : float, optional
+        Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve waves of this length: an
+        S-filter takes out shorter ones, those below 0.39 times it wholly, an L-filter longer ones.
     tip_radius : float, optional
         Of a scanning probe or stylus [length]: sets `short_cutoff` where `scanning_probe_reliability_cutoff` finds
-        waves that such a tip cannot follow.
+        wavelengths that such a tip cannot follow.
     reliable : bool, optional
         Whether a resolution or tip radius that the file states counts as given, the default.
     window : str, optional
@@ -61,6 +70,8 @@ class Treatment:
     detrend: str | None = None
     short_cutoff: float | None = None
     long_cutoff: float | None = None
+    s_filter: float | None = None
+    l_filter: float | None = None
     tip_radius: float | None = None
     reliable: bool = True
     window: str | None = None
@@ -86,7 +97,7 @@ class Treated:
     steps: tuple[float, ...]  # sampling step along each axis [length]
     periodic: bool  # else they continue by their mirror images where that is needed
     unit: str | None  # of length, that the file names
-    waves: tuple[float, float] = (0.0, math.inf)  # wavenumbers between which the waves are that were kept
+    waves: tuple[float, float] = (0.0, math.inf)  # wavenumbers between which the wavelengths are that were kept
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
     window: str | None = None
     uncut: Any = None  # heights before the short cut-off, where there is one
@@ -125,9 +136,10 @@ class Treated:
         if self.window is None:
             windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
         else:
-            ones = (wrapped(np.ones(count), (1.0,), False) for count in self.heights.shape)
+            from scipy.signal import get_window
+
             try:
-                windows = [np.asarray(one.window(self.window).heights()) for one in ones]
+                windows = [get_window(self.window, count) for count in self.heights.shape]
             except ValueError:
                 raise InputError(f"window must be one of scipy.signal.get_window, got {self.window!r}") from None
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
@@ -154,12 +166,14 @@ def treat(
     with warnings.catch_warnings():
         # that library's calls of numpy are its own affair
         warnings.simplefilter("ignore")
-        if treatment.outliers is not None:
-            known = _without_outliers(known, treatment.outliers)
+        known = _without_outliers(known, treatment.outliers)
         known = _flattened(_filled(known, treatment.fill), treatment.detrend)
         known, short = _resolution(known, treatment, info or {})
-        known = _within(known, short, treatment.long_cutoff)
-    shortest = 2 * math.pi / short if short else math.inf
+        known = _within(known, short, treatment)
+    shortest = min(
+        2 * math.pi / short if short else math.inf,
+        last_wave(treatment.s_filter) if treatment.s_filter else math.inf,
+    )
     return dataclasses.replace(known, waves=(2 * math.pi / (treatment.long_cutoff or math.inf), shortest))
 
 
@@ -170,25 +184,19 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
     if degree is None:
         flat = np.asarray(wrapped(heights, known.steps, known.periodic).detrend(trend).heights(), float)
     else:
-        flat = _without_polynomial(heights, degree)
+        flat = without_polynomial(heights, degree)
     size = float(np.abs(heights).max())
     if not float(np.abs(flat).max()) > max(1e3 * np.finfo(float).eps * size, MIN_LENGTH):
         raise InputError(f"the map is flat: nothing is left once its {trend} is subtracted")
     before, after = float(np.std(heights)), float(np.std(flat))
     told = f"{trend} subtracted" + (f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else "")
+    for more, form in ((1, "tilt"), (2, "bow")) if degree is not None else ():
+        share = 1 - (float(np.std(without_polynomial(flat, more))) / after) ** 2 if more > (degree or 0) else 0.0
+        if share > FORM:
+            remedy = "plane" if more == 1 else "quadratic"
+            told += f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} removes it"
+            break
     return known.after(flat, "detrend", told, mode=trend, h_rms_before=before, h_rms_after=after)
-
-
-def _without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
-    """Heights less their least-squares polynomial of that total degree: what the library's modes do, without it."""
-    bases = [
-        np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), degree))[0] for count in heights.shape
-    ]
-    if heights.ndim == 1:
-        return np.asarray(heights - bases[0] @ (bases[0].T @ heights))
-    along, across = bases
-    wanted = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree
-    return np.asarray(heights - along @ (wanted * (along.T @ heights @ across)) @ across.T)
 
 
 def _counted(count: int, size: int) -> str:
@@ -204,8 +212,8 @@ def _harmonic(known: Treated) -> FloatArray:
     return np.asarray(np.ma.getdata(heights), float)
 
 
-def _without_outliers(known: Treated, limit: float) -> Treated:
-    """Heights with what stands out of its neighbourhood undefined."""
+def _without_outliers(known: Treated, asked: float | None) -> Treated:
+    """Heights with what stands out of its neighbourhood undefined; where that was not asked for, a few are told."""
     from scipy.ndimage import median_filter
 
     heights, whole = known.heights, _harmonic(known)
@@ -213,8 +221,14 @@ def _without_outliers(known: Treated, limit: float) -> Treated:
     difference = whole - median_filter(whole, MEDIAN_POINTS, mode="wrap" if known.periodic else "mirror")
     measured = ~np.ma.getmaskarray(heights)
     scale = float(np.quantile(np.abs(difference[measured]), USUAL)) / USUAL_DEVIATES
+    limit = USUAL_LIMIT if asked is None else asked
     found = measured & (np.abs(difference) > limit * scale)
     count = int(found.sum())
+    if asked is None:
+        if not 0 < count <= FEW * heights.size:
+            return known
+        told = f"{_counted(count, heights.size)} stand out by more than {limit:g} standard deviations: "
+        return known.after(heights, "outliers seen", f"{told}outliers={limit:g} removes them", points=count)
     told = f"{_counted(count, heights.size)} stood out by more than {limit:g} standard deviations: taken out"
     left = np.ma.masked_array(np.ma.getdata(heights), ~measured | found)
     return known.after(left, "outliers", told, limit=limit, points=count)
@@ -252,44 +266,48 @@ def _resolution(known: Treated, treatment: Treatment, info: Mapping[str, Any]) -
     except (ValueError, KeyError, TypeError) as fault:
         raise InputError(f"the reliability cut-off by {origin} cannot be found: {fault}") from None
     if limit is None or limit <= 2 * max(known.steps):
-        known = known.after(known.heights, "reliability", f"{origin} follows every wave that was sampled")
+        known = known.after(known.heights, "reliability", f"{origin} follows every wavelength that was sampled")
     else:
-        told = f"{origin} follows no wave below {limit:.4g} {known.unit or ''}".rstrip()
+        told = f"{origin} follows no wavelength below {limit:.4g} {known.unit or ''}".rstrip()
         known = known.after(known.heights, "reliability", told, wavelength=float(limit))
         found.append((float(limit), origin))
     return known, max(found)[0] if found else None
 
 
-def _within(known: Treated, short: float | None, long: float | None) -> Treated:
-    """Heights whose waves lie between both cut-offs."""
+def _within(known: Treated, short: float | None, treatment: Treatment) -> Treated:
+    """Heights whose wavelengths lie between both cut-offs, or filters."""
+    long = treatment.long_cutoff
     if short is not None and not short > 2 * min(known.steps):
         raise InputError(
-            f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wave that "
-            f"was sampled, got {short:g}"
+            f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wavelength "
+            f"sampled, got {short:g}"
         )
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
-    values = known.heights if known.periodic or short is long is None else mirrored(known.heights)
+    asked = {"long_cutoff": long, "short_cutoff": short, "s_filter": treatment.s_filter, "l_filter": treatment.l_filter}
+    own = {name: wavelength for name, wavelength in asked.items() if wavelength is not None}
+    values = known.heights if known.periodic or not own else mirrored(known.heights)
     whole = tuple(slice(count) for count in known.heights.shape)
-    for name, method, wavelength in (("long_cutoff", "longcut", long), ("short_cutoff", "shortcut", short)):
-        if wavelength is None:
-            continue
+    for name, wavelength in own.items():
         if name == "short_cutoff":
             known = dataclasses.replace(known, uncut=values[whole])
         before = squares(values, known.steps)
-        scan = wrapped(values, known.steps, True, known.unit)
-        values = np.asarray(getattr(scan, method)(cutoff_wavelength=wavelength).heights(), float)
+        if name in CUTS:
+            scan = wrapped(values, known.steps, True, known.unit)
+            values = np.asarray(getattr(scan, CUTS[name])(cutoff_wavelength=wavelength).heights(), float)
+        else:
+            values = gaussian(values, known.steps, name, wavelength)
         after = squares(values, known.steps)
         if not after[0] > MIN_POWER * before[0]:
-            raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
+            raise InputError(f"{name} {wavelength:g} leaves no wavelength of the measurement")
         of_variance, of_gradient = (max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True))
         length = f"{wavelength:.4g} {known.unit or ''}".rstrip()
-        told = f"a {name.replace('_cutoff', ' cut-off')} at {length} removes {of_gradient:.0%} of the squared gradient"
-        if name == "short_cutoff":
+        told = f"{CALLED[name]} at {length} removes {of_gradient:.0%} of the squared gradient"
+        if name in ("short_cutoff", "s_filter"):
             told += f": area at light load is {math.sqrt(before[1] / after[1]):.2f} times larger than without"
         told += f"; it removes {of_variance:.0%} of the height variance"
         known = known.after(values, name, told, wavelength=wavelength, of_gradient=of_gradient, of_variance=of_variance)
-    return known if short is long is None else dataclasses.replace(known, heights=values[whole])
+    return dataclasses.replace(known, heights=values[whole]) if own else known
 
 
 def mirrored(values: FloatArray) -> FloatArray:
@@ -302,7 +320,7 @@ def mirrored(values: FloatArray) -> FloatArray:
 def squares(
     values: FloatArray, steps: tuple[float, ...], band: tuple[float, float] = (0.0, math.inf)
 ) -> tuple[float, float]:
-    """Mean squares of periodic heights and of their gradient, of the waves between two wavenumbers."""
+    """Mean squares of periodic heights and of their gradient, of the wavelengths between two wavenumbers."""
     power = np.abs(np.fft.fftn(values) / values.size) ** 2
     power.flat[0] = 0.0
     waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(values.shape, steps, strict=True)]

@@ -20,7 +20,6 @@ import numpy as np
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import read_file
 from mbma_tables.tablefiles import schema
-from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
@@ -81,19 +80,21 @@ def read_sealed(path: pathlib.Path) -> bytes:
     return body
 
 
-def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
-    """The table in an open file whose kind and format are known."""
+def verified(
+    dataset: netCDF4.Dataset, required: tuple[str, ...] = ("values_sha256",)
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]], dict[str, Any]]:
+    """Attributes of an open file, those of its variables, and their values, all as their hashes and types say."""
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
     own = _attributes_of(dataset)
     described = {name: _attributes_of(variable) for name, variable in dataset.variables.items()}
     for owner, attributes in {"": own, **described}.items():
         for name, value in attributes.items():
-            check_attribute(owner, name, value)
+            schema.check_attribute(owner, name, value)
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
             raise ValueError(f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}")
-    missing = [name for name in REQUIRED if name not in own]
+    missing = [name for name in required if name not in own]
     if missing or own.get("attributes_sha256") != attributes_digest(dataset):
         raise ValueError(f"lacks attribute {missing[0]}" if missing else "has attributes that were edited")
     if dataset.groups or sum(variable.size for variable in dataset.variables.values()) * 8 > MAX_BYTES:
@@ -102,6 +103,12 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
     if digest_arrays(values) != own["values_sha256"]:
         raise ValueError("has values that do not match their hash")
+    return own, described, values
+
+
+def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
+    """The table in an open file whose kind and format are known."""
+    own, described, values = verified(dataset, schema.REQUIRED)
     names = [name for name, _ in schema.AXES[kind]]
     axes = tuple(
         schema.Axis(
@@ -146,7 +153,7 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.
             if version != schema.FORMAT_VERSIONS[found]:
                 raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
             content = _content(dataset, found)
-        check_content(content)
+        schema.check_content(content)
     except ValueError as fault:
         raise _refuse(source, str(fault), kind or "all") from None
     # what netCDF4 raises on bytes that are no netCDF file, or that lack a variable

@@ -91,9 +91,21 @@ def default_theory(name: str) -> Theory:
 
 
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The theory as given; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
+    """The theory as given; without one "mbma" for five numbers or its options, and for a measured surface the nearest.
+
+    That is "simulated" for a surface opened from a table, "corrected" for maps that are fit for it, "calibrated" for
+    others.
+    """
     from mbma_tables.surfaces.surface import Surface
 
     if theory is not None:
         return theory
-    return "mbma" if isinstance(surface, Surface) or OPTIONS | options != OPTIONS else "calibrated"
+    if isinstance(surface, Surface) or OPTIONS | options != OPTIONS:
+        return "mbma"
+    if getattr(surface, "table", None) is not None:
+        return "simulated"
+    if getattr(surface, "map", None) is None:
+        return "calibrated"
+    from mbma_tables.theories.corrected import applies
+
+    return "corrected" if applies(surface) else "calibrated"

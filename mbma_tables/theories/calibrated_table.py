@@ -93,8 +93,7 @@ class Table(SurfaceSpline):
     def separations(self, surfaces: FloatArray, owner: Owners, pressure: FloatArray) -> FloatArray:
         """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
         given = self.given(surfaces, pressure.size)
-        u: FloatArray = filled(functools.partial(core.calibrated_separation, *given), (owner, pressure), 1)[0]
-        return u
+        return np.ravel(filled(functools.partial(core.calibrated_separation, *given), (owner, pressure), 1))
 
     def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""

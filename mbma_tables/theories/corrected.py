@@ -12,21 +12,22 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib.util
 from typing import Any
 
 import numpy as np
 from scipy.special import erf, erfinv
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.laws.energy_spline import LARGEST_AREA, LoadCurve
-from mbma_tables.laws.pressing import MIN_POINTS, TOLERANCE, Pressed, coarser, press
+from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, TOLERANCE, Pressed, coarser, press
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.theories import simulated
+from mbma_tables.theories import own_map, simulated
 from mbma_tables.theories.calibrated_curves import OwnLaw, own_law
 from mbma_tables.theories.protocol import TheoryAnswer
 from mbma_tables.theories.simulated import BoundaryElements
@@ -34,9 +35,11 @@ from mbma_tables.theories.simulated import BoundaryElements
 LIGHT = 0.01  # contact below which the law's own area counts, too
 FINE = 4000  # loads over which the law's change is integrated
 LOWEST, HIGHEST = 3e-3, 0.8  # A/A0 that was tested
+# points along a side, and of the map with its continuation, between which it is the default
+LEAST_SIDE, MOST_POINTS = 64, 2**18
 # a, b and c of the scatter, root of a^2 + (b D1)^2 + (c D2)^2: D1 is what the law differs by from the answer, D2 what
-# that by the quarter grid does; fitted to the 65 maps of `python -m generate machined`
-SCATTER = {"pressure": (0.019, 0.56, 0.42), "area": (0.0075, 0.34, 0.59), "stiffness": (0.035, 0.41, 0.46)}
+# that by the quarter grid does; fitted to the 65 maps of `python -m generate machined` (generate/machined/coverage.py)
+SCATTER = {"pressure": (0.021, 0.51, 0.43), "area": (0.0095, 0.28, 0.61), "stiffness": (0.034, 0.44, 0.27)}
 OF_FLOW = (0.065, 0.061, 0.16, 0.83, 2.8, 2.8, 2.8)  # of ln of the flow, at `TESTED_AREAS` of simulated maps
 
 
@@ -47,14 +50,16 @@ class Corrected(BoundaryElements):
 
     def __init__(self, surface: MeasuredSurface, half: Pressed, quarter: FloatArray) -> None:
         pressure, area, u, energy = half.rows
-        super().__init__(surface, pressure, area, u, energy, np.inf, simulated.map_of(surface).heights.size, half)
+        size = own_map.map_of(surface).heights.size
+        super().__init__(surface, pressure, area, u, energy, np.inf, size, half, True)
+        self.origin = f"corrected by {own_map.origin_of(own_map.map_of(surface), TOLERANCE)}"
         law, other = own_law(surface), LoadCurve(quarter)
-        x = self._curve.x
+        x = self.fit.x
         inside = np.clip(x, other.x[0], other.x[-1])
         gaps = np.array([law.separations(pressure), other.separation(inside)])
         areas = np.array([law.area(pressure), other.area(inside)])
         stiff = np.array([-pressure / np.gradient(gaps[0], x), other.stiffness(inside)])
-        own = self._curve.stiffness(x)
+        own = self.fit.stiffness(x)
         # by quantity, law or quarter grid, and load
         self._apart_by = {
             "pressure": np.abs(gaps - u) * own / pressure,
@@ -65,7 +70,7 @@ class Corrected(BoundaryElements):
     @classmethod
     def of(cls, surface: AnySurface, loads: Any = None, tolerance: float = TOLERANCE) -> Corrected:
         """Press half and quarter of the grid of a surface from `mbma_tables.Surface.from_map`."""
-        simulated.map_of(surface)
+        own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
         return cls(surface, _carried(surface, 1, tolerance), _carried(surface, 2, tolerance).rows)
 
@@ -74,29 +79,35 @@ class Corrected(BoundaryElements):
         assert isinstance(self.surface, MeasuredSurface)
         everywhere = np.ones(answer.area.shape, bool)
         odd = dict.fromkeys(self.surface.outside(PRESSED, by_map=True), everywhere)
-        low, high = answer.area < LOWEST, answer.area > HIGHEST
+        low, high = (answer.area < LOWEST) & (answer.area > 0), answer.area > HIGHEST
         return odd | {f"A/A0 is below {LOWEST:g}": low, f"A/A0 is above {HIGHEST:g}": high}
+
+    def apart(self, quantity: str, area: FloatArray) -> list[FloatArray]:
+        """What the law, and the quarter grid, differ from the answer at contact areas, as errors of that quantity."""
+        x = self.fit.log_force_at(np.clip(area, *self.rows[1, [0, -1]]))
+        return [np.interp(x, self.fit.x, difference) for difference in self._apart_by[quantity]]
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid, by what the law and the quarter grid differ from the answer."""
         if quantity == "flow":
             with np.errstate(divide="ignore"):
-                return np.interp(np.log(area), np.log(simulated.TESTED_AREAS), OF_FLOW)
-        inside = np.clip(area, *self.rows[1, [0, -1]])
-        a, *slopes = SCATTER[quantity]
-        apart = [np.interp(self._curve.log_force_at(inside), self._curve.x, d) for d in self._apart_by[quantity]]
-        return np.asarray(np.sqrt(a**2 + sum((b * d) ** 2 for b, d in zip(slopes, apart, strict=True))))
+                found = np.interp(np.log(area), np.log(simulated.TESTED_AREAS), OF_FLOW)
+        else:
+            a, b, c = SCATTER[quantity]
+            by_law, by_quarter = self.apart(quantity, area)
+            found = np.sqrt(a**2 + (b * by_law) ** 2 + (c * by_quarter) ** 2)
+        return np.where(self._beyond(area), np.nan, found)
 
 
 def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Pressed:
     """The map pressed on a coarser grid, and carried to the full one; loads end where the gap no longer falls."""
-    values, sizes = simulated.continued(simulated.map_of(surface))
+    values, sizes = own_map.continued(own_map.map_of(surface))
     coarse = values
     for _ in range(halvings):
         coarse = coarser(coarse, MIN_POINTS)
     steps = tuple(side / count for side, count in zip(sizes, coarse.shape, strict=True))
     law, other = own_law(surface), OwnLaw(MeasuredSurface.of(measured_map(Treated(coarse, steps, True, None), None)))
-    loads = simulated.law_loads(surface, simulated.AREAS)
+    loads = own_map.law_loads(surface, own_map.AREAS)
     found = press(coarse, sizes, loads, MIN_POINTS, law.gradient, None, tolerance)
     pressure, area, u, energy = found.rows
     change = law.separations(pressure) - other.separations(pressure)
@@ -119,6 +130,23 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
     return dataclasses.replace(
         found, heights=values, rows=rows[:, :kept], coarse_from=kept, gaps=found.gaps[:kept], cut=MIN_POINTS
     )
+
+
+def applies(surface: AnySurface) -> bool:
+    """Whether it is the default for a surface: Tamaas is installed, the map resolved, and pressed within seconds."""
+    if not isinstance(surface, MeasuredSurface) or surface.map is None or surface.bands is None:
+        return False
+    whole = surface.map
+    if whole.heights.ndim != 2 or not importlib.util.find_spec("tamaas"):
+        return False
+    size = whole.heights.size * (1 if whole.periodic else 4)
+    points = 2 * np.pi / float(surface.q1) / max(whole.steps)
+    if size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or points < MIN_POINTS * (1 - ROUNDING):
+        return False
+    try:
+        return of_map(Corrected.name, surface).ends_at_h_max
+    except (ConvergenceError, OutOfRangeError):
+        return False
 
 
 @functools.lru_cache(maxsize=8)

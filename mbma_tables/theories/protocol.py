@@ -62,6 +62,7 @@ class Theory(abc.ABC):
     name: str
     variant_name = island_model_name = ""  # what results call its variant of the paper and its island model
     advice = ""  # one line beside each answer
+    origin = ""  # what its numbers were found of, where that is no shipped file
     reached = 0.0  # by how much, relatively, a wanted value may be more than the largest
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,19 +14,18 @@ from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.laws.energy_spline import LoadCurve
-from mbma_tables.laws.pressing import HIGHEST, LOWEST, MIN_POINTS, ROUNDING, TOLERANCE, Pressed, press
+from mbma_tables.laws.energy_spline import Continued, LoadCurve, left_out
+from mbma_tables.laws.pressing import HIGHEST, LOWEST, MIN_POINTS, ROUNDING, TOLERANCE, Pressed, Table, press
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.calibrated_curves import own_law
+from mbma_tables.theories.own_map import AREAS, continued, law_loads, map_of, origin_of, reduced
+from mbma_tables.theories.own_table import read_surface, write_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 MIN_LOADS = 4
-# A/A0 by the law of the map at which it is pressed
-AREAS = (7e-4, 0.0015, 0.006, 0.012, 0.05, 0.09, 0.22, 0.3, 0.52, 0.65, 0.88, 0.95)
 MATCHED = 1e-6  # relative, of the surface that is asked about
 STRAYS = 2.7  # roots of the elements that join between two loads: beyond strays one path in 10^6 (Kolmogorov)
 # standard deviations against contact on the full grid at tolerance 1e-6, at contact areas between the loads above, of
@@ -37,39 +38,7 @@ SCATTER = {
     "flow": (0.0043, 0.031, 0.032, 0.55, 2.2, 2.2, 2.2),
 }
 AREA_OF_FLOW = 0.4
-REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
-
-
-def continued(treated: Treated) -> tuple[FloatArray, tuple[float, float]]:
-    """A map of mean zero whose edges meet, by its mirror images where it is not periodic, and its sides [length]."""
-    values = treated.heights if treated.periodic else mirrored(treated.heights)
-    sizes = values.shape[0] * treated.steps[0], values.shape[1] * treated.steps[1]
-    return values - values.mean(), sizes
-
-
-def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
-    """F/(A0 E*) at which the quick law of a map has contact areas; its area never refuses, its separation may."""
-    octaves = np.arange(-20 * REFINED, 4 * REFINED) / REFINED
-    pressure = float(surface.rms_gradient) * 2.0**octaves
-    area = np.maximum.accumulate(own_law(surface).area(pressure)) + 1e-15 * np.arange(pressure.size)
-    return np.asarray(np.exp(np.interp(np.log(areas), np.log(area), np.log(pressure))))
-
-
-def map_of(surface: AnySurface) -> Treated:
-    """The map that a surface was made from.
-
-    Raises
-    ------
-    InputError
-        Where there is none.
-    """
-    whole = surface.map if isinstance(surface, MeasuredSurface) else None
-    if whole is None or whole.heights.ndim != 2:
-        raise InputError(
-            "theories 'simulated' and 'corrected' press a height map, and this surface has none: make it by "
-            "Surface.from_map, neither combined nor extrapolated nor fitted"
-        )
-    return whole
+EVALUATED = 1e-5  # of the curves through the default loads; laws need not be closer to them
 
 
 class BoundaryElements(Theory):
@@ -87,22 +56,28 @@ class BoundaryElements(Theory):
         Sampling steps along the shortest wave; below four areas are too large, and answers are not `valid`.
     elements : float, optional
         Of the map that do not repeat each other; 1, where the number is not known, leaves `error` to the first bound.
-    pressed : Pressed, optional
-        What they are of, with the gaps at each load: flow along both axes follows from these.
+    pressed : Pressed or Table, optional
+        What they are of, with the gaps at each load or the flow along both axes.
+    origin : str, optional
+        Of which map, and by what.
     own_loads : bool, optional
-        Whether the loads are those of `of`, of which the scatter was measured; else it is NaN.
+        Whether the loads are those of `of`, of which the scatter was measured; else it is NaN, and contacts lighter and
+        heavier than the loads are refused.
 
     Notes
     -----
-    Between loads the curves are those of `mbma_tables.laws.energy_spline`; lighter and heavier contacts are refused.
-    Both rise with compression: `error` there reaches at most to the values of the two loads beside. Less is stated
-    where two things add up to less: what leaving out one of the four nearest loads changes, and how far the count of
-    touching elements strays from a curve if those that join come in random order, which a map that repeats itself does
-    not obey. At 0.1% contact of a small map that are a few elements, and half of the area is uncertain.
+    Between loads the curves are those of `mbma_tables.laws.energy_spline`. The default loads' go on beyond them
+    (`Continued`), where no answer is `valid`; these curves are the theory, `error` is that of evaluating them, and how
+    far they are from contact simulated at a load between is the `scatter`, which was measured on 65 maps.
+
+    Of loads of one's own that is not known, and `error` bounds it: pressure and area rise with compression, and it
+    reaches at most to the values of the two loads beside. Less is stated where two things add up to less: what leaving
+    out one of the four nearest loads changes, and how far the count of touching elements strays from a curve if those
+    that join come in random order, which a map that repeats itself does not obey. At 0.1% contact of a small map that
+    are a few elements, and half of the area is uncertain.
     """
 
     name = "simulated"
-    ends_at_h_max = False
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """None: it is of this very map."""
@@ -117,10 +92,11 @@ class BoundaryElements(Theory):
         energy: ArrayLike,
         points: float = np.inf,
         elements: float = 1.0,
-        pressed: Pressed | None = None,
+        pressed: Pressed | Table | None = None,
         own_loads: bool = False,
+        origin: str = "",
     ) -> None:
-        self.surface, self.points, self.elements = surface, points, elements
+        self.surface, self.points, self.elements, self.origin = surface, points, elements, origin
         self.pressed, self.own_loads = pressed, own_loads
         columns = {"pressure": pressure, "area": area, "mean_separation": mean_separation, "energy": energy}
         rows = np.stack([finite_array(name, column) for name, column in columns.items()])
@@ -133,25 +109,33 @@ class BoundaryElements(Theory):
         self.rows = rows
         split = rows.shape[1] if pressed is None else pressed.coarse_from
         self._apart = split - 1 if split < rows.shape[1] else -1
-        self._curve = LoadCurve(rows, self._apart)
-        self._left_out = self._changes()
+        # an h_max that was stated may lie below the gap of the first load
+        self.ends_at_h_max = own_loads and bool(rows[2, 0] < float(np.asarray(surface.h_max)))
+        self.fit = LoadCurve(rows, self._apart)
+        if self.ends_at_h_max:
+            self.fit = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
+        self._left_out = left_out(rows, self._apart)
 
     @classmethod
     def of(
         cls, surface: AnySurface, loads: Sequence[float] | None = None, tolerance: float = TOLERANCE
     ) -> BoundaryElements:
-        """Press the map of a surface from `mbma_tables.Surface.from_map`, as `from_map` does.
+        """Press the map of a surface from `Surface.from_map`; loads in `common.cache`, or in its `table`, are read.
 
         Raises
         ------
         InputError
             For a surface that was not made from a map, or that was changed so that its map is no longer known.
         """
+        if isinstance(surface, MeasuredSurface) and surface.table is not None and loads is None:
+            table = surface.table
+            F, A, u, U = table.rows
+            return cls(surface, F, A, u, U, table.points, table.elements, table, True, table.origin)
         whole = map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        assert surface.bearing is not None
         values, sizes = continued(whole)
-        points, gradient = 2 * np.pi / float(surface.q1) / max(whole.steps), surface.bearing.gradient
+        values, points, cut = reduced(values, 2 * np.pi / float(surface.q1) / max(whole.steps))
+        gradient = own_law(surface).gradient
         if loads is None:
             wanted, law_area = law_loads(surface, AREAS), own_law(surface).area
         else:
@@ -159,8 +143,10 @@ class BoundaryElements(Theory):
             require("loads", given, (given > 0) & (np.diff(given, prepend=0) > 0), "positive and rising")
             wanted, law_area = gradient * given, None
         found = press(values, sizes, wanted, points, gradient, law_area, tolerance)
+        found = dataclasses.replace(found, left_out=cut * max(whole.steps))
         pressure, area, u, energy = found.rows
-        return cls(surface, pressure, area, u, energy, points, whole.heights.size, found, loads is None)
+        size, origin = whole.heights.size, origin_of(whole, tolerance)
+        return cls(surface, pressure, area, u, energy, points, size, found, loads is None, origin)
 
     @classmethod
     def from_map(
@@ -212,20 +198,27 @@ class BoundaryElements(Theory):
         treated = prepared(heights, {"dx": dx, "dy": dy, "periodic": periodic, "detrend": detrend, **treatment})
         return cls.of(MeasuredSurface.of(measured_map(treated, None)), loads, tolerance)
 
-    def _changes(self) -> FloatArray:
-        """Change of ln F and ln A that one of the four loads nearest to an interval makes, at most."""
-        changes = np.zeros((2, self.rows.shape[1] + 2))
-        for k in range(1, self.rows.shape[1] - 1):
-            # the interval across the load that is missing is of two grids where one beside it is
-            apart = self._apart if self._apart < k else self._apart - 1
-            less = LoadCurve(np.delete(self.rows, k, axis=1), apart)
-            x = less.log_force(self.rows[2, k])
-            found = np.array([x, np.log(less.area(x))])
-            changes[:, k + 1] = np.abs(found - np.log(self.rows[:2, k]))
-        return np.asarray(np.lib.stride_tricks.sliding_window_view(changes, 4, axis=1).max(axis=-1))
+    def to_netcdf(self, path: os.PathLike[str] | str) -> None:
+        """Write what was simulated, with the spectrum and curves of the surface, as a table that opens without the map.
+
+        Raises
+        ------
+        InputError
+            With loads of one's own.
+        TableFileError
+            Where the file cannot be written.
+        """
+        write_table(self, path)
+
+    @classmethod
+    def from_netcdf(cls, path: os.PathLike[str] | str) -> BoundaryElements:
+        """Open such a table, a `TableFileError` if damaged or edited; for its `.surface` "simulated" is the default."""
+        return cls.of(read_surface(path))
 
     def _error(self, u: FloatArray, found: FloatArray) -> FloatArray:
         """Bound on the relative error of pressure and area, from their logarithms at mean separations."""
+        if self.own_loads:
+            return np.full(np.shape(u), EVALUATED)
         k = np.clip(np.searchsorted(-self.rows[2], -u) - 1, 0, self.rows.shape[1] - 2)
         low, high = np.log(self.rows[:2, k]), np.log(self.rows[:2, k + 1])
         joining = np.sqrt((self.rows[1, k + 1] - self.rows[1, k]) / self.elements) / np.exp(found[1])
@@ -234,28 +227,42 @@ class BoundaryElements(Theory):
         return np.asarray(np.maximum(above, below).max(axis=0))
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] that were simulated."""
+        """Mean separations [length] that are answered."""
+        if self.ends_at_h_max:
+            return np.asarray(0.0), np.asarray(surface.h_max, float)
         return np.asarray(self.rows[2, -1]), np.asarray(self.rows[2, 0])
+
+    def bends(self, surface: AnySurface) -> FloatArray:
+        """Mean separations [length] of the first and the last load, where they are no ends."""
+        return self.rows[2, [-1, 0]] if self.ends_at_h_max else np.empty(0)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] of this map, and no other."""
         u = self._within(surface, mean_separation)
-        x = self._curve.log_force(u)
-        area = self._curve.area(x)
-        return TheoryAnswer(np.exp(x), area, self._curve.stiffness(x), self._error(u, np.array([x, np.log(area)])))
+        x = self.fit.log_force(u)
+        area, stiffness = self.fit.area(x), self.fit.stiffness(x)
+        with np.errstate(all="ignore"):
+            return TheoryAnswer(np.exp(x), area, stiffness, self._error(u, np.array([x, np.log(area)])))
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Mean separation [length] at a pressure over E* or an area between those of the first and the last load."""
-        low, high = self.rows[0 if quantity == "pressure" else 1, [0, -1]]
-        good = (wanted >= low * (1 - 1e-12)) & (wanted <= high * (1 + 1e-12))
-        require(quantity, wanted, good, f"between {low:.4g} and {high:.4g}, which were simulated")
-        known = np.clip(wanted, low, high)
-        x = np.log(known) if quantity == "pressure" else self._curve.log_force_at(known)
-        return np.asarray(self._curve.separation(x)), np.zeros(np.shape(wanted), bool)
+        known = wanted
+        if not self.ends_at_h_max:
+            low, high = self.rows[0 if quantity == "pressure" else 1, [0, -1]]
+            good = (wanted >= low * (1 - 1e-12)) & (wanted <= high * (1 + 1e-12))
+            require(quantity, wanted, good, f"between {low:.4g} and {high:.4g}, which were simulated")
+            known = np.clip(wanted, low, high)
+        elif quantity == "area":
+            require(quantity, wanted, wanted < 1, "less than 1")
+        with np.errstate(divide="ignore"):
+            x = np.log(known) if quantity == "pressure" else self.fit.log_force_at(known)
+        u = np.asarray(self.fit.separation(x))
+        require(quantity, wanted, u > np.finfo(float).eps * self.rows[2, 0], "less: the mean separation vanishes")
+        return u, np.zeros(np.shape(wanted), bool)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length]."""
-        return self._curve.energy(self._curve.log_force(self._within(surface, mean_separation)))
+        return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
 
     @functools.cached_property
     def _flows(self) -> FloatArray:
@@ -273,9 +280,12 @@ class BoundaryElements(Theory):
             if last <= self.rows[2, 1]:
                 passing = self.rows[2] >= last
                 curve = PchipInterpolator(np.log(self.rows[2, passing][::-1]), np.log(known[passing][::-1]))
-                # beyond the last open load as steep as before it
-                below = np.minimum(np.log(u / last), 0.0) * curve(np.log(last), 1)
-                found[axis] = np.where(u > end, np.exp(curve(np.log(np.maximum(u, last))) + below), 0.0)
+                # beyond the last open load as steep as before it, wider gaps by their cube
+                with np.errstate(divide="ignore"):
+                    below = np.minimum(np.log(u / last), 0.0) * curve(np.log(last), 1)
+                wider = np.maximum(u / self.rows[2, 0], 1.0) ** 3
+                inside = np.log(np.clip(u, last, self.rows[2, 0]))
+                found[axis] = np.where(u > end, np.exp(curve(inside) + below) * wider, 0.0)
         return found
 
     @property
@@ -303,20 +313,25 @@ class BoundaryElements(Theory):
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons against grids that are too coarse, and contact areas that were not tested."""
-        coarse = self.points < MIN_POINTS * (1 - ROUNDING)
+        left_out = 0.0 if self.pressed is None else self.pressed.left_out
+        cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         text = f"the map's shortest wave has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
         return {
-            text: np.full(answer.area.shape, coarse),
-            f"A/A0 is below {LOWEST:g}": answer.area < LOWEST,
+            text: np.full(answer.area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
+            cut: np.full(answer.area.shape, left_out > 0),
+            f"A/A0 is below {LOWEST:g}": (answer.area < LOWEST) & (answer.area > 0),
             f"A/A0 is above {HIGHEST:g}": answer.area > HIGHEST,
         }
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
-        """Standard deviation against the full grid at tolerance 1e-6; NaN with loads of one's own."""
-        if not self.own_loads:
-            return np.full(np.shape(area), np.nan)
+        """Standard deviation against the full grid at tolerance 1e-6; NaN with loads of one's own, and beyond them."""
         with np.errstate(divide="ignore"):
-            return np.interp(np.log(area), np.log(TESTED_AREAS), SCATTER[quantity])
+            found = np.interp(np.log(area), np.log(TESTED_AREAS), SCATTER[quantity])
+        return np.where(self.own_loads & ~self._beyond(area), found, np.nan)
+
+    def _beyond(self, area: FloatArray) -> NDArray[np.bool_]:
+        """Which contacts are lighter or heavier than those simulated."""
+        return np.asarray((area < self.rows[1, 0] * (1 - ROUNDING)) | (area > self.rows[1, -1] * (1 + ROUNDING)))
 
     def _within(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         for name in ("h_rms", "h_max"):
@@ -325,7 +340,11 @@ class BoundaryElements(Theory):
             require(name, given, good, f"{own:.9g}: boundary elements of one map know that map alone, their .surface")
         shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
         u = np.broadcast_to(np.asarray(mean_separation, float), shape)
-        low, high = self.rows[2, -1], self.rows[2, 0]
+        low, high = map(float, self.interval(self.surface))
+        if self.ends_at_h_max:
+            # bodies are apart beyond h_max
+            require("mean_separation", u, u >= 0, "at least 0")
+            return np.asarray(np.minimum(u, high))
         good = (u >= low * (1 - 1e-12)) & (u <= high * (1 + 1e-12))
         require("mean_separation", u, good, f"between {low:.6g} and {high:.6g}, which were simulated")
         return np.asarray(np.clip(u, low, high))

@@ -5,13 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-import warnings
 
 import helpers
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers import random_map, run
+from helpers import run
 
 from mbma_tables import Surface, contact, island, theories
 from mbma_tables.cli import main
@@ -190,19 +189,19 @@ def test_material_from_options_and_from_a_file(folder):
     modulus = effective_modulus(*material.values())
     (folder / "s.toml").write_text(toml(CONCRETE) + toml(material, "material"))
     (folder / "e.toml").write_text(toml(CONCRETE) + f"[material]\nE_star = {float(modulus)!r}\n")
-    bodies = [part for key, value in material.items() for part in (f"--{key}", str(value))]
-    expected = float(contact(Surface.named("concrete"), separation=0.3, E_star=modulus).pressure)
-    for source in (["--surface", "concrete", *bodies], ["--file", "s.toml"], ["--file", "e.toml"]):
-        found = json.loads(run("contact", *source, "-d", "0.3", "--json"))
-        assert found["E_star"] == modulus
-        assert found["columns"]["pressure"] == pytest.approx([expected], rel=1e-12)
-    other = json.loads(run("contact", "--file", "s.toml", "--E-star", "2", "-d", "0.3", "--json"))
-    assert other["E_star"] == 2.0
     example = os.path.join(os.path.dirname(__file__), os.pardir, os.pardir, "examples", "concrete.toml")
-    found = json.loads(run("contact", "--file", example, "-d", "0.3", "--json"))
-    assert found["surface"]["length_unit"] == "mm"
-    assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
-    assert found["E_star"] == effective_modulus(10.0, 0.5, 30000.0, 0.2)
+    for source, E_star in (
+        (["--surface", "concrete", *(f"--{key}={value}" for key, value in material.items())], modulus),
+        (["--file", "s.toml"], modulus),
+        (["--file", "e.toml"], modulus),
+        (["--file", "s.toml", "--E-star", "2"], 2.0),
+        (["--file", example], effective_modulus(10.0, 0.5, 30000.0, 0.2)),
+    ):
+        found = json.loads(run("contact", *source, "-d", "0.3", "--json"))
+        expected = float(contact(Surface.named("concrete"), separation=0.3, E_star=E_star).pressure)
+        assert found["E_star"] == E_star
+        assert found["columns"]["pressure"] == pytest.approx([expected], rel=1e-12)
+        assert (found["surface"]["length_unit"] == "mm") == (source[0] == "--surface" or source[1] == example)
 
 
 def test_curve_beside_other_theories(folder):
@@ -231,10 +230,8 @@ def test_island_is_the_librarys_answer():
     answer = island(surface, np.array([0.5, 2.0]) * surface.h_rms, rtol=1e-8)
     for name, values in found["columns"].items():
         assert values == getattr(answer, name).tolist(), name
-    assert set(found["columns"]) == {
-        *("delta", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu"),
-        *("force", "area", "error"),
-    }
+    names = "delta zeta_d zeta_u R_d R_u D sigma h_d eta X mu force area error"
+    assert set(found["columns"]) == set(names.split())
     assert found["units"] | {"D": "1/mm^2", "force": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
 
 
@@ -262,7 +259,6 @@ def test_out_holds_what_stdout_would(folder):
     [
         (options(YANG_PERSSON | {"h_rms": -1.0}), "mbma: --h-rms must be positive, got -1"),
         (options(YANG_PERSSON | {"q1": 10.0}), "got --hurst, --q0, --q1, --h-rms, --h-max, --zeta-1"),
-        (options(CONCRETE | {"m4": 0.5}), "alpha = m0 m4/m2^2 must be in"),
         (["--surface", "granite"], "'granite' is not one of 'yang-persson'"),
         (["--hurst", "0.8"], "(or --zeta-1 for --q1), or --hurst, --m0, --m2, --m4, --h-max, or roughness (--Rq, ...)"),
         (["--hurst", "1", "--h-max", "1", "--Rq", "1"], "with one of --longest, --shortest and --Sds, or --longest"),
@@ -271,13 +267,9 @@ def test_out_holds_what_stdout_would(folder):
         (["--surface", "concrete", "--file", "s.toml"], "got --surface and --file"),
         (["--file", "missing.toml"], "missing.toml cannot be read: No such file"),
         (["--file", "."], "not a regular file"),
-        (["--surface", "concrete", "--variant", "mine"], "Invalid value for '--variant': 'mine' is not one of"),
-        (["--surface", "concrete", "--rtol", "0"], "rtol must be a number in"),
-        (["--surface", "concrete", "--E-star", "0"], "--E-star must be positive"),
         (["--surface", "concrete", "--E-star", "1", "--E1", "1"], "a material is --E-star alone"),
         (["--surface", "concrete", "--json", "--csv"], "--json and --csv"),
         (["--surface", "concrete", "--surfce", "x"], "No such option"),
-        (["--surface", "concrete", "--rtol", "small"], "not a valid float"),
         (["--surface", "concrete", "--out", "no/such/folder.txt"], "cannot be written"),
     ],
 )
@@ -291,28 +283,21 @@ def test_bad_input_of_every_command(folder, arguments, message):
     ("arguments", "message"),
     [
         (["contact", "-d", "-1.2"], "separation must be at least -h_max"),
-        (["contact", "-d", "0,nan"], "separation must be finite, got nan at (1,)"),
         (["contact", "-d", ""], "separation is empty"),
         (["contact", "-d", "1;2"], "';2' is no known unit of length"),
-        (["contact", "-p", "9"], "pressure must be at most what theory 'mbma' reaches"),
         (["contact", "-a", "0.01", "--over-h-rms"], "--over-h-rms is about lengths"),
         (["contact", "-d", "1", "--conductivity", "-1"], "--conductivity must be positive"),
         (["contact", "-p", "1e5", "--theory", "calibrated"], "--pressure must be less"),
-        (["contact", "-d", "1", "--theory", "person"], "'person' is not one of 'mbma', "),
-        (
-            ["contact", "-d", "1", "--theory", "persson", "--island-model", "exact"],
-            "--island-model: options of theory 'mbma'",
-        ),
+        (["plan9"], "No such command 'plan9'"),
+        (["contact", "-d1", "--theory", "persson", "--island-model", "exact"], "--island-model: options of theory"),
         (["curve", "--theory", "persson", "--variant", "printed"], "variant: options of theory 'mbma'"),
         (["contact"], "one of --separation, --mean-separation, --pressure and --area"),
-        (["contact", "-d", "1", "-u", "1"], "one of --separation, --mean-separation, --pressure and --area"),
         (["curve", "--points", "4"], "--points"),
         (["curve", "--plot", "c.jpg"], ".png, .svg, .pdf"),
         (["curve", "--plot", "c.png", "--out", "c.png"], "same file"),
         (["curve", "--plot", "no/such/c.png"], "cannot be written"),
         (["island"], "--delta"),
         (["island", "--delta", "0"], "--delta must be positive, got 0"),
-        (["island", "--delta", "1e300"], "X must be in [-6.25, 41]"),
     ],
 )
 def test_bad_input_of_one_command(folder, arguments, message):
@@ -336,34 +321,6 @@ def test_bad_files(folder, content, message):
     found = refused(folder, "contact", "--file", "s.toml", "-d", "0.1")
     assert message in found
     assert "s.toml" in found or "missing.nc" in found
-
-
-def write_map(path, heights, **options) -> None:
-    # that library's own deprecations and optional parts are not this test's subject
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from SurfaceTopography import Topography
-
-        Topography(heights, (100.0, 100.0), **options).to_netcdf(str(path))
-
-
-def test_a_map_is_fitted_and_says_how_well(folder):
-    write_map(folder / "m.nc", random_map(128, 0.5 / 128, 0.25, 1.7, phases=True), unit="um", periodic=True)
-    (folder / "s.toml").write_text("[surface]\nmap = 'm.nc'\nmodel = 'self-affine'\n")
-    (folder / "sub").mkdir()
-    os.chdir(folder / "sub")
-    found = json.loads(
-        run("contact", "--map", "../m.nc", "--model", "self-affine", "-d", "1", "--over-h-rms", "--json")
-    )
-    assert found["surface"]["hurst"] == pytest.approx(0.7, rel=0.02)
-    assert found["surface"]["q0"] == pytest.approx(2 * np.pi / 100, rel=0.05)
-    assert found["surface"]["length_unit"] == found["units"]["separation"] == "um"
-    assert found["surface"]["fit"]["hurst"] == found["surface"]["hurst"]
-    by_file = json.loads(run("contact", "--file", "../s.toml", "-d", "1", "--over-h-rms", "--json"))
-    assert by_file["surface"] == found["surface"]
-    assert by_file["columns"] == found["columns"]
-    text = run("contact", "--map", "../m.nc", "--model", "self-affine", "-d", "1", "--over-h-rms")
-    assert f"residual {found['surface']['fit']['residual']:.6g}" in text
 
 
 @pytest.mark.parametrize(
@@ -411,8 +368,37 @@ def test_a_dash_is_standard_input_and_output(folder):
     assert [path.name for path in folder.iterdir()] == ["law.inp"]
 
 
-def on_terminal(code):
-    """What a program prints, and what it writes to the terminal that is its standard error."""
+COMMAND = """
+import time, click
+from mbma_tables.cli import main
+from mbma_tables.common import progress
+progress.PATIENCE = 0.2
+@main.command('wait')
+def wait():
+    time.sleep(1.0)
+    progress.echo('done')
+main(['wait'])
+"""
+WITHIN = """
+import time
+from mbma_tables.common import progress
+progress.PATIENCE = 0.2
+with progress.shown('outside'):
+    with progress.shown('inside'):
+        time.sleep(0.8)
+    time.sleep(0.8)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
+@pytest.mark.parametrize(
+    ("code", "printed", "told"),
+    [
+        (COMMAND, b"done\n", [b"mbma: wait, 0 s (Ctrl-C ends it)"]),
+        (WITHIN, b"", [b"mbma: inside, 0 s", b"mbma: outside, 1 s"]),
+    ],
+)
+def test_a_terminal_sees_that_work_goes_on_and_what_takes_long(code, printed, told):
     import pty
 
     ours, theirs = pty.openpty()
@@ -420,41 +406,9 @@ def on_terminal(code):
     os.close(theirs)
     said = os.read(ours, 10_000)
     os.close(ours)
-    return found.stdout, said
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
-def test_a_terminal_sees_that_work_goes_on():
-    code = (
-        "import sys, time, click\n"
-        "from mbma_tables.cli import main\n"
-        "from mbma_tables.common import progress\n"
-        "progress.PATIENCE = 0.2\n"
-        "@main.command('wait')\n"
-        "def wait():\n"
-        "    time.sleep(1.0)\n"
-        "    progress.echo('done')\n"
-        "main(['wait'])\n"
-    )
-    printed, said = on_terminal(code)
-    assert printed == b"done\n"
-    assert b"mbma: wait, 0 s (Ctrl-C ends it)" in said
-    assert said.endswith(b"\r\x1b[K")
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
-def test_within_a_command_what_takes_long_is_named():
-    code = (
-        "import time\n"
-        "from mbma_tables.common import progress\n"
-        "progress.PATIENCE = 0.2\n"
-        "with progress.shown('outside'):\n"
-        "    with progress.shown('inside'):\n"
-        "        time.sleep(0.8)\n"
-        "    time.sleep(0.8)\n"
-    )
-    _, said = on_terminal(code)
-    assert 0 < said.index(b"mbma: inside, 0 s") < said.index(b"mbma: outside, 1 s")
+    assert found.stdout == printed
+    places = [said.index(text) for text in told]
+    assert places == sorted(places)
     assert said.endswith(b"\r\x1b[K")
 
 
@@ -512,10 +466,6 @@ def test_missing_matplotlib_leaves_nothing(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     found = refused(folder, "curve", "--surface", "concrete", "--points", "5", "--plot", "c.png", "--out", "c.txt")
     assert "pip install 'mbma_tables[plot]'" in found
-
-
-def test_unknown_commands(folder):
-    assert "No such command 'plan9'" in refused(folder, "plan9")
 
 
 @pytest.mark.slow

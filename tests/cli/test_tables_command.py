@@ -101,7 +101,4 @@ def test_a_missing_table_and_a_wrong_kind(folder):
 def test_misuse(folder):
     assert "TABLE" in refused("tables", "info")
     assert "No such command" in refused("tables", "remake")
-
-
-def test_a_command_is_needed():
     assert refused("tables") == "mbma: Missing command.\n(see 'mbma tables --help')\n"

@@ -192,15 +192,6 @@ def test_the_same_file_is_cpp(tmp_path):
         run("g++", "-x", "c++", "-std=c++11", *strict, "-c", file, folder=tmp_path)
 
 
-@pytest.mark.parametrize("theory", ["mbma", "calibrated"])
-@pytest.mark.parametrize("zeta_1", [200.0, 1e4])
-def test_c_is_short(theory, zeta_1):
-    surface = Surface(0.8, 0.01, 0.01 * zeta_1, 1.0, 4.0, unit="mm")
-    text = law_text("c-law", surface, "13.3 MPa", theory=theory, **HEAT)
-    # beside the core's text, which is the same for all laws
-    assert len(text) - len(core_text(["law.c"], "law")) <= 40_000
-
-
 FORTRAN = """program ask
   use, intrinsic :: iso_fortran_env, only: dp => real64
   use road

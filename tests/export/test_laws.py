@@ -14,6 +14,7 @@ from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix, exponential, optistruct
 from mbma_tables.surfaces.variants import PRINTED
 from mbma_tables.theories import THEORIES
+from mbma_tables.totals.conductance import conductance
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
 HEAT = {"quantity": "conductance", "conductivity": 50.0, "conductivity_unit": "mW/K"}
@@ -397,3 +398,31 @@ def test_rows_of_leakage_are_the_contacts_flow_to_the_blocked_pressure():
     steep = Surface(0.8, 1.0, 1e3, 1.0, 1.5, unit="mm")
     falling = describe_law(steep, "900 MPa", quantity="leakage", theory="persson", rows=50)
     assert (np.diff(falling.y) <= 0).all()
+
+
+HARD = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+HARD_OPTIONS = {"theory": "calibrated", "hardness": "1500 MPa", "pressures": ("1 MPa", "500 MPa"), "rtol": 1e-2}
+
+
+def test_rows_of_a_law_with_a_hardness():
+    law = describe_law(HARD, "100 GPa", stress_unit="MPa", **HARD_OPTIONS)
+    # chords lie about the law by as much as they may miss it
+    kept = law.y > 1.0
+    u = 3.0 - law.x[kept]
+    found = contact(HARD, mean_separation=u, E_star="100 GPa", theory="calibrated", hardness="1500 MPa")
+    assert law.y[kept] == pytest.approx(1e3 * found.pressure, rel=1e-2)
+    text = " ".join(law.comments)
+    assert "hardness = 1500 MPa, plasticity index 3.61" in text
+    elastic = describe_law(HARD, "100 GPa", stress_unit="MPa", theory="calibrated", rtol=1e-2)
+    assert "elastic: within 5% in area for hardnesses from 4922 MPa on" in " ".join(elastic.comments)
+
+
+def test_conductance_is_not_the_slope_of_loading():
+    law = describe_law(
+        HARD, "100 GPa", stress_unit="MPa", quantity="conductance", conductivity=20.0, conductivity_unit="mW/(mm K)",
+        **HARD_OPTIONS,
+    )  # fmt: skip
+    some = law.x > 2.0
+    found = contact(HARD, pressure=law.x[some], E_star=100e3, theory="calibrated", hardness=1500.0)
+    assert law.y[some] == pytest.approx(conductance(found.unloading_stiffness, 20.0, 100e3), rel=1e-2)
+    assert (np.asarray(found.unloading_stiffness) > 1.1 * found.stiffness).all()

@@ -1,22 +1,18 @@
 """Laws tried in the program itself: CalculiX presses and heats two blocks, Octave looks up, ncdump and R read."""
 
 import re
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
+from law_points import needs
 
 from mbma_tables import Surface, contact
 from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.export.solvers import calculix, lsdyna
+from mbma_tables.export.solvers import calculix
 
 SIDE = {"mm": 10.0, "m": 0.01}
-
-
-def needs(program):
-    return pytest.mark.skipif(shutil.which(program) is None, reason=f"{program} is not installed")
 
 
 def blocks(law, card, compressions, side, stiff):
@@ -147,17 +143,6 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
     joint = 1 / (100 / np.array(flux) - 2 * side / k)
     found = contact(surface.to(length), pressure=pressures, E_star=25 * unit)
     np.testing.assert_allclose(joint, found.stiffness * k / (25 * unit), rtol=1e-2)
-
-
-def test_ls_dynas_own_parser_reads(tmp_path):
-    dyna = pytest.importorskip("ansys.dyna.core")
-    law = describe_law(Surface.named("asphalt"), "20 MPa", rows=30)
-    deck = dyna.Deck()
-    # pasted in the middle of a deck
-    deck.loads(f"*KEYWORD\n{lsdyna(law, curve=7)}*DEFINE_CURVE\n         8\n{1.0:20.9E}{2.0:20.9E}\n*END\n")
-    first, second = deck.get_kwds_by_type("DEFINE")
-    assert (first.lcid, second.lcid) == (7, 8)
-    np.testing.assert_allclose(first.curves.to_numpy(dtype=float), np.stack([law.x, law.y], 1), rtol=1e-9)
 
 
 @needs("Rscript")

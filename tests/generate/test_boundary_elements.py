@@ -11,7 +11,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from generate.boundary_elements.collect import collect, dataset
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign, nodes
+from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign
 from generate.boundary_elements.run import SOLVERS, boundary_elements, run
 from generate.boundary_elements.solve import Contact, simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe, heights
@@ -138,7 +138,7 @@ class TestCampaign:
 
         assert not spectra(TRAINING) & spectra(HELD_OUT_SPECTRUM)
         assert {r.kind for r in spectra(TRAINING)} == {r.kind for r in spectra(HELD_OUT_SPECTRUM)}
-        assert len({task.recipe.seed for task in tasks}) >= len(nodes())
+        assert len({task.recipe.seed for task in tasks}) > 150
 
     def test_runs_resumes_and_collects(self, tmp_path):
         tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "held_out_surface")]

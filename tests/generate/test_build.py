@@ -9,7 +9,8 @@ from small_tables import KINDS, SMALL, small, small_build
 
 from generate.__main__ import main
 from generate.tables import build as build_module
-from generate.tables.build import UncertifiedError, certify, evaluate, held_out, resolve
+from generate.tables.build import certify, evaluate, held_out, resolve
+from generate.tables.certificate import UncertifiedError
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.commands import built as build_table
 from generate.tables.configuration import load

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from generate import timing
-from generate.boundary_elements import grids
+from generate.boundary_elements import studies
 from generate.pages import cost, cost_distances, cost_rows, distances, page
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
@@ -142,7 +142,7 @@ def test_points_of_theories_are_priced(monkeypatch):
 
 def test_grids_converge_and_are_told_by_contact():
     rows = {row.way: row for row in cost_distances.grid_rows()}
-    by_grid = [rows[f"{grid} x {grid}, cold"] for grid in grids.GRIDS]
+    by_grid = [rows[f"{grid} x {grid}, cold"] for grid in studies.GRIDS]
     for name in ("force_light", "force_deep"):
         values = [getattr(row, name) for row in by_grid]
         assert values == sorted(values, reverse=True), name

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from generate.machined import campaign
+from generate.machined import campaign, coverage
+from generate.machined import errors as page
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
 from generate.machined.solve import STEP, solved, surface_of
-from generate.pages import machined as page
 from mbma_tables.laws.map_curves import MapLaw, PlateauConstants
+from mbma_tables.theories.corrected import SCATTER
 
 FILE = pathlib.Path("docs/data/machined.nc")
 
@@ -77,6 +78,30 @@ def test_where_valid_the_scatter_covers_the_errors(data, form, quantity):
     assert number > 30
     assert 0.6 < once < 0.95
     assert twice > 0.92
+
+
+@pytest.mark.parametrize("form", ["corrected", "simulated"])
+@pytest.mark.parametrize("quantity", page.QUANTITIES)
+def test_constants_of_the_other_families_cover_the_errors_of_one(data, form, quantity):
+    ratio = np.concatenate([*coverage.left_out(data, form, quantity).values()])
+    assert 0.6 < np.mean(ratio < 1) < 0.88
+    assert np.mean(ratio < 2) > 0.91
+
+
+@pytest.mark.parametrize("quantity", ["area", "pressure", "stiffness"])
+def test_the_librarys_constants_are_those_of_the_fit(data, quantity):
+    found = coverage.corrected(data, quantity, np.arange(data.sizes["surface"]))
+    np.testing.assert_allclose(SCATTER[quantity], found, rtol=0.03)
+
+
+def test_a_fit_finds_constants_that_are_known(data):
+    # errors drawn with known constants, of the distances of the campaign
+    rng, known = np.random.default_rng(3), np.array([0.02, 0.4, 0.6])
+    stated = np.sqrt(np.einsum("i,ijk->jk", known**2, coverage.apart(data, "area") ** 2))
+    drawn = data.assign(corrected_area=data.area * np.exp(stated * rng.standard_normal(stated.shape)))
+    found = coverage.corrected(drawn, "area", np.arange(data.sizes["surface"]))
+    fitted = np.sqrt(np.einsum("i,ijk->jk", found**2, coverage.apart(data, "area") ** 2))
+    assert np.median(np.abs(np.log(fitted / stated))) < 0.1
 
 
 def test_the_quick_law_is_wrong_where_it_is_not_valid(data):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate.boundary_elements.measured_maps import LARGEST, measured_maps, middle
+from generate.boundary_elements.studies import LARGEST, measured_maps, middle
 from generate.pages import distances
 from mbma_tables import Surface, contact
 from mbma_tables.surfaces.maps import prepared

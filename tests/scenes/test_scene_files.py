@@ -11,101 +11,100 @@ from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
 from mbma_tables.scenes.specimen import schema
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
-SURFACE = '[surface]\nname = "concrete"\n'
-ON = '[effects]\non = ["pressure"]\n'
-AT = "[prescribed]\nseparations = [0.5]\n"
+
+
+def scene(more="", surface='name = "concrete"', effects='on = ["pressure"]', at="separations = [0.5]"):
+    """The text of a scene file, less what is None; `more` stands in front of the tables if it is no table itself."""
+    tables = {"surface": surface, "effects": effects, "prescribed": at}
+    text = "".join(f"[{name}]\n{lines}\n" for name, lines in tables.items() if lines is not None)
+    return text + more if more.startswith("[") else f"{more}\n{text}"
+
 
 MISTAKES = {
-    "unknown table": (SURFACE + ON + AT + "[efects]\non = []\n", "did you mean 'effects'"),
-    "unknown key": ('[surface]\nnme = "concrete"\n' + ON + AT, "did you mean 'name'"),
-    "unknown key of prescribed": (SURFACE + ON + "[prescribed]\nseparation = 1\n", "did you mean 'separations'"),
-    "unknown key of accuracy": (SURFACE + ON + AT + "[accuracy]\nrtoll = 1e-3\n", "did you mean 'rtol'"),
-    "unknown key of material": (SURFACE + ON + AT + "[material]\nE = 3.0\n", "did you mean 'E[12]'"),
-    "key of another table": (SURFACE + ON + AT + "[material]\nhardness = 3.0\n", r"it belongs to \[yield\]"),
-    "unknown effect": (SURFACE + '[effects]\non = ["presure"]\n' + AT, "did you mean 'pressure'"),
-    "unknown refinement": (SURFACE + '[effects]\non = ["pressure"]\noff = ["subscale"]\n' + AT, "subscale_area"),
-    "unknown surface": ('[surface]\nname = "concret"\n' + ON + AT, "there are yang-persson"),
-    "unknown variant": ('variant = "printd"\n' + SURFACE + ON + AT, "did you mean 'printed'"),
+    "unknown table": (scene("[efects]\non = []\n"), "did you mean 'effects'"),
+    "unknown key": (scene(surface='nme = "concrete"'), "did you mean 'name'"),
+    "unknown key of prescribed": (scene(at="separation = 1"), "did you mean 'separations'"),
+    "unknown key of accuracy": (scene("[accuracy]\nrtoll = 1e-3"), "did you mean 'rtol'"),
+    "unknown key of material": (scene("[material]\nE = 3.0"), "did you mean 'E[12]'"),
+    "key of another table": (scene("[material]\nhardness = 3.0"), r"it belongs to \[yield\]"),
+    "unknown effect": (scene(effects='on = ["presure"]'), "did you mean 'pressure'"),
+    "unknown refinement": (scene(effects='on = ["pressure"]\noff = ["subscale"]'), "subscale_area"),
+    "unknown surface": (scene(surface='name = "concret"'), "there are yang-persson"),
+    "unknown variant": (scene('variant = "printd"'), "did you mean 'printed'"),
     "unknown theory": (
-        SURFACE + '[effects]\non = ["comparison"]\n' + AT + '[comparison]\ntheories = ["person"]\n',
+        scene('[comparison]\ntheories = ["person"]', effects='on = ["comparison"]'),
         "did you mean 'persson'",
     ),
-    "no surface": (ON + AT, "'surface' is a required property"),
-    "empty surface": ("[surface]\n" + ON + AT, "a surface needs hurst"),
-    "half a surface": ("[surface]\nhurst = 0.8\nq0 = 1.0\n" + ON + AT, "a surface needs hurst, q0, q1"),
-    "name and numbers": ('[surface]\nname = "concrete"\nhurst = 0.8\n' + ON + AT, "leave one of them out"),
-    "name and map": ('[surface]\nname = "concrete"\nmap = "a.nc"\n' + ON + AT, "one of name, map, psd or numbers"),
-    "missing map": ('[surface]\nmap = "none.nc"\n' + ON + AT, "is not a file; paths are relative"),
-    "missing psd": ('[surface]\npsd = "none.txt"\nh_max = 1.0\n' + ON + AT, "is not a file"),
-    "convention without psd": ('[surface]\nname = "concrete"\nconvention = "paper"\n' + ON + AT, "give psd"),
-    "another length unit": ('[surface]\nname = "concrete"\nlength_unit = "MPa"\n' + ON + AT, "no known unit of length"),
+    "no surface": (scene(surface=None), "'surface' is a required property"),
+    "empty surface": (scene(surface=""), "a surface needs hurst"),
+    "half a surface": (scene(surface="hurst = 0.8\nq0 = 1.0"), "a surface needs hurst, q0, q1"),
+    "name and numbers": (scene(surface='name = "concrete"\nhurst = 0.8'), "leave one of them out"),
+    "name and map": (scene(surface='name = "concrete"\nmap = "a.nc"'), "one of name, map, psd or numbers"),
+    "missing map": (scene(surface='map = "none.nc"'), "is not a file; paths are relative"),
+    "missing psd": (scene(surface='psd = "none.txt"\nh_max = 1.0'), "is not a file"),
+    "convention without psd": (scene(surface='name = "concrete"\nconvention = "paper"'), "give psd"),
+    "another length unit": (scene(surface='name = "concrete"\nlength_unit = "MPa"'), "no known unit of length"),
     "hurst above one": (
-        "[surface]\nhurst = 1.8\nq0 = 1.0\nzeta_1 = 50\nh_rms = 0.1\nh_max = 0.3\n" + ON + AT,
+        scene(surface="hurst = 1.8\nq0 = 1.0\nzeta_1 = 50\nh_rms = 0.1\nh_max = 0.3"),
         r"hurst must be in \(0, 1\]",
     ),
-    "no effects": (SURFACE + AT, "'effects' is a required property"),
-    "empty effects": (SURFACE + "[effects]\non = []\n" + AT, "effects.on: .* should be non-empty"),
-    "only refinements": (SURFACE + '[effects]\non = ["finite_height"]\n' + AT, "needs at least one of pressure"),
+    "no effects": (scene(effects=None), "'effects' is a required property"),
+    "empty effects": (scene(effects="on = []"), "effects.on: .* should be non-empty"),
+    "only refinements": (scene(effects='on = ["finite_height"]'), "needs at least one of pressure"),
     "on and off": (
-        SURFACE + '[effects]\non = ["area", "subscale_area"]\noff = ["subscale_area"]\n' + AT,
+        scene(effects='on = ["area", "subscale_area"]\noff = ["subscale_area"]'),
         "leave it in one of the two lists",
     ),
-    "off of an output": (SURFACE + '[effects]\non = ["pressure"]\noff = ["area"]\n' + AT, "did you mean|known are"),
-    "energy of no end": (
-        SURFACE + '[effects]\non = ["energy"]\noff = ["finite_height"]\n' + AT,
-        "leave finite_height on",
-    ),
+    "off of an output": (scene(effects='on = ["pressure"]\noff = ["area"]'), "did you mean|known are"),
+    "energy of no end": (scene(effects='on = ["energy"]\noff = ["finite_height"]'), "leave finite_height on"),
     "rigid profile": (
-        SURFACE
-        + '[effects]\non = ["pressure_profile"]\noff = ["sphere_deformation"]\n[pressure_profile]\ndeltas = [0.1]\n',
+        scene(
+            "[pressure_profile]\ndeltas = [0.1]",
+            effects='on = ["pressure_profile"]\noff = ["sphere_deformation"]',
+            at=None,
+        ),
         "leave sphere_deformation on",
     ),
-    "effects as text": (SURFACE + '[effects]\non = "pressure"\n' + AT, "effects.on: 'pressure' is not of type 'array'"),
-    "nothing prescribed": (SURFACE + ON, "give one of separations"),
-    "unknown theory of the scene": ('theory = "persons"\n' + SURFACE + ON + AT, "did you mean 'persson'"),
-    "areas over h_rms": (SURFACE + ON + "[prescribed]\nareas = [0.01]\nover_h_rms = true\n", "areas have none"),
+    "effects as text": (scene(effects='on = "pressure"'), "effects.on: 'pressure' is not of type 'array'"),
+    "nothing prescribed": (scene(at=None), "give one of separations"),
+    "unknown theory of the scene": (scene('theory = "persons"'), "did you mean 'persson'"),
+    "areas over h_rms": (scene(at="areas = [0.01]\nover_h_rms = true"), "areas have none"),
     "variant of another theory": (
-        'theory = "persson"\nvariant = "printed"\n' + SURFACE + ON + AT,
+        scene('theory = "persson"\nvariant = "printed"'),
         "variant: of theory 'mbma', not of 'persson'",
     ),
-    "empty prescribed": (SURFACE + ON + "[prescribed]\n", "give one of separations, mean_separations"),
-    "pressure and separation": (
-        SURFACE + ON + "[prescribed]\nseparations = [0.5]\npressures = [0.1]\n",
-        "prescribe one of",
-    ),
-    "below the model's end": (SURFACE + ON + "[prescribed]\nseparations = [-2.0]\n", "at least -h_max"),
-    "negative mean separation": (SURFACE + ON + "[prescribed]\nmean_separations = [-0.1]\n", "at least 0"),
-    "negative pressure": (SURFACE + ON + "[prescribed]\npressures = [-1.0]\n", "at least 0"),
-    "pressure over h_rms": (SURFACE + ON + "[prescribed]\npressures = [0.01]\nover_h_rms = true\n", "leave it out"),
+    "empty prescribed": (scene(at=""), "give one of separations, mean_separations"),
+    "pressure and separation": (scene(at="separations = [0.5]\npressures = [0.1]"), "prescribe one of"),
+    "below the model's end": (scene(at="separations = [-2.0]"), "at least -h_max"),
+    "negative mean separation": (scene(at="mean_separations = [-0.1]"), "at least 0"),
+    "negative pressure": (scene(at="pressures = [-1.0]"), "at least 0"),
+    "pressure over h_rms": (scene(at="pressures = [0.01]\nover_h_rms = true"), "leave it out"),
     "pressure without an end": (
-        SURFACE + '[effects]\non = ["pressure"]\noff = ["finite_height"]\n[prescribed]\npressures = [0.01]\n',
+        scene(effects='on = ["pressure"]\noff = ["finite_height"]', at="pressures = [0.01]"),
         "leave finite_height on, or give separations",
     ),
     "text for a number": (
-        SURFACE + ON + '[prescribed]\nseparations = ["a"]\n',
+        scene(at='separations = ["a"]'),
         "separations must be a number, or one with its unit, got 'a'",
     ),
-    "not finite": (SURFACE + ON + "[prescribed]\nseparations = [nan]\n", "must be finite"),
-    "impossible tolerance": (
-        SURFACE + ON + AT + "[accuracy]\nrtol = 1e-14\n",
-        "accuracy.rtol: 1e-14 is less than the minimum of 1e-10",
-    ),
-    "loose tolerance": (SURFACE + ON + AT + "[accuracy]\nrtol = 2.0\n", "2.0 is greater than the maximum of 0.1"),
-    "tolerance and time": (SURFACE + ON + AT + "[accuracy]\nrtol = 1e-3\nseconds = 1.0\n", "one of them"),
-    "no time": (SURFACE + ON + AT + "[accuracy]\nseconds = 0.0\n", "0.0 is less than or equal to the minimum of 0"),
-    "half a material": (SURFACE + ON + AT + "[material]\nE1 = 3.0\n", "all of E1, nu1, E2, nu2"),
-    "negative modulus": (SURFACE + ON + AT + "[material]\nE_star = -3.0\n", "E_star must be positive"),
-    "conductance alone": (SURFACE + '[effects]\non = ["conductance"]\n' + AT, "needs conductivities"),
-    "conductance off": (SURFACE + ON + AT + "[conductance]\nk1 = 1.0\nk2 = 1.0\n", "add it to the effects"),
-    "profile alone": (SURFACE + '[effects]\non = ["pressure_profile"]\n', "needs deltas"),
-    "comparison alone": (SURFACE + '[effects]\non = ["comparison"]\n' + AT, "needs theories"),
-    "statistics off": (SURFACE + ON + AT + "[island_statistics]\npoints = 5\n", "add it to on"),
+    "not finite": (scene(at="separations = [nan]"), "must be finite"),
+    "impossible tolerance": (scene("[accuracy]\nrtol = 1e-14"), "rtol: 1e-14 is less than the minimum of 1e-10"),
+    "loose tolerance": (scene("[accuracy]\nrtol = 2.0"), "2.0 is greater than the maximum of 0.1"),
+    "tolerance and time": (scene("[accuracy]\nrtol = 1e-3\nseconds = 1.0"), "one of them"),
+    "no time": (scene("[accuracy]\nseconds = 0.0"), "0.0 is less than or equal to the minimum of 0"),
+    "half a material": (scene("[material]\nE1 = 3.0"), "all of E1, nu1, E2, nu2"),
+    "negative modulus": (scene("[material]\nE_star = -3.0"), "E_star must be positive"),
+    "conductance alone": (scene(effects='on = ["conductance"]'), "needs conductivities"),
+    "conductance off": (scene("[conductance]\nk1 = 1.0\nk2 = 1.0"), "add it to the effects"),
+    "profile alone": (scene(effects='on = ["pressure_profile"]', at=None), "needs deltas"),
+    "comparison alone": (scene(effects='on = ["comparison"]'), "needs theories"),
+    "statistics off": (scene("[island_statistics]\npoints = 5"), "add it to on"),
     "table as text": (
-        'surface = "concrete"\n' + ON + AT,
+        scene('surface = "concrete"', surface=None),
         r"surface: 'concrete' is not of type 'object'; write \[surface\]",
     ),
-    "a number beyond doubles": (SURFACE + ON + f"[prescribed]\nseparations = [{10**400}]\n", "must be real numbers"),
-    "lists without end": (SURFACE + ON + "[prescribed]\nseparations = " + "[" * 100_000, "is not a TOML file"),
+    "a number beyond doubles": (scene(at=f"separations = [{10**400}]"), "must be real numbers"),
+    "lists without end": (scene(at="separations = " + "[" * 100_000), "is not a TOML file"),
     "no toml": ("[surface\n", "is not a TOML file"),
 }
 
@@ -128,9 +127,9 @@ def test_each_mistake_has_a_message_that_says_what_to_write_instead(kind, tmp_pa
 
 
 PLANNED = {
-    "time too short": (SURFACE + ON + AT + "[accuracy]\nseconds = 1e-8\n", "the cheapest plan takes"),
-    "too tight for a law": (SURFACE + '[effects]\non = ["energy"]\n' + AT + "[accuracy]\nrtol = 1e-10\n", "at best"),
-    "unreachable pressure": (SURFACE + ON + "[prescribed]\npressures = [1e6]\n", "where the branch ends"),
+    "time too short": (scene("[accuracy]\nseconds = 1e-8"), "the cheapest plan takes"),
+    "too tight for a law": (scene("[accuracy]\nrtol = 1e-10", effects='on = ["energy"]'), "at best"),
+    "unreachable pressure": (scene(at="pressures = [1e6]"), "where the branch ends"),
 }
 
 
@@ -163,7 +162,7 @@ def test_a_psd_file(tmp_path):
     q = [1.05**k for k in range(100)]
     lines = "\n".join(f"{a} {1e-3 * a**-3.6}" for a in q)
     (tmp_path / "psd.txt").write_text(lines, encoding="utf-8")
-    path = write(tmp_path, '[surface]\npsd = "psd.txt"\nh_max = 0.3\n' + ON + AT.replace("0.5", "0.1"))
+    path = write(tmp_path, scene(surface='psd = "psd.txt"\nh_max = 0.3', at="separations = [0.1]"))
     assert float(Scene.from_toml(path).surface.hurst) == pytest.approx(0.8, rel=0.02, abs=0)
     (tmp_path / "psd.txt").write_text("# q C\n")
     with pytest.raises(InputError, match="must hold two columns"):

@@ -1,5 +1,6 @@
-"""What scenes plan, compute and leave alone."""
+"""What scenes plan, compute and leave alone; beyond tables, without contact; contradictions between arguments."""
 
+import dataclasses
 import importlib
 import itertools
 import json
@@ -8,15 +9,25 @@ import sys
 
 import numpy as np
 import pytest
-from helpers import fresh
 from scipy.integrate import quad
 
-from mbma_tables import Scene, Surface, contact, contact_law, island, open_table
+from mbma_tables import (
+    ConvergenceError,
+    OutOfRangeError,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    greenwood_tripp,
+    island,
+    open_table,
+)
 from mbma_tables.common.errors import InputError
-from mbma_tables.models import answer_islands
+from mbma_tables.models import IslandAnswer, answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import statistics as islands
 from mbma_tables.scenes.problem import ELASTIC, OUTPUTS
+from mbma_tables.scenes.run import run_plan
 from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Persson
 from mbma_tables.theories.yielding import Yielding
@@ -203,40 +214,11 @@ def test_a_result_names_what_made_it():
     assert found["separation"].attrs["units"] == "mm"
 
 
-WATCHED = {
-    "mbma_tables.answers.contact": {"pressure", "area", "validity", "yield", "leakage"},
-    "mbma_tables.law.make": {"stiffness", "energy", "conductance"},
-    "mbma_tables.answers.leakage": {"leakage"},
-    "mbma_tables.theories.yielding": {"yield"},
-    "mbma_tables.laws.hardness": {"yield"},
-    "mbma_tables.totals.conductance": {"conductance"},
-    "mbma_tables.theories.greenwood_williamson": {"comparison"},
-    "mbma_tables.theories.persson": set(),
-    "mbma_tables.scenes.statistics": {"island_statistics", "pressure_profile"},
-}
 COMBINATIONS = [
     names
     for names in [(name,) for name in OUTPUTS] + list(itertools.combinations(OUTPUTS, 2))
     if not ("yield" in names and set(names) & set(ELASTIC))
 ]
-COUNTED = """
-import json, sys
-import numpy as np
-from mbma_tables import Scene, Surface
-import mbma_tables.models as models
-surface, arguments = Surface.named("concrete"), json.loads(sys.argv[1])
-before = set(sys.modules)
-Scene(surface, **arguments).run()
-print(json.dumps(sorted(set(sys.modules) - before)))
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", OUTPUTS)
-def test_modules_of_an_effect_that_is_off_are_not_imported(name):
-    loaded = fresh(COUNTED, json.dumps(arguments_of([name])))
-    for module, effects in WATCHED.items():
-        assert (module in loaded) == (name in effects), module
 
 
 @pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
@@ -305,3 +287,133 @@ def test_stiffness_at_the_end_of_a_laws_piece(surface, gap, rtol):
     found = Scene(surface, effects=("stiffness",), separations=[gap], rtol=rtol).run()
     truth = -2 * contact(surface, separation=gap, rtol=1e-11, derivatives=True).pressure_by["separation"]
     assert abs(float(found["stiffness"][0]) / truth - 1) <= found.attrs["error"] <= rtol
+
+
+# its islands at full compression lie beyond X = 41, where the tables end
+DEEP = Surface(0.8, 1.0, 200.0, 1.0, 45.0)
+
+
+def scene_with(surface=CONCRETE, **given):
+    return Scene(surface, **({"effects": ("pressure",), "separations": (0.2, 0.5)} | given))
+
+
+def with_island_model(scene, island_model):
+    """The scene's plan with that island model in every step of the model."""
+    plan = scene.plan()
+    steps = tuple(
+        step if step.island_model is None else dataclasses.replace(step, island_model=island_model)
+        for step in plan.steps
+    )
+    return dataclasses.replace(plan, steps=steps)
+
+
+@pytest.mark.parametrize("island_model", ["universal", "island4d"])
+def test_beyond_a_table_totals_are_solved(island_model):
+    scene = scene_with(DEEP, separations=(-44.0, 44.0), rtol=1e-3)
+    with pytest.raises(OutOfRangeError):
+        contact(DEEP, separation=-44.0, island_model=island_model)
+    found = run_plan(scene, with_island_model(scene, island_model))
+    truth = contact(DEEP, separation=[-44.0, 44.0], island_model="exact", rtol=1e-6).pressure
+    np.testing.assert_allclose(found["pressure"], truth, rtol=1e-3, atol=0)
+
+
+def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
+    made = []
+
+    def law(surface, rtol, island_model, **rest):
+        made.append(island_model)
+        if island_model != "exact":
+            raise OutOfRangeError("islands outside", True)
+        # as good, and quicker
+        return contact_law(surface, rtol=rtol, island_model="universal", **rest)
+
+    monkeypatch.setattr("mbma_tables.law.make.contact_law", law)
+    scene = scene_with(effects=("energy",), rtol=1e-2)
+    found = run_plan(scene, with_island_model(scene, "universal"))
+    assert made == ["universal", "exact"]
+    assert found.attrs["island_models"] == '{"law": "exact"}'
+    np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2, atol=0)
+
+
+def test_progress_in_blocks():
+    calls = []
+    gaps = np.linspace(0.2, 1.0, 130)
+    scene = scene_with(separations=gaps, rtol=1e-2)
+    run_plan(scene, with_island_model(scene, "exact"), lambda *step: calls.append(step))
+    assert calls == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"without": ("pressure",)}, "is both on and off"),
+        ({"without": ("energy",)}, "'energy' is off unless it is asked for"),
+        (
+            {"effects": ("pressure_profile",), "separations": None, "deltas": (0.1,), "without": ("finite_height",)},
+            "does not touch single islands",
+        ),
+        (
+            {"effects": ("pressure", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
+            "pressure_profile is of the deformed sphere",
+        ),
+        ({"separations": None, "pressures": (-1.0,)}, "no adhesion in the model"),
+        ({"effects": ("conductance",), "conductivities": (1.0, 2.0, 3.0)}, "two numbers"),
+        ({"effects": ("conductance",), "conductivities": (1.0, -2.0)}, "positive"),
+        ({"effects": ("pressure_profile",), "deltas": (0.1,)}, "are not needed by any effect"),
+        ({"island_model": "exakt"}, "did you mean 'exact'"),
+        ({"island_model": "exact", "without": ("sphere_deformation",)}, "leave island model out"),
+        ({"island_model": object(), "seconds": 1.0}, "give rtol instead of seconds"),
+        ({"effects": "pressure"}, "list of names"),
+        ({"separations": [[0.5]]}, "one number or a list"),
+        ({"rtol": 1.0}, "rtol must be"),
+        ({"points": 1}, "points must be"),
+        ({"surface": Surface([0.5, 0.7], 1.0, 50.0, 0.1, 0.3)}, "not a batch"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_contradictions(given, said):
+    with pytest.raises(InputError, match=said):
+        scene_with(**given)
+
+
+def test_an_island_model_of_choice():
+    """Given by name it is taken as it is, and a bound above the tolerance is an error."""
+    found = scene_with(island_model="island4d", rtol=1e-3).run()
+    assert found.attrs["island_models"] == '{"totals": "island4d"}'
+    alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["pressure"])
+    np.testing.assert_array_equal(found["pressure"], alone.pressure)
+    with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
+        scene_with(island_model="formula", rtol=1e-6).run()
+
+
+class Hertzian:
+    """An island model of one's own: the exact solver, and a bound ten times its."""
+
+    name = "hertzian"
+
+    def answer(self, X, mu):
+        solved = greenwood_tripp.solve(X.ravel(), mu.ravel(), rtol=1e-9)
+        return IslandAnswer(*(part.reshape(X.shape) for part in (solved.phi_F, solved.phi_A, 10 * solved.error)))
+
+
+def test_island_models_as_objects():
+    effects = ("pressure", "area", "island_statistics")
+    scene = scene_with(effects=effects, island_model=Hertzian(), rtol=1e-5)
+    assert "by hertzian  (count=2, rtol=5.0e-06, error not certified, time=not measured)" in scene.explain()
+    found, truth = scene.run(), scene_with(effects=effects, island_model="exact", rtol=1e-8).run()
+    for name in ("pressure", "area", "island_number", "island_force"):
+        np.testing.assert_allclose(found[name], truth[name], rtol=1e-5)
+    assert found.attrs["island_models"] == '{"totals": "hertzian", "island statistics": "hertzian"}'
+    assert found.attrs["table_hashes"] == "{}"
+    law = scene_with(effects=("energy",), island_model=Hertzian(), rtol=1e-2).run()
+    np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2)
+
+
+def test_no_contact():
+    by_area = Scene(CONCRETE, effects=["pressure", "stiffness"], areas=[0.0]).run()
+    assert by_area.separation.values == pytest.approx(1.1)
+    assert (by_area.pressure.values, by_area.stiffness.values) == (0, 0)
+    assert scene_with(effects=("stiffness",), separations=(2 * CONCRETE.h_max,), rtol=1e-4).run()["stiffness"] == 0
+    found = scene_with(effects=("pressure", "island_statistics"), separations=(CONCRETE.h_max, 2.0), points=5).run()
+    for name in ("pressure", "island_number", "island_density", "island_force", "island_area", "island_delta"):
+        assert (found[name] == 0).all(), name

@@ -33,6 +33,13 @@ def trace(C, longest, seed, points=POINTS, waves=3000):
     return (coarse @ np.exp(1j * np.outer(np.arange(block), along)).T).real.ravel()
 
 
+ROLL_OFF = 2 * np.pi * 40 / POINTS
+
+
+def rough_line(seed=5):
+    return trace(plateau(0.6, ROLL_OFF, ROLL_OFF / 4), ROLL_OFF / 4, seed)
+
+
 def errors(surface):
     return next(entry for entry in surface.provenance if entry["step"] == "errors")
 
@@ -67,9 +74,8 @@ def test_fifty_traces(hurst, waves):
 
 
 def test_the_kernel_is_the_abel_transform():
-    roll_off = 2 * np.pi * 40 / POINTS
-    C = plateau(0.8, roll_off, roll_off / 4)
-    found = ProfileSpectrum.of(Treated(trace(C, roll_off / 4, 3), (1.0,), False, None, (0.0, np.inf), ()))
+    C = plateau(0.8, ROLL_OFF, ROLL_OFF / 4)
+    found = ProfileSpectrum.of(Treated(trace(C, ROLL_OFF / 4, 3), (1.0,), False, None, (0.0, np.inf), ()))
     fine = np.exp(np.interp(np.arange(found.kernel.shape[1] + 1) / 8, np.arange(found.edges.size), np.log(found.edges)))
     own = found.kernel @ (np.sqrt(fine[1:] * fine[:-1]) ** -3.6)
     for k in (8, 15, 20):
@@ -83,9 +89,8 @@ def test_the_kernel_is_the_abel_transform():
         assert own[k] == pytest.approx(np.mean([seen(q) for q in waves]), rel=0.01)
 
 
-def test_height_variance_and_gradient_are_the_lines_own():
-    roll_off = 2 * np.pi * 40 / POINTS
-    line = trace(plateau(0.6, roll_off, roll_off / 4), roll_off / 4, 5)
+def test_height_variance_and_gradient_are_the_lines_own_in_any_unit():
+    line = rough_line()
     surface = Surface.from_profile(line, 1.0)
     x = np.arange(POINTS)
     flat = line - np.polyval(np.polyfit(x, line, 1), x)
@@ -93,14 +98,9 @@ def test_height_variance_and_gradient_are_the_lines_own():
     # finite differences see six points a wave a little flatter
     assert surface.m2 == pytest.approx(np.mean(np.gradient(flat)[1:-1] ** 2), rel=0.2)
     assert surface.h_max == pytest.approx(flat.max())
-
-
-def test_units_do_not_matter():
-    roll_off = 2 * np.pi * 40 / POINTS
-    line = trace(plateau(0.6, roll_off, roll_off / 4), roll_off / 4, 5)
-    one, other = Surface.from_profile(line, 1.0), Surface.from_profile(1e-9 * line, "1e3 nm", unit="m")
-    assert other.h_rms == pytest.approx(1e-9 * one.h_rms, rel=1e-9)
-    assert other.rms_gradient == pytest.approx(1e-3 * one.rms_gradient, rel=1e-4)
+    other = Surface.from_profile(1e-9 * line, "1e3 nm", unit="m")
+    assert other.h_rms == pytest.approx(1e-9 * surface.h_rms, rel=1e-9)
+    assert other.rms_gradient == pytest.approx(1e-3 * surface.rms_gradient, rel=1e-4)
     assert other.unit == "m"
 
 
@@ -115,8 +115,7 @@ def test_files_and_scans(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         library = pytest.importorskip("SurfaceTopography")
-    roll_off = 2 * np.pi * 40 / POINTS
-    line = trace(plateau(0.6, roll_off, roll_off / 4), roll_off / 4, 5)
+    line = rough_line()
     plain = Surface.from_profile(line, 0.5)
     np.savetxt(tmp_path / "a.csv", np.c_[0.5 * np.arange(POINTS), line], delimiter=",")
     np.save(tmp_path / "a.npy", line)
@@ -149,12 +148,10 @@ def test_refused(line, error, message):
 @pytest.mark.parametrize("cut", [8.0, 20.0])
 def test_a_cut_line_is_that_of_the_cut_surface(cut):
     # waves along the line that are longer than the cut-off are in part of oblique shorter ones
-    roll_off = 2 * np.pi * 40 / POINTS
-    C = plateau(0.6, roll_off, roll_off / 4)
-    ratios = []
+    C, ratios = plateau(0.6, ROLL_OFF, ROLL_OFF / 4), []
     for seed in range(4):
-        found = Surface.from_profile(trace(C, roll_off / 4, seed), 1.0, short_cutoff=cut)
-        m2, m4 = moments(lambda q: np.where(q <= 2 * np.pi / cut, C(q), 0.0), roll_off / 4, 2, 4)
+        found = Surface.from_profile(rough_line(seed), 1.0, short_cutoff=cut)
+        m2, m4 = moments(lambda q: np.where(q <= 2 * np.pi / cut, C(q), 0.0), ROLL_OFF / 4, 2, 4)
         assert found.q1 == pytest.approx(2 * np.pi / cut)
         ratios.append((found.rms_gradient / np.sqrt(m2), found.m4 / (0.375 * m4)))
     gradient, curvature = np.mean(ratios, axis=0)

@@ -62,7 +62,7 @@ def test_as_options_of_a_map():
 
 def test_every_answer_of_a_map_says_so():
     heights = 0.05 * random_map(64, 0.02, 0.4)
-    told = "area is a matter of resolution: waves are known down to"
+    told = "area depends on resolution: wavelengths are known down to"
     for model in ("measured", "self-affine"):
         surface = Surface.from_map(heights, 1.0, periodic=True, unit="um", model=model)
         rows = describe_law(surface, "1 GPa", rows=10, theory="calibrated")
@@ -72,9 +72,7 @@ def test_every_answer_of_a_map_says_so():
         for found in answers:
             assert told in repr(found)
             assert told in found.to_dataset().attrs["resolution"]
-    longer = Surface.from_map(
-        heights, 1.0, periodic=True, model="measured", extrapolate_to=0.5, extrapolate_hurst=0.8
-    )  # fmt: skip
+    longer = Surface.from_map(heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8)
     assert "which was not measured" in repr(contact(longer, pressure=0.01))
     assert "resolution" not in repr(contact(WHOLE, pressure=0.01))
 

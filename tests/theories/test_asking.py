@@ -1,4 +1,4 @@
-"""`contact` asked by separation, mean separation, pressure or area, of any theory."""
+"""`contact` asked by separation, mean separation, pressure or area, of any theory, and differences for derivatives."""
 
 import dataclasses
 import re
@@ -9,10 +9,11 @@ import pytest
 import xarray as xr
 
 from benchmarks.request import traced
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
-from mbma_tables.theories import THEORIES, Calibrated, Mbma
+from mbma_tables.theories import THEORIES, Mbma
+from mbma_tables.theories.differences import HALVINGS, differences
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
 BATCH = Surface(hurst=[0.7, 0.9], q0=0.01, q1=[1.0, 2.0], h_rms=1.0, h_max=[3.0, 3.4])
@@ -151,20 +152,6 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
         contact(SURFACE, area=0.01).conductance("45 W/(m K)")
 
 
-def test_a_theory_is_asked_once(monkeypatch):
-    asked = []
-    own = Calibrated.answer
-
-    def counted(self, surface, mean_separation):
-        asked.append(np.shape(mean_separation))
-        return own(self, surface, mean_separation)
-
-    monkeypatch.setattr(Calibrated, "answer", counted)
-    found = contact(SURFACE, mean_separation=[1.2, 1.9], theory="calibrated")
-    _ = found.stiffness, found.scatter, found.area_scatter, found.valid, found.reasons, found.mean_pressure
-    assert asked == [(2,)]
-
-
 @each
 def test_labelled_arrays_keep_their_names(theory):
     pressure = xr.DataArray([1.0, 10.0], dims="load", coords={"load": [1.0, 10.0]})
@@ -280,6 +267,62 @@ def test_energies_hold_where_the_force_bends():
         expected = law.energy(u[:, 0])
         assert found[:, k] == pytest.approx(expected, rel=1e-8)
         assert contact(law.surface, mean_separation=u[:, 0]).energy == pytest.approx(expected, rel=1e-8)
+
+
+FUNCTIONS = (np.exp, lambda x: 1 / (2 + x), lambda x: np.sqrt(1 + x) * np.cos(3 * x), lambda x: 5.0 + 0 * x)
+SLOPES = np.array([1.0, -0.25, 0.5, 0.0])
+
+
+def function(entry, x):
+    return np.choose(entry, [f(x) for f in FUNCTIONS])
+
+
+@pytest.mark.parametrize("side", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("step", [1e-4, 0.02, 0.3])
+def test_derivatives_and_their_errors(side, step):
+    found, error = differences(
+        lambda k, x: np.stack([function(k, x), 2 * function(k, x)]),
+        np.full(4, step), np.full(4, side), np.ones((2, 4)),
+    )  # fmt: skip
+    assert (np.abs(found - [SLOPES, 2 * SLOPES]) <= np.maximum(error, 1e-8)).all()
+    assert (error <= 1e-6).all()
+
+
+def test_steps_are_halved_where_that_is_needed_alone():
+    asked = []
+
+    def rough(k, x):
+        asked.append(np.unique(k))
+        return np.where(k == 1, np.tanh(300 * x), np.sin(x))[None]
+
+    found, error = differences(rough, np.full(3, 0.02), np.zeros(3), np.ones((1, 3)))
+    assert found[0] == pytest.approx([1, 300, 1], rel=1e-6)
+    assert (error < 1e-3).all()
+    assert [len(k) for k in asked] == [3] + [1] * (len(asked) - 1)
+    asked.clear()
+    found, error = differences(lambda k, x: 1.0 * (x[None] > 0), np.full(3, 0.02), np.zeros(3), np.ones((1, 3)))
+    assert (error > 0.1).all()
+    found, error = differences(lambda k, x: np.full((1, x.size), np.nan), np.ones(3), np.zeros(3), np.ones((1, 3)))
+    assert not (error <= 1).any()
+    assert len(asked) <= HALVINGS
+
+
+def test_a_force_without_bound_has_no_derivative():
+    surface = Surface(0.8, 0.01, 2.0, 1.0, 3.0)
+    with pytest.raises(ConvergenceError, match="no derivative of pressure by mean_separation was found") as caught:
+        contact(surface, mean_separation=[0.0, 1.0], theory="calibrated", derivatives=True)
+    assert caught.value.mask.tolist() == [True, False]
+
+
+@pytest.mark.parametrize("cap", [0.03, np.inf])
+def test_forces_that_no_gap_resolves_are_refused(cap):
+    surface, asked = Surface(0.8, 0.01, 2.0, 1.0, 3.0), {"pressure": [1e-150, 1e-3], "hardness": cap}
+    # lighter than what is left where h_max - u is rounding
+    with pytest.raises(ConvergenceError, match="the separation at this pressure was not found for 1 entries") as caught:
+        contact(surface, **asked, theory="mbma")
+    assert caught.value.mask.tolist() == [True, False]
+    found = contact(surface, **asked, theory="greenwood_williamson")
+    assert found.pressure == pytest.approx([1e-150, 1e-3], rel=1e-10)
 
 
 @pytest.mark.parametrize("options", [{}, {"theory": "calibrated", "hardness": "1.5 GPa"}], ids=["mbma", "hardness"])

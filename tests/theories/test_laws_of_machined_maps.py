@@ -1,13 +1,16 @@
 """The law of a map on machined surfaces: what it states of itself, against what boundary elements found."""
 
+import importlib.util
+
 import numpy as np
 import pytest
 
 from generate.machined.makers import Part, heights
-from mbma_tables import Scene, Surface, contact
+from mbma_tables import Scene, Surface, contact, contact_law
 from mbma_tables.laws.boundary_elements import Contact
+from mbma_tables.theories import theory_name
 from mbma_tables.theories.corrected import of_map
-from mbma_tables.theories.simulated import law_loads
+from mbma_tables.theories.own_map import law_loads
 
 
 def surface_of(family, number):
@@ -30,7 +33,7 @@ def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
     found = contact(surface_of(family, number), area=[0.01, 0.1, 0.5], theory="calibrated")
     assert not found.valid.any()
     (reason,) = (text for text in found.reasons if text.startswith(statistic))
-    assert "theory='simulated' presses the map itself" in reason
+    assert "theory='simulated' simulates the map" in reason
     assert (found.scatter > 0.13).all()
     assert (found.area_scatter > 0.07).all()
     assert (found.stiffness_scatter > 0.2).all()
@@ -83,3 +86,43 @@ def test_a_scene_presses_the_map():
     direct = contact(surface, pressure=[0.01, 0.02], theory="simulated")
     np.testing.assert_allclose(found.area, direct.area)
     assert found.attrs["theory"] == "simulated"
+
+
+class TestDefaultTheory:
+    """Of a map: corrected, where that is possible within seconds."""
+
+    @staticmethod
+    def surface(points=128, **options):
+        return Surface.from_map(heights(Part("milled", 1, points)), 1.0, **{"periodic": True, "unit": "um"} | options)
+
+    def test_a_map_is_corrected(self):
+        surface = self.surface()
+        found = contact(surface, pressure=[0.0, 1e-6, 0.01, 0.03, 0.2])
+        assert found.theory == contact_law(surface).theory == "corrected"
+        assert Scene(surface, pressures=[0.01], effects=["area"]).theory == "corrected"
+        # any pressure is answered, and where none was tested is told
+        assert (np.diff(found.area) > 0).all()
+        assert found.area[0] == 0
+        assert found.valid.tolist() == [True, False, True, True, False]
+        assert contact(surface, separation=2 * float(surface.h_max)).pressure == 0
+        # changed surfaces have no map that is known
+        assert contact(surface.combined(surface), pressure=0.01).theory == "calibrated"
+        assert theory_name(surface, None, variant="printed") == "mbma"
+
+    @pytest.mark.parametrize(
+        "surface",
+        [
+            lambda own: own.surface(48),
+            lambda own: Surface.from_map(np.random.default_rng(1).standard_normal((64, 64)), 1.0, periodic=True),
+            lambda own: Surface.from_map(np.tile(heights(Part("milled", 1, 128)), (6, 6)), 1.0, periodic=True),
+            lambda own: Surface.from_spectrum([0.1, 1.0], [1.0, 1e-3], h_max=3.0),
+        ],
+        ids=["small", "not resolved", "large", "spectrum"],
+    )
+    def test_others_are_calibrated(self, surface):
+        assert contact(surface(self), area=0.1).theory == "calibrated"
+
+    def test_without_the_engine_the_law_answers(self, monkeypatch):
+        real = importlib.util.find_spec
+        monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "tamaas" else real(name))
+        assert contact(self.surface(), area=0.1).theory == "calibrated"

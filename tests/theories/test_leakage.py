@@ -119,17 +119,15 @@ def test_outside_the_table_and_of_a_spectrum():
 
 
 class TestRates:
-    def test_liquid_between_parallel_plates(self):
+    def test_liquid(self):
         # 1 mm wide open gap: h^3 dp/(12 eta L)
-        found = asked(mean_separation="1 mm", E_star="10 MPa")
         plates = 1000.0**3 * 0.1 / (12 * 1e-9 * 1e4)  # um^3 MPa/(MPa s um)
-        assert found.liquid("1e-3 Pa s", "0.1 MPa", "10 mm") == pytest.approx(plates, rel=2e-6)
-
-    def test_units_of_a_liquid(self):
+        wide = asked(mean_separation="1 mm", E_star="10 MPa")
+        assert wide.liquid("1e-3 Pa s", "0.1 MPa", "10 mm") == pytest.approx(plates, rel=2e-6)
         found = asked(area=0.1, E_star="10 MPa")
         plain = found.K * 0.1 / (12 * 1e-9 * 2000)  # MPa, MPa s, um
-        assert found.liquid("1e-3 Pa s", "0.1 MPa", "2 mm") == pytest.approx(plain, rel=1e-12)
-        assert found.liquid(1e-9, 0.1, 2000.0) == pytest.approx(plain, rel=1e-12)
+        for known in (("1e-3 Pa s", "0.1 MPa", "2 mm"), (1e-9, 0.1, 2000.0)):
+            assert found.liquid(*known) == pytest.approx(plain, rel=1e-12)
         assert found.units == {"K": "um^3", "hydraulic_aperture": "um"}
         assert found.hydraulic_aperture**3 == pytest.approx(found.K)
 
@@ -195,10 +193,6 @@ class TestLaw:
         assert law.area(separation=at) == pytest.approx(shipped_flow().constants.threshold, rel=1e-9)
         assert law.leakage(separation=[law.lowest, at - 0.1, at]).tolist() == [0.0, 0.0, 0.0]
         assert law.leakage(separation=at + 1e-6) > 0
-        apart = np.array([3.5, 4.0, 400.0])
-        np.testing.assert_allclose(
-            law.leakage(separation=apart), contact(SEAL, separation=apart, theory="calibrated").leakage.K, rtol=1e-4
-        )
 
     def test_falls_with_pressure_in_units_and_labels(self):
         law = contact_law(SEAL, E_star="10 MPa", theory="calibrated")

@@ -39,28 +39,21 @@ def errors(example):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("example", "lightest", "bar"),
-    [(BARS[0], 0.1, 0.10), (BARS[0], 0.01, 0.30), (BARS[1], 0.1, 0.10), (BARS[1], 0.01, 0.30)],
-    ids=lambda value: getattr(value, "name", str(value)),
-)
-def test_force_at_equal_separation(example, lightest, bar):
-    area, _, force = errors(example)
-    assert np.abs(force[area >= lightest]).max() < bar
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("example", "lightest"), [(BARS[0], 0.002), (BARS[1], 0.009)], ids=["al3d-1", "di-1"])
-def test_area_at_equal_force(example, lightest):
-    area, found, _ = errors(example)
-    assert np.abs(found[area >= lightest]).max() < 0.12
-
-
-@pytest.mark.slow
-def test_area_of_the_force_microscopes_map_at_light_load():
-    # 12% is not met below 0.9% contact
-    area, found, _ = errors(BARS[1])
-    assert np.abs(found[area >= 0.002]).max() < 0.21
+@pytest.mark.parametrize("example", BARS, ids=lambda example: example.name)
+def test_laws_of_maps_from_files(example):
+    area, by_force, by_gap = errors(example)
+    assert np.abs(by_gap[area >= 0.1]).max() < 0.10
+    assert np.abs(by_gap[area >= 0.01]).max() < 0.30
+    # of the force microscope's map 12% is not met below 0.9% contact
+    assert np.abs(by_force[area >= (0.002 if example is BARS[0] else 0.009)]).max() < 0.12
+    assert np.abs(by_force[area >= 0.002]).max() < 0.21
+    # and they are answered without options
+    surface = Surface.from_map(reference(example)[0])
+    for theory in ("calibrated", "mbma"):
+        found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)
+        assert found.pressure > 0
+        assert found.area > 0
+    assert any("area is a matter of resolution" in entry.get("told", "") for entry in surface.provenance)
 
 
 def test_light_contacts_of_that_map_are_not_resolved_by_its_own_grid():
@@ -74,18 +67,6 @@ def test_light_contacts_of_that_map_are_not_resolved_by_its_own_grid():
     assert (change[light] > 0.05).all()
     assert (change > 0).all()
     assert change.max() < 0.15
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("example", BARS, ids=lambda example: example.name)
-def test_they_are_answered_without_options(example):
-    path, _ = reference(example)
-    surface = Surface.from_map(path)
-    for theory in ("calibrated", "mbma"):
-        found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)
-        assert found.pressure > 0
-        assert found.area > 0
-    assert any("area is a matter of resolution" in entry.get("told", "") for entry in surface.provenance)
 
 
 @pytest.mark.slow

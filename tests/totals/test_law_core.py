@@ -1,7 +1,6 @@
 """The core's law: the same bits however it is asked, and no gap, force or block that could make it read elsewhere."""
 
 import functools
-import itertools
 import math
 import sys
 
@@ -11,7 +10,7 @@ import xarray as xr
 
 from mbma_tables import OutOfRangeError, Surface, contact_law
 from mbma_tables.core import core
-from mbma_tables.law.block import AREA, EXPONENT, FORCE, HEAD, HIGH, MINUS_ROWS, QUANTITIES, RECORD, RECORDS
+from mbma_tables.law.block import AREA, EXPONENT, FORCE, HEAD, HIGH, MINUS_ROWS, QUANTITIES, RECORDS
 from mbma_tables.laws.effective_medium import wide_gap
 
 SURFACES = {
@@ -123,17 +122,6 @@ def test_values_that_no_gap_has_are_nan_and_counted(name, which):
             assert law.separation(**{QUANTITIES[which]: tiny}) == law.h_max
 
 
-def test_a_light_load_has_all_digits_of_its_overclosure():
-    """A power of it, where contact ends: what is left to last contact is found relative to itself."""
-    law = law_of("mbma")
-    inverse = law._inverse_block("pressure")
-    x, side = np.empty((2, 60))
-    wanted = np.geomspace(1e-280, 1e-60, 60)
-    core.inverse_nodes(wanted, law.block, FORCE, inverse[5], x, side)
-    assert (side == -1).all()
-    np.testing.assert_allclose(np.diff(np.log(x)) / np.diff(np.log(wanted)), 1 / 3.5, rtol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["mbma", "calibrated"])
 def test_leakage_apart(name):
     law = law_of(name)
@@ -165,29 +153,6 @@ def test_broken_blocks_are_refused():
         core.law_fill(d, law.block, np.empty(2), None, None, None, None)
     with pytest.raises(TypeError, match="an array of 'd' was expected"):
         core.law_fill(d.astype(np.float32), law.block, out, None, None, None, None)
-
-
-def test_no_block_makes_the_core_read_elsewhere():
-    """Random words, of which some pass for a law's: answers are numbers or NaN, and nothing is read beyond the end."""
-    law, rng = law_of("calibrated"), np.random.default_rng(2)
-    d, wanted = np.concatenate([gaps_of(law, 200), NO_GAPS]), np.geomspace(1e-12, 1, 300)
-    inverse = law._inverse_block("pressure")
-    places = [*range(HEAD + 2 * len(law.rows)), *range(HEAD + 2 * len(law.rows), law.block.size, RECORD + 4)]
-    accepted = 0
-    for place, _ in itertools.product(places, range(6)):
-        block, bent = law.block.copy(), inverse.copy()
-        word = rng.integers(-(2**63), 2**63) if rng.integers(2) else rng.integers(-70, 1 << 12)
-        block.view(np.int64)[place] = word
-        bent.view(np.int64)[rng.integers(bent.size)] = word
-        out = np.empty((5, d.size))
-        try:
-            core.law_fill(d, block, *out)
-        except ValueError:
-            continue
-        accepted += 1
-        gap = np.empty((3, wanted.size))
-        core.law_invert(wanted[:30], block, bent, FORCE, *gap[:, :30].copy())
-    assert accepted > 100
 
 
 def test_questions_that_are_none():

@@ -1,0 +1,180 @@
+"""Further commands on simulated maps: `grids`, `measured_maps` and `gaps`."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import itertools
+import pathlib
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import click
+import numpy as np
+import pandas as pd
+from tqdm import tqdm
+
+from generate.boundary_elements.capped import CappedContact, load_at
+from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
+from generate.boundary_elements.solve import LOADS, Contact, prepared, pressed
+from generate.boundary_elements.surfaces import Recipe, heights
+from generate.timing import fixed_work
+from mbma_tables import Surface, contact
+from mbma_tables.common.files import write_file
+from mbma_tables.laws.bearing_curve import bearing
+from mbma_tables.laws.gas import mean_inverse
+from mbma_tables.surfaces.maps import prepared as treated_map
+from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.theories.own_map import continued
+
+DATA = pathlib.Path("docs/data")
+CHOSEN = ((0.3, 12.0), (0.9, 12.0))  # H and zeta_1 of held-out spectra, their first surfaces
+GRIDS = (32, 64, 128, 256, 512, 1024)  # points a side; 60 of the shortest waves
+STARTS = ("cold", "continued")
+COLUMNS = ("hurst", "zeta_1", "waves", "seed", "points", "start", "force", "area", "mean_separation", "seconds", "cost")
+HEAD = """\
+# Held-out surfaces of boundary_elements.nc on grids of 32 to 1024 points a side, by python -m generate grids.
+# force in A0 E* g, g the rms gradient of the finest grid; area A/A0, corrected for its perimeter; separation in h_rms.
+# seconds of the processor a load; cost: those over the fixed piece of work of docs/cost.md, timed before and after.
+"""
+LARGEST = 256  # points a side of measured maps that are kept, from the middle
+
+JUMPS = np.array([0.03, 0.1, 0.3, 1.0, 3.0])  # of a gas's temperature [h_rms]
+AREAS = (0.003, 0.01, 0.03, 0.1, 0.2, 0.35, 0.55, 0.75)
+LIGHT, HEAVY = 0.05, 0.3  # contact fractions
+MANY = 3  # long waves a side from which the highest point is a surface's, not a map's
+HARDNESSES = {"fitted": (np.inf, 0.4, 0.1), "held out": (np.inf, 0.8, 0.2, 0.05)}
+PLAIN, PLATEAU = "self_affine", "plateau"
+# kind, H, zeta_1, waves and seed of surfaces by which the constants of `mbma_tables.laws.gas` were chosen, and others
+SURFACES = {
+    "fitted": (
+        *((PLAIN, 0.8, 16, 4, 1), (PLAIN, 0.8, 32, 2, 2), (PLAIN, 0.5, 16, 4, 3), (PLAIN, 0.3, 8, 4, 4)),
+        *((PLAIN, 1.0, 16, 4, 5), (PLATEAU, 0.8, 8, 8, 6), (PLAIN, 0.8, 8, 8, 7), (PLAIN, 0.8, 32, 3, 8)),
+        *((PLATEAU, 0.8, 16, 4, 9), (PLAIN, 0.5, 32, 2, 10), (PLAIN, 0.9, 12, 4, 11), (PLATEAU, 0.5, 8, 8, 12)),
+    ),
+    "held out": (
+        *((PLAIN, 0.7, 20, 3, 101), (PLAIN, 0.6, 12, 5, 102), (PLAIN, 0.9, 32, 2, 103), (PLAIN, 0.2, 8, 4, 104)),
+        *((PLAIN, 0.4, 10, 6, 105), (PLATEAU, 0.8, 10, 6, 106), ("filtered", 0.8, 5, 6, 107)),
+        *((PLAIN, 0.8, 16, 4, 108), (PLAIN, 0.8, 24, 2, 109), (PLAIN, 0.8, 64, 1, 110)),
+    ),
+}
+PATH: Any = click.Path(path_type=pathlib.Path)
+
+
+def priced(run: Callable[[], Any]) -> tuple[Any, float, float]:
+    """What `run` returns, its seconds, and these over the fixed piece of work done before and after."""
+
+    def timed(function: Callable[[], Any]) -> tuple[Any, float]:
+        started = time.process_time()
+        return function(), time.process_time() - started
+
+    before = min(timed(fixed_work)[1] for _ in range(3))
+    found, seconds = timed(run)
+    after = min(timed(fixed_work)[1] for _ in range(3))
+    return found, seconds, 2 * seconds / (before + after)
+
+
+def solve(recipe: Recipe, grid: int, finest: int, start: str) -> Iterator[tuple[Any, ...]]:
+    """Rows of one surface on one grid, whose heights are those of the finest at every second, fourth, ... point."""
+    fine = heights(dataclasses.replace(recipe, points=finest))
+    known = bearing(fine, recipe.sizes)
+    surface = (fine / known.gradient)[:: finest // grid, :: finest // grid]
+    length, engine = known.h_rms / known.gradient, Contact(surface, recipe.sizes)
+    for force in LOADS[::2]:
+        # cold by an engine made for the load, continued from the pressures of the load below
+        own = (lambda: Contact(surface, recipe.sizes)) if start == "cold" else (lambda: engine)
+        found, *times = priced(lambda own=own, force=force: own().press(force))  # type: ignore[misc]
+        node = (recipe.hurst, recipe.zeta_1, recipe.waves, recipe.seed, grid, start, force)
+        yield (*node, found["area"], found["mean_separation"] / length, *times)
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--folder", type=PATH, default="boundary_elements", show_default=True, help="One file a grid.")
+@click.option("--out", "target", type=PATH, default=DATA / "boundary_element_grids.csv", show_default=True)
+@click.option("--collect", is_flag=True, help="Write what there is, no runs.")
+def grids(folder: pathlib.Path, target: pathlib.Path, collect: bool) -> None:
+    """Solve held-out surfaces on ever finer grids, loads cold and continued: half an hour.
+
+    Stopped and called again, it goes on where it was.
+    """
+    held = [task.recipe for task in campaign() if task.split == HELD_OUT_SPECTRUM and task.recipe.kind == PLAIN]
+    surfaces = [next(one for one in held if (one.hurst, one.zeta_1) == chosen) for chosen in CHOSEN]
+    finest, parts = GRIDS[-1], []
+    for grid, recipe, start in tqdm(list(itertools.product(GRIDS, surfaces, STARTS)), disable=None):
+        path = folder / f"{recipe.name}_on_{grid}_of_{finest}_{start}.csv"
+        if not path.exists():
+            if collect:
+                continue
+            rows = pd.DataFrame(list(solve(recipe, grid, finest, start)))
+            text = rows.to_csv(index=False, header=False, float_format="%.8g", lineterminator="\n")
+            write_file(path, text.encode(), make_folders=True)
+        parts.append(path.read_text(encoding="utf-8"))
+    write_file(target, (HEAD + ",".join(COLUMNS) + "\n" + "".join(parts)).encode())
+    click.echo(f"{target}: {sum(part.count(chr(10)) for part in parts)} loads")
+
+
+def middle(treated: Treated) -> Treated:
+    """At most `LARGEST` points a side from the middle of a map."""
+    kept = tuple(slice((n - min(n, LARGEST)) // 2, (n + min(n, LARGEST)) // 2) for n in treated.heights.shape)
+    return dataclasses.replace(treated, heights=treated.heights[kept])
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("maps", nargs=-1, required=True, type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
+@click.option("--folder", type=PATH, default=DATA, show_default=True)
+def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
+    """Simulate measured maps for docs/fidelity.md, read by SurfaceTopography: a few minutes each."""
+    for path in maps:
+        treated = middle(treated_map(path, {"periodic": False}))
+        surface, sizes = continued(treated)
+        # in units of the shorter side, as random surfaces are
+        unit = min(sizes)
+        found = pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi)
+        content = io.BytesIO()
+        np.savez_compressed(content, **found)
+        target = folder / f"measured_{path.stem}.npz"
+        write_file(target, content.getvalue(), make_folders=True)
+        click.echo(f"{target}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
+
+
+def gap_errors(kind: str, surfaces: slice = slice(None)) -> dict[str, np.ndarray]:
+    """ln(law/simulation) by contacts and `JUMPS`: with the simulated contact, with one gap for all, of the whole chain.
+
+    The chain, from pressure and hardness by the calibrated law, is that of self-affine surfaces, else NaN.
+    """
+    found: dict[str, list[Any]] = {"law": [], "one gap": [], "chain": [], "area": [], "waves": []}
+    for recipe in (Recipe(*numbers, 256) for numbers in SURFACES[kind][surfaces]):
+        surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+        h_rms = float(surface.std())
+        like = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, h_rms, known["h_max"] * h_rms)
+        for eta in HARDNESSES[kind]:
+            solved = CappedContact(surface, recipe.sizes, eta)
+            for load in (load_at(area, eta) for area in AREAS):
+                found["area"].append(solved.press(load)["area"])
+                found["waves"].append(recipe.waves)
+                assert solved.pressure is not None
+                open_, gap = solved.pressure <= 0, solved.gap / h_rms
+                simulated = np.array([(open_ / (gap + jump)).mean() for jump in JUMPS])
+                chain, law = np.full(JUMPS.size, np.nan), mean_inverse(gap.mean(), 1 - open_.mean(), JUMPS, 1.0, eta)
+                if recipe.kind == PLAIN:
+                    own = contact(like, pressure=load, theory="calibrated", hardness=eta)
+                    chain = mean_inverse(float(own.mean_separation) / h_rms, float(own.area), JUMPS, 1.0, eta)
+                for name, value in {"law": law, "one gap": 1 / (gap.mean() + JUMPS), "chain": chain}.items():
+                    found[name].append(np.log(value / simulated))
+    return {name: np.array(rows) for name, rows in found.items()}
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+def gaps() -> None:
+    """Print errors of a gas's conductance against gaps of boundary elements, for docs/joints.md: six minutes."""
+    for kind in SURFACES:
+        known = gap_errors(kind)
+        light, many = known["area"] < LIGHT, (known["waves"] >= MANY) & (known["area"] < HEAVY)
+        click.echo(f"{kind}: M/h_rms; root mean square and largest error; largest of k/(u + M) below 5% contact;")
+        click.echo("mean and standard deviation of the chain, from three long waves a side on, below 30% contact [%]")
+        columns = [np.sqrt(np.mean(known["law"] ** 2, axis=0)), np.abs(known["law"]).max(axis=0)]
+        columns += [np.abs(known["one gap"][light]).max(axis=0)]
+        columns += [np.nanmean(known["chain"][many], axis=0), np.nanstd(known["chain"][many], axis=0)]
+        for jump, row in zip(JUMPS, 100 * np.array(columns).T, strict=True):
+            click.echo(" ".join([f"{jump:5g}", *(f"{value:6.1f}" for value in row)]))

@@ -1,0 +1,58 @@
+"""Where jobs run: here, in processes of this machine, or on a dask scheduler."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import contextlib
+import functools
+import multiprocessing
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar
+
+from mbma_tables.common.errors import InputError, MbmaError
+
+Pool = concurrent.futures.Executor | None
+Key = TypeVar("Key")
+
+
+class WorkerError(MbmaError, RuntimeError):
+    """Worker processes that died, or that a scheduler lost."""
+
+
+@contextlib.contextmanager
+def executor(workers: int, scheduler: str | None) -> Iterator[Pool]:
+    """Processes, a dask scheduler's workers, or None for one worker: here."""
+    if scheduler is not None:
+        try:
+            from distributed import Client
+
+            client = Client(scheduler)
+        except ImportError:
+            raise InputError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
+        except (OSError, ValueError) as fault:
+            raise WorkerError(f"no dask scheduler at {scheduler}: {fault}") from None
+        with client:
+            yield client.get_executor()
+    elif workers == 1:
+        yield None
+    else:
+        # started afresh: threads and forks do not mix
+        with concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+            yield pool
+
+
+def attempts(
+    pool: Pool, work: Callable[..., Any], jobs: Mapping[Key, tuple[Any, ...]]
+) -> Iterator[tuple[Key, Callable[[], Any]]]:
+    """Keys of jobs, as they finish, and a function that returns the job's result or raises its error."""
+    if pool is None:
+        yield from ((key, functools.partial(work, *job)) for key, job in jobs.items())
+        return
+    waiting = {pool.submit(work, *job): key for key, job in jobs.items()}
+    try:
+        for future in concurrent.futures.as_completed(waiting):
+            yield waiting[future], future.result
+    finally:
+        # else leaving the pool waits for all of them
+        for future in waiting:
+            future.cancel()

@@ -1,0 +1,106 @@
+"""Where a map touches: pressures and gaps at every point at one load, simulated by boundary elements."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import new_figure, pressure_label
+from mbma_tables.common.progress import shown as progress
+from mbma_tables.common.units import Units, unit_of
+from mbma_tables.laws.boundary_elements import Contact as Simulation
+from mbma_tables.laws.pressing import TOLERANCE
+from mbma_tables.theories.own_map import continued, map_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ContactMap(Displayed):
+    """One map at one load, as `Contact.map` finds it; `to_dataset` is its xarray Dataset, `plot` its picture.
+
+    Attributes
+    ----------
+    pressure, gap, heights : ndarray, shape (nx, ny)
+        Contact pressure, zero where the gap is open [stress]; gap to the plane, zero in contact [length]; heights above
+        their mean [length]. The first axis is x.
+    steps : pair of float
+        Sampling steps along x and y [length].
+    units : Units
+        Of lengths and stresses.
+    """
+
+    pressure: FloatArray
+    gap: FloatArray
+    heights: FloatArray
+    steps: tuple[float, ...]
+    units: Units
+
+    @property
+    def contact(self) -> Any:
+        """Where the map touches, shape (nx, ny)."""
+        return self.pressure > 0
+
+    def _facts(self) -> dict[str, str]:
+        stress, length = unit_of("pressure", self.units), self.units.length or "1"
+        return {
+            "points": " x ".join(map(str, self.pressure.shape)),
+            "pressure": shown(self.pressure.mean(), stress),
+            "contact": f"{self.contact.mean():.4g} of the points",
+            "largest_pressure": shown(self.pressure.max(), stress),
+            "mean_gap": shown(self.gap.mean(), length),
+        }
+
+    def _variables(self) -> dict[str, Variable]:
+        stress, length = unit_of("pressure", self.units), self.units.length or "1"
+        axes = zip("xy", self.pressure.shape, self.steps, strict=True)
+        places = {name: Variable(np.arange(count) * step, length, "", (name,)) for name, count, step in axes}
+        return places | {
+            "pressure": Variable(self.pressure, stress, "contact pressure", ("x", "y")),
+            "gap": Variable(self.gap, length, "gap to the rigid plane", ("x", "y")),
+            "contact": Variable(self.contact, "1", "whether the map touches", ("x", "y")),
+            "heights": Variable(self.heights, length, "height above the mean", ("x", "y")),
+        }
+
+    def _figure(self) -> Figure:
+        figure = new_figure(10, 4.2)
+        length, stress = self.units.length or "length", unit_of("pressure", self.units)
+        sides = [count * step for count, step in zip(self.pressure.shape, self.steps, strict=True)]
+        fields = {
+            pressure_label(stress): (np.where(self.contact, self.pressure, np.nan), "magma_r"),
+            f"gap [{length}]": (np.where(self.contact, np.nan, self.gap), "viridis"),
+        }
+        for axes, (label, (values, colours)) in zip(figure.subplots(1, 2), fields.items(), strict=True):
+            picture = axes.imshow(values.T, origin="lower", extent=(0, sides[0], 0, sides[1]), cmap=colours)
+            axes.set_xlabel(f"x [{length}]")
+            axes.set_ylabel(f"y [{length}]")
+            figure.colorbar(picture, ax=axes, label=label, shrink=0.8)
+        return figure
+
+
+def contact_map(found: Any) -> ContactMap:
+    """The map of a contact's surface pressed with its pressure; see `Contact.map`."""
+    source, pressure = found._source, np.asarray(found.pressure, float)
+    if pressure.ndim or np.ndim(source.E_star) or source.yields:
+        raise InputError("a map is of one elastic contact: give one pressure, one modulus and no hardness")
+    surface: Any = source.surface
+    whole = map_of(surface)
+    modulus, force = float(source.E_star), float(pressure) / float(source.E_star)
+    if not 0 < force < np.inf:
+        raise InputError(f"a map needs a pressure above 0, got {float(pressure):g}")
+    values, sizes = continued(whole)
+    # of rms gradient one, heights of order one
+    scale, gradient = float(np.abs(values).max()), float(surface.bearing.gradient)
+    stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
+    engine = Simulation(values / scale, stretched, TOLERANCE)
+    with progress("boundary elements"):
+        engine.press(force / gradient)
+    own = tuple(slice(count) for count in whole.heights.shape)
+    fields = modulus * gradient * engine.traction[own], scale * engine.gap[own], values[own]
+    return ContactMap(*fields, whole.steps, source.units)

@@ -1,0 +1,108 @@
+"""Several scans of one surface as one: mean spectrum, heights and curves, and how much the scans differ."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.common.errors import InputError
+from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
+from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.spectral import resolution
+from mbma_tables.surfaces.surface import MeasuredSurface
+
+SQUARES = ("h_rms", "gradient")  # whose mean is that of squares
+
+
+def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
+    """The surface of which several maps were measured, each a `Surface.from_map`, alike in size and treatment.
+
+    Spectra, quantiles of heights and the curves of highest parts are averaged. h_max is the mean of the scans': that of
+    one scan's area.
+
+    Parameters
+    ----------
+    scans : sequence of MeasuredSurface
+        At least two, in the same or in convertible units.
+
+    Returns
+    -------
+    MeasuredSurface
+        Without a map; its `provenance` says how much h_rms, gradient and highest point differ from scan to scan.
+
+    Raises
+    ------
+    InputError
+        For fewer than two scans, and surfaces that are not of maps.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Surface, contact
+    >>> from mbma_tables.surfaces.averages import average
+    >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    >>> def scan(seed):
+    ...     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((64, 64)))
+    ...     heights = 0.1 * np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
+    ...     return Surface.from_map(heights, 1.0, periodic=True)
+    >>> both = average([scan(1), scan(2)])
+    >>> f"{contact(both, pressure=0.01).area:.2f}"
+    '0.39'
+    """
+    if len(scans) < 2 or not all(isinstance(scan, MeasuredSurface) and scan.map is not None for scan in scans):
+        raise InputError("average takes two or more surfaces of Surface.from_map")
+    first = scans[0]
+    if len({scan.unit is None for scan in scans}) > 1:
+        raise InputError("some scans know their unit and some do not: make them with unit=...")
+    known = [scan if scan.unit == first.unit else scan.to(str(first.unit)) for scan in scans]
+    q = np.unique(np.concatenate([scan.q for scan in known]))
+    spectra = np.array([scan.power_spectrum(q) for scan in known])
+    covered = np.array([(q >= scan.q0) & (q <= scan.q1) for scan in known]).sum(axis=0)
+    bearing = Bearing(
+        **{field.name: _mean([s.bearing for s in known], field.name) for field in dataclasses.fields(Bearing)}
+    )
+    spread = "; ".join(
+        f"{name} {np.mean(values):.4g} ({min(values):.4g} to {max(values):.4g})"
+        for name in ("h_rms", "h_max", "rms_gradient")
+        for values in [[float(getattr(scan, name)) for scan in known]]
+    )
+    record = {"step": "average", "of": [list(scan.provenance) for scan in known]}
+    whole = MeasuredSurface(
+        q,
+        spectra.sum(axis=0) / np.maximum(covered, 1),
+        heights=_heights([scan.heights for scan in known]),
+        bearing=bearing,
+        bands=_bands([scan.bands for scan in known]),
+        anisotropy=bearing.anisotropy,
+        unit=first.unit,
+        provenance=(record | {"told": f"average of {len(known)} scans: {spread}"},),
+    )
+    return dataclasses.replace(whole, provenance=(*whole.provenance, resolution(whole)))
+
+
+def _mean(parts: Sequence[Any], name: str) -> Any:
+    values = np.array([getattr(part, name) for part in parts], float)
+    found = np.sqrt(np.mean(values**2, axis=0)) if name in SQUARES else values.mean(axis=0)
+    return found if found.ndim else float(found)
+
+
+def _heights(parts: Sequence[Heights]) -> Heights:
+    """Of all scans together; moments about their means add."""
+    h_rms = _mean(parts, "h_rms")
+    skewness = np.mean([part.skewness * part.h_rms**3 for part in parts]) / h_rms**3
+    kurtosis = np.mean([part.kurtosis * part.h_rms**4 for part in parts]) / h_rms**4
+    quantiles, h_max = _mean(parts, "quantiles"), _mean(parts, "h_max")
+    return Heights(quantiles, h_rms, h_max, float(skewness), float(kurtosis), _mean(parts, "top"))
+
+
+def _bands(parts: Sequence[Any]) -> RadialSpectrum:
+    """The bands of all scans, each with its share of the variance."""
+    names = [field.name for field in dataclasses.fields(RadialSpectrum) if field.name != "band"]
+    joined = {name: np.concatenate([getattr(part, name)[part.variance > 0] for part in parts]) for name in names}
+    order = np.argsort(joined["q"])
+    for name in ("variance", "gradient", "curvature"):
+        joined[name] = joined[name] / len(parts)
+    return RadialSpectrum(**{name: values[order] for name, values in joined.items()}, band=np.empty(0, np.intp))

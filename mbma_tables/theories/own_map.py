@@ -1,0 +1,75 @@
+"""The map of a surface, made ready for boundary elements: its continuation, and loads at which to press it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError
+from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, coarser
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.treatment import Treated, mirrored
+from mbma_tables.theories.calibrated_curves import own_law
+
+# A/A0 by the law of the map at which it is pressed
+AREAS = (7e-4, 0.0015, 0.006, 0.012, 0.05, 0.09, 0.22, 0.3, 0.52, 0.65, 0.88, 0.95)
+MOST_POINTS = 2**20  # of a map that is pressed as it is
+REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
+
+
+def continued(treated: Treated) -> tuple[FloatArray, tuple[float, float]]:
+    """A map of mean zero whose edges meet, by its mirror images where it is not periodic, and its sides [length]."""
+    values = treated.heights if treated.periodic else mirrored(treated.heights)
+    sizes = values.shape[0] * treated.steps[0], values.shape[1] * treated.steps[1]
+    return values - values.mean(), sizes
+
+
+def reduced(values: FloatArray, points: float) -> tuple[FloatArray, float, float]:
+    """A periodic map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps.
+
+    Every second point is left out until at most `MOST_POINTS` remain; where that leaves fewer than four along the
+    shortest wavelength, shorter ones than four are cut off.
+    """
+    step, cut = 1.0, 0.0
+    while values.size > MOST_POINTS:
+        step *= 2
+        fine = points >= 2 * MIN_POINTS * (1 - ROUNDING)
+        values = coarser(values) if fine else coarser(values, MIN_POINTS)
+        points, cut = (points / 2, cut) if fine else (MIN_POINTS, step * MIN_POINTS)
+    return values, points, cut
+
+
+def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
+    """F/(A0 E*) at which the quick law of a map has contact areas; its area never refuses, its separation may."""
+    octaves = np.arange(-20 * REFINED, 4 * REFINED) / REFINED
+    pressure = float(surface.rms_gradient) * 2.0**octaves
+    area = np.maximum.accumulate(own_law(surface).area(pressure)) + 1e-15 * np.arange(pressure.size)
+    return np.asarray(np.exp(np.interp(np.log(areas), np.log(area), np.log(pressure))))
+
+
+def map_of(surface: AnySurface) -> Treated:
+    """The map that a surface was made from.
+
+    Raises
+    ------
+    InputError
+        Where there is none.
+    """
+    whole = surface.map if isinstance(surface, MeasuredSurface) else None
+    if whole is None or whole.heights.ndim != 2:
+        raise InputError(
+            "theories 'simulated' and 'corrected' press a height map, and this surface has none: make it by "
+            "Surface.from_map, neither combined nor extrapolated nor fitted"
+        )
+    return whole
+
+
+def origin_of(whole: Treated, tolerance: float) -> str:
+    """Which map was pressed, and how."""
+    digest = hashlib.sha256(np.ascontiguousarray(whole.heights, "<f8").tobytes()).hexdigest()
+    points = " x ".join(map(str, whole.heights.shape))
+    return f"boundary elements, tolerance {tolerance:g}, of the map of {points} points with SHA-256 {digest[:16]}"

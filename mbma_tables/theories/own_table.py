@@ -1,0 +1,112 @@
+"""A simulated map as a netCDF file that opens without the map: its loads and flow, its spectrum and its curves."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import json
+import os
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
+from mbma_tables.laws.pressing import Table
+from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.tablefiles.own import ADVICE, read_own, write_own
+
+ROWS = {
+    "pressure": ("F/(A0 E*) of a load", "1"),
+    "area": ("A/A0, real over nominal contact area", "1"),
+    "mean_separation": ("u, the mean gap", "{length}"),
+    "energy": ("elastic energy over A0 E*", "{length}"),
+}
+NUMBERS = {
+    "coarse_from": "first load on half of the grid; the number of loads if there is none",
+    "points": "sampling steps along the shortest wavelength",
+    "elements": "elements of the map that do not repeat each other",
+    "left_out": "wavelength below which a large map was cut off, 0 if it was not",
+    "anisotropy": "root of the ratio of the gradient tensor's eigenvalues",
+}
+# parts of the surface, by the names of their fields; `band` of a spectrum tells of the map's own grid
+PARTS: dict[str, Any] = {"heights": Heights, "bearing": Bearing, "bands": RadialSpectrum}
+POWERS = {
+    **dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), "{length}"),
+    **{"q": "1/{length}", "q2_mean_inverse": "{length}^2", "variance": "{length}^2", "curvature": "1/{length}^2"},
+}
+
+
+def _fields(name: str) -> list[str]:
+    return [field.name for field in dataclasses.fields(PARTS[name]) if field.name != "band"]
+
+
+def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
+    """Write a simulated map; see `BoundaryElements.to_netcdf`."""
+    surface, pressed = theory.surface, theory.pressed
+    if not theory.own_loads or pressed is None or not isinstance(surface, MeasuredSurface) or surface.bands is None:
+        raise InputError("a table holds a map that was simulated at its default loads: BoundaryElements.of(surface)")
+    table: dict[str, Any] = {}
+    for row, (name, (meaning, unit)) in zip(theory.rows, ROWS.items(), strict=True):
+        table[name] = ("load",), row, meaning, unit
+    table["flow"] = ("load", "axis"), pressed.flow(), "flow coefficient along both axes, 0 where blocked", "{length}^3"
+    numbers = (pressed.coarse_from, theory.points, theory.elements, pressed.left_out, surface.anisotropy)
+    for (name, meaning), value in zip(NUMBERS.items(), numbers, strict=True):
+        table[name] = (), value, meaning, "{length}" if name == "left_out" else "1"
+    table["q"] = ("wave",), surface.q, "wavenumber", "1/{length}"
+    table["C"] = ("wave",), surface.C, "power spectrum, h_rms^2 = 2 pi integral C q dq", "{length}^4"
+    table["samples"] = ("wave",), surface.samples, "independent samples of the spectrum", "1"
+    table["h_max"] = (), surface.h_max, "highest point above the mean", "{length}"
+    held = surface.bands.variance > 0
+    for part, kind in PARTS.items():
+        for name in _fields(part):
+            values = np.asarray(getattr(getattr(surface, part), name), float)
+            values = values[held] if part == "bands" else values
+            over = (f"{part}_{values.size}",) if values.ndim else ()
+            unit = "1" if (part, name) == ("bands", "gradient") else POWERS.get(name, "1")
+            table[f"{part}_{name}"] = over, values, f"{name} of mbma_tables {kind.__name__}", unit
+    length = surface.unit or "length"
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": "A rough surface pressed flat by boundary elements",
+        "source": theory.origin,
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} mbma fit MAP --simulate",
+        "comment": f"Lengths in {length}. BoundaryElements.from_netcdf of mbma_tables opens it.",
+        "provenance": json.dumps([dict(step) for step in surface.provenance]),
+    } | ({"length_unit": surface.unit} if surface.unit else {})
+    described = {
+        name: (over, values, meaning, unit.format(length=length) if surface.unit else "1")
+        for name, (over, values, meaning, unit) in table.items()
+    }
+    write_own(path, described, attributes)
+
+
+def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
+    """The surface of such a file, with its table."""
+    values, own = read_own(path)
+    try:
+        parts = {
+            part: kind(**{name: _plain(values[f"{part}_{name}"]) for name in _fields(part)})
+            for part, kind in PARTS.items()
+            if part != "bands"
+        }
+        known = {name: values[f"bands_{name}"] for name in _fields("bands")}
+        bands = RadialSpectrum(**known, band=np.empty(0, np.intp))
+        numbers = [values[name].item() for name in NUMBERS]
+        rows = np.stack([values[name] for name in ROWS])
+        if values["flow"].shape != (rows.shape[-1], 2) or rows.ndim != 2:
+            raise InputError("has loads and flows that do not fit each other")
+        points, elements, left_out, anisotropy = numbers[1:]
+        table = Table(rows, values["flow"], int(numbers[0]), points, elements, left_out, own["source"])
+        return MeasuredSurface(
+            values["q"], values["C"], values["h_max"].item(), **parts, bands=bands, table=table,
+            samples=values["samples"], anisotropy=anisotropy, unit=own.get("length_unit"),
+            provenance=tuple(json.loads(own["provenance"])),
+        )  # fmt: skip
+    except (InputError, LookupError, TypeError, ValueError) as fault:
+        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {ADVICE}") from None
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if value.size == 1 else value

@@ -1,0 +1,331 @@
+"""Simulations that are kept: a table of one's own surface, the cache, and laws in other languages."""
+
+import json
+import os
+import pathlib
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from helpers import fresh, refused, run
+from scipy.special import erf
+
+from generate.machined.makers import Part, heights
+from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
+from mbma_tables.common import cache
+from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
+from mbma_tables.export import CODE, DATA, LAWS, SOLVERS
+from mbma_tables.export.targets import targets
+from mbma_tables.laws import pressing
+from mbma_tables.laws.energy_spline import Continued
+from mbma_tables.theories import BoundaryElements, own_map
+from mbma_tables.theories.corrected import of_map
+
+pytest.importorskip("tamaas")
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return Surface.from_map(heights(Part("milled", 1, 64)), 1.0, periodic=True, unit="um")
+
+
+@pytest.fixture(scope="module")
+def file(surface, tmp_path_factory):
+    path = tmp_path_factory.mktemp("own") / "own.nc"
+    BoundaryElements.of(surface).to_netcdf(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def own(file):
+    return BoundaryElements.from_netcdf(file).surface
+
+
+def test_it_opens_without_the_map(surface, own):
+    assert own.map is None
+    for theory in (None, "calibrated"):
+        found = contact(own, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory)
+        known = contact(surface, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory or "simulated")
+        assert found.theory == known.theory
+        for name in ("pressure", "mean_separation", "stiffness", "energy", "scatter", "error", "valid"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+        np.testing.assert_array_equal([found.leakage.x, found.leakage.y], [known.leakage.x, known.leakage.y])
+    hard = {"pressure": 0.005, "hardness": 0.05}
+    assert contact(own, **hard).yielded == contact(surface, **hard, theory="simulated").yielded
+    assert own.provenance[0]["points"] == [64, 64]
+    with pytest.raises(InputError, match="this surface has none"):
+        contact(own, area=0.1, theory="corrected")
+
+
+def test_laws_scenes_and_other_units(surface, own):
+    law, known = contact_law(own), contact_law(surface, theory="simulated")
+    np.testing.assert_array_equal(law.block, known.block)
+    found = Scene(own, pressures=[0.01, 0.02], effects=["pressure", "area"]).run()
+    np.testing.assert_allclose(found.area, contact(own, pressure=[0.01, 0.02]).area)
+    moved = contact(own.to("mm"), pressure=0.01)
+    one = contact(own, pressure=0.01)
+    assert moved.mean_separation == pytest.approx(1e-3 * one.mean_separation)
+    np.testing.assert_allclose(moved.leakage.K, 1e-9 * one.leakage.K)
+    # all lengths twice as large, along the plane and across: nothing changes but these; heights alone: slopes
+    steep = contact(own.resized(2.0, 1.0), pressure=0.02)
+    assert (steep.area, steep.energy) == (pytest.approx(one.area), pytest.approx(4 * one.energy))
+    # a cut takes the simulation away
+    assert contact(own.between(float(own.q0), float(own.q1) / 1.5), pressure=0.01).theory == "calibrated"
+    # a simulation knows one surface
+    assert sensitivity(own, pressure=0.01).slopes["heights"]["area"] < -0.5
+
+
+def test_damage_and_other_files_are_refused(file, tmp_path):
+    content, bad = file.read_bytes(), tmp_path / "bad.nc"
+    for broken in (content[:-10], content[:2000], content[:3000] + b"x" + content[3001:], b""):
+        bad.write_bytes(broken)
+        with pytest.raises(TableFileError, match="mbma fit MAP --simulate --out"):
+            BoundaryElements.from_netcdf(bad)
+    with pytest.raises(TableFileError, match="not a simulated_map"):
+        BoundaryElements.from_netcdf("tables/universal.nc")
+    same = Surface.from_map(heights(Part("milled", 1, 64)), 1.0, periodic=True)
+    few = BoundaryElements.of(same, [0.1, 0.2, 0.3, 0.4])
+    with pytest.raises(InputError, match="default loads"):
+        few.to_netcdf(bad)
+
+
+def test_a_file_that_was_edited_and_sealed_again_is_refused(file, tmp_path):
+    import hashlib
+
+    import netCDF4
+
+    from mbma_tables.tablefiles.netcdf import SEAL, read_sealed
+
+    bad = tmp_path / "edited.nc"
+    bad.write_bytes(read_sealed(file))
+    with netCDF4.Dataset(bad, "a") as dataset:
+        dataset["pressure"][0] = 1e-9
+    body = bad.read_bytes()
+    bad.write_bytes(body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
+    with pytest.raises(TableFileError, match="do not match their hash"):
+        BoundaryElements.from_netcdf(bad)
+
+
+def test_every_variable_explains_itself(file):
+    import netCDF4
+
+    with netCDF4.Dataset(file) as dataset:
+        assert "SHA-256" in dataset.source
+        for name, variable in dataset.variables.items():
+            assert variable.long_name, name
+            assert variable.units, name
+        assert dataset["mean_separation"].units == "um"
+        assert dataset["C"].units == "um^4"
+
+
+def test_on_the_command_line(tmp_path):
+    np.save(tmp_path / "map.npy", heights(Part("milled", 1, 64)))
+    table = tmp_path / "own.nc"
+    words = ("--dx", "1um", "--periodic", "--E-star", "1GPa", "--simulate")
+    said = run("fit", tmp_path / "map.npy", *words, "--out", table)
+    assert f"{table} has the simulation" in said
+    found = json.loads(run("contact", "--map", table, "--E-star", "1GPa", "-p", "5MPa", "--json"))
+    assert found["theory"] == "simulated"
+    own = BoundaryElements.from_netcdf(table).surface
+    assert found["columns"]["area"] == pytest.approx(contact(own, pressure="5 MPa", E_star="1 GPa").area)
+    assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
+    assert "leave --dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
+    assert "not the map" in refused("fit", table)
+
+
+@pytest.mark.parametrize("target", [t for t in targets() if t not in CODE])
+def test_every_target_of_laws(target, file, tmp_path):
+    out = tmp_path / {"matlab": "own.mat", "onnx": "own.onnx"}.get(target, "own.txt")
+    words = ["export", target, "--map", str(file), "--E-star", "1 GPa", "--out", str(out)]
+    heat = ["--conductivity", "0.05", "--conductivity-unit", "W/(mm K)"] if "gapcon" in target else []
+    from mbma_tables.cli import main
+
+    result = CliRunner().invoke(main, words + heat)
+    if result.exit_code and "pip install" in result.stderr:
+        pytest.skip(result.stderr)
+    assert result.exit_code == 0, result.stderr
+    assert out.stat().st_size > 500
+    if target in (*SOLVERS, *LAWS, *DATA) and target not in ("matlab", "netcdf", "hdf5", "parquet", "json"):
+        text = " ".join(out.read_text().split())
+        assert "theory 'simulated'" in text
+        assert "SHA-256" in text
+
+
+def test_an_exported_law_is_the_law(own, file, tmp_path):
+    module = tmp_path / "own_law.py"
+    run("export", "python-law", "--map", file, "--E-star", "1 GPa", "--out", module)
+    law = contact_law(own, E_star="1 GPa")
+    c = np.geomspace(1e-3, 0.99, 50) * law.h_max
+    found = fresh(
+        "import importlib.util as i, json, sys, numpy as np\n"
+        "spec = i.spec_from_file_location('own_law', sys.argv[1]); m = i.module_from_spec(spec)\n"
+        "spec.loader.exec_module(m)\n"
+        "print(json.dumps(np.asarray(m.pressure(np.array(json.loads(sys.argv[2])))).tolist()))",
+        str(module),
+        json.dumps(c.tolist()),
+    )
+    np.testing.assert_allclose(found, law.pressure(law.h_max - c), rtol=1e-12)
+
+
+class TestBeyondTheLoads:
+    def test_force_and_stiffness_go_on(self, own):
+        theory = of_map("simulated", own)
+        for u in theory.rows[2, [0, -1]]:
+            beside = contact(own, mean_separation=u * (1 + np.array([-1e-9, 1e-9])))
+            for name in ("pressure", "stiffness", "area", "energy"):
+                assert np.ptp(np.log(getattr(beside, name))) < 1e-6, name
+        ends = contact(own, mean_separation=[0.0, float(own.h_max)])
+        assert ends.pressure.tolist() == [np.inf, 0.0]
+        assert ends.area.tolist() == [1.0, 0.0]
+
+    def test_what_was_not_simulated_is_told(self, own):
+        found = contact(own, pressure=[1e-8, 0.01, 0.25])
+        assert found.valid.tolist() == [False, True, False]
+        assert np.isnan(found.scatter).tolist() == [True, False, True]
+        assert (np.diff(found.area) > 0).all()
+        assert found.area[0] / found.pressure[0] == pytest.approx(
+            contact(own, pressure=1e-9).area / 1e-9, rel=1e-6
+        )  # in proportion
+        with pytest.raises(InputError, match="less: the mean separation vanishes"):
+            contact(own, pressure=1e3)
+        with pytest.raises(InputError, match="less than 1"):
+            contact(own, area=1.0)
+
+    def test_closed_forms(self):
+        # force (2 - u)^3 and its energy between loads, and beyond them the same
+        u = np.linspace(1.9, 1.0, 30)
+        force = 0.1 * (2 - u) ** 3
+        rows = np.array([force, erf(0.2 * force), u, 0.1 * (2 - u) ** 4 / 4])
+        curve = Continued(rows, -1, 2.0)
+        light = np.array([1.92, 1.95, 1.999])
+        x = np.log(0.1 * (2 - light) ** 3)
+        np.testing.assert_allclose(curve.log_force(light), x, rtol=1e-3)
+        np.testing.assert_allclose(curve.separation(x), light, rtol=1e-5)
+        np.testing.assert_allclose(curve.stiffness(x), 0.3 * (2 - light) ** 2, rtol=3e-3)
+        np.testing.assert_allclose(curve.energy(x), 0.1 * (2 - light) ** 4 / 4, rtol=3e-3)
+        for heavy in (np.log([0.3, 1.0]), x):
+            np.testing.assert_allclose(curve.area(heavy), erf(0.2 * np.exp(heavy)), rtol=1e-6)
+            np.testing.assert_allclose(curve.log_force_at(curve.area(heavy)), heavy, atol=1e-9)
+            np.testing.assert_allclose(curve.log_force(curve.separation(heavy)), heavy, atol=1e-9)
+        # -du/dF and the work of pressing on, by differences
+        step = np.log(0.3) + np.array([-1e-5, 1e-5])
+        u, energy = curve.separation(step), curve.energy(step)
+        assert curve.stiffness(np.log(0.3)) == pytest.approx(np.diff(np.exp(step))[0] / -np.diff(u)[0], rel=1e-6)
+        assert np.diff(energy)[0] == pytest.approx(-0.3 * np.diff(u)[0], rel=1e-6)
+
+
+class TestCache:
+    @pytest.fixture
+    def place(self, tmp_path, monkeypatch):
+        monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "kept"))
+        return tmp_path / "kept"
+
+    @staticmethod
+    def pressed(times=1.0, unit="um"):
+        values = times * heights(Part("milled", 1, 64))
+        return BoundaryElements.of(Surface.from_map(values, times, periodic=True, unit=unit))
+
+    def test_a_second_process_simulates_nothing(self, place, monkeypatch):
+        first = self.pressed()
+        flows = first.pressed.flow()
+        monkeypatch.setattr(pressing, "Contact", None)
+        monkeypatch.setattr(pressing, "flow_conductance", None)
+        for again in (self.pressed(), self.pressed(1e-3, "mm")):
+            np.testing.assert_allclose(again.rows[:2], first.rows[:2], rtol=1e-9)
+        assert np.array_equal(self.pressed().pressed.flow(), flows)
+        assert self.pressed(1e-3, "mm").pressed.flow()[0] == pytest.approx(1e-9 * flows[0])
+
+    def test_it_goes_on_where_it_was_interrupted(self, place, monkeypatch):
+        real, calls = pressing.Contact, []
+
+        class Interrupted(real):
+            def press(self, force):
+                calls.append(force)
+                if len(calls) == 5:
+                    raise KeyboardInterrupt
+                return super().press(force)
+
+        monkeypatch.setattr(pressing, "Contact", Interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            self.pressed()
+        assert len(cache.files()) == 4
+        found = self.pressed()
+        assert len(calls) == 5 + found.rows.shape[1] - 4
+        monkeypatch.setenv(cache.VARIABLE, "off")
+        np.testing.assert_allclose(found.rows, self.pressed().rows, rtol=5e-3)
+
+    def test_damaged_files_are_made_anew(self, place):
+        first = self.pressed()
+        for path, _ in cache.files():
+            path.write_bytes(path.read_bytes()[:100])
+        np.testing.assert_array_equal(self.pressed().rows, first.rows)
+
+    def test_the_oldest_goes_first(self, place):
+        for name, used in (("old", 100), ("new", 300), ("middle", 200)):
+            cache.keep(name, values=np.random.default_rng(1).random(1000))
+            os.utime(place / f"{name}.npz", (used, used))
+        assert cache.trim(2 * (place / "old.npz").stat().st_size) == 1
+        assert [path.stem for path, _ in cache.files()] == ["middle", "new"]
+        # what is read is new again
+        assert cache.load("middle", values=(1000,)) is not None
+        assert cache.load("middle", values=(999,)) is None
+        assert [path.stem for path, _ in cache.files()] == ["new", "middle"]
+
+    def test_command(self, place):
+        cache.keep("one", values=np.zeros(10))
+        assert f"{place}: 1 files" in run("cache")
+        assert json.loads(run("cache", "--clear", "--json")) == {
+            "folder": str(place), "files": 0, "bytes": 0, "removed": 1
+        }  # fmt: skip
+
+    def test_it_may_be_off_or_impossible(self, monkeypatch, tmp_path):
+        monkeypatch.setenv(cache.VARIABLE, "off")
+        assert cache.folder() is None
+        assert "nothing is kept" in run("cache")
+        monkeypatch.setenv(cache.VARIABLE, str(tmp_path / "file"))
+        (tmp_path / "file").write_text("no folder")
+        assert self.pressed().rows.shape[0] == 4
+        monkeypatch.delenv(cache.VARIABLE)
+        assert isinstance(cache.folder(), pathlib.Path)
+        assert cache.folder().name == "mbma_tables"
+
+
+class TestLargeMaps:
+    """Maps of too many points, here of more than 32 x 32."""
+
+    @pytest.fixture(autouse=True)
+    def few(self, monkeypatch):
+        monkeypatch.setattr(own_map, "MOST_POINTS", 32 * 32)
+
+    def test_finely_sampled_ones_lose_nothing(self):
+        part = Part("gaussian", 2, 64)  # eight sampling steps along the shortest wavelength
+        own = BoundaryElements.of(Surface.from_map(heights(part), 1.0, periodic=True))
+        assert own.pressed.heights.shape == (32, 32)
+        assert own.points == pytest.approx(4.0, rel=0.05)
+        found = contact(own.surface, area=0.2, theory=own)
+        assert found.valid
+        own_map.MOST_POINTS = 64 * 64
+        full = BoundaryElements.of(own.surface)
+        assert found.pressure == pytest.approx(contact(own.surface, area=0.2, theory=full).pressure, rel=0.05)
+
+    def test_others_are_cut_and_say_so(self, tmp_path):
+        surface = Surface.from_map(0.5 * heights(Part("gaussian", 0, 64)), 0.5, periodic=True, unit="um")
+        own = BoundaryElements.of(surface)
+        assert own.pressed.left_out == 4.0
+        found = contact(surface, area=0.2, theory=own)
+        assert not found.valid
+        assert next(iter(found.reasons)) == "wavelengths below 4 were left out, since the map has too many points"
+        own.to_netcdf(tmp_path / "own.nc")
+        again = BoundaryElements.from_netcdf(tmp_path / "own.nc")
+        assert again.pressed.left_out == 4.0
+        assert BoundaryElements.of(again.surface.to("nm")).pressed.left_out == pytest.approx(4000.0)
+
+
+def test_a_solver_that_fails_is_no_crash(monkeypatch):
+    # one element that stands out touches alone
+    spike = np.zeros((64, 64))
+    spike[5, 5] = 1.0
+    surface = Surface.from_map(spike + 1e-6 * heights(Part("gaussian", 0, 64)), 1.0, periodic=True)
+    with pytest.raises(ConvergenceError, match="boundary elements at F/"):
+        BoundaryElements.of(surface)
+    assert contact(surface, pressure=1e-3).theory == "calibrated"
