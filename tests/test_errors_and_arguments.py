@@ -1,4 +1,4 @@
-"""Typed errors, and the messages of the argument checks."""
+"""Public names, typed errors, and the messages of the argument checks."""
 
 import functools
 import math
@@ -7,7 +7,9 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import fresh
 
+import mbma_tables
 from mbma_tables import (
     ConvergenceError,
     InputError,
@@ -178,3 +180,27 @@ def test_what_is_given_by_place_but_has_a_name_is_refused_with_the_names():
         TypeError, match=r"contact takes 1 argument by position, got 2; .* separation=, mean_separation="
     ):
         contact(ROAD, 1.0)
+
+
+HEAVY = ("scipy", "matplotlib", "xarray", "SurfaceTopography", "pandas")
+
+
+def test_nothing_heavy_comes_with_the_package_its_errors_and_its_dir():
+    code = (
+        "import mbma_tables, sys, json; dir(mbma_tables); mbma_tables.InputError; mbma_tables.__version__;"
+        "print(json.dumps(sorted(sys.modules)))"
+    )
+    loaded = {name.partition(".")[0] for name in fresh(code)}
+    assert "mbma_tables" in loaded
+    assert loaded.isdisjoint(HEAVY)
+
+
+@pytest.mark.parametrize("name", mbma_tables.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(mbma_tables, name) is not None
+    assert name in dir(mbma_tables)
+
+
+def test_unknown_name():
+    with pytest.raises(AttributeError, match="no attribute 'contacts'"):
+        _ = mbma_tables.contacts

@@ -19,46 +19,30 @@ ROUNDS = 4  # of every question by every thread: about a million lookups in all
 @pytest.fixture(scope="module")
 def questions():
     """Functions of a seed, each with lookups of its own."""
-    model = universal_model()
+    model, law = universal_model(), contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
     X_axis, mu_axis = model.content.axes
-    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
 
-    def arguments(seed):
+    def phi(seed):
         rng = np.random.default_rng(seed)
-        X = rng.uniform(X_axis.low, X_axis.high, ENTRIES)
-        return X, 10 ** rng.uniform(-12, np.log10(mu_axis.high), ENTRIES)
+        X, mu = rng.uniform(X_axis.low, X_axis.high, ENTRIES), 10 ** rng.uniform(-12, np.log10(mu_axis.high), ENTRIES)
+        both = model.answer(X, mu), *model.slopes(X, mu)
+        return [part for found in both for part in (found.phi_F, found.phi_A)] + [both[0].error]
 
-    def gaps(seed, count):
-        return np.random.default_rng(seed).uniform(-3, 3, count)
+    def laws(seed):
+        d = np.random.default_rng(seed).uniform(-3, 3, ENTRIES)
+        p, area, slope = (value(separation=d) for value in (law.pressure, law.area, law.stiffness))
+        return [p, area, slope, law.pressure(separation=float(d[0])), law.separation(pressure=p[:200])]
 
-    def values(seed):
-        found = model.answer(*arguments(seed))
-        return [found.phi_F, found.phi_A, found.error]
-
-    def slopes(seed):
-        value, by_X, by_mu = model.slopes(*arguments(seed))
-        return [value.phi_F, by_X.phi_F, by_X.phi_A, by_mu.phi_F, by_mu.phi_A]
-
-    def law_values(seed):
-        d = gaps(seed, ENTRIES)
-        every = law.pressure, law.area, law.stiffness
-        return [*(value(separation=d) for value in every), law.pressure(separation=float(d[0]))]
-
-    def inverses(seed):
-        return [law.separation(pressure=law.pressure(separation=gaps(seed, 200)))]
-
-    def batches(seed):
+    def totals(seed):
         # 31 islands or more a gap
         rng = np.random.default_rng(seed)
-        surfaces = Surface(rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0)
-        found = contact(surfaces, separation=gaps(seed, 60), rtol=1e-6)
-        return [found.pressure, found.area, found.error]
+        many = Surface(rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0)
+        batch = contact(many, separation=rng.uniform(-3, 3, 60), rtol=1e-6)
+        one = Surface(0.6, 0.2, 30.0, 1.0, 3.0)
+        found = contact(one, separation=rng.uniform(-3, 3, 10), rtol=1e-6, derivatives=True)
+        return [batch.pressure, batch.area, batch.error, *found.pressure_by.values(), *found.area_by.values()]
 
-    def gradients(seed):
-        found = contact(Surface(0.6, 0.2, 30.0, 1.0, 3.0), separation=gaps(seed, 10), rtol=1e-6, derivatives=True)
-        return [*found.pressure_by.values(), *found.area_by.values()]
-
-    return [values, slopes, law_values, inverses, batches, gradients]
+    return [phi, laws, totals]
 
 
 def test_sixteen_threads_give_the_bits_of_one(questions):

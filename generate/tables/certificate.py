@@ -12,8 +12,7 @@ from generate.tables.configuration import Configuration
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.schema import FUNCTIONS, TableContent
+from mbma_tables.tablefiles.schema import FUNCTIONS, TableContent, check_content
 
 CONFORMANCE_POINTS = 64
 CONFORMANCE_TOLERANCE = 1e-11

@@ -17,8 +17,8 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles import schema
-from mbma_tables.tablefiles.checks import check_content
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, attributes_digest, digest_arrays
+from mbma_tables.tablefiles.schema import check_content
 
 CONVENTIONS = "CF-1.11"
 ANSWERS = {schema.UNIVERSAL: "Phi_{f}", schema.ISLAND4D: "{f}_hat"}

@@ -12,6 +12,8 @@ from typing import Any
 import click
 
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import KINDS
+from mbma_tables.models import ISLAND_MODELS
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -22,8 +24,7 @@ from mbma_tables.theories import OF_MAPS, THEORIES
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
-ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
-PICTURES = (".png", ".svg", ".pdf")
+PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 
 @dataclasses.dataclass(frozen=True)

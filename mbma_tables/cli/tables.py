@@ -5,17 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from mbma_tables.cli.options import json_option
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
-from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL
-
-if TYPE_CHECKING:
-    from mbma_tables.tablefiles.schema import TableContent
+from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL, TableContent
 
 
 def _place(name: str) -> tuple[Path, str | None]:

@@ -139,14 +139,7 @@ class Units:
             object.__setattr__(self, kind, known(unit, kind))
 
     def number(self, name: str, value: Any) -> Any:
-        """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry.
-
-        Examples
-        --------
-        >>> from mbma_tables.common.units import Units
-        >>> Units("um", "MPa").number("separation", ["2 um", "1.5e-3 mm"])
-        [2.0, 1.5]
-        """
+        """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry."""
         if isinstance(value, list | tuple):
             flat = list(_entries(value))
             bare = [entry for entry in flat if not isinstance(entry, str) or read(name, entry)[1] is None]
@@ -242,27 +235,16 @@ def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tu
 
 
 def unit_of(name: str, units: Units) -> str:
-    """The unit of a quantity by its name, such as "MPa/um"; "1" for numbers without one.
-
-    Examples
-    --------
-    >>> from mbma_tables.common.units import Units, unit_of
-    >>> unit_of("stiffness", Units("um", "MPa")), unit_of("m4", Units("mm")), unit_of("energy", Units("mm"))
-    ('MPa/um', '1/mm^2', 'stress mm')
-    """
+    """The unit of a quantity by its name, such as "MPa/um"; "1" for numbers without one."""
     length, stress = DIMENSIONS.get(name, (0, 0))
     powers = ((units.stress or "stress", stress), (units.length or "length", length))
-    above = [_power(unit, n) for unit, n in powers if n > 0 and unit != "1"]
-    below = [_power(unit, -n) for unit, n in powers if n < 0]
-    return (" ".join(above) or "1") + "".join(f"/{part}" for part in below)
-
-
-def _power(unit: str, power: int) -> str:
-    return unit if power == 1 else f"{unit}^{power}"
+    parts = [(n, unit if abs(n) == 1 else f"{unit}^{abs(n)}") for unit, n in powers]
+    above = " ".join(part for n, part in parts if n > 0 and part != "1")
+    return (above or "1") + "".join(f"/{part}" for n, part in parts if n < 0)
 
 
 def in_unit(surface: Any, unit: str | None) -> Any:
-    """A surface in the unit asked for: converted where it knows its own, said to be in it where it does not."""
+    """A surface in the unit asked for: converted from its own unit, or given that unit where it has none."""
     if unit is None:
         return surface
     return dataclasses.replace(surface, unit=unit) if surface.unit is None else surface.to(unit)

@@ -199,12 +199,7 @@ static mbma_spline spline_of(const argument *a) {
        mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4))) \
     /* hardness.c */ \
     FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
-       mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9))) \
-    FN(gap_start, "i Dm Dm Dm i Dn Dn w6n", \
-       I(0) > 0 && (I(0) == 1 || (uint64_t)I(0) == N(5)) && N(1) > 0 && N(1) % (size_t)I(0) == 0, \
-       mbma_gap_start(N(5), N(1) / (size_t)I(0), (size_t)I(0), P(1), P(2), P(3), I(4) != 0, P(5), P(6), P(7))) \
-    FN(gap_step, "Dn Dn i Ln Dm Dm w6m bn", true, \
-       mbma_gap_step(N(0), P(0), P(1), I(2) != 0, P(3), N(4), P(4), P(5), P(6), P(7)))
+       mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9)))
 
 /* A function of arguments: whether their sizes fit, and what was found. */
 #define DEFINE_CALL(name, kinds, fits, call) \

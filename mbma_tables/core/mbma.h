@@ -358,20 +358,6 @@ size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffnes
                          const double *slope, const double *eta, double light, double by_eta, double by_share,
                          double *force, double *steepness);
 
-/* Gaps at which a value that falls with the gap (a force, an area) is as wanted, by Newton's method in a bracket that
- * the caller repeats: values and -dvalue/du at state[0], then a step. `state` has six rows: the gap, its lower and upper
- * bound, and three numbers of the place before. `end` is the last gap with contact, which may be infinite. `exact` says
- * that slopes are those of the values; else they are about right, and differences are used.
- *
- * The start, from values at m places in order from last contact on, rows of one column for all, or of one column each;
- * bounds are given. */
-size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const double *value, const double *steep,
-                      int exact, const double *wanted, const double *end, double *state);
-
-/* One step of the gaps numbered `places`, of `total`, to whose places value and slope belong; `left`: not there yet. */
-size_t mbma_gap_step(size_t n, const double *value, const double *steep, int exact, const int64_t *places, size_t total,
-                     const double *wanted, const double *end, double *state, uint8_t *left);
-
 #ifdef __cplusplus
 }
 #endif

@@ -153,9 +153,10 @@ def closed(
     heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
 ) -> tuple[FloatArray, FloatArray]:
     """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
-    x, elastic = u / h_rms, (pressure / gradient, stiffness / gradient)
+    x, c = u / h_rms, CONSTANTS
     share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
-    load, steep = force(*elastic, share, slope / h_rms, eta)
+    given = pressure / gradient, stiffness / gradient, share, slope / h_rms, eta
+    load, steep = answered(core.capped_force, given, 2, c.force_light, c.force_eta, c.force_share)
     return load * gradient, steep * gradient
 
 
@@ -177,7 +178,7 @@ def plane_separation(u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: C
 def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
     gap, last = np.asarray(u, float), np.asarray(np.inf if h_max is None else h_max)
-    d, end = _levels(gap), _levels(last)
+    d, end = _levels(gap), _level_at_end(last.item()) if last.size == 1 else _levels(last)
     below, whole = ndtr(d), ndtr(end)
     share = np.maximum(np.where(end > 0, ndtr(-d) - ndtr(-end), whole - below), 0.0)
     slope = np.where(gap <= LEAST_GAP, -np.inf, np.exp(-d * d / 2) / (-ROOT_TWO_PI * below))
@@ -192,6 +193,12 @@ def _level_spline() -> Any:
     # the gap of -x, where both terms nearly cancel; that of x is larger by x
     deep = np.exp(-x * x / 2) * (1 / ROOT_TWO_PI - x * erfcx(x / np.sqrt(2)) / 2)
     return make_interp_spline(np.log(np.maximum(d, 0.0) + deep), d, 7)
+
+
+@functools.lru_cache(64)
+def _level_at_end(h_max: float) -> Any:
+    """The same of one highest point, kept for inversions."""
+    return _levels(np.asarray(h_max))
 
 
 def _levels(u: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,9 +21,6 @@ from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.schema import TableContent, error_cell
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 RAW = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
 STEP = 1e-5  # relative, of a raw number or of the spread: central differences of closed forms err by its square
@@ -100,7 +97,7 @@ class Island4dModel(Displayed):
             name: Variable(values, "1", about["long_name"], names) for name, (_, values, about) in fields.items()
         }
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         delta = np.geomspace(0.05, 2.0, 60)
         found = {hurst: self.lookup(delta, 3.0, 20.0, hurst, outside="nan").F_hat for hurst in (0.5, 0.7, 0.9)}
         return draw_lines({f"H = {hurst}": (delta, F) for hurst, F in found.items()}, "delta/h_rms", "F_hat")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -18,9 +18,6 @@ from mbma_tables.common.plots import draw_lines
 from mbma_tables.core import core, in_blocks
 from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SHOWN = 65  # places along an axis of the table as a Dataset
 BLOCK = 1 << 16  # islands between two looks for Ctrl-C
@@ -95,7 +92,7 @@ class UniversalModel(Ranged, Displayed):
         axes = {"X": Variable(X, "1", self._X.long_name, ("X",)), "mu": Variable(mu, "1", self._mu.long_name, ("mu",))}
         return axes | {name: Variable(values, "1", "", ("X", "mu")) for name, values in held}
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         X = np.linspace(0.0, 20.0, 60)
         lines = {f"mu = {mu:g}": (X[1:], self.answer(X[1:], mu).phi_F) for mu in (1e-3, 1.0, 1e3)}
         return draw_lines(lines, "X", "Phi_F")

@@ -11,16 +11,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbma_tables.common.errors import InputError
+from mbma_tables.models import AnyModel
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.problem import INVERTED, OF_LAW, OUTPUTS, REFINEMENTS, Problem
-
-if TYPE_CHECKING:
-    from mbma_tables.models import AnyModel
 
 ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is asked of its quadrature or law
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
@@ -121,8 +119,8 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
             continue  # too tight for the theory
         if math.isnan(plan.seconds):
             step = next(step for step in plan.steps if math.isnan(step.seconds))
-            unpriced = f"theory {step.theory!r}" if step.theory else f"step {step.name!r}"
-            raise InputError(f"the cost of {unpriced} is not known: give rtol instead of seconds")
+            unknown = f"theory {step.theory!r}" if step.theory else f"step {step.name!r}"
+            raise InputError(f"the cost of {unknown} is not known: give rtol instead of seconds")
         if plan.seconds <= problem.seconds:
             return plan
         least = plan.seconds
@@ -183,7 +181,9 @@ class _Planner:
         elif of_law:
             steps.append(self.law(of_law))
         elif totals:
-            steps.append(self.law(totals) if self.many_gaps() else self.totals(totals))
+            what = f"sum over islands at {self.count} gaps (Eqs. 48, 49)"
+            both = (", ".join(totals), what, None, totals[0] if len(totals) == 1 else "both")
+            steps.append(self.law(totals) if self.many_gaps() else self.summed("totals", *both))
         if hertz:
             what = "adaptive sum over islands with eta = 1, the Hertz area"
             steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
@@ -196,9 +196,11 @@ class _Planner:
             "validity": f"where the theory is tested, and its scatter, at {self.count} gaps",
             "leakage": f"flow through the gaps of contacts at {self.count} gaps",
         }
-        for name in filter(outputs.__contains__, followed):
-            step = Step(name, name, followed[name], None, None, self.count, 0.0, self.seconds_of_slopes())
-            steps.append(step)
+        steps += [
+            Step(name, name, what, None, None, self.count, 0.0, self.seconds_of_slopes())
+            for name, what in followed.items()
+            if name in outputs
+        ]
         steps += [self.other_theory(name) for name in self.problem.theories]
         theory = self.problem.theory_name
         left_out = tuple(name for name in OUTPUTS if name not in outputs)
@@ -232,10 +234,6 @@ class _Planner:
         error = factor * (asked + certified_error(island_model, asked))
         what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
         return Step("law", ", ".join(why), what, island_model, asked, self.count, error, seconds)
-
-    def totals(self, why: Sequence[str]) -> Step:
-        what = f"sum over islands at {self.count} gaps (Eqs. 48, 49)"
-        return self.summed("totals", ", ".join(why), what, None, why[0] if len(why) == 1 else "both")
 
     def summed(self, name: str, why: str, what: str, priced_as: str | None, quantity: str = "both") -> Step:
         """A sum over islands at every gap; `priced_as` is an island model whose totals cost about the same."""

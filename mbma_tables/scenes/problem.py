@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,10 @@ from mbma_tables.common.arguments import finite_array, nearest, number_in, requi
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
 from mbma_tables.materials import hardness_in
+from mbma_tables.models import ISLAND_MODELS, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
-
-if TYPE_CHECKING:
-    from mbma_tables.models import AnyModel
 
 # effects; docs/scenes.md says what each is
 OUTPUTS = (
@@ -229,8 +227,6 @@ class Problem:
     def _check_island_model(self) -> None:
         if self.island_model is None:
             return
-        from mbma_tables.models import ISLAND_MODELS
-
         if "sphere_deformation" in self.dropped:
             raise InputError("sphere_deformation is off, which is the rigid sphere: leave island model out")
         if isinstance(self.island_model, str) and self.island_model not in ISLAND_MODELS:

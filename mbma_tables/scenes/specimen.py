@@ -90,10 +90,10 @@ def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
 
         surface = BoundaryElements.from_netcdf(path).surface
         return Specimen(in_unit(surface, unit), f"simulated map: {_printable(path)}")
-    if options.pop("model", "measured") == "measured":
-        return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
-    surface = Surface.from_map(path, model="self-affine", **options)
-    return Specimen(surface, f"fitted to the map {_printable(path)}")
+    if options.get("model", "measured") != "measured":
+        return Specimen(Surface.from_map(path, **options), f"fitted to the map {_printable(path)}")
+    options.pop("model", None)
+    return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
 
 
 def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated, MeasuredSurface]:

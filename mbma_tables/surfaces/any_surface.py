@@ -6,7 +6,7 @@ import abc
 import dataclasses
 import functools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +16,6 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_lines
 from mbma_tables.common.units import Units, factor, unit_of
 from mbma_tables.surfaces import spectrum
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def frozen(values: Any) -> Any:
@@ -158,7 +155,7 @@ class AnySurface(Displayed, abc.ABC):
         known = {name: getattr(self, name) for name in MEANINGS}
         return {n: Variable(v, unit_of(n, units), MEANINGS[n]) for n, v in known.items() if v is not None}
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum to draw: take one surface")
         q = np.geomspace(self.q0, self.q1, 200)[1:-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from math import pi
+from typing import Any
 
 from mbma_tables.common.errors import InputError
 
@@ -19,7 +20,7 @@ class Case:
     name: str
     title: str
     length_unit: str | None
-    numbers: Mapping[str, float]
+    numbers: Mapping[str, Any]
 
 
 def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, top: float) -> dict[str, float]:

@@ -173,8 +173,8 @@ def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]
     ]
     if found.longest > ROLLED_OFF:
         told = (
-            f"the {LONGEST} longest wavelengths of the trace hold {found.longest:.0%} of its variance: h_rms increases "
-            "with its length, its error is larger than stated, and heights are taken as Gaussian"
+            f"the {LONGEST} longest wavelengths of the trace hold {found.longest:.0%} of its variance: "
+            "h_rms grows with its length, its error is larger than stated, and heights are taken as Gaussian"
         )
         notes.append({"step": "no roll-off", "share": found.longest, "told": told})
     return tuple(notes)

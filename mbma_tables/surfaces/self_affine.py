@@ -221,9 +221,9 @@ class SelfAffine(AnySurface):
         (0.762, 'um')
         """
         case = get_case(name)
-        make: Any = cls.from_moments if "m0" in case.numbers else cls
-        surface: Self = make(**case.numbers, unit=case.length_unit)
-        return surface
+        if "m0" in case.numbers:
+            return cls.from_moments(**case.numbers, unit=case.length_unit)
+        return cls(**case.numbers, unit=case.length_unit)
 
     @functools.cached_property
     def labelled(self) -> bool:

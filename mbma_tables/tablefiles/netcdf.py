@@ -20,7 +20,6 @@ import numpy as np
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import read_file
 from mbma_tables.tablefiles import schema
-from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
@@ -91,7 +90,7 @@ def verified(
     described = {name: _attributes_of(variable) for name, variable in dataset.variables.items()}
     for owner, attributes in {"": own, **described}.items():
         for name, value in attributes.items():
-            check_attribute(owner, name, value)
+            schema.check_attribute(owner, name, value)
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
             raise ValueError(f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}")
@@ -109,34 +108,26 @@ def verified(
 
 def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     """The table in an open file whose kind and format are known."""
-    own, described, values = verified(dataset, REQUIRED)
-    names = [name for name, _ in schema.AXES[kind]]
-    axes = tuple(
-        schema.Axis(
-            name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size
-        )
-        for name, text in ((name, described[name]) for name in names)
-    )
-    fields = schema.COEFFICIENTS[kind], "error"
-    for what, over in zip(fields, schema.dimensions(kind), strict=True):
+    own, described, values = verified(dataset, schema.REQUIRED)
+    names, fields = [name for name, _ in schema.AXES[kind]], ("long_name", "transform", "offset", "first", "last")
+    axes = tuple(schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size)) for name in names)
+    kinds = schema.COEFFICIENTS[kind], "error"
+    for what, over in zip(kinds, schema.dimensions(kind), strict=True):
         if any(dataset[f"{what}_{function}"].dimensions != over for function in schema.FUNCTIONS):
             raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
     coefficients, local_error = (
-        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1) for what in fields
+        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1) for what in kinds
     )
-    main = {f"{what}_{function}" for what in fields for function in schema.FUNCTIONS} | set(names)
-    beside = [name for name in values if name not in main and not name.startswith("conformance_")]
+    main = {f"{what}_{function}" for what in kinds for function in schema.FUNCTIONS} | set(names)
+    point = "conformance_"
+    beside = [name for name in values if name not in main and not name.startswith(point)]
     return schema.TableContent(
         kind=kind,
         axes=axes,
         coefficients=coefficients,
         local_error=local_error,
         auxiliary={name: (dataset[name].dimensions, values[name], described[name]) for name in beside},
-        conformance={
-            name.removeprefix("conformance_"): array
-            for name, array in values.items()
-            if name.startswith("conformance_")
-        },
+        conformance={name.removeprefix(point): values[name] for name in values if name.startswith(point)},
         attributes=own,
     )
 
@@ -154,7 +145,7 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.
             if version != schema.FORMAT_VERSIONS[found]:
                 raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
             content = _content(dataset, found)
-        check_content(content)
+        schema.check_content(content)
     except ValueError as fault:
         raise _refuse(source, str(fault), kind or "all") from None
     # what netCDF4 raises on bytes that are no netCDF file, or that lack a variable

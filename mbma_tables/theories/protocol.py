@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.core import core
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.differences import differences
+from mbma_tables.theories.gaps import Search
 
 LOOKS, FEW_LOOKS = 128, 8  # gaps at which an inversion begins, of one surface and of each of a batch,
 LOOKED_AT = 7.0  # from where to where, of ln u - ln(h_max - u),
@@ -218,9 +218,7 @@ class Theory(abc.ABC):
             (3, *(shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)))
         )
         seen[0], seen[1], seen[2] = looked, value, steep
-        state = np.full((6, goal.size), np.nan)
-        state[1], state[2] = low, high
-        core.gap_start(seen[0][0].size, *seen, exact, goal, ends, state)
+        search = Search(seen.reshape(3, len(shares), -1), exact, goal, ends, low, high)
         at_end = goal > seen[1][-1].ravel()
         if at_end.any():
             at_end = self._at_end(surface, quantity, goal, first, shape)
@@ -228,15 +226,14 @@ class Theory(abc.ABC):
         for _ in range(STEPS):
             if not left.size:
                 break
-            u, more = state[0, left], np.empty(left.size, dtype=bool)
             theory, own = self.at(shape, left), select(surface, shape, left)
-            value, steep, _ = (curve if theory is self and own is surface else theory.curve(own, quantity))(u)
-            known = np.ascontiguousarray(value), np.ascontiguousarray(steep)
-            core.gap_step(*known, exact, left, goal, ends, state, more)
-            left = left[more]
-        missed = (np.isnan(state[0]) | (np.abs(state[3] - np.log(goal)) > MISSED)) & (goal > 0) & ~at_end
+            value, steep, _ = (curve if theory is self and own is surface else theory.curve(own, quantity))(
+                search.gap[left]
+            )
+            left = search.step(left, value, steep)
+        missed = (np.isnan(search.gap) | (np.abs(search.before[0] - np.log(goal)) > MISSED)) & (goal > 0) & ~at_end
         missed[left] = True
-        u = np.where(goal == 0, high, np.where(at_end, low, state[0]))
+        u = np.where(goal == 0, high, np.where(at_end, low, search.gap))
         return u.reshape(shape), missed.reshape(shape)
 
     def _at_end(

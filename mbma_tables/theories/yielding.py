@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.common.arguments import FloatArray, checked_hardness
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws import hardness as law
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -118,16 +118,17 @@ class Yielding(Theory):
     theory : Theory
         The elastic one.
     hardness : array_like
-        p_m/E*; broadcasts with surfaces and separations. Where it is infinite, answers are the elastic theory's own.
+        p_m/E*, positive; broadcasts with surfaces and separations. Where it is infinite, nothing yields.
     """
 
     elastic: Any = None
 
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
-        self.elastic, self.hardness, self.reached = theory, checked_hardness(hardness), REACHED
+        self.elastic, self.hardness, self.reached = theory, np.asarray(hardness, dtype=float), REACHED
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
         # whether the elastic area at a force needs no separation
         self.knows_areas = type(theory).area_at is not Theory.area_at
+        self._bound: tuple[Any, Any] = None, None
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
         """With the hardnesses at flat places of a broadcast shape."""
@@ -153,10 +154,11 @@ class Yielding(Theory):
         else:
             both = self.elastic.answer(surface, np.stack([u, lighter]))
             elastic, (_, at_force, *_) = (TheoryAnswer(*(part[k] for part in both)) for k in range(2))
-        eta, gradient, endless = self._eta(surface), np.asarray(surface.rms_gradient), np.isinf(self.hardness)
+        eta, closed = self._closed(surface)
+        gradient, endless = np.asarray(surface.rms_gradient), np.isinf(self.hardness)
         if endless.all():
             return Loaded(u, h_rms, eta, elastic.pressure / gradient, elastic, elastic, elastic.area)
-        pressure, stiffness = self._closed(surface, eta)(u, elastic.pressure, elastic.stiffness)
+        pressure, stiffness = closed(u, elastic.pressure, elastic.stiffness)
         if at_force is None:
             needed = (pressure > 0) & ~endless
             # where nothing yields or touches, a force that the theory is sure to reach
@@ -169,10 +171,13 @@ class Yielding(Theory):
             capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
         return Loaded(u, h_rms, eta, capped.pressure / gradient, capped, elastic, at_force)
 
-    def _closed(self, surface: AnySurface, eta: FloatArray) -> Callable[..., Any]:
-        """Force over A0 E* and its -d/du at mean separations, between the elastic ones and the bearing curve."""
-        sizes = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient), eta
-        return functools.partial(law.closed, self.elastic.heights(surface), *sizes)
+    def _closed(self, surface: AnySurface) -> Any:
+        """p_m/(E* g), and the force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
+        if self._bound[0] is not surface:
+            eta = self._eta(surface)
+            sizes = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient), eta
+            self._bound = surface, (eta, functools.partial(law.closed, self.elastic.heights(surface), *sizes))
+        return self._bound[1]
 
     def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations [length] of the elastic contact at the forces of this one."""
@@ -197,7 +202,7 @@ class Yielding(Theory):
         """Force without the area, which follows from it."""
         if quantity != "pressure":
             return super().curve(surface, quantity)
-        elastic, closed = self.elastic.curve(surface, quantity), self._closed(surface, self._eta(surface))
+        elastic, closed = self.elastic.curve(surface, quantity), self._closed(surface)[1]
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
             pressure, steep, exact = elastic(u)

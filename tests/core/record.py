@@ -91,8 +91,6 @@ def use():
         more = [surfaces[2] if form > 5 else None] * 2
         core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
     greenwood_tripp.radius(2.0, 0.5, 1e-6)
-    u = np.geomspace(2.9, 0.1, 12)
-    core.gap_start(1, u, np.exp(-u), np.exp(-u), 1, surfaces[0], surfaces[2], np.full((6, 20), 0.5))
 
     open_table("island4d").lookup(np.linspace(1.0, 2.0, 100), 3.0, 20.0, 0.8)
     universal = open_table("universal")

@@ -1,8 +1,5 @@
 """What running exports in their programs found, each as a test of its own."""
 
-from __future__ import annotations
-
-import ctypes
 import importlib.util
 import io
 import json
@@ -11,7 +8,6 @@ import re
 import subprocess
 import sys
 import zipfile
-from typing import Any
 
 import law_points
 import numpy as np
@@ -23,7 +19,7 @@ from mbma_tables import InputError, Surface, contact, contact_law
 from mbma_tables.export import FMUS, solvers
 from mbma_tables.export.fmu import fmu
 from mbma_tables.export.law_code import law_files
-from mbma_tables.export.law_rows import LawTable, describe_law
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.onnx import onnx
 
 SIDE, BLOCKS, CONDUCTIVITY = 10.0, 1e6, 50.0  # mm, MPa, mW/(mm K)
@@ -32,12 +28,12 @@ PRESSURES = np.geomspace(0.012, 1.9, 6)  # MPa
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 
 
-def heat_law(**options: Any) -> LawTable:
+def heat_law(**options):
     asked = {"quantity": "conductance", "pressures": ("10 kPa", "2 MPa"), "rows": 20, **HEAT}
     return describe_law(ROUGH, "25 MPa", **(asked | options))
 
 
-def calculix(deck: str, folder: pathlib.Path) -> tuple[subprocess.CompletedProcess[str], np.ndarray, np.ndarray]:
+def calculix(deck, folder):
     """What CalculiX says of a deck, and the pressures and heat fluxes at the ends of its steps."""
     (folder / "joint.inp").write_text(deck)
     said = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
@@ -49,7 +45,7 @@ def calculix(deck: str, folder: pathlib.Path) -> tuple[subprocess.CompletedProce
     return said, np.array([row[2] for row in rows if len(row) == 3]), np.array([r[0] for r in rows if len(r) == 1])
 
 
-def pressed(card: str, c: np.ndarray, p: np.ndarray, coupled: str = "*COUPLED") -> str:
+def pressed(card, c, p, coupled="*COUPLED"):
     """Two blocks pressed by displacements and heated, in one step for each overclosure."""
     deck = blocks(None, card, [], SIDE, BLOCKS).replace("NODE TO SURFACE", "SURFACE TO SURFACE")
     deck = deck.replace("*SOLID", f"*CONDUCTIVITY\n{CONDUCTIVITY!r}\n*EXPANSION\n0.\n*SOLID", 1)
@@ -66,14 +62,13 @@ def pressed(card: str, c: np.ndarray, p: np.ndarray, coupled: str = "*COUPLED") 
     return f"{deck}*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 50.\n{steps}"
 
 
-def conductance(flux: np.ndarray) -> np.ndarray:
+def conductance(flux):
     """That of the joint, in series with the blocks."""
-    joint: np.ndarray = 1 / (100 / flux - 2 * SIDE / CONDUCTIVITY)
-    return joint
+    return 1 / (100 / flux - 2 * SIDE / CONDUCTIVITY)
 
 
 @needs("ccx")
-def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path: pathlib.Path) -> None:
+def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     law = contact_law(ROUGH, E_star="25 MPa")
     card, c = solvers.calculix(heat_law()), law.h_max - law.at_pressure(PRESSURES).mean_separation
     said, p, flux = calculix(pressed(card, c, PRESSURES), tmp_path)
@@ -89,7 +84,7 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path: pathl
 
 
 @needs("ccx")
-def test_calculix_uncoupled_is_an_increment_late(tmp_path: pathlib.Path) -> None:
+def test_calculix_uncoupled_is_an_increment_late(tmp_path):
     law = contact_law(ROUGH, E_star="25 MPa")
     pressures = np.repeat([0.1, 0.5, 0.9], 2)
     c = law.h_max - law.at_pressure(pressures).mean_separation
@@ -103,7 +98,7 @@ def test_calculix_uncoupled_is_an_increment_late(tmp_path: pathlib.Path) -> None
 
 @needs("ccx")
 @pytest.mark.parametrize("rows", [20, 50])
-def test_calculix_does_not_read_tabular_surface_to_surface(rows: int, tmp_path: pathlib.Path) -> None:
+def test_calculix_does_not_read_tabular_surface_to_surface(rows, tmp_path):
     law = describe_law(ROUGH, "25 MPa", pressures=("10 kPa", "2 MPa"), rows=rows)
     found = contact(ROUGH, pressure=PRESSURES, E_star="25 MPa")
     deck = blocks(law, solvers.calculix(law), ROUGH.h_max - found.mean_separation, SIDE, 1e9)
@@ -114,13 +109,13 @@ def test_calculix_does_not_read_tabular_surface_to_surface(rows: int, tmp_path: 
     assert "no force at up to 41 rows, without a message, and from 50 rows on it aborts" in text
 
 
-def test_rows_of_conductance_are_where_it_is_used() -> None:
+def test_rows_of_conductance_are_where_it_is_used():
     law = heat_law()
     assert law.x[:2] == pytest.approx([0, 0.01], rel=1e-2)
     assert law.largest_error < 3e-3
 
 
-def test_the_exponential_card_states_its_limits() -> None:
+def test_the_exponential_card_states_its_limits():
     text = solvers.exponential(Surface.named("concrete"), "13.3 MPa")
     for share, p in re.findall(r"(\d+)% up to p = ([\d.e-]+)", text):
         c0, p0 = map(float, text.splitlines()[-1].split(", "))
@@ -144,7 +139,7 @@ print(json.dumps([[float(v) for pair in beyond for v in pair], [float(v) for v i
 
 
 @pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="not installed: jax")
-def test_jax_has_no_derivative_where_it_has_no_value(tmp_path: pathlib.Path) -> None:
+def test_jax_has_no_derivative_where_it_has_no_value(tmp_path):
     (tmp_path / "road.py").write_text(law_points.text("jax-law", "calibrated", leakage=True))
     said = subprocess.run([sys.executable, "-c", JAX], cwd=tmp_path, capture_output=True, text=True, check=True)
     beyond, (below, at, above) = json.loads(said.stdout)
@@ -162,7 +157,7 @@ printf('%.17g\\n', law.pressure(int32([0 1])), law.leakage(int32(1)), law.overcl
 
 
 @needs("octave-cli")
-def test_octave_takes_any_number(tmp_path: pathlib.Path) -> None:
+def test_octave_takes_any_number(tmp_path):
     (tmp_path / "road.m").write_text(law_points.text("matlab-law", "mbma", name="road", leakage=True))
     command = ["octave-cli", "--no-init-file", "--eval", OCTAVE]
     said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
@@ -174,21 +169,8 @@ def test_octave_takes_any_number(tmp_path: pathlib.Path) -> None:
     )
 
 
-@needs("gcc")
-@pytest.mark.parametrize("name", law_points.ASKED)
-def test_c_is_finite_at_the_least_numbers(name: str, tmp_path: pathlib.Path) -> None:
-    (tmp_path / "road.c").write_text(law_points.text("c-law", name, name="road", leakage=True))
-    strict = ["-Wall", "-Wextra", "-Wconversion", "-Wfloat-conversion", "-Werror"]
-    subprocess.run(["gcc", *strict, "-shared", "-fPIC", "road.c", "-lm", "-o", "road.so"], cwd=tmp_path, check=True)
-    library = ctypes.CDLL(str(tmp_path / "road.so"))
-    for quantity in ("pressure", "tangent", "curvature", "area", "energy", "leakage"):
-        function = library[f"road_{quantity}"]
-        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
-        assert np.isfinite([function(c) for c in (5e-324, 1e-320, 1e-310, 2.3e-308)]).all(), quantity
-
-
 @needs("gcc", "g++")
-def test_the_header_of_a_law_in_c_and_cpp(tmp_path: pathlib.Path) -> None:
+def test_the_header_of_a_law_in_c_and_cpp(tmp_path):
     files = law_files("c-law", law_points.ROAD, "13.3 MPa", name="road", leakage=True, **HEAT)
     (tmp_path / "road.c").write_text(files[""])
     (tmp_path / "road.h").write_text(files[".h"])
@@ -207,15 +189,14 @@ def test_the_header_of_a_law_in_c_and_cpp(tmp_path: pathlib.Path) -> None:
 
 
 @pytest.mark.parametrize("more", [{}, {"leakage": True, **HEAT}])
-def test_types_of_a_law_in_javascript(more: dict[str, Any]) -> None:
+def test_types_of_a_law_in_javascript(more):
     files = law_files("javascript-law", law_points.ROAD, "13.3 MPa", name="road", **more)
     exported = re.findall(r"^export (?:const|function) (\w+)", files[""], flags=re.M)
-    assert sorted(re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)) == sorted(
-        exported
-    )
+    typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)
+    assert sorted(typed) == sorted(exported)
 
 
-def test_onnx_states_what_it_takes() -> None:
+def test_onnx_states_what_it_takes():
     runtime, library = pytest.importorskip("onnxruntime"), pytest.importorskip("onnx")
     file = onnx(law_points.ROAD, "13.3 MPa")
     session = runtime.InferenceSession(file, providers=["CPUExecutionProvider"])
@@ -232,26 +213,24 @@ def test_onnx_states_what_it_takes() -> None:
 @pytest.mark.parametrize(
     "target", ["c-law", "javascript-law", "python-law", "matlab-law", "modelica-law", "fortran-law"]
 )
-def test_headers_name_functions_that_are_there(target: str) -> None:
-    text = law_points.text(target, "calibrated", name="road", **HEAT)
-    lines = " ".join(line.strip("*/!#%; ") for line in text.partition("Example: ")[2].splitlines()[:4])
+def test_headers_name_functions_that_are_there(target):
+    head, _, text = law_points.text(target, "calibrated", name="road", **HEAT).partition("Example: ")
+    lines = " ".join(line.strip("*/!#%; ") for line in text.splitlines()[:4])
     called = re.findall(r"(?:road[._]|law\.)?(\w+)\([\d.]", lines)
     assert len(called) >= 2
     for name in called:
-        assert re.search(
-            rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text.partition("Example: ")[2]
-        )
-    assert "{{" not in text.partition("Example: ")[0]
+        assert re.search(rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text)
+    assert "{{" not in head
 
 
 @pytest.mark.parametrize("name", law_points.ASKED)
-def test_a_turn_is_told_of_where_there_is_one(name: str) -> None:
+def test_a_turn_is_told_of_where_there_is_one(name):
     text, law = law_points.text("c-law", name), points(name).law
     turns = law.turning_point is not None and law.turning_point > law.lowest + 1e-9 * law.h_max
     assert ("where pressure turns down" in text) == turns
 
 
-def test_units_of_modelica(tmp_path: pathlib.Path) -> None:
+def test_units_of_modelica(tmp_path):
     text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)
     for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
         assert f'type {kind} = Real(unit = "{unit}");' in text
@@ -274,7 +253,7 @@ int main(void) {
 
 @needs("gcc")
 @pytest.mark.parametrize("target", ["abaqus-gapcon", "calculix-gapcon"])
-def test_gapcon_keeps_its_last_value(target: str, tmp_path: pathlib.Path) -> None:
+def test_gapcon_keeps_its_last_value(target, tmp_path):
     text = law_points.text(target, "calibrated", name="road", **HEAT)
     (tmp_path / "road.c").write_text(text)
     (tmp_path / "ask.c").write_text(GAPCON)
@@ -298,7 +277,7 @@ def test_gapcon_keeps_its_last_value(target: str, tmp_path: pathlib.Path) -> Non
 
 @needs("cc")
 @pytest.mark.parametrize("target", FMUS)
-def test_an_fmu_runs_as_it_is(target: str, tmp_path: pathlib.Path) -> None:
+def test_an_fmu_runs_as_it_is(target, tmp_path):
     fmpy = pytest.importorskip("fmpy")
     file = fmu(target, law_points.ROAD, "13.3 MPa", name="road", leakage=True)
     (tmp_path / "road.fmu").write_bytes(file)
@@ -317,7 +296,7 @@ def test_an_fmu_runs_as_it_is(target: str, tmp_path: pathlib.Path) -> None:
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_an_fmu_without_a_compiler(fails: bool, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_fmu_without_a_compiler(fails, tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     (tmp_path / "cc").write_text("#!/bin/sh\nexit 1\n")
     (tmp_path / "cc").chmod(0o755)
@@ -334,7 +313,7 @@ def test_an_fmu_without_a_compiler(fails: bool, tmp_path: pathlib.Path, monkeypa
 
 @pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang")
-def test_an_fmu_for_all_platforms() -> None:
+def test_an_fmu_for_all_platforms():
     archive = zipfile.ZipFile(io.BytesIO(fmu("fmu3", law_points.ROAD, "13.3 MPa", binaries="all")))
     begins = {name.split("/")[1]: archive.read(name)[:4] for name in archive.namelist() if "binaries/" in name}
     elf, mach, dll = b"\x7fELF", b"\xcf\xfa\xed\xfe", b"MZ"
@@ -345,7 +324,7 @@ def test_an_fmu_for_all_platforms() -> None:
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
 @pytest.mark.parametrize("pressures", [None, ("1 kPa", "0.5 MPa")])
-def test_a_law_continued_by_its_tangents(theory: str, pressures: Any) -> None:
+def test_a_law_continued_by_its_tangents(theory, pressures):
     law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory=theory)
     trial = law.continued(pressures)
     inner = np.linspace(trial.heavy, trial.light, 50)
@@ -370,7 +349,7 @@ def test_a_law_continued_by_its_tangents(theory: str, pressures: Any) -> None:
 
 
 @pytest.mark.parametrize("pressures", [("2 kPa", "1 kPa"), (0.0, 0.1), "12", (1, 2, 3)])
-def test_pressures_that_do_not_rise(pressures: Any) -> None:
+def test_pressures_that_do_not_rise(pressures):
     law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
     with pytest.raises(InputError, match="two rising numbers"):
         law.continued(pressures)
@@ -379,7 +358,7 @@ def test_pressures_that_do_not_rise(pressures: Any) -> None:
 
 
 @pytest.mark.skipif(importlib.util.find_spec("skfem") is None, reason="not installed: scikit-fem")
-def test_newton_in_scikit_fem_from_zero_load() -> None:
+def test_newton_in_scikit_fem_from_zero_load():
     example = pathlib.Path(__file__).parents[2] / "examples" / "newton.py"
     said = subprocess.run(
         [sys.executable, str(example)], capture_output=True, text=True, check=True

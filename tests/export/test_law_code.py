@@ -25,7 +25,7 @@ from mbma_tables.export.text import core_file
 
 QUANTITIES = ("pressure", "tangent", "area", "energy", "leakage")
 FIELDS = {"pressure": "p"}  # of points, where they have another name
-WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wshadow")
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wfloat-conversion", "-Wshadow")
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 
 
@@ -89,6 +89,11 @@ def test_c_outside_its_range(name, compiled):
     assert np.isnan(c_function(library, "overclosure")([-1.0, math.nan, math.inf, 1.01 * most])).all()
     if not before:
         assert c_function(library, "overclosure")([0.0]) == 0
+    # the least numbers
+    for quantity in (*QUANTITIES, "curvature"):
+        found = c_function(library, quantity)([5e-324, 1e-320, 1e-310, 2.3e-308])
+        assert np.isfinite(found).all(), quantity
+        assert (found >= 0).all() or quantity == "curvature" or before, quantity
 
 
 @needs("gcc")
@@ -115,8 +120,6 @@ def test_headers_say_what_is_there():
     assert all(fact in text for fact in facts)
     assert "import { pressure, withTangent, area" in law_points.text("javascript-law", "mbma")
     assert "overclosure(" not in law_points.text("modelica-law", "mbma").partition("package")[0]
-    for name, turns in (("mbma", False), ("calibrated", False), ("turning", True)):
-        assert ("where pressure turns down" in law_points.text("c-law", name)) == turns
 
 
 @pytest.mark.parametrize(
@@ -164,10 +167,7 @@ def test_digits_next_to_first_contact(compiled):
     c = np.geomspace(1e-70, 1e-14, 100)
     np.testing.assert_allclose(c * tangent(c) / pressure(c), 3.5, rtol=1e-6)
     np.testing.assert_allclose(inverse(pressure(c)), c, rtol=1e-14)
-    lightest = np.array([5e-324, 1e-310, 1e-200])
-    for quantity in ("pressure", "tangent", "area", "energy", "curvature"):
-        assert (c_function(compiled["mbma"], quantity)(lightest) >= 0).all()
-    assert (inverse(lightest) > 0).all()
+    assert (inverse(np.array([5e-324, 1e-310, 1e-200])) > 0).all()
 
 
 @needs("gcc")

@@ -1,4 +1,4 @@
-"""`Surface`: its properties against the spectrum itself, units, batches, bad input."""
+"""`Surface` against its spectrum, units, batches, bad input; the paper's cases and variants."""
 
 import dataclasses
 import math
@@ -8,7 +8,9 @@ import pytest
 import scipy.integrate
 import xarray as xr
 
-from mbma_tables import OutOfRangeError, Surface
+from mbma_tables import InputError, OutOfRangeError, Surface
+from mbma_tables.surfaces.cases import CASES
+from mbma_tables.surfaces.variants import PRINTED, REPORTED, VARIANTS, get_variant
 
 GOOD = {"hurst": 0.8, "q0": 0.5, "q1": 100.0, "h_rms": 0.2, "h_max": 0.6}
 
@@ -94,3 +96,80 @@ def test_band_out_of_range(zeta_1):
     with pytest.raises(OutOfRangeError, match=r"^q1/q0 must be") as caught:
         Surface(0.8, 1.0, [200.0, zeta_1], 0.2, 0.6)
     assert caught.value.mask.tolist() == [False, True]
+
+
+# name: H, zeta_1, q0 h_rms, h_max/h_rms, to the digits known
+KNOWN = {
+    "yang-persson": (0.8, 216, 6 * math.pi / 1040 * 10, 3),
+    "papangelo": (0.8, 64, 2 * math.pi / 100 * 5, 3),
+    "challenge": (0.8, 200, 2 * math.pi / 20 * 0.762, 3.7),
+    **{f"resolution-{z}": (0.7, z, 0.1, 3) for z in (125, 250, 500, 1000)},
+}
+ROADS = {
+    "concrete": (0.7, 64.8598, 0.538132, 0.071, 0.27, 62.0, 1.1),
+    "asphalt": (0.85, 143.8668, 1.734830, 0.091, 2.67, 21000.0, 1.37),
+}
+
+
+def test_every_case_is_checked_here():
+    assert set(CASES) == {*KNOWN, *ROADS}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_given_by_its_band(name):
+    surface = Surface.named(name)
+    found = (surface.hurst, surface.zeta_1, surface.q0 * surface.h_rms, surface.h_max / surface.h_rms)
+    assert found == pytest.approx(KNOWN[name], rel=1e-13, abs=0)
+
+
+@pytest.mark.parametrize("name", ROADS)
+def test_given_by_its_moments(name):
+    hurst, zeta_1, q0, m0, m2, m4, h_max = ROADS[name]
+    surface = Surface.named(name)
+    assert (surface.hurst, surface.h_max) == (hurst, h_max)
+    assert surface.zeta_1 == pytest.approx(zeta_1, abs=5e-5)
+    assert surface.q0 == pytest.approx(q0, abs=5e-7)
+    assert (surface.m0, surface.m2, surface.m4) == pytest.approx((m0, m2, m4), rel=1e-12, abs=0)
+
+
+def test_unknown_case():
+    with pytest.raises(InputError, match="no surface is named 'moon'; there are yang-persson"):
+        Surface.named("moon")
+
+
+def test_the_two_variants_differ_by_pi_alone():
+    assert math.pi * REPORTED.density_divisor == pytest.approx(PRINTED.density_divisor, rel=1e-15, abs=0)
+    assert PRINTED.density_divisor == pytest.approx(6 * math.pi * math.sqrt(3), rel=1e-15, abs=0)
+    same = dataclasses.replace(REPORTED, name="printed", density_divisor=PRINTED.density_divisor)
+    assert same == PRINTED
+    assert set(VARIANTS) == {"reported", "printed"}
+
+
+def test_the_papers_constants():
+    assert (PRINTED.beta, PRINTED.phi) == (1 / 3, 0.05)
+    assert (PRINTED.floor_d, PRINTED.floor_u, PRINTED.jacobian) == (1.5, 3.0, "printed")
+    assert (PRINTED.offset, PRINTED.summit_sigma) == (True, True)
+
+
+def test_by_name_or_own():
+    assert get_variant("printed") is PRINTED
+    own = dataclasses.replace(PRINTED, name="own", beta=0.3)
+    assert get_variant(own) is own
+    assert own.recorded == [PRINTED.density_divisor, 0.3, 0.05, 1.5, 3.0, True, True]
+    assert own.numbers.tolist() == [*own.recorded, True]
+
+
+@pytest.mark.parametrize("name", ["guessed", "", None, 3, ["printed"]])
+def test_unknown_variant(name):
+    with pytest.raises(InputError, match="variant must be one of"):
+        get_variant(name)
+
+
+NONSENSE = {"density_divisor": (0.0, -1.0, math.nan, math.inf), "jacobian": ("guessed",), "beta": (0.0, 0.75, math.nan)}
+NONSENSE |= {"phi": (0.0, 2.0, math.nan), "floor_d": (1.0, 3.0), "floor_u": (1.2, math.nan)}
+
+
+@pytest.mark.parametrize(("field", "value"), [(field, value) for field in NONSENSE for value in NONSENSE[field]])
+def test_nonsense_is_refused(field, value):
+    with pytest.raises(InputError, match="variant 'own'"):
+        dataclasses.replace(PRINTED, name="own", **{field: value})

@@ -270,6 +270,7 @@ def test_lengths_with_their_unit():
     plain = Surface.from_map(MAP, STEP, unit="um", short_cutoff=3.0, model="measured")
     named = Surface.from_map(MAP, "250 nm", unit="um", short_cutoff="3e-6 m", model="measured")
     assert named.q1 == pytest.approx(plain.q1, rel=1e-12)
+    assert plain.q1 <= 2 * np.pi / 3 * (1 + 1e-9)
     assert named.unit == "um"
     with pytest.raises(InputError, match="whose unit of length is not known"):
         Surface.from_map(MAP, STEP, short_cutoff="3 um")

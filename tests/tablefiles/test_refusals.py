@@ -11,9 +11,8 @@ from fuzzing import spoilt
 from small_tables import copied, edited, seal, small_table, unseal
 
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.tablefiles.checks import check_content
 from mbma_tables.tablefiles.netcdf import MAX_BYTES, SEAL_LENGTH, attributes_digest, read_table
-from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, ISLAND4D, KINDS, UNIVERSAL
+from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, ISLAND4D, KINDS, UNIVERSAL, check_content
 
 
 def refused(path, kind=None):

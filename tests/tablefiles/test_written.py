@@ -1,16 +1,27 @@
-"""Files are written whole or not at all, the same each time, and any netCDF reader opens them."""
+"""Files are written whole or not at all, the same each time; their hashes and conformance points verify them."""
 
 import dataclasses
+import hashlib
+import os
+import pathlib
+import re
 import resource
+import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from small_tables import small_table
 
+import mbma_tables
+from generate.provenance import MODULES, source_digest
 from generate.tables.writing import write_table
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.models.tables import verify
+from mbma_tables.tablefiles.netcdf import digest_arrays, digest_json, read_table
+from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
 
 
 @pytest.fixture(params=KINDS)
@@ -65,3 +76,126 @@ def test_content_that_does_not_fit_leaves_nothing(tmp_path):
     with pytest.raises(ValueError, match="incomplete conformance points"):
         write_table(tmp_path / "table.nc", dataclasses.replace(content, conformance=conformance))
     assert list(tmp_path.iterdir()) == []
+
+
+PACKAGE = pathlib.Path(mbma_tables.__file__).parent
+
+
+def test_the_source_digest_is_that_of_the_files():
+    assert set(MODULES[UNIVERSAL]) < set(MODULES[ISLAND4D])
+    python, c = ([name for name in MODULES[ISLAND4D] if ("/" in name) == is_c] for is_c in (False, True))
+    assert (*c, *python) == MODULES[ISLAND4D]
+    files = [PACKAGE.parent / path for path in (*c, *(f"{name.replace('.', '/')}.py" for name in python))]
+    joined = b"".join(file.read_bytes() for file in files)
+    assert source_digest(MODULES[ISLAND4D]) == hashlib.sha256(joined).hexdigest()
+    with pytest.raises(ModuleNotFoundError, match=r"mbma_tables\.nowhere"):
+        source_digest(("mbma_tables.nowhere",))
+
+
+@pytest.mark.slow
+def test_renaming_a_local_variable_of_the_solver_changes_nothing_outside(tmp_path):
+    for name in ("mbma_tables", "tables"):
+        shutil.copytree(PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    solver = tmp_path / "mbma_tables" / "islands" / "greenwood_tripp.py"
+    source = solver.read_text(encoding="utf-8")
+    renamed, count = re.subn(r"\bdigits\b", "decimal_digits", source)
+    assert count > 1
+    solver.write_text(renamed, encoding="utf-8")
+    command = [sys.executable, "-W", "error", "-m", "mbma_tables", "tables", "verify"]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    made = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    lines = made.stdout.splitlines()
+    assert made.stderr == ""
+    assert [line.partition(": ")[0] for line in lines] == [str(tmp_path / "tables" / f"{kind}.nc") for kind in KINDS]
+    assert all("hashes match; 64 conformance points" in line for line in lines)
+
+
+def test_arrays_count_by_name_shape_type_and_bytes():
+    x = np.arange(6.0)
+    own = digest_arrays({"a": x, "b": x + 1})
+    assert own == digest_arrays({"b": x + 1, "a": x})
+    assert own == digest_arrays({"a": x.astype(">f8"), "b": np.repeat(x + 1, 2)[::2]})
+    others = [
+        {"a": x},
+        {"b": x, "a": x + 1},
+        {"a": x, "c": x + 1},
+        {"a": x.reshape(2, 3), "b": x + 1},
+        {"a": x.astype("f4"), "b": x + 1},
+        {"a": np.nextafter(x, 9.0), "b": x + 1},
+        {"a": -x, "b": x + 1},
+    ]
+    assert len({own, *(digest_arrays(other) for other in others)}) == len(others) + 1
+    by_hand = hashlib.sha256(b"a:<f8:(6,);" + x.astype("<f8").tobytes()).hexdigest()
+    assert digest_arrays({"a": x}) == by_hand
+
+
+def test_json_in_its_canonical_form():
+    assert digest_json({"b": [1, 2.5, "é"], "a": None}) == digest_json({"a": None, "b": [1, 2.5, "\u00e9"]})
+    assert digest_json({"a": 1}) == hashlib.sha256(b'{"a":1}').hexdigest()
+    assert len({digest_json(v) for v in (1, 1.0, "1", [1], {"1": 1}, None, True)}) == 7
+
+
+POINTS = 64
+
+
+def with_points(kind, **changes):
+    content = small_table(kind)
+    points = {name: values.copy() for name, values in content.conformance.items()}
+    for name, change in changes.items():
+        points[name] = change(points[name])
+    return dataclasses.replace(content, conformance=points)
+
+
+@pytest.fixture(params=KINDS)
+def path(request, table_files):
+    return table_files[request.param]
+
+
+def test_the_difference_of_another_solver_is_measured(path, monkeypatch):
+    solve = greenwood_tripp.solve
+
+    def nearby(X, mu, rtol):
+        found = solve(X, mu, rtol=rtol)
+        return dataclasses.replace(found, phi_F=found.phi_F * (1 + 2e-12))
+
+    monkeypatch.setattr(greenwood_tripp, "solve", nearby)
+    assert verify(path).solver_error == pytest.approx(2e-12, rel=1e-3, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("name", "who"),
+    [("table_F", "the table"), ("table_A", "the table"), ("exact_F", "exact solver"), ("exact_A", "exact solver")],
+)
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_answer_beyond_its_tolerance_is_refused(kind, name, who, tmp_path):
+    tolerance = small_table(kind).conformance["tolerance"][7]
+
+    def beyond(factor):
+        return lambda v: np.where(np.arange(POINTS) == 7, v * (1 + factor * tolerance), v)
+
+    verify(write_table(tmp_path / "a.nc", with_points(kind, **{name: beyond(0.9)})))
+    write_table(tmp_path / "a.nc", with_points(kind, **{name: beyond(1.2)}))
+    with pytest.raises(TableFileError, match=rf"a\.nc: the answers of .*{who} .*`python -m generate tables {kind}`"):
+        verify(tmp_path / "a.nc")
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        (UNIVERSAL, {"mu": lambda v: -v}),
+        (UNIVERSAL, {"X": lambda v: v + 100}),
+        (ISLAND4D, {"zeta_d": lambda v: 0 * v}),
+        (ISLAND4D, {"zeta_u": lambda v: 1e9 * v}),
+    ],
+)
+def test_points_outside_the_axes_are_refused(kind, changes, tmp_path):
+    path = write_table(tmp_path / "a.nc", with_points(kind, **changes))
+    with pytest.raises(TableFileError, match="conformance points cannot be answered"):
+        verify(path)
+
+
+def test_another_spline_is_found_out(tmp_path):
+    content = small_table(ISLAND4D)
+    path = write_table(tmp_path / "a.nc", dataclasses.replace(content, coefficients=content.coefficients + 1e-7))
+    with pytest.raises(TableFileError, match="the answers of the table differ"):
+        verify(path)

@@ -53,7 +53,7 @@ def test_laws_of_maps_from_files(example):
         found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)
         assert found.pressure > 0
         assert found.area > 0
-    assert any("area is a matter of resolution" in entry.get("told", "") for entry in surface.provenance)
+    assert any("area depends on resolution" in entry.get("told", "") for entry in surface.provenance)
 
 
 def test_light_contacts_of_that_map_are_not_resolved_by_its_own_grid():
