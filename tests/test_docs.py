@@ -86,11 +86,14 @@ TAGS = re.findall(rf"\\tag{{({NUMBER})}}", PAGES["model.md"])
 
 
 def cited(path):
-    """Numbers of equations in the comments and strings of a module; a range stands for its members."""
+    """Numbers of equations in the comments and strings of a module, or in texts; a range stands for its members."""
     text = path.read_text(encoding="utf-8")
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    prose = [token.string for token in tokens if token.type == tokenize.COMMENT]
-    values = (node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant))
+    if path.suffix == ".py":
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        prose = [token.string for token in tokens if token.type == tokenize.COMMENT]
+        values = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)]
+    else:
+        prose, values = [text.replace("\\\n", "")], []
     for words in (*prose, *(value for value in values if isinstance(value, str))):
         for listed in CITATION.findall(re.sub(r"\(|\)", "", words)):
             for part in re.split(r", and |, | and ", listed):
@@ -102,7 +105,8 @@ def cited(path):
 def test_every_cited_equation_is_on_the_page_of_the_model_once(package):
     assert len(TAGS) == len(set(TAGS))
     assert {re.sub("[ab]", "", tag) for tag in TAGS} >= set(map(str, range(1, 52)))
-    found = {(path.name, number) for path in (ROOT / package).rglob("*.py") for number in cited(path)}
+    paths = [path for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".toml")]
+    found = {(path.name, number) for path in paths for number in cited(path)}
     assert found
     assert {(name, number) for name, number in found if number not in TAGS and f"{number}a" not in TAGS} == set()
 
