@@ -38,7 +38,9 @@ static const double RULE[NODES / 2][2] = {{0.1252334085114689, 0.249147045813402
 
 /* ---- polynomials through Chebyshev nodes of [-1, 1] -------------------------------------------------------------- */
 
-static double node(int j) { return cos(MBMA_PI * (j + 0.5) / ORDER); }
+static double angle_of(int j) { return MBMA_PI * (j + 0.5) / (double)ORDER; }
+
+static double node(int j) { return cos(angle_of(j)); }
 
 /* Powers from values at the nodes; the last two Chebyshev coefficients, which tell the error. */
 static double powers_of(const double value[ORDER], double p[ORDER]) {
@@ -47,7 +49,7 @@ static double powers_of(const double value[ORDER], double p[ORDER]) {
     for (int m = 0; m < ORDER; m++) {
         double c = 0.0;
         for (int j = 0; j < ORDER; j++)
-            c += (m == 0 ? 1.0 : 2.0) / ORDER * cos(m * (MBMA_PI * (j + 0.5) / ORDER)) * value[j];
+            c += (m == 0 ? 1.0 : 2.0) / (double)ORDER * cos(m * angle_of(j)) * value[j];
         last[m % 2] = fabs(c);
         /* the next Chebyshev polynomial is 2 x times this one less the one before */
         for (int j = ORDER - 1; j >= 0; j--) {
