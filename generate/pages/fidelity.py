@@ -16,7 +16,7 @@ from generate.pages import distances
 from generate.pages.page import Measured, panels, percent, table
 from mbma_tables import Surface, contact, theories
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.theories.protocol import answer_where_finite
+from mbma_tables.theories.wrapped import answer_where_finite
 
 THEORIES: dict[str, theories.Theory] = {
     "MBMA reported": theories.Mbma(),

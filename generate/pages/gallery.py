@@ -24,7 +24,8 @@ from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import BoundaryElements, get_theory
 from mbma_tables.theories.own_map import continued
-from mbma_tables.theories.protocol import Theory, answer_where_finite
+from mbma_tables.theories.protocol import Theory
+from mbma_tables.theories.wrapped import answer_where_finite
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"

@@ -175,7 +175,7 @@ def contact(
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
     """The requested theory, with MBMA's `options`, which other theories refuse."""
-    given = [name for name, value in options.items() if value is not OPTIONS[name] and value != OPTIONS[name]]
+    given = [] if options == OPTIONS else [name for name, value in options.items() if value != OPTIONS[name]]
     named = theory_name(surface, theory, **options) if theory is None else theory
     if isinstance(named, str) and named in THEORIES:
         if not given and options.get("workers") is not True:
@@ -197,10 +197,13 @@ def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
 
 def one_known(**given: Any) -> tuple[str, Any]:
     """The one of `KNOWN` that is given."""
-    known = {name: value for name, value in given.items() if value is not None}
+    known = []
+    for name, value in given.items():
+        if value is not None:
+            known.append(name)
     if len(known) != 1:
         raise InputError(f"give exactly one of {', '.join(KNOWN)}; got {' and '.join(known) or 'none'}")
-    return next(iter(known.items()))
+    return known[0], given[known[0]]
 
 
 def _contact(

@@ -173,11 +173,15 @@ def filled(fill: Callable[..., Any], columns: Sequence[Any], outputs: int, *more
 
 def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> list[FloatArray]:
     """Rows that a loop of the core makes of what is given, of its broadcast shape."""
-    known, shape = rows(*given)
-    if known.shape[1] > BLOCK:
-        return list(filled(fill, list(known), outputs, *more).reshape(outputs, *shape))
-    out = np.empty((outputs, *shape))
-    fill(*known, *more, *out.reshape(outputs, -1))
+    shape = np.broadcast(*given).shape
+    known, out = np.empty((len(given), *shape)), np.empty((outputs, *shape))
+    for k, value in enumerate(given):
+        known[k] = value
+    flat, rows_out = known.reshape(len(given), -1), out.reshape(outputs, -1)
+    if flat.shape[1] <= BLOCK:
+        fill(*flat, *more, *rows_out)
+    else:
+        in_blocks(lambda some: fill(*flat[:, some], *more, *rows_out[:, some]), flat.shape[1], BLOCK)
     return list(out)
 
 

@@ -110,7 +110,8 @@ def _contact(batch: Batch, u: FloatArray) -> FloatArray:
 def area_reasons(area: FloatArray) -> dict[str, Any]:
     """Contact fractions that were not simulated, or hardly."""
     low, high = TESTED_AREA
-    return {f"A/A0 is below {low:g}": (area > 0) & (area < low), f"A/A0 is above {high:g}": area > high}
+    below = (area > 0) & (area < low * (1 - 1e-9))
+    return {f"A/A0 is below {low:g}": below, f"A/A0 is above {high:g}": area > high * (1 + 1e-9)}
 
 
 class Calibrated(Theory):

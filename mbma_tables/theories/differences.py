@@ -15,6 +15,8 @@ from mbma_tables.common.arguments import FloatArray
 
 ENOUGH = 2e-8  # relative, of derivatives or of their scale
 HALVINGS = 10  # of the step, at most
+INTEGRAL_RTOL = 1e-9
+LEAST_LEVEL = 4  # of the rule of energies, whose estimate of its error may vanish by chance where it is coarse
 
 # places over the step, and weights of the derivative: in their middle, and at the first of them
 CENTRAL: tuple[Any, Any] = np.array([-1.0, -0.5, 0.5, 1.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 6
@@ -55,3 +57,15 @@ def differences(
             rough = ~(miss <= enough * np.maximum(np.abs(best), scale[:, left])).all(axis=0)
             coarse, left, widths = fine[:, rough], left[rough], widths[-1:] / 2
     return found, error
+
+
+def integral(function: Callable[..., Any], edges: FloatArray) -> tuple[FloatArray, Any]:
+    """Integrals of function(x, place) between rows of edges, shape (m, ...), and which were not found.
+
+    A place is the flat number of an entry, as a float.
+    """
+    from scipy.integrate import tanhsinh
+
+    place = np.arange(float(edges[0].size)).reshape(edges[0].shape)
+    found = tanhsinh(function, edges[:-1], edges[1:], args=(place,), rtol=INTEGRAL_RTOL, minlevel=LEAST_LEVEL)
+    return np.asarray(found.integral.sum(axis=0)), ~found.success.all(axis=0)

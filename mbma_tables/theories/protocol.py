@@ -1,8 +1,7 @@
 """What a theory is: anything that answers a surface and a mean separation with pressure, area and stiffness.
 
-MBMA, Persson's theory, Greenwood and Williamson's and the law calibrated on boundary elements are theories, and so is a
-user's own object with a `name` and an ``answer(surface, mean_separation)``. What a theory has not in closed form
-(stiffness, energy, the separation at a given load) follows from its forces here.
+A user's object with a `name` and an ``answer(surface, mean_separation)`` is one, too. What a theory does not have in
+closed form (energy, the separation at a given load) follows from its forces.
 """
 
 from __future__ import annotations
@@ -19,17 +18,19 @@ from mbma_tables.common.arguments import FloatArray, describe_entries, require, 
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
-from mbma_tables.theories.differences import differences
-from mbma_tables.theories.gaps import Search
+from mbma_tables.theories.differences import integral
 
 LOOKS, FEW_LOOKS = 128, 8  # gaps at which an inversion begins, of one surface and of each of a batch,
 LOOKED_AT = 7.0  # from where to where, of ln u - ln(h_max - u),
 FAR = 12.0  # and up to which u/h_rms where contact has no end
 STEPS = 200
 MISSED = 0.5  # of ln of a value that lies between two numbers u
-ENERGY_RTOL = 1e-9
-LEAST_LEVEL = 4  # of the rule of energies, whose estimate of its error may vanish by chance where it is coarse
 SCAN = 49  # compressions at which a law is looked at for a turning point
+SETTLED = 1e-7  # of a logarithm, before the last step, whose miss would be about its square
+SETTLED_STEP = 1e-4  # of y, which is large where values hardly change
+SETTLED_BOTH = 1e-14  # of its product with the step before, where slopes are not known
+FARTHEST = 40.0  # step of y
+DISTINCT = 8.9e-16  # relative, of gaps that rounding leaves distinct
 
 # values at mean separations, about -d/du of them, and whether that is exact
 Curve = Callable[[FloatArray], tuple[Any, Any, bool]]
@@ -61,8 +62,7 @@ class Theory(abc.ABC):
 
     name: str
     variant_name = island_model_name = ""  # what results call its variant of the paper and its island model
-    advice = ""  # one line beside each answer
-    origin = ""  # what its numbers were found of, where that is no shipped file
+    advice = origin = ""  # one line beside each answer; what its numbers were found of, if not of a shipped file
     reached = 0.0  # by how much, relatively, a wanted value may be more than the largest
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
 
@@ -144,24 +144,15 @@ class Theory(abc.ABC):
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
-        from scipy.integrate import tanhsinh
-
         u = np.asarray(mean_separation, dtype=float)
         high = np.broadcast_to(self.interval(surface)[1], u.shape)
         low = np.minimum(u, high)
         # from bend to bend, across which no rule converges
         edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.elastic.bends(surface)), high], axis=0)
-        found = tanhsinh(
-            lambda x, place: self.at(u.shape, place).answer(select(surface, u.shape, place), x).pressure,
-            edges[:-1],
-            edges[1:],
-            args=(np.arange(float(u.size)).reshape(u.shape),),  # of one type with x
-            rtol=ENERGY_RTOL,
-            minlevel=LEAST_LEVEL,
-        )
-        if not found.success.all():
-            raise unfinished(~found.success.all(axis=0), "the elastic energy")
-        return np.asarray(found.integral.sum(axis=0))
+        found, missed = integral(lambda x, k: self.at(u.shape, k).answer(select(surface, u.shape, k), x)[0], edges)
+        if missed.any():
+            raise unfinished(missed, "the elastic energy")
+        return found
 
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
         """Derivatives of force and of area by "mean_separation" and the surface's parameters, if in closed form."""
@@ -272,58 +263,88 @@ def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:
     return ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
 
 
-def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-    """A theory's answers at mean separations u, shape (n,), on one surface; NaN where it has no finite force."""
-    u = np.asarray(mean_separation, dtype=float)
-    places = np.arange(u.size)
-    fields = np.full((4, u.size), np.nan)
-    while places.size:
-        try:
-            with np.errstate(all="ignore"):
-                found = theory.answer(surface, u[places])
-        except OutOfRangeError as fault:
-            if fault.mask is None or np.shape(fault.mask) != places.shape or not np.any(fault.mask):
-                raise
-            places = places[~np.asarray(fault.mask)]
-        else:
-            fields[:, places] = np.where(np.isfinite(found.pressure), found, np.nan)
-            break
-    return TheoryAnswer(*fields)
+def _places(u: FloatArray, value: FloatArray, steep: FloatArray, end: FloatArray) -> FloatArray:
+    """Rows of ln value, y, and the derivative of y by that logarithm."""
+    rest = 1 - u / end
+    return np.array([np.log(value), np.log(u / rest), -value / (steep * u * rest)])
 
 
-class Wrapped(Theory):
-    """A user's theory, its stiffness by numerical differentiation."""
+def _through(places: FloatArray, goal: FloatArray) -> FloatArray:
+    """y at a goal by the polynomial through places, (3, places, n), and their rates, by divided differences."""
+    x, found = places[0].repeat(2, axis=0), places[1, 0]
+    difference, product = places[1].repeat(2, axis=0), 1.0
+    for order in range(1, len(x)):
+        difference = (difference[1:] - difference[:-1]) / (x[order:] - x[:-order])
+        if order == 1:
+            difference[::2] = places[2]
+        product = product * (goal - x[order - 1])
+        found = found + product * difference[0]
+    return np.asarray(found)
 
-    def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """None: its author decides."""
-        return ()
 
-    def __init__(self, theory: UserTheory) -> None:
-        self.name = theory.name
-        self._theory = theory
+def _middle(low: FloatArray, high: FloatArray) -> FloatArray:
+    apart = np.where((high > 2 * low) & (low > 0), np.sqrt(low) * np.sqrt(high), 0.5 * (low + high))
+    return np.where(high == np.inf, 2 * low, apart)
 
-    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force, area and stiffness at mean separations u [length]; the error is not known."""
-        u = np.asarray(mean_separation, dtype=float)
-        found = self._theory.answer(surface, u)
-        pressure, area = (np.array(np.broadcast_to(part, u.shape), dtype=float) for part in found)
 
-        def force_at(k: Any, x: FloatArray) -> FloatArray:
-            return np.asarray(self._theory.answer(select(surface, u.shape, k), u.ravel()[k] + x)[0], dtype=float)[None]
+class Search:
+    """Gaps that are looked for, from values at places in order from last contact on.
 
-        step = 0.01 * np.broadcast_to(np.asarray(surface.h_rms), u.shape).ravel()
-        slope, _ = differences(force_at, step, np.zeros(u.size), np.zeros((1, u.size)))
-        return TheoryAnswer(pressure, area, -slope[0].reshape(u.shape), np.full(u.shape, np.nan))
+    These are rows of one column for all, or of one for each. `exact`: `steep`, -dvalue/du, is that of the values; else
+    it is about right, and differences are used. `end` is the last gap with contact, which may be infinite.
+    """
 
-    def looks(self, surface: AnySurface) -> int:
-        """Few: an answer may take long."""
-        return FEW_LOOKS
+    def __init__(
+        self, seen: FloatArray, exact: bool, wanted: FloatArray, end: FloatArray, low: FloatArray, high: FloatArray
+    ) -> None:
+        self.exact, self.wanted, self.end = exact, wanted, end
+        # the branch of first contact: the first place, coming from there, at which enough is reached
+        reached, count = seen[1] >= wanted, seen.shape[1]
+        number = np.where(reached.any(axis=0), reached.argmax(axis=0), count) + np.arange(-2, 2)[:, None]
+        column = np.arange(wanted.size) if seen.shape[2] == wanted.size else 0
+        u, value, steep = seen[:, number.clip(0, count - 1), column]
+        inside, goal = (number >= 0) & (number < count), np.log(wanted)
+        self.low, self.high = np.where(inside[2], u[2], low), np.where(inside[1], u[1], high)
+        known = inside & (value > 0) & (value < np.inf)
+        around = np.where(known, _places(u, value, steep, end), np.nan)
+        (_, light, heavy, _), y, _ = around
+        nearer = known[2] & ~(goal - light <= heavy - goal)
+        self.before: FloatArray = np.where(nearer, around[:, 2], around[:, 1])
+        x0, y0, rate = self.before
+        straight = y[1] + (goal - light) / (heavy - light) * (y[2] - y[1])
+        found = np.where(heavy > light, straight, y0 + rate * (goal - x0))
+        if exact:
+            curved = _through(around, goal)
+            rises = (around[0, 1:] > around[0, :-1]).all(axis=0)
+            good = rises & (curved <= y[1]) & (curved >= y[2])
+            found = np.where(good, curved, found)
+        ratio = np.exp(y0 + np.minimum(np.maximum(found - y0, -FARTHEST), FARTHEST))
+        gap = ratio / (1 + ratio / end)
+        self.gap = np.where((gap > self.low) & (gap < self.high), gap, _middle(self.low, self.high))
 
-    def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Force or area alone."""
-
-        def values(u: FloatArray) -> tuple[Any, Any, bool]:
-            found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)
-            return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False
-
-        return values
+    def step(self, left: NDArray[np.intp], value: FloatArray, steep: FloatArray) -> NDArray[np.intp]:
+        """A step of the gaps numbered `left`, to which values belong, by the cubic through these and those before."""
+        u, end, miss = self.gap[left], self.end[left], np.log(value / self.wanted[left])
+        here = x, y, rate = _places(u, value, steep, end)
+        x0, y0, rate0 = self.before[:, left]
+        low, high = np.where(miss > 0, u, self.low[left]), np.where(miss > 0, self.high[left], u)
+        apart, straight = x - x0, -miss * rate
+        mean = (y - y0) / apart
+        # slopes that are not exact are scaled to the straight line through both
+        scale = 1.0 if self.exact else 2 * mean / (rate + rate0)
+        second = (scale * rate - mean) / apart
+        third = (second - (mean - scale * rate0) / apart) / apart
+        curved, by_both = miss * miss * (third * (apart - miss) + second), -miss * scale * rate
+        other = np.where(mean < 0, -mean * miss, straight)
+        cubic = np.where(np.abs(curved) <= 0.5 * np.abs(by_both), by_both + curved, other)
+        step = np.where(np.isfinite(apart) & (apart != 0), cubic, straight)
+        following = u * np.exp(np.minimum(np.maximum(step, -FARTHEST), FARTHEST))
+        following = following / (1 + (following - u) / end)
+        near = (np.abs(miss) <= SETTLED) & (np.abs(step) <= SETTLED_STEP)
+        if not self.exact:
+            near &= np.abs(miss * apart) <= SETTLED_BOTH
+        held = np.where((following > low) & (following < high), following, _middle(low, high))
+        gap = np.where(near, np.minimum(np.maximum(following, low), high), held)
+        gap[np.isnan(miss) | ~(u > 0)] = np.nan
+        self.gap[left], self.low[left], self.high[left], self.before[:, left] = gap, low, high, here
+        return np.asarray(left[~(near | (high - low <= DISTINCT * high) | (gap == u) | np.isnan(gap))])

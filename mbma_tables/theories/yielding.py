@@ -225,8 +225,10 @@ class Yielding(Theory):
 
     def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Mean separations u at forces over A0 E*, and `lighter` of `loaded` where areas need that."""
-        if self.knows_areas or np.isinf(self.hardness).all():
-            return self.mean_separation_at(surface, "pressure", pressure), None
+        elastic = np.isinf(self.hardness).all()
+        if self.knows_areas or elastic:
+            asked: Theory = self.elastic if elastic else super()  # type: ignore[assignment]
+            return asked.mean_separation_at(surface, "pressure", pressure), None
         shape = np.broadcast_shapes(pressure.shape, surface.shape, self.hardness.shape)
         cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
         both = Yielding(self.elastic, np.stack([cap, np.full(cap.shape, np.inf)]))
