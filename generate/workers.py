@@ -6,6 +6,9 @@ import concurrent.futures
 import contextlib
 import functools
 import multiprocessing
+import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
@@ -37,8 +40,21 @@ def executor(workers: int, scheduler: str | None) -> Iterator[Pool]:
         yield None
     else:
         # started afresh: threads and forks do not mix
-        with concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        start = multiprocessing.get_context("spawn")
+        ends = functools.partial(_end_with, os.getpid())
+        with concurrent.futures.ProcessPoolExecutor(workers, start, initializer=ends) as pool:
             yield pool
+
+
+def _end_with(parent: int) -> None:
+    """End this worker when its parent is gone, even if that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def attempts(

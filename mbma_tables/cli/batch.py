@@ -29,6 +29,7 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 
 MAX_BYTES = 64 * 2**20
+MAX_COLUMNS, MAX_ROWS, MAX_CELL = 100, 1_000_000, 1000  # of a file of surfaces; letters of a cell
 OF_MAPS = ("dx", "dy", "detrend", "short_cutoff", "long_cutoff", "s_filter", "l_filter")
 LOADS = ("separation", "mean_separation", "pressure", "area")
 
@@ -119,6 +120,10 @@ def batch_command(
 def _lines(file: Path) -> Any:
     """Number and filled cells of each line below the header."""
     text = read_file(file, MAX_BYTES).decode("utf-8-sig", "replace")
+    if (count := text.partition("\n")[0].count(",") + 1) > MAX_COLUMNS:
+        raise InputError(f"{file}: {count} columns, more than {MAX_COLUMNS}")
+    if (count := text.count("\n")) > MAX_ROWS:
+        raise InputError(f"{file}: {count} lines, more than {MAX_ROWS}")
     rows = csv.DictReader(io.StringIO(text, newline=""))
     known = {"name", "surface", "map", *OF_MAPS, *NUMBERS, *MATERIAL, *LOADS}
     names = [name.strip() for name in rows.fieldnames or ()]
@@ -132,6 +137,8 @@ def _lines(file: Path) -> Any:
         if None in row:
             raise InputError(f"{file}, line {rows.line_num}: more cells than the header has")
         cells = {name.strip(): cell.strip() for name, cell in row.items() if cell and cell.strip()}
+        if long := [name for name, cell in cells.items() if len(cell) > MAX_CELL]:
+            raise InputError(f"{file}, line {rows.line_num}, column {long[0]}: more than {MAX_CELL} letters")
         if cells:
             empty = False
             yield rows.line_num, cells

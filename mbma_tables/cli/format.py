@@ -89,7 +89,7 @@ class Report:
         content.writelines(f"# {line}\n" for line in head)
         rows = csv.writer(content, lineterminator="\n")
         rows.writerow(c.name for c in self.columns)
-        rows.writerows(zip(*(c.values for c in self.columns), strict=True))
+        rows.writerows(map(_harmless, row) for row in zip(*(c.values for c in self.columns), strict=True))
         return content.getvalue()
 
     def write(self, output: Output, plot: Path | None = None, picture: bytes = b"") -> None:
@@ -106,6 +106,11 @@ class Report:
 def to_json(content: Any) -> str:
     """JSON, in which null says that there is no number."""
     return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=2)
+
+
+def _harmless(cell: Any) -> Any:
+    """A cell of CSV; text that a spreadsheet would run as a formula begins with an apostrophe."""
+    return f"'{cell}" if isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell
 
 
 def _rounded(value: Any) -> str:

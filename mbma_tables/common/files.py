@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
 import pathlib
+import re
 import shutil
 import stat
 import sys
 import tempfile
+import time
 import uuid
 from collections.abc import Callable
 
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
+
+ABANDONED = 3600.0  # s, age from which on a draft is no longer being written
 
 
 def shipped_file(name: str) -> pathlib.Path:
@@ -20,6 +26,20 @@ def shipped_file(name: str) -> pathlib.Path:
     package = pathlib.Path(__file__).parents[1]
     inside = package / "tables" / name
     return inside if inside.exists() else package.parent / "tables" / name
+
+
+def numbers_of(lines: list[str], delimiter: str | None) -> FloatArray:
+    """The numbers of text, shape (rows, columns); the error names row and column, and quotes nothing of the file."""
+    import warnings
+
+    import numpy as np
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # for a file without numbers
+            return np.loadtxt(lines, ndmin=2, delimiter=delimiter)
+    except (ValueError, UserWarning) as fault:
+        raise InputError(re.sub(r"could not convert string .* to float64 at", "no number at", str(fault))) from None
 
 
 def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
@@ -48,6 +68,11 @@ def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool 
         return
     target = pathlib.Path(os.path.realpath(path))
     draft = target.with_name(f".{target.name}.{uuid.uuid4().hex[:12]}.draft")
+    # of runs that were killed
+    for left in target.parent.glob(f".{glob.escape(target.name)}.*.draft"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > ABANDONED:
+                left.unlink()
     try:
         if make_folders:
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -8,15 +8,12 @@ import json
 import os
 import pathlib
 import tomllib
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from mbma_tables.common.arguments import nearest, one_number, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import read_file
+from mbma_tables.common.files import numbers_of, read_file
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -214,12 +211,10 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
     # not by its name: numpy would unpack .gz, .bz2 and .xz, whatever they grow to
     content = read_file(path, MAX_SPECTRUM_BYTES)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # for a file without numbers
-            lines = content.decode("utf-8").splitlines()
-            columns = np.loadtxt(lines, ndmin=2, delimiter="," if path.suffix == ".csv" else None)
-    except (ValueError, UserWarning) as fault:
-        raise InputError(f"[surface]: {path.name} must hold two columns of numbers, q and C: {fault}") from None
+        columns = numbers_of(content.decode("utf-8").splitlines(), "," if path.suffix == ".csv" else None)
+    except (UnicodeDecodeError, InputError) as fault:
+        why = fault if isinstance(fault, InputError) else "it is no text"
+        raise InputError(f"[surface]: {path.name} must hold two columns of numbers, q and C: {why}") from None
     if columns.shape[1] != 2:
         raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")
     h_max = Units(unit).number("h_max", numbers["h_max"])

@@ -16,7 +16,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import finite_array, needed, one_number, require
 from mbma_tables.common.errors import InputError, MbmaError
-from mbma_tables.common.files import read_file
+from mbma_tables.common.files import numbers_of, read_file
 from mbma_tables.common.units import factor, known
 
 LISTS = (2, 3)  # columns of a list of points, which is no matrix of heights
@@ -46,8 +46,8 @@ def read_measurement(
     """
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"
-    if not piped and not place.is_file():
-        raise InputError(f"there is no file {os.fspath(path)!r}{': it is a folder' if place.is_dir() else ''}")
+    if not piped and not os.path.isfile(place):
+        raise InputError(f"there is no file {os.fspath(path)!r}{': it is a folder' if os.path.isdir(place) else ''}")
     with warnings.catch_warnings():
         # its readers complain of what they go around
         warnings.simplefilter("ignore")
@@ -75,9 +75,10 @@ def _without_commas(path: pathlib.Path) -> bytes:
     """A matrix of numbers with commas or semicolons as that library's plain text."""
     try:
         lines = read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig").replace(";", ",").splitlines()
-        numbers = np.loadtxt(lines, delimiter=",", ndmin=2)
-    except ValueError as fault:
-        raise InputError(f"{path.name} must hold numbers with commas between them: {fault}") from None
+        numbers = numbers_of(lines, ",")
+    except (UnicodeDecodeError, InputError) as fault:
+        why = fault if isinstance(fault, InputError) else "it is no text"
+        raise InputError(f"{path.name} must hold numbers with commas between them: {why}") from None
     content = io.BytesIO()
     np.savetxt(content, numbers)
     content.seek(0)
