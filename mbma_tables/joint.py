@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.answers.contact import contact
 from mbma_tables.answers.result import Contact
 from mbma_tables.answers.sensitivity import Sensitivity, sensitivity
-from mbma_tables.common.arguments import hinted, needed
+from mbma_tables.common.arguments import hinted, nearest, needed
 from mbma_tables.common.display import Displayed, Variable
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
@@ -174,6 +174,48 @@ class Joint(Displayed):
     def sensitivity(self, pressure: float | str, ranges: Mapping[str, tuple[Any, Any]] | None = None) -> Sensitivity:
         """How much each number of the joint matters at a pressure, as of `sensitivity`."""
         return sensitivity(self.surface, pressure=pressure, ranges=ranges, **self._asked)
+
+    def export(
+        self, target: str, pressures: tuple[float | str, float | str], name: str | None = None, heat: bool = True
+    ) -> str:
+        """The joint for a solver: pressure against overclosure, and its conductance with `heat`, in N, mm, MPa, mW.
+
+        Parameters
+        ----------
+        target : str
+            One that takes rows: "calculix", "abaqus", "csv", ... (`mbma export --help`).
+        pressures : pair of float or str
+            Smallest and largest pressure; plain numbers in MPa.
+        name : str, optional
+            Of the surface interaction.
+        heat : bool
+            Whether conductance of the solid spots is written, too.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, materials="copper C11000 hard", nominal_area="4 cm^2")
+        >>> card = joint.export("calculix", ("0.1 MPa", "50 MPa"), name="JOINT")
+        >>> [line for line in card.splitlines() if line.startswith("*") and line[1] != "*"][:2]
+        ['*SURFACE INTERACTION, NAME=JOINT', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL']
+        """
+        from mbma_tables.export.law_rows import describe_law
+        from mbma_tables.export.targets import targets
+
+        known = {key: each for key, each in targets().items() if each.rows}
+        if target not in known:
+            raise InputError(f"no target of rows is called {target!r}: {nearest(target, known)}")
+        options: dict[str, Any] = {"theory": self.theory, "hardness": self.hardness or self.pair.hardness or np.inf}
+        if heat:
+            k1, k2 = (float(text.split()[0]) for text in self.pair.conductivities)  # W/(m K) is mW/(mm K)
+            options |= {"quantity": "conductance", "conductivity": 2 * k1 * k2 / (k1 + k2)}
+            options["conductivity_unit"] = "mW/(mm K)"
+        law = describe_law(
+            self.surface, self.pair.E_star, length_unit="mm", stress_unit="MPa", pressures=pressures, **options
+        )
+        named = {} if name is None else {"name": name}
+        return known[target].files(law, **named)[""].decode()
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""

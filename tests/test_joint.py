@@ -103,3 +103,18 @@ def test_command(tmp_path, capsys):
     found = dict(zip(head.split(","), row.split(","), strict=True))
     assert float(found["area"]) == float(Joint.from_toml(EXAMPLE).at_pressure("10 MPa").area)
     assert found["valid"] == "yes"
+
+
+def test_cards_hold_the_joint(joint):
+    card = joint.export("calculix", ("1 MPa", "50 MPa"), name="JOINT")
+    text = card[card.index("*GAP CONDUCTANCE") :].splitlines()[1:]
+    k, p = np.array([[float(number) for number in line.split(",")] for line in text]).T
+    assert p[-1] == pytest.approx(50, rel=0.02)
+    # mW/(mm^2 K) is 1000 W/(m^2 K)
+    found = joint.at_pressure((p[1:] / 1000).tolist())
+    np.testing.assert_allclose(1000 * k[1:], found.conductance(), rtol=2e-3)  # of the rows
+    assert "hardness = 950 MPa" in card
+    closure = joint.export("abaqus", ("1 MPa", "50 MPa"), heat=False)
+    assert "GAP CONDUCTANCE" not in closure
+    with pytest.raises(InputError, match="calculix"):
+        joint.export("calculux", (1, 50))

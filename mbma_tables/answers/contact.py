@@ -69,8 +69,8 @@ def contact(
         One surface or a batch; it broadcasts against what is known.
     separation : array_like
         d between the rigid plane and the mid-plane, in the surface's unit or, as text, with its own ("0.8 um"); at
-        least -h_max (full compression). From h_max on there is no contact, and force and area are zero. Exactly one
-        of the four is given.
+        least -h_max (full compression). Above h_max the bodies are apart: pressure and area are zero, and u is d.
+        Exactly one of the four is given.
     mean_separation : array_like
         u = (h_max + d)/2 (50) [length].
     pressure : array_like
@@ -283,6 +283,9 @@ def _places(
                 _refuse_pressures(surface, asked, modulus, cap, theory, source.units.stress)
             raise
     gap = asked if by == "separation" else 2 * average - h_max
+    if theory.ends_at_h_max:
+        # apart, both are the distance of the mean planes
+        average, gap = np.maximum(average, gap) if by == "separation" else average, np.minimum(gap, average)
     return {"separation": gap[()], "mean_separation": average[()]}, lighter
 
 

@@ -98,6 +98,8 @@ class Contact(Interface, Displayed):
                 facts[name] = shown(getattr(self, name), units[name])
         if any_labelled(source.surface, self.mean_separation) or np.size(self.error) > MOST_SHOWN:
             return facts
+        if np.all(self._touching == 0):
+            facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
         if source.yields:

@@ -14,7 +14,7 @@ import xarray as xr
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
-from mbma_tables.theories import THEORIES, Mbma
+from mbma_tables.theories import THEORIES, Mbma, get_theory
 from mbma_tables.theories.differences import HALVINGS, differences
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -335,3 +335,16 @@ def test_a_request_takes_few_calls_in_few_files():
         calls, files = re.search(r"(\d+) calls .* (\d+) files", row).groups()
         assert int(calls) <= 90
         assert int(files) <= 9
+
+
+@each
+def test_bodies_apart(theory):
+    """Both separations are then the distance of the mean planes, and the answer states that there is no contact."""
+    found = contact(SURFACE, separation=50.0, theory=theory)
+    ends = get_theory(theory).ends_at_h_max
+    assert found.mean_separation == (50.0 if ends else 26.5)
+    if ends:
+        assert (found.pressure, found.area) == (0, 0)
+        assert "the bodies are apart" in repr(found)
+        assert contact(SURFACE, mean_separation=50.0, theory=theory).separation == 50.0
+    assert contact(SURFACE, separation=SURFACE.h_max, theory=theory).mean_separation == SURFACE.h_max
