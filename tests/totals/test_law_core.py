@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from mbma_tables import OutOfRangeError, Surface, contact_law
-from mbma_tables.core import GENERATIONS, core
+from mbma_tables.core import core
 from mbma_tables.law.block import AREA, EXPONENT, FORCE, HEAD, HIGH, MINUS_ROWS, QUANTITIES, RECORDS
 from mbma_tables.laws.effective_medium import wide_gap
 
@@ -175,7 +175,7 @@ def test_generations_of_processors_have_the_same_bits(name, generations):
     for k, other in enumerate(generations):
         out, found = np.empty((5, d.size)), np.empty((3, force.size))
         assert other.law_fill(d, law.block, *out) == other.law_invert(force, law.block, inverse, FORCE, *found) == 0
-        if k == 0 and core.generation == GENERATIONS["plain"]:  # without fused operations bits are others
+        if k == 0 and core.__name__.endswith("_plain"):  # without fused operations bits are others
             values, gaps = out, found
         np.testing.assert_array_equal(out, values)
         np.testing.assert_array_equal(found, gaps)
