@@ -96,7 +96,8 @@ def test_a_law_with_a_hardness_is_a_law(theory, rtol, surface, shares):
     found = contact(surface, mean_separation=u, **asked)
     for name in ("pressure", "area"):
         np.testing.assert_allclose(getattr(law, name)(u), getattr(found, name), rtol=max(rtol, law.error))
-    assert law.at_pressure(found.pressure).mean_separation == pytest.approx(u, rel=10 * law.error)
+    # the first one may be where the law ends, beyond whose pressure rounding leads
+    assert law.at_pressure(found.pressure[1:]).mean_separation == pytest.approx(u[1:], rel=10 * law.error)
     assert pickle.loads(pickle.dumps(law)).pressure(1.0) == law.pressure(1.0)
     if theory == "mbma":
         assert law.lowest == pytest.approx((2e-6 - 1) * surface.h_max)
