@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import json
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from mbma_tables.common.arguments import finite_array, needed, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import written_bytes
-from mbma_tables.export.law_rows import LawTable
+from mbma_tables.export.law_rows import Friction, LawTable
 from mbma_tables.export.targets import Target
 from mbma_tables.export.text import checked_name, comment, csv_cell
 
@@ -59,6 +60,7 @@ def to_json(law: LawTable) -> bytes:
 
 def _content(law: LawTable) -> dict[str, Any]:
     content = _header(law) | {"columns": {law.x_name: law.x.tolist(), law.y_name: law.y.tolist()}}
+    content |= {"friction": dataclasses.asdict(law.friction)} if law.friction else {}
     return content if law.behaviour is None else content | {"behaviour": _content(law.behaviour)}
 
 
@@ -76,8 +78,11 @@ def _law_of(held: dict[str, Any]) -> LawTable:
         raise ValueError("two columns of one length are needed, the first of them rising")
     x_name, y_name, x_unit, y_unit = (str(held[name]) for name in ("x", "y", "x_unit", "y_unit"))
     comments, behaviour = tuple(map(str, held["comments"])), _law_of(held["behaviour"]) if "behaviour" in held else None
+    friction = held.get("friction") and Friction(**held["friction"] | {"comments": tuple(held["friction"]["comments"])})
     error, floor = (number_in(name, held[name], 0, 1e300) for name in ("largest_error", "floor"))
-    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, str(held["theory"]), floor, behaviour)
+    return LawTable(
+        x, y, x_name, y_name, x_unit, y_unit, error, comments, str(held["theory"]), floor, behaviour, friction
+    )
 
 
 def to_matlab(law: LawTable) -> bytes:

@@ -215,6 +215,11 @@ def _known(name: str, unit: str | None) -> str:
     return unit
 
 
+def checked_kappa(kappa: float) -> float:
+    """Normal over tangential stiffness."""
+    return number_in("kappa", kappa, 0.5, 2.0)
+
+
 def checked_conductivity(conductivity: float | None, unit: str | None) -> tuple[float, str]:
     """k_s = 2 k1 k2/(k1 + k2) and its unit, both needed for a conductance."""
     if conductivity is None:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,21 +20,36 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_lines
 from mbma_tables.common.units import Units
 from mbma_tables.export.chords import chosen_rows
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
+from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.totals.conductance import conductance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-QUANTITIES = ("pressure", "conductance", "leakage")
+QUANTITIES = ("pressure", "conductance", "leakage", "tangential_stiffness")
+OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
 LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # of h_max, mean separations of the last points
+
+
+@dataclasses.dataclass(frozen=True)
+class Friction:
+    """What a friction card has: one stiffness, of stick before any slip, at one pressure."""
+
+    coefficient: float
+    pressure: float
+    stiffness: float  # shear stress over displacement [stress/length]
+    comments: tuple[str, ...]
+
+    @property
+    def elastic_slip(self) -> float:
+        """Displacement at which slip begins at the pressure [length]."""
+        return self.coefficient * self.pressure / self.stiffness
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -41,7 +57,7 @@ class LawTable(Displayed):
     """Rows of a contact law, ready to be written."""
 
     x: FloatArray  # overclosure, or pressure: zero, then rising
-    y: FloatArray  # pressure or conductance, rising from zero; or flow, which falls, to zero where contact blocks it
+    y: FloatArray  # rising from zero; or flow, which falls, to zero where contact blocks it
     x_name: str
     y_name: str
     x_unit: str
@@ -51,6 +67,7 @@ class LawTable(Displayed):
     theory: str  # whose law it is
     floor: float = 0.0  # value below which errors are relative to it
     behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
+    friction: Friction | None = None
 
     def _facts(self) -> dict[str, str]:
         columns = {self.x_name: shown(self.x, self.x_unit), self.y_name: shown(self.y, self.y_unit)}
@@ -68,8 +85,8 @@ class LawTable(Displayed):
         return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
 
 
-def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: float) -> tuple[FloatArray, FloatArray]:
-    """The law on fine points; conductance by the frozen contact's stiffness where it is not the law's own slope."""
+def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: float) -> tuple[FloatArray, FloatArray]:
+    """The law on fine points; what follows the unloading stiffness is `scale` times that."""
     law = exported.law
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
@@ -89,7 +106,33 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: fl
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
-    return pressure[rises], np.asarray(conductance(stiffness, k_s, exported.modulus))[rises]
+    return pressure[rises], scale * stiffness[rises]
+
+
+def _friction(
+    exported: ExportedLaw, coefficient: float, kappa: Any, pressure: Any, pressures: tuple[Any, Any] | None
+) -> Friction:
+    """What a friction card has, by the stiffness of a small unloading."""
+    law, units = exported.law, exported.units
+    if kappa is None or (pressure is None and pressures is None):
+        raise InputError("friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures")
+    ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
+    at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
+
+    def stiffness(p: float) -> float:
+        point = law.at_pressure(p)
+        ratio = kappa(float(point.area)) if callable(kappa) else kappa
+        return float(law.unloading_stiffness(point.mean_separation)) / checked_kappa(ratio)
+
+    chosen = Friction(one_number("friction", coefficient), at, stiffness(at), ())
+    places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
+    known = ", ".join(f"{stiffness(p):.4g} at {p:.4g}" for p in places)
+    comments = (
+        f"friction coefficient {chosen.coefficient:.10g}; shear stress over displacement before slip, the stiffness of "
+        f"a small unloading over kappa: {chosen.stiffness:.4g} {exported.stress}/{exported.length} at {at:.4g} "
+        f"{exported.stress}, where the friction card holds; {known} {exported.stress}",
+    )
+    return dataclasses.replace(chosen, comments=comments)
 
 
 @hinted
@@ -106,6 +149,9 @@ def describe_law(
     pressures: tuple[float | str, float | str] | None = None,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
+    kappa: float | Callable[[float], float] | None = None,
+    friction: float | None = None,
+    friction_pressure: float | str | None = None,
     variant: str | Variant = "reported",
     evenly: bool = False,
     theory: str | Theory | UserTheory | None = None,
@@ -122,9 +168,9 @@ def describe_law(
         Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
-    quantity : {"pressure", "conductance", "leakage"}
-        Pressure against overclosure, or conductance against pressure, or the flow coefficient k h_rms^3 of the gaps
-        (`ContactLaw.leakage`) against pressure.
+    quantity : {"pressure", "conductance", "leakage", "tangential_stiffness"}
+        Pressure against overclosure; or against pressure the conductance, the flow coefficient k h_rms^3 of the gaps
+        (`ContactLaw.leakage`), or the tangential stiffness before slip.
     rows : int, optional
         How many; else as few as `rtol` needs, 1e-3 where neither is given.
     rtol : float, optional
@@ -137,6 +183,13 @@ def describe_law(
         smallest on. Not with `largest_overclosure`.
     conductivity : float, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
+    kappa : float or callable, optional
+        Normal over tangential stiffness (`materials.tangential_ratio`), a number or a function of the contact area.
+    friction : float, optional
+        Coefficient of friction, for the friction cards of solvers; with `kappa`.
+    friction_pressure : float or str, optional
+        Pressure at which the one tangential stiffness of a friction card holds; by default the geometric mean of
+        `pressures`. Its comments have the stiffness at other pressures.
     variant : str or Variant
         Of the MBMA model.
     theory : str or theory
@@ -166,17 +219,22 @@ def describe_law(
     exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
     law, units = exported.law, exported.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    k_s, names = 1.0, (own := ("overclosure", "pressure", exported.length, exported.stress))
+    scale, names = 1.0, (own := ("overclosure", "pressure", exported.length, exported.stress))
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
+        scale = k_s / exported.modulus
         names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")
     elif quantity == "leakage":
         names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
+    elif quantity == "tangential_stiffness":
+        names = ("pressure", quantity, exported.stress, f"{exported.stress}/{exported.length}")
+        scale = 1 / checked_kappa(kappa)  # type: ignore[arg-type]
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
     behaviour = _table(exported, "pressure", own, least, end, choose) if quantity == "conductance" else None
-    return _table(exported, quantity, names, least, end, choose, k_s, behaviour)
+    sheared = None if friction is None else _friction(exported, friction, kappa, friction_pressure, pressures)
+    return _table(exported, quantity, names, least, end, choose, scale, behaviour, sheared)
 
 
 def _table(
@@ -186,12 +244,13 @@ def _table(
     least: float | None,
     end: float,
     choose: Callable[..., tuple[FloatArray, FloatArray, float]],
-    k_s: float = 1.0,
+    scale: float = 1.0,
     behaviour: LawTable | None = None,
+    friction: Friction | None = None,
 ) -> LawTable:
     """Rows up to an overclosure, whose error holds from the `least` pressure on, or above `FLOOR`."""
     law = exported.law
-    fine_x, fine_y = _curve(exported, quantity, end, k_s)
+    fine_x, fine_y = _curve(exported, quantity, end, scale)
     floor = FLOOR * float(fine_y[-1])
     if quantity == "leakage":
         floor = float(fine_y[-1])
@@ -201,21 +260,22 @@ def _table(
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
-    if heat := quantity == "conductance":
+    if slope := quantity in ("conductance", "tangential_stiffness"):
         # between no contact and the smallest pressure that counts there is one row alone, that of zero
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
-    x, y, error = choose(fine_x, fine_y, floor, jump=heat or law.highest < np.inf)
+    x, y, error = choose(fine_x, fine_y, floor, jump=slope or law.highest < np.inf)
     comments = exported.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
         f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
         *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
+        *(friction.comments if friction else ()),
         end=end,
         leakage=quantity == "leakage",
     )
-    return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour)
+    return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, friction)
 
 
 def _why_there(law: ContactLaw, end: float, quantity: str) -> str:

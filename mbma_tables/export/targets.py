@@ -18,9 +18,10 @@ from mbma_tables.export.text import comment
 if TYPE_CHECKING:
     from mbma_tables.export.law_rows import LawTable
 
-LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit"})
+LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"})
 ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
 CODE = LAW | {"name", "leakage"}
+FRICTION = frozenset({"friction", "friction_pressure"})
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "GRAPHS": "onnx", "CODE": "code"}
 
@@ -69,6 +70,7 @@ class Grammar:
     most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
     named: str | None = None  # what a name stands for that is not given; None where there is none
     first: str = ""  # line of the file
+    friction: str = ""  # what the user of its friction card must know; empty where there is none
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
         """The text of a file.
@@ -85,16 +87,18 @@ class Grammar:
             raise InputError(
                 f"{self.program} holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows"
             )
+        if law.friction is not None and not self.friction:
+            raise InputError(f"{self.program} takes no friction here")
         named = {} if self.named is None else {"name": self.named if name is None else name}
         return (
             self.first
-            + comment([*law.comments, self.beyond], self.mark)
+            + comment([*law.comments, *([self.friction] if law.friction else []), self.beyond], self.mark)
             + self.body[law.y_name](law, **named, **numbers)
         )
 
     def target(self, name: str) -> Target:
         """The target of this name."""
-        return Target(name, self, ROWS if self.named is None else ROWS | {"name"})
+        return Target(name, self, ROWS | ({"name"} if self.named else set()) | (FRICTION if self.friction else set()))
 
 
 @functools.cache

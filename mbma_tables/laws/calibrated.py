@@ -8,7 +8,7 @@ energy over A0 E* g h_rms. A spectrum enters by its shares w(x) of h_rms^2 per d
     U(F)    = 1/(4 g^) integral x w(x) W(P) d ln x,      W(P) = a P + b P^3 + (1 - a - b) P^16,  g^ = g/(q0 h_rms)
     u_P(F)  = integral from F to infinity of dU/F        so that F = -dU/du, and full contact is exact
     F_G(u)  = F_P(u) exp(-c (1 - nu) u^3)                a Gaussian surface without end
-    F(u)    = F_G(u) - F_G(h_max)                        one that ends at h_max: its stiffness is the endless one's
+    F(u)    = F_G(u) (1 - r)^(3/2)/(1 + r), r = F_G(h_max)/F_G(u)     one that ends at h_max, as Hertz's contacts do
 
 W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a depends on the
 spectrum's narrowness nu = 1/(<x> <1/x>), which needs no Hurst exponent. The compiled core, spectrum_laws.c, keeps
@@ -47,7 +47,7 @@ class Constants:
     weight: float = 0.438  # W's coefficient a,
     weight_slope: float = 0.08577  # its slope in the narrowness less 0.65,
     cubic: float = 0.4279  # and b
-    tail: float = 0.06492  # c of the Gaussian tail factor
+    tail: float = 0.05822  # c of the Gaussian tail factor
 
 
 CONSTANTS = Constants()

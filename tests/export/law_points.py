@@ -15,7 +15,7 @@ from mbma_tables.export.law_code import law_text
 
 POINTS = 10_000
 VALUES, TANGENTS = 1e-13, 1e-11  # what agreement is asked of exported laws
-CONDUCTIVITY = 3.0
+CONDUCTIVITY, KAPPA = 3.0, 1.25
 # h_max is a dyadic number, so that c = (h_max - d)/2 is exact
 ROAD = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="mm")
 ASKED = {
@@ -54,6 +54,14 @@ class Points:
     def pressures(self):
         """Pressures on the branch of first contact, but where pieces meet: they do so within the law's error alone."""
         return self.p[:POINTS][self.c[:POINTS] < self.c_turn]
+
+    def assert_slopes(self, conductance, sheared):
+        """Conductance and tangential stiffness by the unloading stiffness."""
+        law, factor = self.law.unloading
+        slope = factor * np.asarray(law.stiffness(separation=self.law.h_max - 2 * self.c))
+        allowed = 1e-11 * np.maximum(np.abs(slope), 1e-2 * self.p / np.abs(self.c))
+        assert (np.abs(conductance * 13.3 / CONDUCTIVITY - slope) <= allowed).all()
+        assert (np.abs(sheared * KAPPA - slope) <= allowed).all()
 
     def assert_inverse(self, c):
         """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""

@@ -13,7 +13,7 @@ import types
 import law_points
 import numpy as np
 import pytest
-from law_points import ASKED, CONDUCTIVITY, VALUES, needs, points
+from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 
 from mbma_tables import InputError, Surface, contact_law
 from mbma_tables.core import core
@@ -50,8 +50,8 @@ def c_function(library, name):
 def compiled(tmp_path_factory):
     folder, found = tmp_path_factory.mktemp("laws"), {}
     for name in ASKED:
-        heat = {} if name == "hardened" else HEAT
-        (folder / f"{name}.c").write_text(law_points.text("c-law", name, name="road", leakage=True, **heat))
+        asked = HEAT | {"kappa": KAPPA, "leakage": True}
+        (folder / f"{name}.c").write_text(law_points.text("c-law", name, name="road", **asked))
         strict = ("-std=c99", "-Wmissing-prototypes", "-Wstrict-prototypes", *WARNINGS)
         for level in ("-O3", "-O2"):
             run("gcc", *strict, level, "-shared", "-fPIC", f"{name}.c", "-lm", "-o", f"{name}.so", folder=folder)
@@ -70,9 +70,7 @@ def test_c(name, compiled):
     both.restype, both.argtypes = ctypes.c_double, [ctypes.c_double, ctypes.POINTER(ctypes.c_double)]
     slope = ctypes.c_double()
     assert (both(float(known.c[0]), ctypes.byref(slope)), slope.value) == (found[0][0], found[1][0])
-    if name != "hardened":
-        conductance = c_function(library, "conductance")(known.c)
-        np.testing.assert_allclose(conductance, CONDUCTIVITY / 13.3 * found[1], rtol=1e-15)
+    known.assert_slopes(*(c_function(library, what)(known.c) for what in ("conductance", "tangential_stiffness")))
 
 
 @needs("gcc")
@@ -127,8 +125,8 @@ def test_headers_say_what_is_there():
     [
         *((target, "calibrated", HEAT | {"leakage": True}, "has no place for leakage") for target in SUBROUTINES),
         *((f"{code}-gapcon", "mbma", {}, "conductance needs conductivity") for code in ("abaqus", "calculix")),
-        *((f"{code}-gapcon", "hardened", HEAT, "leave conductivity or hardness") for code in ("abaqus", "calculix")),
-        ("onnx", "hardened", HEAT, "leave conductivity or hardness out"),
+        ("onnx", "hardened", HEAT, "leave the hardness out"),
+        ("c-law", "calibrated", {"kappa": 3.0}, "kappa must be"),
         ("onnx", "mbma", {"name": "1 x"}, "a name must be a letter"),
         ("cobol-law", "mbma", {}, "target must be one of"),
         ("c-law", "mbma", {"name": "1 x"}, "a name must be a letter"),
@@ -463,19 +461,19 @@ package asked
   end at;
 end asked;
 model Ask
-  Real c; Real p; Real h; Real a; Real e; Real l;
+  Real c; Real p; Real k; Real h; Real s; Real a; Real e; Real l;
 equation
   c = asked.at(time); p = road.pressure(c); h = road.conductance(c); a = road.area(c); e = road.energy(c);
-  l = road.leakage(c);
+  l = road.leakage(c); k = road.tangent(c); s = road.tangential_stiffness(c);
 end Ask;
 """
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["mbma", "calibrated"])
+@pytest.mark.parametrize("name", ["mbma", "calibrated", "hardened"])
 def test_modelica(name, tmp_path):
     rumoca, known = pytest.importorskip("rumoca"), points(name)
-    text, answers = law_points.text("modelica-law", name, name="road", leakage=True, **HEAT), []
+    text, answers = law_points.text("modelica-law", name, name="road", leakage=True, kappa=KAPPA, **HEAT), []
     # in parts: the compiler hands all of an array on in each step
     for k, c in enumerate(np.array_split(known.c, 25)):
         asks = MODELICA.format(size=c.size, gaps=", ".join(map(repr, c.tolist())))
@@ -484,9 +482,10 @@ def test_modelica(name, tmp_path):
         model = rumoca.Session().load(str(tmp_path / f"{k}" / "ask.mo"), model="Ask")
         found = model.simulate(t=(0, c.size - 1), dt=1)
         assert (np.asarray(found["c"]) == c).all()
-        answers.append([found[what] for what in ("p", "h", "a", "e", "l")])
-    p, conductance, *others = np.concatenate(answers, axis=1)
-    known.assert_equal(p, conductance / (CONDUCTIVITY / 13.3), *others, close=1e-9)
+        answers.append([found[what] for what in ("h", "s", "p", "k", "a", "e", "l")])
+    conductance, sheared, *others = np.concatenate(answers, axis=1)
+    known.assert_equal(*others, close=1e-9)
+    known.assert_slopes(conductance, sheared)
 
 
 @needs("gcc")
