@@ -119,17 +119,17 @@ def _friction(
     ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
     at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
 
+    ratio = checked_kappa(kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa)
+
     def stiffness(p: float) -> float:
-        point = law.at_pressure(p)
-        ratio = kappa(float(point.area)) if callable(kappa) else kappa
-        return float(law.unloading_stiffness(point.mean_separation)) / checked_kappa(ratio)
+        return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
 
     chosen = Friction(one_number("friction", coefficient), at, stiffness(at), ())
     places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
     known = ", ".join(f"{stiffness(p):.4g} at {p:.4g}" for p in places)
     comments = (
         f"friction coefficient {chosen.coefficient:.10g}; shear stress over displacement before slip, the stiffness of "
-        f"a small unloading over kappa: {chosen.stiffness:.4g} {exported.stress}/{exported.length} at {at:.4g} "
+        f"a small unloading over kappa = {ratio:.4g}: {chosen.stiffness:.4g} {exported.stress}/{exported.length} at {at:.4g} "
         f"{exported.stress}, where the friction card holds; {known} {exported.stress}",
     )
     return dataclasses.replace(chosen, comments=comments)
