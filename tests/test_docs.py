@@ -47,6 +47,14 @@ def test_examples_of_docstrings(name):
     assert found.failed == 0
 
 
+def test_readme_quotes_the_audit():
+    rows = re.findall(
+        r"\| (?:`error`|inverses)[^|]*\| ([\d,]+) \| [\d,]+ \| 0 \|", (ROOT / "docs/guarantees.md").read_text()
+    )
+    assert len(rows) == 10
+    assert f"compared {sum(int(row.replace(',', '')) for row in rows):,} answers" in (ROOT / "README.md").read_text()
+
+
 def test_public_names_and_first_pages_have_examples():
     finder = doctest.DocTestFinder()
     public = ("Surface", "contact", "contact_law", "island", "open_table", "Scene", "height_integral")
