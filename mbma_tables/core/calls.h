@@ -196,10 +196,7 @@ static mbma_spline spline_of(const argument *a) {
     FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4))) \
     FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4))) \
-    /* hardness.c */ \
-    FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
-       mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9)))
+       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4)))
 
 /* A function of arguments: whether their sizes fit, and what was found. */
 #define DEFINE_CALL(name, kinds, fits, call) \
