@@ -244,16 +244,6 @@ def test_surfaces_lists_every_case():
     assert [row[0] for row in rows[1:]] == list(CASES)
 
 
-def test_out_holds_what_stdout_would(folder):
-    arguments = ("contact", "--surface", "concrete", "-d", "0.5", "--json")
-    expected = run(*arguments)
-    (folder / "o.json").write_text("an older answer")
-    assert run(*arguments, "--out", "o.json") == ""
-    found, wanted = json.loads((folder / "o.json").read_text()), json.loads(expected)
-    assert found == wanted
-    assert [path.name for path in folder.iterdir()] == ["o.json"]
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

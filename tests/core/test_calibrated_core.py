@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import NdBSpline
 
-from generate.splines import TAPS
 from mbma_tables.answers import leakage_table
 from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.core import GENERATIONS, core
@@ -77,32 +76,6 @@ def test_erf_within_1e_15(used):
 
 
 class TestSpline:
-    @pytest.mark.parametrize("used", CORES)
-    @pytest.mark.parametrize("number", range(6))
-    def test_weights_at_forty_digits(self, used, number):
-        # one cell, one coefficient: the product of three cardinal B-splines, which is a polynomial of the last place
-        one = np.zeros(6**3 + 2, np.float32)
-        one[36 * number + 6 * 5 + number] = 1.0
-        places = np.linspace(0, 1, 18)
-        numbers = np.array([0.0, 0, 0, 1, 1, 1, 0, 1, 0, 1, 0, 0, 0])
-        out = np.empty((18, 1, 6))
-        bad = used.spline_pieces(one, numbers, np.ones(3, np.int64), places, np.ones(18), None, None, None, out)
-        assert bad == 0
-        with mpmath.workdps(40):
-
-            def exact(u):
-                # by divided differences of truncated powers
-                x = mpmath.mpf(u) + 5 - number
-                terms = ((-1) ** k * mpmath.binomial(6, k) * max(x - k, 0) ** 5 for k in range(7))
-                return mpmath.fsum(terms) / 120
-
-            last = mpmath.mpf(1) / 120
-            assert number == 5 or TAPS[5][number] == pytest.approx(float(exact(0)), rel=2e-16)
-            for u, six in zip(places.tolist(), out[:, 0].tolist(), strict=True):
-                for z in (0.0, 0.3, 1.0):
-                    found = mpmath.polyval([mpmath.mpf(c) for c in six[::-1]], z)
-                    assert abs(found - exact(u) * last * exact(z)) < 2e-16
-
     def test_is_the_tensor_spline_of_scipy(self):
         rows, _ = batch(300, seed=2)
         x = np.random.default_rng(3).uniform(TABLE.first[2], TABLE.last, 300)

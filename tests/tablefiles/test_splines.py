@@ -1,6 +1,5 @@
 """Spline coefficients and their evaluation against scipy, polynomials, and arithmetic at 50 digits."""
 
-import mpmath
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
@@ -67,41 +66,6 @@ def test_one_axis_against_scipy_and_more_components(degree, nodes):
     places = np.linspace(0, nodes - 1, 977)
     expected = make_interp_spline(np.arange(nodes), values, k=degree)(places)
     np.testing.assert_allclose(BSpline(knots, coefs, degree)(places), expected, rtol=1e-11, atol=1e-11)
-
-
-def basis(number, u, cell):
-    """The cubic B-spline and its derivative as the core has them, from a table that is it along each axis in turn."""
-    for axis in range(4):
-        shape = [7, 7, 7, 7]
-        coefs = np.ones((*shape, 2))
-        one = np.zeros(7)
-        one[cell + number] = 1.0
-        coefs *= one.reshape([7 if k == axis else 1 for k in range(4)] + [1])
-        place = np.full(4, 2.0)
-        place[axis] = cell + u
-        out = at_places(coefs, place[:, None], slopes=True)[..., 0]
-        np.testing.assert_array_equal(out[0], out[1])
-        # the others sum to 1, to rounding
-        yield out[0, 0], out[0, 1 + axis]
-
-
-def by_truncated_powers(degree, number, u, order=0):
-    """The cardinal B-spline by divided differences of truncated powers."""
-    x = u + degree - number
-    terms = (
-        (-1) ** k * mpmath.binomial(degree + 1, k) * max(x - k, mpmath.mpf(0)) ** (degree - order)
-        for k in range(degree + 2)
-    )
-    return mpmath.fsum(terms) / mpmath.factorial(degree - order)
-
-
-def test_cubic_weights_at_fifty_digits():
-    with mpmath.workdps(50):
-        for number in range(4):
-            for u in (k / 16 for k in range(16)):
-                for value, slope in basis(number, u, 2):
-                    assert abs(value - by_truncated_powers(3, number, mpmath.mpf(u))) < 4e-16
-                    assert abs(slope - by_truncated_powers(3, number, mpmath.mpf(u), 1)) < 8e-16
 
 
 def test_the_last_node_belongs_to_the_table():

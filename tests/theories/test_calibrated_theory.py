@@ -209,16 +209,6 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number):
         assert np.all(errors_of <= 2 * shipped().standard_deviation("calibrated", quantity, area[touching])), quantity
 
 
-def test_an_older_set_of_boundary_elements():
-    force, area, _, u = np.loadtxt(DATA / "bem_hurst0.8_zeta64.csv", delimiter=",", skiprows=4).T[:4]
-    surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
-    force *= surface.rms_gradient
-    found = contact(surface, pressure=force, theory="calibrated").area
-    np.testing.assert_allclose(found[area > 0.005], area[area > 0.005], rtol=0.03)
-    back = contact(surface, mean_separation=u, theory="calibrated").pressure
-    np.testing.assert_allclose(back[area > 0.01], force[area > 0.01], rtol=0.04)
-
-
 def synthetic():
     """A periodic Gaussian map of side 1 with H = 0.8."""
     k = np.hypot(np.fft.fftfreq(192, 1 / 192)[:, None], np.arange(97)[None, :])
@@ -282,12 +272,6 @@ class TestMap:
         mirrored = Surface.from_map(synthetic(), 1 / 192, model="measured")
         found = contact(mirrored, pressure=0.01, theory=THEORY).area
         assert found == pytest.approx(THEORY.answer(surface, expected[1:]).area, rel=0.1)
-
-    def test_heights_without_a_map_stand_between_spectrum_and_map(self, surface):
-        heights = Surface.from_spectrum(surface.q, surface.C, heights=synthetic())
-        u = 0.003 * np.array([0.5, 1.0, 2.0])
-        found, whole = (contact(s, mean_separation=u, theory=THEORY) for s in (heights, surface))
-        np.testing.assert_allclose(found.pressure, whole.pressure, rtol=0.12)
 
 
 class TestSpectrum:
@@ -365,16 +349,6 @@ def test_what_is_told_of_a_measured_surface():
     assert any("anisotropy is 6, tested from 1 to 4.1" in told for told in contact(stretched, area=0.05).reasons)
     flat = Surface(hurst=0.8, q0=0.02, q1=1.28, h_rms=1.5, h_max=4.95)
     assert contact(flat.sampled(), area=0.05, theory="calibrated").valid
-
-
-def test_separations_are_the_inverse_of_force():
-    table, rng, n = shipped(), np.random.default_rng(3), 250
-    low, high = (0.1, np.log(3), 2), (1, np.log(1e5), 12)
-    surfaces = rng.uniform(low, high, (n, 3)).T.copy()
-    u = surfaces[2] * np.concatenate([rng.uniform(0, 0.99, 150), 10 ** rng.uniform(-9, -1, 96), [0, 1, 1.5, 1e-300]])
-    force = table.fill(surfaces, np.arange(n), u)[0]
-    known = np.flatnonzero((force > 0) & (force < 1e3))
-    np.testing.assert_allclose(table.separations(surfaces, known, force[known]), u[known], rtol=1e-9)
 
 
 @pytest.mark.parametrize("h_max", [20.0, 200.0, 1e4])

@@ -302,19 +302,6 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
             assert (misses <= law.slope_error(separation=gap)).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_what_it_takes(name):
-    function = getattr(law_of(CASES[0]), name)
-    expected = function(separation=1.0)
-    for same in (1, np.float64(1), np.float32(1), np.int16(1), np.array(1), np.array(1.0)):
-        assert function(separation=same) == expected
-        assert np.shape(function(separation=same)) == ()
-    labelled = function(separation=xr.DataArray([1.0, 0.5], dims="t", coords={"t": [3, 4]}, attrs={"units": "mm"}))
-    assert labelled.t.values.tolist() == [3, 4]
-    assert "units" not in labelled.attrs
-    assert labelled.values.tolist() == [expected, function(separation=0.5)]
-
-
 def test_the_ends_and_no_contact():
     law = law_of(CASES[0])
     for name in NAMES:
