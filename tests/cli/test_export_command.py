@@ -100,7 +100,6 @@ def test_a_range_of_pressures(tmp_path):
     assert held.floor == pytest.approx(1e-3, rel=1e-6)
 
 
-CONDUCTANCE = ["--conductivity", "50", "--conductivity-unit"]
 WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] != name] for name in LAW[::2]}
 
 
@@ -111,23 +110,14 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "--stress-unit is missing"),
         (["calculix", "--out", "law", *WITHOUT["--E-star"]], "is given and no modulus"),
         (["calculix", "--out", "law", *WITHOUT["--surface"]], "one surface is needed"),
-        (["calculix", "--out", "law", *WITHOUT["--rows"], "--rows", "300"], "holds 200 rows"),
-        (["calculix", "--out", "law", *LAW, "--largest-overclosure", "5"], "--largest-overclosure must be in"),
-        (["calculix", "--out", "no/such/folder/law", *LAW], "cannot be written"),
-        (["matlab", "--out", "1law.mat", *LAW], "a name must be a letter"),
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
-        (["abaqus", "--out", "law", *LAW, *CONDUCTANCE, "W\n*INCLUDE, INPUT=evil"], "--conductivity-unit is not print"),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c_law", "--out", "law", *LAW], "no target is called 'c_law': did you mean 'c-law'?"),
-        (["c", "--out", "code", "--variant", "other"], "variant"),
         (["c", "--out", "code", "--rows", "3", "--exponential"], "leave --rows and --exponential out"),
         (["calculix", "--out", "law", *LAW, "--exponential"], "leave --rows out"),
         (["calculix", "--out", "law", *LAW[:-2], "--exponential", "--theory", "persson"], "leave --theory out"),
-        (["calculix", "--out", "law", *LAW, "--name", "1 X"], "a name must be a letter"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
-        (["calculix", "--out", "law", *LAW, "--pressures", "2:1"], "pressures must be two rising numbers"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"], "pressure must be at most 2.02721 MPa, at d ="),
-        (["calculix", "--out", "law.inp", *LAW, "--theory", "calibrated", "--leakage"], "takes pressure against over"),
         (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "needs --conductivity, which is missing"),
     ],
 )
