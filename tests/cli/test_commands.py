@@ -109,15 +109,6 @@ def test_where_an_answer_is_not_valid_is_said_in_one_line():
     assert "not valid" not in run("contact", "--surface", "concrete", "-u", "0.8")
 
 
-def test_scatter_is_said_where_it_is_known(folder, monkeypatch):
-    from mbma_tables.theories.persson import Persson
-
-    known = {"pressure": lambda area: 0.3 + area, "area": lambda area: 0.02 + 0 * area, "stiffness": lambda area: area}
-    monkeypatch.setattr(Persson, "scatter", lambda self, surface, quantity, area: known[quantity](area))
-    text = run("contact", "--surface", "concrete", "--theory", "persson", "-a", "0.01,0.1")
-    assert "scatter against simulations: ln force 0.31 to 0.4 at a separation, ln area 0.02 to 0.02 at a force" in text
-
-
 @pytest.mark.parametrize("theory", THEORIES)
 def test_curve_of_any_theory(folder, theory):
     arguments = ("curve", "--surface", "concrete", "--theory", theory, "--points", "9", "--plot", "c.png", "--json")
@@ -324,16 +315,6 @@ def test_faults_of_the_system_are_one_line(folder, fault, said, monkeypatch):
 def test_without_a_command_it_shows_its_help():
     assert run() == run("--help")
     assert run().startswith("Usage: mbma [OPTIONS] [COMMAND]")
-
-
-@pytest.mark.parametrize(("kind", "start"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])
-def test_kinds_of_pictures(folder, kind, start):
-    for name in ("one", "two"):
-        run("curve", "--surface", "concrete", "--points", "5", "--plot", f"{name}.{kind}")
-    content = (folder / f"one.{kind}").read_bytes()
-    assert content.startswith(start)
-    assert content == (folder / f"two.{kind}").read_bytes()
-    assert kind != "svg" or b">real contact area" in content
 
 
 def test_a_dash_is_standard_input_and_output(folder):

@@ -1,17 +1,15 @@
 """The compiled core's laws of spectra: against quadrature by numpy and mpmath, and on any input."""
 
-import dataclasses
 import importlib
 import math
 
-import mpmath
 import numpy as np
 import pytest
 from scipy.special import erf
 
 from mbma_tables import ConvergenceError, InputError, Surface
 from mbma_tables.core import GENERATIONS, core
-from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, POWERS, YANG_PERSSON, Law, Spectrum
+from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum
 
 PLAIN = importlib.import_module("mbma_tables.core._plain")
 FUSED = [importlib.import_module(f"mbma_tables.core._{name}") for name, least in GENERATIONS.items()
@@ -68,24 +66,6 @@ def log_separation(q, C, force, law):
 
 def self_affine(hurst, zeta_1):
     return np.array([1.0, zeta_1]), np.array([1.0, zeta_1 ** (-2 - 2 * hurst)])
-
-
-@pytest.mark.parametrize("constants", [PERSSON, YANG_PERSSON, dataclasses.replace(PERSSON, weight=0.0)])
-def test_one_wave_has_the_inner_integral_of_mpmath(constants):
-    law = Law(Spectrum(*np.ones((3, 1)), 1.0, 10.0), None, constants)
-    for place in (-40.0, -19.9, -10.0, -3.0, -1.1, 0.01, 0.45, 1.3, 2.9):
-        with mpmath.workdps(20):
-            y = mpmath.exp(place)
-
-            def integrand(v, y=y):
-                P = mpmath.erf(mpmath.sqrt(2 * (y * y + v / 2)))
-                slope = sum(n * a * P ** (n - 1) for n, a in zip(POWERS, law.coefficients.tolist(), strict=True))
-                return slope * mpmath.exp(-v) / (4 * (y * y + v / 2))
-
-            edges = [0, *(mpmath.mpf(10) ** k for k in range(-40, 1)), 2, 4, 8, 16, 32, 64]
-            expected = mpmath.sqrt(8 / mpmath.pi) * mpmath.quad(integrand, edges) / 4
-        found = math.log(law.separation_persson(math.exp(place))[0]) + 2 * math.exp(2 * place)
-        assert found == pytest.approx(float(mpmath.log(expected)), abs=2e-12), place
 
 
 class TestCurve:

@@ -252,32 +252,12 @@ def test_stiffness_is_the_slope_of_force(theory):
     assert theory.answer(SURFACE, u).stiffness == pytest.approx((4 * fine - coarse) / 3, rel=1e-5)
 
 
-def test_mbma_inverts_and_integrates_as_its_law_does():
-    law, theory, u = contact_law(SURFACE), Mbma(), SHARES * SURFACE.h_max
-    loads = law.pressure(u)
-    assert theory.answer(SURFACE, u).stiffness == pytest.approx(law.stiffness(u), rel=1e-5)
-    assert theory.energy(SURFACE, u) == pytest.approx(law.energy(u), rel=1e-7)
-    assert theory.mean_separation_at(SURFACE, "pressure", loads) == pytest.approx(u, rel=1e-7)
-    with pytest.raises(OutOfRangeError, match="'mbma' reaches"):
-        theory.mean_separation_at(SURFACE, "pressure", np.array(1.0))
-
-
 def test_mbma_ends_where_its_force_turns():
     low = Mbma().interval(BATCH)[0]
     law = contact_law(Surface(0.3, 1.0, 1000.0, 1.0, 3.0))
     assert law.turning_point is not None
     assert low[0] == pytest.approx((3.0 + law.turning_point) / 2, abs=1e-5)
     assert (low[1:] == 0).all()
-
-
-def test_softening_is_the_maximum_of_stiffness():
-    found = Mbma().softening(BATCH)
-    fine = np.linspace(0.01, 0.999, 1500)[:, None]
-    stiffness = Mbma().answer(BATCH, fine * BATCH.h_max).stiffness
-    # the first maximum from first contact on
-    rising = np.diff(stiffness[::-1], axis=0) > 0
-    first = 1500 - 1 - np.argmin(rising, axis=0)
-    assert found == pytest.approx(fine[first, 0] * BATCH.h_max, abs=3e-3)
 
 
 def test_a_users_own_object_is_a_theory():
