@@ -262,44 +262,6 @@ def test_units_of_modelica(tmp_path):
     assert 'output Real y(unit = "mm3");' in text
 
 
-GAPCON = """
-#include <stdio.h>
-void gapcon_();
-int main(void) {
-    double ak[5], d[2] = {0, 0};
-    for (int k = 0; k < 3; k++) {
-        d[1] = 1e3*k + 1e-3;
-        gapcon_(ak, d);
-        printf("%.17g %.17g\\n", ak[0], ak[2]);
-    }
-}
-"""
-
-
-@needs("gcc")
-@pytest.mark.parametrize("target", ["abaqus-gapcon", "calculix-gapcon"])
-def test_gapcon_keeps_its_last_value(target, tmp_path):
-    text = law_points.text(target, "calibrated", name="road", **HEAT)
-    (tmp_path / "road.c").write_text(text)
-    (tmp_path / "ask.c").write_text(GAPCON)
-    subprocess.run(["gcc", "-w", "-O1", "road.c", "ask.c", "-lm", "-o", "ask"], cwd=tmp_path, check=True)
-    done = subprocess.run(["./ask"], cwd=tmp_path, capture_output=True, text=True, check=True)
-    found = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
-    law = points("calibrated").law
-    known = [law.at_pressure(1e-3).stiffness, *2 * [law.stiffness(separation=law.lowest)]]
-    np.testing.assert_allclose(found[:, 0], CONDUCTIVITY / 13.3 * np.array(known), rtol=1e-6)
-    assert (found[1:, 1] == 0).all()
-    assert done.stderr.count("beyond the law's range") == 1
-    if target == "calculix-gapcon":
-        said = " ".join(text.replace("\n *", " ").split())
-        for words in (
-            "TYPE=SURFACE TO SURFACE",
-            "PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR",
-            "-o gapcon.o, ar r ccx_",
-        ):
-            assert words in said
-
-
 @needs("cc")
 @pytest.mark.parametrize("target", FMUS)
 def test_an_fmu_runs_as_it_is(target, tmp_path):
