@@ -195,25 +195,3 @@ def test_moments_of_self_affine_surfaces(hurst, log_zeta_1):
         given = np.array([bad, 0.5]), np.array([1.0, bad])
         out = np.empty((2, 2))
         assert core.self_affine(*given, *out) == np.isnan(out[0]).sum() == np.isnan(out[1]).sum() >= 1
-
-
-def test_flow_is_its_closed_form():
-    rows, _ = batch(200, seed=9)
-    rng = np.random.default_rng(10)
-    u, area = rng.uniform(0.01, 3, 200), 10.0 ** rng.uniform(-9, math.log10(0.5), 200)
-    c = FLOW.constants
-    with np.errstate(invalid="ignore"):
-        odds = np.log(area / (c.threshold - area))
-    inside = odds.clip(FLOW.first[2], FLOW.last)
-    place = (inside - FLOW.first[2]) / FLOW.step[2]
-    cell = np.where(np.isnan(place), 0, place).astype(int).clip(0, FLOW.cells[2] - 1)
-    six = pieces_of(FLOW, rows)[np.arange(200), cell]
-    value, slope = (
-        np.array([np.polynomial.polynomial.polyval(z, p) for z, p in zip(place - cell, part, strict=True)])
-        for part in (six, six[:, 1:] * np.arange(1, 6) / FLOW.step[2])
-    )
-    value = (value + slope * np.maximum(odds - FLOW.last, 0)) * np.exp(
-        c.obstruction * np.minimum(odds - FLOW.first[2], 0)
-    )
-    expected = np.where(area < c.threshold, u**3 * (1 - 1.5 / (u**2 + 4)) * np.exp(np.minimum(value, 0)), 0.0)
-    np.testing.assert_allclose(flow(rows, np.arange(200), u, area), expected, rtol=1e-12)

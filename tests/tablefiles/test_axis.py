@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -45,15 +44,6 @@ def test_positions_and_coordinates_are_inverse_and_as_the_formula_says(axis, sha
     assert name == "position"
     stated = eval(right, {"__builtins__": {}}, {"log": math.log, "x": float(x)})
     assert abs(stated - axis.position(x)) <= 1e-15 * rounding
-
-
-def test_a_logarithmic_axis_by_hand():
-    axis = Axis("mu", "stiffness", "log", 0.0, 1e-8, 1e6, 15)
-    np.testing.assert_allclose(axis.values, 10.0 ** np.arange(-8, 7), rtol=1e-14)
-    assert axis.step == pytest.approx(math.log(10), rel=1e-14, abs=0)
-    assert axis.position(1.0) == pytest.approx(8, rel=1e-14, abs=0)
-    shifted = Axis("X", "approach", "log", 3.0, -2.0, 97.0, 3)
-    np.testing.assert_allclose(shifted.values, [-2.0, 7.0, 97.0], rtol=1e-14)
 
 
 @given(axes(), st.floats(0, 1))

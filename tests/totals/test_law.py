@@ -149,13 +149,6 @@ def test_turning_points(surface, variant, name):
         law.separation(**{name: 1.0001 * peak})
 
 
-def test_no_turning_point_where_height_dominates():
-    for case in (case for case in CASES if case[0] >= 0.5):
-        law = law_of(case)
-        assert law.turning_point is law.area_turning_point is None
-        assert (np.diff(law.pressure(separation=np.linspace(law.h_max, -law.h_max, 400))) > 0).all()
-
-
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_turn_within_a_hundredth_of_the_range(rtol):
     """Force falls by 4e-6 and rises again, between places that are further apart."""
