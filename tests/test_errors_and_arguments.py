@@ -106,8 +106,8 @@ CALLS = {
     "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
     "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
     **{
-        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1})
-        for theory in ("greenwood_williamson", "persson", "calibrated")
+        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1, "E_star": 1.0})
+        for theory in ("mbma", "greenwood_williamson", "persson", "calibrated")
         for known in ("separation", "mean_separation", "pressure", "area")
     },
     "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),

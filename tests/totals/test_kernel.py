@@ -176,17 +176,6 @@ def test_failure_says_which():
     assert caught.value.mask.tolist() == [False, True, False]
 
 
-def test_the_estimate_is_of_the_kronrod_sum():
-    """Not of the Gauss sum, which is far worse: where that one alone misses the tolerance, nothing is halved."""
-    x, weights = np.polynomial.legendre.leggauss(15)
-    true, gauss = 4 + 0.2 * math.sin(10), weights @ (2 + np.cos(10 * x))
-    rtol = abs(gauss / true - 1) / 5
-    ends = np.array([-1.0]), np.array([1.0])
-    found = integrate(lambda _, points: 2 + np.cos(10 * points)[..., None], np.array([0]), *ends, 1, rtol)
-    assert found.evaluations == 31
-    assert abs(found.value[0, 0] / true - 1) <= found.error[0, 0] <= rtol
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
 def test_stated_errors_of_totals(name):
