@@ -49,10 +49,9 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: fl
         flow = np.asarray(law.leakage(separation=d))
         # the first row that is blocked is the last
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
-from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
-from mbma_tables.export.film_rows import facts_of, film_rows
-from mbma_tables.export.law_table import LawTable
+        return pressure[open_], flow[open_] if quantity == "leakage" else np.cbrt(flow[open_])
+    if exported.hardness < np.inf:
+        stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
     return pressure[rises], np.asarray(conductance(stiffness, k_s, exported.modulus))[rises]
 
@@ -133,25 +132,28 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
-from mbma_tables.export.film_rows import facts_of, film_rows
-from mbma_tables.export.law_table import LawTable
+    if film := quantity == "film":
+        theory = "calibrated" if theory is None else theory
+        if any(given is not None for given in (rtol, largest_overclosure)):
+            raise InputError("rtol and largest_overclosure are not of a film: give rows and pressures")
+    elif peklenik is not None:
+        raise InputError("peklenik belongs to quantity='film': leave it out")
+    exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
+    law, units = exported.law, exported.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
     k_s, names = 1.0, (own := ("overclosure", "pressure", exported.length, exported.stress))
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
         names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")
     elif quantity == "leakage":
-from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
-from mbma_tables.export.film_rows import facts_of, film_rows
-from mbma_tables.export.law_table import LawTable
+        names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
+    elif quantity == "hydraulic_aperture":
+        names = ("pressure", quantity, exported.stress, exported.length)
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
     if film:
         count = whole_number_in("rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS)
-        return film_rows(joint, count, least, end if pressures else np.inf, peklenik)
+        return film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
     behaviour = _table(exported, "pressure", own, least, end, choose) if quantity == "conductance" else None
     return _table(exported, quantity, names, least, end, choose, k_s, behaviour)
@@ -200,10 +202,10 @@ def _table(
         fine_u = np.asarray(law.at_pressure(fine_x).mean_separation)
         by_u = np.interp(-np.asarray(found.mean_separation), -fine_u, np.gradient(fine_y, fine_u))
         more = {
-            "aperture": (np.asarray(found.mean_separation), joint.length), "derivative": (by_u, "1"),
-            "stiffness": (np.asarray(found.stiffness), f"{joint.stress}/{joint.length}"),
+            "aperture": (np.asarray(found.mean_separation), exported.length), "derivative": (by_u, "1"),
+            "stiffness": (np.asarray(found.stiffness), f"{exported.stress}/{exported.length}"),
         }  # fmt: skip
-    facts = facts_of(joint, conductivity=(k_s, names[3].rpartition("/")[0])) if heat else facts_of(joint)
+    facts = facts_of(exported, conductivity=(k_s, names[3].rpartition("/")[0])) if heat else facts_of(exported)
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, more, facts)
 
 
