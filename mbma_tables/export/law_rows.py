@@ -20,6 +20,7 @@ from mbma_tables.common.plots import draw_lines
 from mbma_tables.common.units import Units
 from mbma_tables.export.chords import chosen_rows
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
+from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -94,8 +95,8 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
 
 @hinted
 def describe_law(
-    surface: AnySurface,
-    E_star: float | str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
     *,
     length_unit: str | None = None,
     stress_unit: str | None = None,
@@ -117,7 +118,7 @@ def describe_law(
     Parameters
     ----------
     surface : Surface
-        One surface.
+        One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`) alone, of pressure as force.
     E_star : float or str
         Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
     length_unit, stress_unit : str, optional
@@ -163,10 +164,14 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+    of_body = isinstance(surface, ForceLaw)
+    if of_body and quantity != "pressure":
+        raise InputError(f"a force law has no {quantity}")
     joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
-    law, units = joint.law, joint.units
+    law = joint.law
+    units = law.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    k_s, names = 1.0, (own := ("overclosure", "pressure", joint.length, joint.stress))
+    k_s, names = 1.0, (own := ("overclosure", "force" if of_body else "pressure", joint.length, joint.stress))
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
         names = ("pressure", "conductance", joint.stress, f"{unit}/{joint.length}")
