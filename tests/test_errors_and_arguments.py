@@ -19,6 +19,7 @@ from mbma_tables import (
     Surface,
     contact,
     contact_law,
+    flow_factors,
     greenwood_tripp,
     height_integral,
     island,
@@ -105,8 +106,8 @@ CALLS = {
     "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
     "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
     **{
-        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1})
-        for theory in ("greenwood_williamson", "persson", "calibrated")
+        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1, "E_star": 1.0})
+        for theory in ("mbma", "greenwood_williamson", "persson", "calibrated")
         for known in ("separation", "mean_separation", "pressure", "area")
     },
     "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),
@@ -163,6 +164,13 @@ BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
         (lambda: contact(ROAD, separation=1.0, derivatives="no"), "derivatives must be True or False, got 'no'"),
         (lambda: contact(ROAD, separation=1.0, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
         (lambda: contact_law(ROAD, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
+        (lambda: flow_factors("concrete", 1.0), "surface must be a Surface, got 'concrete'; a named"),
+        (lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))), "rtol, outside, workers take one value each"),
+        (lambda: contact(ROAD, separation=1.0, hardness=10**400), "hardness must be real numbers: entries of type obj"),
+        (lambda: contact(ROAD, separation=1.0, hardness=b"1"), "hardness must be real numbers"),
+        (lambda: island(ROAD, 5e-324), "delta must be at least 1e-250, got 5e-324"),
+        (lambda: Surface(0.8, 5e-324, 1.0, 1.0, 3.0), "q0 must be from 1e-50 to 1e\\+50: take another unit"),
+        (lambda: Surface(5e-324, 1.0, 10.0, 1.0, 3.0), r"hurst must be in \(0, 1\], got 5e-324"),
         (lambda: contact(ROAD, separation="50 MPa"), "'MPa' is no known unit of length but one of stress"),
         (lambda: contact(ROAD, pressure=["5 MPa", 50], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
         (lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
@@ -171,7 +179,7 @@ BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
     ],
 )
 def test_natural_mistakes_have_a_message_with_the_remedy(asked, message):
-    with pytest.raises(InputError, match=message):
+    with pytest.raises((InputError, OutOfRangeError), match=message):
         asked()
 
 

@@ -174,12 +174,12 @@ def flow_factors(
     [1.03 1.04 1.02] [0.51 0.72 0.9 ] [0.8  0.61 0.37]
     """
     one: Any = surface
-    if getattr(surface, "labelled", False) or surface.shape != ():
-        raise InputError("flow factors are of one surface, not of a batch")
     theory = "calibrated" if theory is None else theory
     found = contact(
         surface, mean_separation=mean_separation, theory=theory, E_star=E_star, hardness=hardness, materials=materials
     )
+    if surface.labelled or surface.shape != ():
+        raise InputError("flow factors are of one surface, not of a batch")
     u = np.ravel(found.mean_separation)
     low, high = (end * float(surface.h_rms) for end in RANGE)
     require("mean_separation", u, (u >= low) & (u <= high), f"from {RANGE[0]:g} to {RANGE[1]:g} h_rms")
@@ -206,8 +206,9 @@ def flow_factors(
     reasons = {text: mask for text, mask in reasons.items() if np.any(mask)}
     units = {name: found.units[name] for name in ("mean_separation", "pressure")}
     units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units))
+    shear_scatter = np.full(u.shape, OWN_SHEAR if own else SHEAR)
     return FlowFactors(
-        u, phi_x, phi_y, shear[0], shear[1], np.ravel(found.pressure), area, scatter, np.full(u.shape, OWN_SHEAR if own else SHEAR),
+        u, phi_x, phi_y, shear[0], shear[1], np.ravel(found.pressure), area, scatter, shear_scatter,
         ~np.logical_or.reduce([np.zeros(u.shape, bool), *reasons.values()]), reasons, float(gamma), surface, units,
     )  # fmt: skip
 
@@ -228,20 +229,16 @@ def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         return contact(surface, mean_separation=known, theory=source.theory)
 
     lightest = float(contact(surface, area=LIGHTEST, theory=source.theory).mean_separation)
-    knots = [] if u.min() >= lightest else np.geomspace(u.min(), lightest, KNOTS)[:-1].tolist()
-    rows = [flow(pressed(known).map().gap) for known in (*knots, lightest)]
+    knots = np.geomspace(u.min(), lightest, KNOTS)[:-1] if u.min() < lightest else np.empty(0)
+    rows = [flow(pressed(known).map().gap) for known in (*knots.tolist(), lightest)]
     top = float(heights.max())
-    wide = np.geomspace(top * CLEAR, max(u.max(), 2 * top), KNOTS) if u.max() > lightest else []
-    rows += [flow(known - heights) for known in wide]
+    rows += [flow(known - heights) for known in np.geomspace(top * CLEAR, max(u.max(), 2 * top), KNOTS)]
     at, phi, shear = (np.array(part) for part in zip(*rows, strict=True))
-    leak = found.leakage
-    own = np.stack([np.ravel(leak.x), np.ravel(leak.y)]) / u**3
-    # above the lightest contact by their own knots, whose flow is far from blocked
-    open_ = at >= at[len(knots)]
-    if open_.sum() > 1:
-        beyond = np.exp(PchipInterpolator(np.log(at[open_]), np.log(phi[open_]))(np.log(np.maximum(u, at[open_][0]))))
-        own = np.where(u > at[open_][0], beyond.T, own)
-    return own, PchipInterpolator(np.log(at), shear)(np.log(np.clip(u, at[0], at[-1]))).T
+    leak, wide = found.leakage, slice(knots.size, None)  # by their own knots, whose flow is far from blocked
+    curve = PchipInterpolator(np.log(at[wide]), np.log(phi[wide]))
+    beyond = np.exp(curve(np.log(np.maximum(u, at[knots.size])))).T
+    own = np.where(u > at[knots.size], beyond, np.stack([np.ravel(leak.x), np.ravel(leak.y)]) / u**3)
+    return own, PchipInterpolator(np.log(at), shear)(np.log(np.maximum(u, at[0]))).T
 
 
 def _peklenik(surface: Any) -> float:

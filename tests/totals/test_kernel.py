@@ -19,12 +19,11 @@ from mbma_tables.totals import island_sum
 from mbma_tables.totals.island_sum import Pairs, integrate, kinks, totals_of
 
 
-@pytest.mark.parametrize("points", [21, 31])
-def test_the_rules_by_their_degrees(points):
+def test_the_rule_by_its_degrees():
     """2 n + 1 Kronrod points are exact up to degree 3 n + 1, n Gauss points up to 2 n - 1, and not beyond."""
-    nodes, kronrod, gauss = np.empty((3, points))
-    assert core.kronrod(points, nodes, kronrod, gauss) == OK
-    n = points // 2
+    nodes, kronrod, gauss = np.empty((3, 31))
+    assert core.kronrod(nodes, kronrod, gauss) == 0
+    n = 15
     np.testing.assert_allclose(nodes[1::2], legendre.leggauss(n)[0], rtol=0, atol=2e-16)
     np.testing.assert_allclose(gauss[1::2], legendre.leggauss(n)[1], rtol=1e-14)
     assert (gauss[::2] == 0).all()
@@ -175,17 +174,6 @@ def test_failure_says_which():
     with pytest.raises(ConvergenceError, match="1 of 3") as caught:
         integrals(lambda who, x: np.where(who == 1, x**-1.0, x), np.zeros(3), np.ones(3))
     assert caught.value.mask.tolist() == [False, True, False]
-
-
-def test_the_estimate_is_of_the_kronrod_sum():
-    """Not of the Gauss sum, which is far worse: where that one alone misses the tolerance, nothing is halved."""
-    x, weights = np.polynomial.legendre.leggauss(10)
-    true, gauss = 4 + 0.4 * math.sin(5), weights @ (2 + np.cos(5 * x))
-    rtol = abs(gauss / true - 1) / 5
-    ends = np.array([-1.0]), np.array([1.0])
-    found = integrate(lambda _, points: 2 + np.cos(5 * points)[..., None], np.array([0]), *ends, 1, rtol)
-    assert found.evaluations == 21
-    assert abs(found.value[0, 0] / true - 1) <= found.error[0, 0] <= rtol
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""A joint: the law of one surface with its units, and what every file that is written of it says at its head."""
+"""An exported law: that of one surface with its units, and what every file that is written of it says at its head."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surfac
 
 
 @dataclasses.dataclass(frozen=True)
-class Joint:
+class ExportedLaw:
     """One surface's law, whose units are known."""
 
     surface: AnySurface  # in the units of the law
@@ -179,7 +179,7 @@ class Joint:
 
 
 @dataclasses.dataclass(frozen=True)
-class BodyJoint(Joint):
+class ExportedForce(ExportedLaw):
     """The force of a rough sphere or cylinder in place of a pressure, its unit in place of that of stress."""
 
     _: dataclasses.KW_ONLY
@@ -190,7 +190,7 @@ class BodyJoint(Joint):
         return pressed(self.force.body, self.law.h_max + self.force.first - u)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """As of `Joint`; a body has no leakage."""
+        """As of `ExportedLaw`; a body has no leakage."""
         body, law = self.force.body, self.law
         return (
             f"Force law of a rough {body.shape} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
@@ -225,7 +225,7 @@ def outward(value: float, rounding: str) -> str:
     return f"{float(Context(prec=4, rounding=rounding).create_decimal(value)):.4g}"
 
 
-def frozen_joint(
+def exported_law(
     surface: AnySurface | ForceLaw,
     E_star: float | str = 1.0,
     length_unit: str | None = None,
@@ -234,12 +234,12 @@ def frozen_joint(
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
     made_by: tuple[str, ...] = (),
-) -> Joint:
+) -> ExportedLaw:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
     if isinstance(surface, ForceLaw):
         if E_star != 1.0 or hardness != np.inf or any((length_unit, stress_unit, theory)) or variant != "reported":
             raise InputError("a force law has its modulus, hardness, units and theory: give no others")
-        return _body_joint(surface, made_by)
+        return _exported_force(surface, made_by)
     one: AnySurface = in_unit(surface, length_unit)
     plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
     length, stress = _known("length_unit", one.unit), _known("stress_unit", stress_unit)
@@ -250,16 +250,16 @@ def frozen_joint(
     own = chosen_theory(one, theory, variant=variant)
     law = contact_law(one, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    return Joint(one, law, own, modulus, float(cap), length, stress, made_by)
+    return ExportedLaw(one, law, own, modulus, float(cap), length, stress, made_by)
 
 
-def _body_joint(force: ForceLaw, made_by: tuple[str, ...]) -> BodyJoint:
+def _exported_force(force: ForceLaw, made_by: tuple[str, ...]) -> ExportedForce:
     """The force law of a body in known units."""
     body, layer = force.body, force.body.problem.law
     length = _known("length_unit", body.surface.unit)
     _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
     numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
-    return BodyJoint(body.surface, force.law, body.theory, *numbers, force=force)
+    return ExportedForce(body.surface, force.law, body.theory, *numbers, force=force)
 
 
 def _known(name: str, unit: str | None) -> str:
