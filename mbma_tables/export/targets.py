@@ -22,11 +22,8 @@ LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_
 ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "quantity", "peklenik"}
 CODE = LAW | {"name", "leakage"}
 # groups by the modules that declare them, in the order in which help lists them
-<<<<<<< HEAD
-GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code"}
-=======
 GROUPS = {
-    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "GRAPHS": "onnx",
+    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu",
     "CODE": "code",
 }  # fmt: skip
 SI = ("m", "Pa")
@@ -38,7 +35,6 @@ AGAINST = {
     "pressure": "overclosure", "conductance": "pressure", "leakage": "pressure", "hydraulic_aperture": "pressure",
     "film": "mean_separation",
 }  # fmt: skip
->>>>>>> f32a
 
 
 @dataclasses.dataclass(frozen=True)
