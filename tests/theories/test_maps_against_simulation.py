@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from generate.pages import maps
-from generate.pages.gallery import BARS, REFINED, ratios, read_rows
+from generate.pages.maps import BARS, ratios, read_rows
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories import BoundaryElements, Calibrated
@@ -58,7 +58,7 @@ def test_laws_of_maps_from_files(example):
 
 def test_light_contacts_of_that_map_are_not_resolved_by_its_own_grid():
     rows = read_rows()
-    coarse, fine = rows[REFINED], rows[f"{REFINED} refined"]
+    coarse, fine = rows["di-1.di"], rows["di-1.di refined"]
     count = fine.shape[1]
     np.testing.assert_allclose(fine[0], coarse[0, :count], rtol=1e-6)
     np.testing.assert_allclose(fine[2], coarse[2, :count], rtol=1e-3)
