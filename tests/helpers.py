@@ -6,7 +6,10 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
+
+from mbma_tables import InputError
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))  # multiplies the counts of random tests
 
@@ -58,6 +61,30 @@ def refused(*arguments):
     assert result.stderr.startswith("mbma: ")
     assert 1 <= len(result.stderr.splitlines()) <= 2
     return result.stderr
+
+
+def refusals(ask, *rows, error=InputError):
+    """A test of rows: arguments of `ask`, the type of the error if it is another, and what its message says."""
+
+    @pytest.mark.parametrize("row", rows, ids=lambda row: row[-1])
+    def test(row):
+        *given, said = row
+        kind = given.pop() if isinstance(given[-1], type) else error
+        with pytest.raises(kind, match=said):
+            ask(*given)
+
+    return test
+
+
+def told(ask, *rows):
+    """A test of rows, each of arguments of `ask` and of what is in the text that it answers."""
+
+    @pytest.mark.parametrize("row", rows, ids=lambda row: row[-1])
+    def test(row):
+        *given, said = row
+        assert said in ask(*given)
+
+    return test
 
 
 class Springs:

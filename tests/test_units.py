@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from helpers import refused, run
+from helpers import refused, run, told
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -167,21 +167,17 @@ def test_conflicts_in_toml(content, said, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (
-            "--hurst 0.8 --q0 0.1/mm --zeta-1 50 --h-rms 800um --h-max 3 -d 1",
-            "--h-max without a unit beside numbers in mm",
-        ),
-        ("--hurst 0.8 --q0 0.1 --zeta-1 50 --h-rms 1 --h-max 3 -d 1mm", "give --length-unit"),
-        ("--surface concrete -d 1 --stress-unit MPa", "no modulus"),
-        ("--surface concrete -d 1mm --over-h-rms", "multiples of h_rms"),
-        ("--surface concrete -a 1mm", "area has no unit"),
-    ],
+test_conflicts_on_the_command_line = told(
+    lambda arguments: refused("contact", *arguments.split()),
+    (
+        "--hurst 0.8 --q0 0.1/mm --zeta-1 50 --h-rms 800um --h-max 3 -d 1",
+        "--h-max without a unit beside numbers in mm",
+    ),
+    ("--hurst 0.8 --q0 0.1 --zeta-1 50 --h-rms 1 --h-max 3 -d 1mm", "give --length-unit"),
+    ("--surface concrete -d 1 --stress-unit MPa", "no modulus"),
+    ("--surface concrete -d 1mm --over-h-rms", "multiples of h_rms"),
+    ("--surface concrete -a 1mm", "area has no unit"),
 )
-def test_conflicts_on_the_command_line(arguments, said):
-    assert said in refused("contact", *arguments.split())
 
 
 def asked(*arguments):

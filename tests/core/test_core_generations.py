@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 def passed(tests, **environment):
     """Quick tests, in one other process."""
-    options = "-P -m pytest -n 0 -p no:cacheprovider".split()
+    options = ["-P", "-m", "pytest", "-n", "0", "-p", "no:cacheprovider"]
     command = [sys.executable, *options, *(f"tests/{name}" for name in tests)]
     done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -10,7 +10,7 @@ import runpy
 import numpy as np
 import pytest
 from catalogue import LEVEL, OWN, random_gaps, random_surfaces
-from helpers import fresh
+from helpers import fresh, refusals
 
 from mbma_tables import InputError, OutOfRangeError, Scene, Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.models.tables import open_table, shipped
@@ -148,21 +148,16 @@ def test_outside_in_X():
     assert caught.value.mask.tolist() == [True, True, False]
 
 
-@pytest.mark.parametrize(
-    ("options", "match"),
-    [
-        ({"outside": "clamp"}, "outside must be one of"),
-        ({"island_model": "formula4"}, "island_model must be one of"),
-        *(
-            ({"island_model": name, "derivatives": True}, "derivatives come from island model 'universal'")
-            for name in ("exact", "island4d", "rigid")
-        ),
-        ({"outside": "exact", "derivatives": True}, "outside must be 'raise' or 'nan'"),
-    ],
+test_bad_options = refusals(
+    lambda options: contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, **options),
+    ({"outside": "clamp"}, "outside must be one of"),
+    ({"island_model": "formula4"}, "island_model must be one of"),
+    *(
+        ({"island_model": name, "derivatives": True}, "derivatives come from island model 'universal'")
+        for name in ("exact", "island4d", "rigid")
+    ),
+    ({"outside": "exact", "derivatives": True}, "outside must be 'raise' or 'nan'"),
 )
-def test_bad_options(options, match):
-    with pytest.raises(InputError, match=match):
-        contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, **options)
 
 
 @pytest.mark.slow
