@@ -70,8 +70,9 @@ def refusals(ask, *rows, error=InputError):
     def test(row):
         *given, said = row
         kind = given.pop() if isinstance(given[-1], type) else error
-        with pytest.raises(kind, match=said):
+        with pytest.raises(kind, match=said) as caught:
             ask(*given)
+        assert "\n" not in str(caught.value)
 
     return test
 

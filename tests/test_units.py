@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from helpers import refused, run, told
+from helpers import refusals, refused, run, told
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -123,24 +123,18 @@ CONCRETE = Surface.named("concrete")
 PLAIN = Surface(0.8, 0.1, 10.0, 1.0, 3.0)
 
 
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: PLAIN.to("mm"), "the surface's unit is not known: make it with unit="),
-        (lambda: Surface(0.8, 0.1, 10.0, 1.0, 3.0, unit="millimetre"), "no known unit of length"),
-        (lambda: CONCRETE.to(1.0), "a unit of length is a text"),
-        (lambda: Scene(CONCRETE, separations=[0.5], length_unit="m"), r"ask for surface.to\('m'\)"),
-        (lambda: Scene(PLAIN, separations=["1 um"]), "give the surface its unit"),
-        (lambda: Scene(CONCRETE, pressures=["1 MPa"]), "needs a modulus"),
-        (lambda: Scene(CONCRETE, pressures=["1 MPa"], E_star=9.0), "give E\\* with its unit"),
-        (lambda: describe_law(PLAIN, "13 MPa", rows=9), "length_unit is missing"),
-        (lambda: describe_law(CONCRETE, 13.0, rows=9), "stress_unit is missing"),
-    ],
+test_conflicts_in_python = refusals(
+    lambda ask: ask(),
+    (lambda: PLAIN.to("mm"), "the surface's unit is not known: make it with unit="),
+    (lambda: Surface(0.8, 0.1, 10.0, 1.0, 3.0, unit="millimetre"), "no known unit of length"),
+    (lambda: CONCRETE.to(1.0), "a unit of length is a text"),
+    (lambda: Scene(CONCRETE, separations=[0.5], length_unit="m"), r"ask for surface.to\('m'\)"),
+    (lambda: Scene(PLAIN, separations=["1 um"]), "give the surface its unit"),
+    (lambda: Scene(CONCRETE, pressures=["1 MPa"]), "needs a modulus"),
+    (lambda: Scene(CONCRETE, pressures=["1 MPa"], E_star=9.0), "give E\\* with its unit"),
+    (lambda: describe_law(PLAIN, "13 MPa", rows=9), "length_unit is missing"),
+    (lambda: describe_law(CONCRETE, 13.0, rows=9), "stress_unit is missing"),
 )
-def test_conflicts_in_python(make, said):
-    with pytest.raises(InputError, match=said) as caught:
-        make()
-    assert "\n" not in str(caught.value)
 
 
 SURFACE = '[surface]\nhurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = "800 um"\nh_max = '

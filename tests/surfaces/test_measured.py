@@ -7,7 +7,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from helpers import random_map
+from helpers import random_map, refusals
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -87,9 +87,9 @@ class TestMeasuredSurface:
         with pytest.raises(ValueError, match="read-only"):
             found.q[0] = 1.0
 
-    @pytest.mark.parametrize(
-        ("q", "c", "options", "reason"),
-        [
+    test_what_is_no_spectrum_is_refused = staticmethod(
+        refusals(
+            lambda q, c, options: Surface.from_spectrum(q, c, **options),
             (Q, C, {}, "h_max is missing"),
             (Q, -C, {"h_max": 1.0}, "C must be zero or positive"),
             (Q, np.where(Q == 1, np.nan, C), {"h_max": 1.0}, r"C must be finite, got nan at \(1,\)"),
@@ -102,11 +102,8 @@ class TestMeasuredSurface:
             (Q, C, {"h_max": -1.0}, "h_max must be positive"),
             (Q, C, {"heights": np.ones(9)}, "heights are all the same"),
             (Q, C, {"h_max": 1.0, "convention": "profile"}, "convention must be"),
-        ],
+        )
     )
-    def test_what_is_no_spectrum_is_refused(self, q, c, options, reason):
-        with pytest.raises(InputError, match=reason):
-            Surface.from_spectrum(q, c, **options)
 
 
 class TestCombined:
