@@ -112,11 +112,6 @@ def test_force_and_separation_are_inverse(hurst, log_zeta_1, log_load, theory):
     assert relative(theory.answer(surface, u).pressure, load) < 1e-10
 
 
-def test_full_near_hurst_one_is_continuous():
-    below, at = (separation(Surface(H, 0.1, 100.0, 1.0, 3.0), [1e-6, 1e-2, 1]) for H in (1 - 1e-9, 1.0))
-    assert relative(below, at) < 1e-7
-
-
 def test_persson_area_limits():
     surface = Surface(np.array([0.4, 0.8, 1.0]), 0.1, 50.0, 1.0, 3.0)
     light = 1e-9 * surface.rms_gradient

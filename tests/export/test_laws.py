@@ -12,7 +12,7 @@ from helpers import refusals
 from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.export import DATA, SOLVERS, chords, data, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
-from mbma_tables.export.solvers import calculix, exponential, optistruct
+from mbma_tables.export.solvers import calculix, optistruct
 from mbma_tables.surfaces.variants import PRINTED
 from mbma_tables.theories import THEORIES
 from mbma_tables.totals.conductance import conductance
@@ -161,22 +161,6 @@ def test_text_holds_the_rows(target, rows):
     np.testing.assert_allclose(parse(target, text), np.stack([law.x, law.y], 1), rtol=1e-9)
     for word in ("variant 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "table: data"):
         assert word in text
-
-
-def test_calculix_writes_what_it_reads_rightly():
-    law = law_of()
-    assert "TYPE=NODE TO SURFACE" in calculix(law)
-    assert "with SURFACE TO SURFACE 2.20 reads TABULAR into arrays that are too short" in calculix(law)
-
-
-def test_exponential_is_persson_for_light_loads():
-    from mbma_tables import theories
-
-    text = exponential(CONCRETE, 13.3, stress_unit="MPa")
-    c0, p0 = numbers(text.splitlines()[-1])
-    for u in (0.5, 1.0):
-        p = p0 * np.exp((CONCRETE.h_max - u) / (c0 / np.log(100)))
-        assert p == pytest.approx(13.3 * theories.Persson("simplified").answer(CONCRETE, u).pressure, rel=1e-8, abs=0)
 
 
 @pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])
