@@ -1,4 +1,4 @@
-"""The command line `mbma`: contact, curves and islands of a surface, as a table, JSON, CSV or a picture.
+"""The command line `mbma`: results as tables, JSON, CSV or pictures.
 
 Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Whatever needs
 scipy is imported where a command runs, so that ``--help`` answers at once.

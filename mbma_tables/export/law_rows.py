@@ -19,7 +19,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_lines
 from mbma_tables.common.units import Units
 from mbma_tables.export.chords import chosen_rows
-from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
+from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -68,9 +68,9 @@ class LawTable(Displayed):
         return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
 
 
-def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> tuple[FloatArray, FloatArray]:
+def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: float) -> tuple[FloatArray, FloatArray]:
     """The law on fine points; conductance by the frozen contact's stiffness where it is not the law's own slope."""
-    law = joint.law
+    law = exported.law
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
     # close to full compression pressure may run up with the logarithm of the mean separation
@@ -86,10 +86,10 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
         # the first row that is blocked is the last
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
         return pressure[open_], flow[open_]
-    if joint.hardness < np.inf:
-        stiffness[1:] = joint.answer(law.h_max - c[1:]).unloading_stiffness
+    if exported.hardness < np.inf:
+        stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
-    return pressure[rises], np.asarray(conductance(stiffness, k_s, joint.modulus))[rises]
+    return pressure[rises], np.asarray(conductance(stiffness, k_s, exported.modulus))[rises]
 
 
 @hinted
@@ -163,24 +163,24 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
-    law, units = joint.law, joint.units
+    exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
+    law, units = exported.law, exported.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    k_s, names = 1.0, (own := ("overclosure", "pressure", joint.length, joint.stress))
+    k_s, names = 1.0, (own := ("overclosure", "pressure", exported.length, exported.stress))
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
-        names = ("pressure", "conductance", joint.stress, f"{unit}/{joint.length}")
+        names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")
     elif quantity == "leakage":
-        names = ("pressure", "leakage", joint.stress, f"{joint.length}^3")
+        names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
-    behaviour = _table(joint, "pressure", own, least, end, choose) if quantity == "conductance" else None
-    return _table(joint, quantity, names, least, end, choose, k_s, behaviour)
+    behaviour = _table(exported, "pressure", own, least, end, choose) if quantity == "conductance" else None
+    return _table(exported, quantity, names, least, end, choose, k_s, behaviour)
 
 
 def _table(
-    joint: Joint,
+    exported: ExportedLaw,
     quantity: str,
     names: tuple[str, str, str, str],
     least: float | None,
@@ -190,8 +190,8 @@ def _table(
     behaviour: LawTable | None = None,
 ) -> LawTable:
     """Rows up to an overclosure, whose error holds from the `least` pressure on, or above `FLOOR`."""
-    law = joint.law
-    fine_x, fine_y = _curve(joint, quantity, end, k_s)
+    law = exported.law
+    fine_x, fine_y = _curve(exported, quantity, end, k_s)
     floor = FLOOR * float(fine_y[-1])
     if quantity == "leakage":
         floor = float(fine_y[-1])
@@ -206,7 +206,7 @@ def _table(
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
     x, y, error = choose(fine_x, fine_y, floor, jump=heat or law.highest < np.inf)
-    comments = joint.header(
+    comments = exported.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
         f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "

@@ -22,7 +22,7 @@ LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_
 ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
 CODE = LAW | {"name", "leakage"}
 # groups by the modules that declare them, in the order in which help lists them
-GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "GRAPHS": "onnx", "CODE": "code"}
+GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code"}
 
 
 @dataclasses.dataclass(frozen=True)

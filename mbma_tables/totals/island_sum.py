@@ -33,16 +33,9 @@ COLUMNS, BY_COMPRESSION = 5, 3
 
 
 Integrand = Callable[[NDArray[np.intp], FloatArray], FloatArray]
-
-
-def _rule(count: int) -> FloatArray:
-    """Nodes on [-1, 1], Kronrod weights, and Gauss weights, zero where that rule has no node."""
-    rule = np.empty((3, count))
-    core.kronrod(count, *rule)
-    return rule
-
-
-NODES_21, KRONROD_21, GAUSS_21 = _rule(21)
+# nodes on [-1, 1], Kronrod weights, and Gauss weights, zero where that rule has no node
+NODES, KRONROD, GAUSS = np.empty((3, 31))
+core.kronrod(NODES, KRONROD, GAUSS)
 BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
 DEPTH = 64  # halvings of an interval before giving up
 MOST = 1000  # intervals of an integral before giving up
@@ -62,11 +55,11 @@ def _apply_rule(
 ) -> tuple[FloatArray, FloatArray]:
     """Kronrod sums and error estimates of each interval, shape (intervals, components)."""
     half = (high - low) / 2
-    points = (low + high)[:, None] / 2 + half[:, None] * NODES_21
+    points = (low + high)[:, None] / 2 + half[:, None] * NODES
     values = integrand(owner, points) * half[:, None, None]
-    kronrod = np.einsum("kic,i->kc", values, KRONROD_21)
-    gauss = np.einsum("kic,i->kc", values, GAUSS_21)
-    spread = np.einsum("kic,i->kc", np.abs(values - kronrod[:, None, :] / 2), KRONROD_21)
+    kronrod = np.einsum("kic,i->kc", values, KRONROD)
+    gauss = np.einsum("kic,i->kc", values, GAUSS)
+    spread = np.einsum("kic,i->kc", np.abs(values - kronrod[:, None, :] / 2), KRONROD)
     difference = np.abs(kronrod - gauss)
     # QUADPACK's estimate: the difference belongs to the Gauss rule, Kronrod's own error is far smaller
     ratio = np.divide(difference, spread, out=np.zeros_like(spread), where=spread > 0)
@@ -81,7 +74,7 @@ def integrate(
     Parameters
     ----------
     integrand : callable
-        ``integrand(owner, points)`` with `owner` (n,) and `points` (n, 21) gives (n, 21, components).
+        ``integrand(owner, points)`` with `owner` (n,) and `points` (n, 31) gives (n, 31, components).
     owner : (n,) int array
         Which integral an interval belongs to, 0 ... count - 1.
     low, high : (n,) arrays
@@ -109,7 +102,7 @@ def integrate(
     for _ in range(DEPTH):
         batches = [[part[k : k + BATCH] for part in fresh] for k in range(0, fresh[0].size, BATCH)]
         fresh += map(np.concatenate, zip(*(_apply_rule(integrand, *batch) for batch in batches), strict=True))
-        evaluations += fresh[0].size * NODES_21.size
+        evaluations += fresh[0].size * NODES.size
         kept = [np.concatenate(both) for both in zip(kept, fresh, strict=True)] if kept else fresh
         owner, low, high, value, error = kept
         sums: Any = [np.stack([np.bincount(owner, x, count) for x in part.T], axis=1) for part in (value, error)]

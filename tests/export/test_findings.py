@@ -20,7 +20,6 @@ from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.fmu import fmu
 from mbma_tables.export.law_code import law_files
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.export.onnx import onnx
 
 CONDUCTIVITY = 50.0  # mW/(mm K)
 SIDES = {"mm": 10.0, "m": 0.01}
@@ -219,20 +218,6 @@ def test_types_of_a_law_in_javascript(more):
     exported = re.findall(r"^export (?:const|function) (\w+)", files[""], flags=re.M)
     typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)
     assert sorted(typed) == sorted(exported)
-
-
-def test_onnx_states_what_it_takes():
-    runtime, library = pytest.importorskip("onnxruntime"), pytest.importorskip("onnx")
-    file = onnx(law_points.ROAD, "13.3 MPa")
-    session = runtime.InferenceSession(file, providers=["CPUExecutionProvider"])
-    c, law = np.linspace(0, 2.5, 24).reshape(2, 3, 4), points("mbma").law
-    found = session.run(None, {"overclosure": c.ravel()})[0].reshape(c.shape)
-    np.testing.assert_allclose(found, law.pressure(law.h_max - c), rtol=1e-12)
-    for refused in (c, c[0, 0].astype(np.float32)):
-        with pytest.raises(Exception, match=r"Unexpected input data type|Invalid rank"):
-            session.run(None, {"overclosure": refused})
-    said = library.load_from_string(file).graph.doc_string
-    assert "float64 of shape (n,); convert float32 and ravel before" in said
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Laws as source code: equal to the library's law in each language, down to first contact."""
 
 import ctypes
-import functools
 import importlib.util
 import math
 import re
@@ -20,7 +19,6 @@ from mbma_tables.core import core
 from mbma_tables.export import LAWS, SUBROUTINES
 from mbma_tables.export.law_code import code_name, core_text, law_text
 from mbma_tables.export.law_languages import LANGUAGES
-from mbma_tables.export.onnx import onnx
 from mbma_tables.export.text import core_file
 
 QUANTITIES = ("pressure", "tangent", "area", "energy", "leakage")
@@ -128,8 +126,6 @@ def test_headers_say_what_is_there():
         *((target, "calibrated", HEAT | {"leakage": True}, "has no place for leakage") for target in SUBROUTINES),
         *((f"{code}-gapcon", "mbma", {}, "conductance needs conductivity") for code in ("abaqus", "calculix")),
         *((f"{code}-gapcon", "hardened", HEAT, "leave conductivity or hardness") for code in ("abaqus", "calculix")),
-        ("onnx", "hardened", HEAT, "leave conductivity or hardness out"),
-        ("onnx", "mbma", {"name": "1 x"}, "a name must be a letter"),
         ("cobol-law", "mbma", {}, "target must be one of"),
         ("c-law", "mbma", {"name": "1 x"}, "a name must be a letter"),
         ("fortran-law", "mbma", {"name": "Energy"}, "name must not be that of a function of the law"),
@@ -137,9 +133,8 @@ def test_headers_say_what_is_there():
 )
 def test_requests_that_are_refused(target, law, options, match):
     surface, asked = ASKED[law]
-    write = onnx if target == "onnx" else functools.partial(law_text, target)
     with pytest.raises(InputError, match=match):
-        write(surface, "13.3 MPa", **(asked | options))
+        law_text(target, surface, "13.3 MPa", **(asked | options))
 
 
 @needs("gcc")
@@ -441,26 +436,6 @@ def test_gapcon(target, more, name, tmp_path):
             "-o gapcon.o, ar r ccx_",
         ):
             assert words in text
-
-
-@pytest.mark.parametrize("name", ASKED)
-def test_onnx(name):
-    runtime, checker = pytest.importorskip("onnxruntime"), pytest.importorskip("onnx.checker")
-    (surface, options), known = ASKED[name], points(name)
-    heat = {} if name == "hardened" else HEAT
-    file = onnx(surface, "13.3 MPa", leakage=True, **(options | heat))
-    checker.check_model(file, full_check=True)
-    session = runtime.InferenceSession(file, providers=["CPUExecutionProvider"])
-    found = session.run(None, {"overclosure": known.c})
-    known.assert_equal(*found[:4], found[-1])
-    if heat:
-        np.testing.assert_allclose(found[4], CONDUCTIVITY / 13.3 * found[1], rtol=1e-15)
-    beyond = [math.nan, math.inf, 0.5 * (known.law.h_max - known.law.lowest) * (1 + 1e-9)]
-    assert np.isnan(session.run(None, {"overclosure": np.array(beyond)})).all()
-    if math.isinf(known.law.highest):
-        before = np.array([0.0, -0.0, -1.0, -math.inf])
-        assert (np.array(session.run(None, {"overclosure": before})[:-1]) == 0).all()
-    assert file == onnx(surface, "13.3 MPa", leakage=True, **(options | heat))
 
 
 MODELICA = """

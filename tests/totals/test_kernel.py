@@ -17,12 +17,11 @@ from mbma_tables.totals import island_sum
 from mbma_tables.totals.island_sum import Pairs, integrate, kinks, totals_of
 
 
-@pytest.mark.parametrize("points", [21, 31])
-def test_the_rules_by_their_degrees(points):
+def test_the_rule_by_its_degrees():
     """2 n + 1 Kronrod points are exact up to degree 3 n + 1, n Gauss points up to 2 n - 1, and not beyond."""
-    nodes, kronrod, gauss = np.empty((3, points))
-    assert core.kronrod(points, nodes, kronrod, gauss) == OK
-    n = points // 2
+    nodes, kronrod, gauss = np.empty((3, 31))
+    assert core.kronrod(nodes, kronrod, gauss) == 0
+    n = 15
     np.testing.assert_allclose(nodes[1::2], legendre.leggauss(n)[0], rtol=0, atol=2e-16)
     np.testing.assert_allclose(gauss[1::2], legendre.leggauss(n)[1], rtol=1e-14)
     assert (gauss[::2] == 0).all()
