@@ -7,7 +7,7 @@ from functools import partial
 import netCDF4
 import numpy as np
 import pytest
-from fuzzing import spoilt
+from helpers import spoilt
 from small_tables import copied, edited, seal, small_table, unseal
 
 from mbma_tables.common.errors import TableFileError

@@ -6,15 +6,11 @@ import warnings
 
 import numpy as np
 import pytest
-from fuzzing import finite, spoilt
-from helpers import SCALE
+from helpers import SCALE, random_map, spoilt
 
-from mbma_tables import Scene, Surface
+from mbma_tables import MbmaError, Scene, Surface
 
-POINTS = 40
-NOISE = np.random.default_rng(0).standard_normal((POINTS, POINTS))
-Q = 2 * np.pi * np.hypot(np.fft.fftfreq(POINTS)[:, None], np.fft.rfftfreq(POINTS)[None, :])
-ROUGH = np.fft.irfft2(np.fft.rfft2(NOISE) / np.where(Q > 0, Q, np.inf) ** 1.8, s=NOISE.shape)
+ROUGH = random_map(40, 0, 1)
 DTYPES = ["f2", "f4", ">f8", "f16", "i1", "i8", "u8", "?", "c16", "O", "U3", "S3", "M8[s]", "m8[s]", "V4", "f8,i4"]
 SPECIAL = [np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, 1e-200, 1e154, 1e300, -1e308, 1e18]
 
@@ -58,24 +54,32 @@ def options(rng):
     return {key: value for key, value in every.items() if rng.integers(3) == 0}
 
 
+def read(reader, *given):
+    """What a reader answers; None for a typed error. Anything else comes through."""
+    try:
+        return reader(*given)
+    except (MbmaError, OSError):
+        return None
+
+
 def surface_is_right(surface):
     """A surface of positive finite numbers; or none."""
     numbers = () if surface is None else (surface.q0, surface.q1, surface.h_rms, surface.h_max)
     numbers += (surface.hurst,) if isinstance(surface, Surface) else ()
-    return finite(*numbers) and all(number > 0 for number in numbers)
+    return all(0 < number < np.inf for number in numbers)
 
 
-def test_map_arrays(tally):
+def test_map_arrays():
     rng = np.random.default_rng(11)
     for _ in range(100 * SCALE):
         heights = odd_array(ROUGH, rng)
         before = np.asarray(heights).tobytes()
-        found = tally.read(lambda: Surface.from_map(heights, odd_number(rng), **options(rng)))  # noqa: B023
+        found = read(lambda: Surface.from_map(heights, odd_number(rng), **options(rng)))  # noqa: B023
         assert surface_is_right(found)
         assert np.asarray(heights).tobytes() == before
 
 
-def test_spectra(tally):
+def test_spectra():
     rng = np.random.default_rng(13)
     q = np.geomspace(1.0, 100.0, 50)
     for _ in range(50 * SCALE):
@@ -83,10 +87,10 @@ def test_spectra(tally):
         own = {key: value for key, value in options(rng).items() if key == "band"}
         own["convention"] = ["paper", "isotropic", "profile", "none", None][rng.integers(5)]
         own["model"] = ["self-affine", "measured"][rng.integers(2)]
-        assert surface_is_right(tally.read(lambda: Surface.from_spectrum(*given, h_max=odd_number(rng), **own)))  # noqa: B023
+        assert surface_is_right(read(lambda: Surface.from_spectrum(*given, h_max=odd_number(rng), **own)))  # noqa: B023
 
 
-EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
+EXAMPLES = pathlib.Path(__file__).parents[1] / "examples"
 SCENES = sorted(path.name for path in EXAMPLES.glob("scene_*.toml"))
 
 
@@ -97,9 +101,11 @@ def scene_numbers(path):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_scene_bytes(name, tmp_path, tally):
+def test_scene_bytes(name, tmp_path):
     rng = np.random.default_rng(3)
     path, text = tmp_path / "scene.toml", (EXAMPLES / name).read_bytes()
     for _ in range(60 * SCALE):
-        found = tally.read_file(path, spoilt(text, rng), scene_numbers)
-        assert found is None or finite(*found)
+        content = spoilt(text, rng)
+        path.write_bytes(content)
+        assert np.isfinite(np.asarray(read(scene_numbers, path) or 0, dtype=float)).all()
+        assert path.read_bytes() == content
