@@ -11,7 +11,7 @@ from helpers import refusals, refused, run, told
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import InputError, Scene, Surface, contact, contact_law, island
+from mbma_tables import InputError, Scene, Surface, contact, contact_law
 from mbma_tables.common.units import ALIASES, DIMENSIONS, SIZES, Units, known, read, resolve, unit_of
 from mbma_tables.export.law_rows import describe_law
 
@@ -60,13 +60,6 @@ def test_any_length_converts(number, name, have, want, spelling, space):
     found = Units(want).number(name, text)
     exact = Fraction(number) * (SIZES["length"][have] / SIZES["length"][want]) ** power
     assert abs(Fraction(found) - exact) <= abs(exact) * Fraction(2 * EPS)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.floats(1e-6, 1e6), st.sampled_from(sorted(PASCALS)), st.sampled_from(sorted(PASCALS)))
-def test_any_stress_converts(number, have, want):
-    found = Units(stress=want).number("pressure", f"{number!r} {have}")
-    assert found == pytest.approx(number * PASCALS[have] / PASCALS[want], rel=4 * EPS)
 
 
 @settings(max_examples=50, deadline=None)
@@ -293,12 +286,6 @@ def test_a_law_keeps_its_units(theory):
     assert pickle.loads(pickle.dumps(law)).units == law.units
     with pytest.raises(InputError, match="needs a modulus"):
         contact_law(CONCRETE, rtol=1e-3).at_pressure("10 kPa")
-
-
-def test_islands_take_units():
-    plain = island(CONCRETE, [0.1, 0.3], E_star=13.3)
-    found = island(CONCRETE.to("um"), ["0.1 mm", "300 um"], E_star="13.3 MPa")
-    np.testing.assert_allclose(found.force, 1e6 * plain.force, rtol=1e-12)
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])

@@ -59,12 +59,6 @@ class TestPowerLaws:
         assert laws.above(place) == pytest.approx(wanted, rel=1e-12)
         assert Q[0] <= math.exp(laws.log_q(place)) * (1 + 1e-15)
 
-    def test_spectrum_between_samples(self):
-        laws = PowerLaws(Q, C)
-        assert laws.at(Q[[0, 1, 4, 7, 8]]) == pytest.approx(C[[0, 1, 4, 7, 8]], rel=1e-14)
-        assert laws.at(np.array([0.49, 4.0, 6.0, 40.1])).tolist() == [0, 0, 0, 0]
-        assert laws.at(np.array([math.sqrt(160.0)])) == pytest.approx(math.sqrt(1e-5), rel=1e-13)
-
 
 class TestMeasuredSurface:
     @pytest.mark.parametrize("count", [2, 3, 50])
@@ -78,14 +72,6 @@ class TestMeasuredSurface:
         assert other.h_rms == pytest.approx(found.h_rms, rel=1e-14)
         assert found.fit().hurst == pytest.approx(0.8, rel=1e-6) if count > 10 else True
         assert (found.shape, found.labelled, found.skewness, found.kurtosis) == ((), False, 0, 3)
-
-    def test_nothing_given_is_changed(self):
-        q, c = Q.copy(), C.copy()
-        found = Surface.from_spectrum(q, c, h_max=9.0)
-        q[0] = c[0] = 7.0
-        assert (found.q0, found.C[0]) == (0.5, 3.0)
-        with pytest.raises(ValueError, match="read-only"):
-            found.q[0] = 1.0
 
     test_what_is_no_spectrum_is_refused = staticmethod(
         refusals(

@@ -186,13 +186,6 @@ test_what_cannot_be_asked = refusals(
 )
 
 
-def test_a_theory_object_with_its_own_options():
-    by_object = contact(SURFACE, separation=1.0, theory=Mbma("rigid", "printed"))
-    by_name = contact(SURFACE, separation=1.0, island_model="rigid", variant="printed")
-    assert by_object.pressure == by_name.pressure
-    assert (by_object.island_model, by_object.variant, by_object.theory) == ("rigid", "printed", "mbma")
-
-
 @each
 def test_ends_validity_and_advice(theory):
     gw_or_persson = theory in ("persson", "greenwood_williamson")

@@ -82,14 +82,6 @@ def test_ranges():
     assert "10\n" not in text.splitlines()[1]
 
 
-def test_a_hurst_exponent_of_one_is_stepped_down_from():
-    smooth = Surface(1.0, 0.06, 12.0, 0.5, 1.7)
-    found = sensitivity(smooth, mean_separation=1.1)
-    exact = contact(smooth, mean_separation=1.1, derivatives=True)
-    assert found.slopes["hurst"]["pressure"] == pytest.approx(exact.pressure_by["hurst"] / exact.pressure, rel=1e-4)
-    assert "E_star" not in found.parameters
-
-
 test_what_is_refused = refusals(
     lambda changed: sensitivity(**({"surface": SURFACE, "E_star": 10.0} | changed)),
     ({}, "give exactly one of separation"),

@@ -142,12 +142,6 @@ def test_outside_as_nan(derivatives):
             np.testing.assert_array_equal(slope[1], inside.pressure_by[name])
 
 
-def test_outside_in_X():
-    with pytest.raises(OutOfRangeError, match=r"2 of 3 entries .*X above") as caught:
-        contact(Surface(0.9, 0.2, 400.0, 1.0, 4.7), separation=np.array([4.6, -4.7, 4.8]), variant=SHALLOW)
-    assert caught.value.mask.tolist() == [True, True, False]
-
-
 test_bad_options = refusals(
     lambda options: contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, **options),
     ({"outside": "clamp"}, "outside must be one of"),

@@ -295,27 +295,6 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
             assert (misses <= law.slope_error(separation=gap)).all()
 
 
-def test_the_ends_and_no_contact():
-    law = law_of(CASES[0])
-    for name in NAMES:
-        function = getattr(law, name)
-        assert function(separation=law.h_max) == 0
-        assert function(separation=[1e300, law.h_max]).tolist() == [0, 0]
-        assert math.isfinite(function(separation=-law.h_max))
-        assert function(separation=math.nextafter(law.h_max, 0)) > 0
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf, [1.0, math.nan], [], "deep", 1j, None])
-def test_no_number(bad):
-    law = law_of(CASES[0])
-    for name in NAMES:
-        with pytest.raises(InputError, match="separation"):
-            getattr(law, name)(separation=bad)
-    if bad is not None:
-        with pytest.raises(InputError, match=r"^pressure "):
-            law.separation(pressure=bad)
-
-
 test_bad_laws = refusals(
     lambda asked: contact_law(**({"surface": surface_of(*CASES[0][:3])} | asked)),
     ({"surface": Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0)}, r"one surface, got a batch of shape \(2,\)"),
