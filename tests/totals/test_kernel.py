@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 from catalogue import LEVEL, OWN
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, Surface, contact
@@ -147,27 +145,6 @@ def test_each_integral_to_its_own_size(rtol):
     error = np.abs(found.value[:, 0] / known - 1)
     assert (error <= np.maximum(found.error[:, 0], 4e-15)).all()
     assert found.error.max() <= rtol
-
-
-@settings(deadline=None)
-@given(power=st.floats(-0.5, 8), high=st.floats(1e-8, 1e8))
-def test_end_point_powers(power, high):
-    found = integrals(lambda who, x: x**power, 0.0, high, 1e-8)
-    known = high ** (power + 1) / (power + 1)
-    assert abs(found.value[0, 0] / known - 1) <= 1e-8
-
-
-def test_several_intervals_of_one_owner_and_none():
-    found = integrate(
-        lambda who, x: np.stack([x, x**2], axis=-1),
-        np.array([0, 2, 0]),
-        np.array([0.0, 0.0, 1.0]),
-        np.array([1.0, 3.0, 2.0]),
-        3,
-        1e-12,
-    )
-    assert found.value == pytest.approx(np.array([[2.0, 8 / 3], [0, 0], [4.5, 9.0]]), rel=1e-14, abs=0)
-    assert (found.error[1] == 0).all()
 
 
 def test_failure_says_which():
