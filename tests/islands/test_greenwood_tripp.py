@@ -194,8 +194,7 @@ def test_negative_stiffness():
     assert caught.value.mask.tolist() == [False, True]
 
 
-BAD = {"rtol": (0.0, 1e-14, 0.5, math.nan, "tight"), "nodes": (7, 1025, 20.5), "damping": (0.0, 1.5, math.nan)}
-BAD |= {"method": ("secant",), "max_iterations": (-1,)}
+BAD = {"rtol": (0.0, 1e-14, 0.5, math.nan, "tight"), "nodes": (7, 1025, 20.5)}
 
 
 @pytest.mark.parametrize(("option", "value"), [(option, value) for option in BAD for value in BAD[option]])
@@ -204,8 +203,7 @@ def test_bad_options(option, value):
         greenwood_tripp.solve(1.0, 1.0, **{option: value})
 
 
-@pytest.mark.parametrize(("method", "most"), [("newton", 1024), ("classical", 2048)])
-def test_nodes_are_bounded(method, most):
+def test_nodes_are_bounded():
     """4096 nodes took 136 s and 1.35 GB, without a word."""
-    with pytest.raises(InputError, match=rf"nodes must be a whole number in \[8, {most}\], got 4096"):
-        greenwood_tripp.solve(10.0, 10.0, nodes=4096, method=method)
+    with pytest.raises(InputError, match=r"nodes must be a whole number in \[8, 1024\], got 4096"):
+        greenwood_tripp.solve(10.0, 10.0, nodes=4096)
