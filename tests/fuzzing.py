@@ -7,36 +7,9 @@ import numpy as np
 from mbma_tables import MbmaError
 
 LONGEST = 10.0  # seconds for one input
-WORDS = [
-    b"",
-    b"nan",
-    b"inf",
-    b"-1",
-    b"1e400",
-    b"[",
-    b"]",
-    b"{",
-    b"}",
-    b"=",
-    b",",
-    b"#",
-    b"\n",
-    b"\x00",
-    b"\xff",
-    b"'",
-    b'"',
-    b'"""',
-    b"0" * 400,
-    b"9" * 5000,
-    b"0x" + b"f" * 9000,
-    b"[" * 3000,
-    b'{"a":' * 3000,
-    b"a=" * 3000,
-    b"a." * 3000,
-    b"1979-05-27T07:32:00Z",
-    b"\xef\xbb\xbf",
-    "\u202e\u00b2\u0663".encode(),
-]
+WORDS = [*b' nan inf -1 1e400 [ ] { } = , # \n \x00 \xff \' " """ 1979-05-27T07:32:00Z \xef\xbb\xbf'.split(b" ")]
+WORDS += [b"0" * 400, b"9" * 5000, b"0x" + b"f" * 9000, "\u202e\u00b2\u0663".encode()]
+WORDS += [3000 * word for word in (b"[", b'{"a":', b"a=", b"a.")]
 
 
 class Endless(BaseException):

@@ -1,5 +1,6 @@
 """Public names, typed errors, and the messages of the argument checks."""
 
+import contextlib
 import functools
 import math
 
@@ -19,6 +20,7 @@ from mbma_tables import (
     Surface,
     contact,
     contact_law,
+    flow_factors,
     greenwood_tripp,
     height_integral,
     island,
@@ -86,6 +88,23 @@ def test_masked_entries_are_refused_not_uncovered(take):
     take(np.ma.masked_array([0.1, 0.2, 0.3], False))
 
 
+def test_quantities_of_other_libraries_are_refused():
+    class Quantity:
+        magnitude = 5.0
+
+        def __array__(self, dtype=None, copy=None):
+            return np.asarray(self.magnitude)
+
+    given = [Quantity()]
+    with contextlib.suppress(ImportError):
+        import pint
+
+        given += [5 * pint.UnitRegistry().MPa, np.ones(2) * pint.UnitRegistry().MPa]
+    for quantity in given:
+        with pytest.raises(InputError, match="pressure is a Quantity with a unit of its own: convert it"):
+            contact(ROAD, pressure=quantity, E_star="1 GPa")
+
+
 def test_other_containers_of_xarray_and_hdf5_are_refused(tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         for value in (xr.Variable("t", [0.1]), xr.Dataset({"a": ("t", [0.1])}), file.create_dataset("x", data=[0.1])):
@@ -105,8 +124,8 @@ CALLS = {
     "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
     "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
     **{
-        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1})
-        for theory in ("greenwood_williamson", "persson", "calibrated")
+        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1, "E_star": 1.0})
+        for theory in ("mbma", "greenwood_williamson", "persson", "calibrated")
         for known in ("separation", "mean_separation", "pressure", "area")
     },
     "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),
@@ -163,6 +182,13 @@ BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
         (lambda: contact(ROAD, separation=1.0, derivatives="no"), "derivatives must be True or False, got 'no'"),
         (lambda: contact(ROAD, separation=1.0, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
         (lambda: contact_law(ROAD, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
+        (lambda: flow_factors("concrete", 1.0), "surface must be a Surface, got 'concrete'; a named"),
+        (lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))), "rtol, outside, workers take one value each"),
+        (lambda: contact(ROAD, separation=1.0, hardness=10**400), "hardness must be real numbers: entries of type obj"),
+        (lambda: contact(ROAD, separation=1.0, hardness=b"1"), "hardness must be real numbers"),
+        (lambda: island(ROAD, 5e-324), "delta must be at least 1e-250, got 5e-324"),
+        (lambda: Surface(0.8, 5e-324, 1.0, 1.0, 3.0), "q0 must be from 1e-50 to 1e\\+50: take another unit"),
+        (lambda: Surface(5e-324, 1.0, 10.0, 1.0, 3.0), r"hurst must be in \(0, 1\], got 5e-324"),
         (lambda: contact(ROAD, separation="50 MPa"), "'MPa' is no known unit of length but one of stress"),
         (lambda: contact(ROAD, pressure=["5 MPa", 50], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
         (lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
@@ -171,7 +197,7 @@ BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
     ],
 )
 def test_natural_mistakes_have_a_message_with_the_remedy(asked, message):
-    with pytest.raises(InputError, match=message):
+    with pytest.raises((InputError, OutOfRangeError), match=message):
         asked()
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 ROOT = pathlib.Path(__file__).parents[2]
 DATA = ROOT / "docs" / "data"
-_OWN = ("cost", "explorer", "export", "fidelity", "gallery", "machined", "maps", "stability", "tables")
+_OWN = ("architecture", "cost", "explorer", "export", "fidelity", "gallery", "machined", "maps", "stability", "tables")
 PAGES = {
     **{name: f"{name}:measure" for name in _OWN},
     **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},

@@ -164,12 +164,12 @@ def flow_factors(
     [1.03 1.04 1.02] [0.51 0.72 0.9 ] [0.8  0.61 0.37]
     """
     one: Any = surface
-    if getattr(surface, "labelled", False) or surface.shape != ():
-        raise InputError("flow factors are of one surface, not of a batch")
     theory = "calibrated" if theory is None else theory
     found = contact(
         surface, mean_separation=mean_separation, theory=theory, E_star=E_star, hardness=hardness, materials=materials
     )
+    if surface.labelled or surface.shape != ():
+        raise InputError("flow factors are of one surface, not of a batch")
     u = np.ravel(found.mean_separation)
     low, high = (end * float(surface.h_rms) for end in RANGE)
     require("mean_separation", u, (u >= low) & (u <= high), f"from {RANGE[0]:g} to {RANGE[1]:g} h_rms")

@@ -181,8 +181,8 @@ def solve(
     shape = broadcast_shape(X=approach, mu=stiffness)
     flat_X, flat_mu = (np.broadcast_to(each, shape).ravel() for each in (approach, stiffness))
     phi, steps, used, missed = _solve_newton(flat_X, flat_mu, rtol, nodes)
-    fields: list[Any] = [part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)]
-    result = IslandSolution(*fields, rtol=rtol)
+    fields: list[Any] = [*(part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)), rtol]
+    result = IslandSolution(*fields)
     failed = missed.reshape(shape)
     if failed.any():
         first = int(np.flatnonzero(missed)[0])

@@ -1,4 +1,4 @@
-"""Island models: anything that answers (X, mu) with force, area and a bound on its own error.
+"""Island models: force, area and error of an island at (X, mu).
 
 Totals take any of them, by name or as an object, and do not ask which. Two need no table: the exact solver and the
 rigid sphere.

@@ -87,15 +87,6 @@ def test_no_warnings_of_clang(target, tmp_path):
         checked(zig(), tmp_path, "-O1", "-target", target, *BUILD.ZIG_LEVELS[generation])
 
 
-def test_it_is_cxx_too(tmp_path):
-    compiler = found("g++")
-    users = tmp_path / "user.cpp"
-    users.write_text('#include "mbma.h"\n#include "elementary.h"\nint main() { return mbma_exp(0.0) != 1.0; }\n')
-    run(compiler, "-std=c++11", *STRICT, f"-I{CORE}", users, "-o", tmp_path / "user")
-    run(tmp_path / "user")
-    run(compiler, "-x", "c++", "-std=c++17", "-Wall", "-Werror", "-fsyntax-only", *SOURCES)
-
-
 FIELDS = {
     "PyObject": "ob_refcnt ob_type",
     "Py_buffer": "buf obj len itemsize readonly ndim format shape strides suboffsets internal",

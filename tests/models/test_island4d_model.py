@@ -225,15 +225,3 @@ def test_narrow_bands(power):
             (high, most), (low, least) = moved
             # a hundredth, squared
             assert own[end] / hat == pytest.approx((most - least) / (high - low), rel=3e-4, abs=0)
-
-
-def test_islands_outside_warn_of_nothing():
-    raw, _ = narrow_island(1e-3)
-    deep = [np.concatenate([field, field]) for field in raw]
-    # X = -9, which the axis cannot even place
-    deep[0][1] = ZETA_D**-HURST - 3 * (raw[0][0] - ZETA_D**-HURST)
-    found = open_table("island4d").lookup(*deep, outside="nan", derivatives=True)
-    alone = open_table("island4d").lookup(*raw, derivatives=True)
-    for name, values in found.F_by.items():
-        assert values[0] == alone.F_by[name][0]
-        assert np.isnan(values[1])

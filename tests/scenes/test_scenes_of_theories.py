@@ -7,7 +7,7 @@ import pytest
 from helpers import Springs
 
 from mbma_tables import InputError, Scene, Surface, contact, contact_law
-from mbma_tables.theories import THEORIES, Persson
+from mbma_tables.theories import THEORIES
 from mbma_tables.totals.conductance import conductance, mean_conductivity
 
 CONCRETE = Surface.named("concrete")
@@ -130,18 +130,6 @@ def test_what_is_refused(more, match):
         scene_of(**({"theory": "persson", "separations": [0.5]} | more)).run()
 
 
-def test_a_file_and_an_object_ask_the_same():
-    content = {
-        "theory": "persson",
-        "surface": {"name": "concrete"},
-        "effects": {"on": ["pressure", "area"]},
-        "prescribed": {"areas": [0.01, 0.1]},
-    }
-    by_file, by_object = Scene.from_mapping(content).run(), scene_of(Persson(), E_star=1.0, areas=[0.01, 0.1]).run()
-    assert by_file["pressure"].values.tolist() == by_object["pressure"].values.tolist()
-    assert by_file["area"].values == pytest.approx([0.01, 0.1], rel=1e-9)
-
-
 def test_energies_of_many_gaps_reach_beyond_a_law():
     surface = Surface.named("concrete")
     u = np.linspace(0.8, 0.98, 400) * surface.h_max
@@ -173,14 +161,6 @@ def test_a_scene_yields_as_contact_does(theory):
     assert found.conductance.values == pytest.approx(own, rel=1e-6)
     assert found.separation_scatter.values == pytest.approx(known.separation_scatter, rel=1e-6)
     assert (found.conductance.values > 1.05 * conductance(known.stiffness, mean_conductivity(16.0, 167.0), 100e3)).all()
-
-
-def test_what_a_yielding_scene_costs_is_stated():
-    prices = [
-        Scene(**PRESSED, effects=["area", *more], theory="calibrated", **given).plan().steps[0].seconds
-        for more, given in (([], {}), (["yield"], {"hardness": 1500.0}))
-    ]
-    assert 2 * prices[0] <= prices[1] <= 3 * prices[0]
 
 
 @pytest.mark.parametrize("cap", [{}, {"hardness": 1500.0}], ids=["elastic", "yield"])

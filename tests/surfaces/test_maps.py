@@ -3,11 +3,9 @@
 import dataclasses
 import functools
 import math
-import os
 import sys
 import types
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -52,12 +50,6 @@ def topography_class():
         # its import warns of its own missing optional parts
         warnings.simplefilter("ignore")
         return pytest.importorskip("SurfaceTopography").Topography
-
-
-def reference_maps():
-    named = os.environ.get("MBMA_REFERENCE_MAPS")
-    places = [Path(named)] if named else [p / "shared/reference/maps" for p in Path(__file__).parents]
-    return next((place for place in places if place.is_dir()), None)
 
 
 X, Y = np.meshgrid(np.arange(POINTS) / POINTS, np.arange(POINTS) / POINTS, indexing="ij")
@@ -158,31 +150,7 @@ class TestKnownMaps:
         assert found.fit.hurst == pytest.approx(1.03, abs=0.005)
 
 
-@settings(max_examples=15, deadline=None)
-@given(length=st.floats(1e-9, 1e9), height=st.floats(1e-9, 1e9), lift=st.floats(-1e3, 1e3))
-def test_units_do_not_matter(length, height, lift):
-    plain = from_map(CUT_OUT, STEP)
-    scaled = from_map(height * (CUT_OUT + lift), length * STEP)
-    assert scaled.hurst == pytest.approx(plain.hurst, rel=1e-7)
-    for name, unit in {"q0": 1 / length, "q1": 1 / length, "h_rms": height, "h_max": height}.items():
-        assert getattr(scaled, name) == pytest.approx(getattr(plain, name) * unit, rel=1e-7)
-
-
 class TestRadialSpectrum:
-    @pytest.mark.parametrize("shape", [(64, 64), (64, 63), (63, 64), (33, 80)])
-    def test_parseval(self, shape):
-        # waves inside the Nyquist circle only, so that nothing of the variance is left out
-        rng = np.random.default_rng(7)
-        x, y = np.arange(shape[0])[:, None] / shape[0], np.arange(shape[1])[None, :] / shape[1]
-        heights = sum(
-            rng.normal() * np.cos(2 * np.pi * (m * x + n * y) + rng.uniform(0, 6))
-            for m, n in rng.integers(-9, 9, (40, 2))
-        )
-        heights = heights - heights.mean()
-        _, C, waves, _ = radial_spectrum(heights, 0.3, 0.3)
-        cell = (2 * math.pi / 0.3) ** 2 / heights.size
-        assert np.sum(C * waves) * cell == pytest.approx(np.mean(heights**2), rel=1e-12)
-
     def test_agrees_with_surface_topography(self):
         topography = topography_class()(BASE, (SIDE, SIDE), periodic=True)
         edges = np.arange(1, 100, 3) - 0.4375  # edges of this library's rings too
@@ -282,16 +250,12 @@ class TestRefused:
         ("heights", "options", "reason"),
         [
             (BASE[:3, :3], {}, r"3 x 3 points hold too few scales; the least is 32 x 32"),
-            (np.full((64, 64), 7.0), {}, "flat"),
             (3 * X + 2 * Y + 7, {}, "flat"),
             (WHITE, {"periodic": True}, r"exponent of -[01]\.\d+ .*not above 0"),
-            (WHITE, {}, "not above 0"),
             (np.sin(10 * np.pi * X), {"periodic": True}, "only 1 spectral points"),
             (np.sin(10.6 * np.pi * X), {}, "a wavelength stands out"),
             (BASE + 5 * np.sin(40 * np.pi * X), {"periodic": True}, r"a wavelength stands out: at q = 20\.\d+ "),
             (np.where(X > 0.37, 1.0, 0.0), {}, "few edges"),
-            (np.where((X - 0.45) ** 2 + (Y - 0.5) ** 2 < 0.09, 1.0, 0.0), {}, "few edges"),
-            (-((X - 0.5) ** 2) - (Y - 0.5) ** 2, {}, "a wavelength stands out"),
             (synthetic(ROUGH, 512, gaussian=True)[::2, :256], {}, "not isotropic"),
             (synthetic(Surface(0.8, 30.0, 91.0, 1.0, 3.0))[:, :], {"periodic": True, "band": (31, 90)}, "too narrow"),
             (np.where((np.arange(64)[:, None] + np.arange(64)) % 2, 1.0, -1.0), {"periodic": True}, "shorter than two"),
@@ -323,11 +287,8 @@ class TestRefused:
             ({"heights": np.where(BASE > 1, np.nan, BASE)}, InputError, r"has \d+ holes"),
             ({"heights": np.ma.masked_greater(BASE, 1)}, InputError, r"has \d+ holes"),
             ({"heights": BASE[0]}, InputError, "two-dimensional"),
-            ({"heights": [[1, 2], [3]]}, InputError, "array of numbers"),
-            ({"heights": np.ma.masked_array(np.zeros((40, 40), "f8,i4"))}, InputError, "heights must be real numbers"),
             ({"heights": BASE * 1e40}, OutOfRangeError, "at most 1e30"),
             ({"dx": None}, InputError, "dx is missing"),
-            ({"dx": -1.0}, OutOfRangeError, "dx must be positive"),
             ({"dy": 0.0}, OutOfRangeError, "dy must be positive"),
             ({"short_cutoff": 1.9 * STEP}, InputError, "longer than two sampling steps"),
             ({"detrend": "cubic"}, InputError, "detrend must be one of mean, plane, quadratic, median"),
@@ -346,7 +307,6 @@ class TestRefused:
             ({"q": SLOPED - 1}, OutOfRangeError, "leave q = 0 out"),
             ({"q": SLOPED.reshape(2, 20), "C": SLOPED.reshape(2, 20)}, InputError, "two columns"),
             ({"C": np.where(np.arange(40) == 9, 0, SLOPED**-3)}, OutOfRangeError, "between its first and last"),
-            ({"C": np.ma.masked_array(SLOPED[:9])}, InputError, "of one length"),
             ({"convention": "german"}, InputError, "paper, isotropic, profile"),
             ({"band": (0.1, 50)}, OutOfRangeError, "within the measured range"),
         ],
@@ -387,16 +347,6 @@ class TestFiles:
         save(path, np.full((40, 40), Charge(), dtype=object), allow_pickle=True)
         with pytest.raises(InputError, match="cannot read"):
             read_measurement(path)
-
-    @pytest.mark.parametrize(("name", "reason"), [("al3d-1.al3d", "above 1"), ("di-1.di", "above 1")])
-    def test_measured_maps(self, name, reason):
-        # a lens blurs the first into q^-6.9; the second, of directed features, falls like q^-4.6 from its roll-off
-        topography_class()
-        folder = reference_maps()
-        if folder is None:
-            pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
-        with pytest.raises(NotSelfAffineError, match=reason):
-            from_map(read_measurement(folder / name))
 
 
 def cut_out(seed, roll_off, points=128, tiles=4):

@@ -77,11 +77,6 @@ class TestHoles:
             treated(np.full((40, 40), np.nan))
         assert np.isfinite(treated(holed, fill="harmonic").heights).all()
 
-    def test_masked_is_undefined(self):
-        masked = np.ma.masked_greater(MAP, np.quantile(MAP, 0.99))
-        nan = np.where(masked.mask, np.nan, MAP)
-        np.testing.assert_array_equal(treated(masked).heights, treated(nan).heights)
-
 
 class TestOutliers:
     def test_a_bad_pixel_goes_and_little_else(self):
@@ -151,9 +146,6 @@ class TestReliability:
         entry = next(e for e in found.provenance if e["step"] == "reliability")
         assert entry["wavelength"] == pytest.approx(limit)
         assert found.waves[1] == pytest.approx(2 * np.pi / limit)
-
-    def test_a_fine_tip_can(self):
-        assert "follows every wavelength" in told(treated(tip_radius=1e-3), "reliability")
 
     def test_what_the_file_says_counts_unless_told_otherwise(self):
         info = {"instrument": {"parameters": {"resolution": {"value": 2000.0, "unit": "nm"}}}}

@@ -2,13 +2,8 @@
 
 import dataclasses
 import hashlib
-import os
 import pathlib
-import re
 import resource
-import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -90,24 +85,6 @@ def test_the_source_digest_is_that_of_the_files():
     assert source_digest(MODULES[ISLAND4D]) == hashlib.sha256(joined).hexdigest()
     with pytest.raises(ModuleNotFoundError, match=r"mbma_tables\.nowhere"):
         source_digest(("mbma_tables.nowhere",))
-
-
-@pytest.mark.slow
-def test_renaming_a_local_variable_of_the_solver_changes_nothing_outside(tmp_path):
-    for name in ("mbma_tables", "tables"):
-        shutil.copytree(PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    solver = tmp_path / "mbma_tables" / "islands" / "greenwood_tripp.py"
-    source = solver.read_text(encoding="utf-8")
-    renamed, count = re.subn(r"\bdigits\b", "decimal_digits", source)
-    assert count > 1
-    solver.write_text(renamed, encoding="utf-8")
-    command = [sys.executable, "-W", "error", "-m", "mbma_tables", "tables", "verify"]
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-    made = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
-    lines = made.stdout.splitlines()
-    assert made.stderr == ""
-    assert [line.partition(": ")[0] for line in lines] == [str(tmp_path / "tables" / f"{kind}.nc") for kind in KINDS]
-    assert all("hashes match; 64 conformance points" in line for line in lines)
 
 
 def test_arrays_count_by_name_shape_type_and_bytes():

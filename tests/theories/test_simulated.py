@@ -122,14 +122,6 @@ def test_a_coarse_grid_is_not_valid():
     assert "sampling steps" in next(iter(found.reasons))
 
 
-def test_a_map_is_continued_by_its_mirror_images():
-    half = heights()[:32, :40]
-    images = np.block([[half, half[:, ::-1]], [half[::-1], half[::-1, ::-1]]])
-    one = BoundaryElements.from_map(half, 1.0, detrend="mean", loads=LOADS[2:6])
-    other = BoundaryElements.from_map(images, 1.0, periodic=True, loads=LOADS[2:6])
-    np.testing.assert_allclose(one.rows, other.rows, rtol=1e-4)
-
-
 @pytest.mark.parametrize(
     ("count", "change", "message"),
     [

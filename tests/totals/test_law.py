@@ -149,13 +149,6 @@ def test_turning_points(surface, variant, name):
         law.separation(**{name: 1.0001 * peak})
 
 
-def test_no_turning_point_where_height_dominates():
-    for case in (case for case in CASES if case[0] >= 0.5):
-        law = law_of(case)
-        assert law.turning_point is law.area_turning_point is None
-        assert (np.diff(law.pressure(separation=np.linspace(law.h_max, -law.h_max, 400))) > 0).all()
-
-
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_turn_within_a_hundredth_of_the_range(rtol):
     """Force falls by 4e-6 and rises again, between places that are further apart."""
@@ -304,19 +297,6 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
         assert missed(law, surface, gap, 1e-10) <= 1
         for misses in slope_misses(surface, law, gap, law.variant):
             assert (misses <= law.slope_error(separation=gap)).all()
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_what_it_takes(name):
-    function = getattr(law_of(CASES[0]), name)
-    expected = function(separation=1.0)
-    for same in (1, np.float64(1), np.float32(1), np.int16(1), np.array(1), np.array(1.0)):
-        assert function(separation=same) == expected
-        assert np.shape(function(separation=same)) == ()
-    labelled = function(separation=xr.DataArray([1.0, 0.5], dims="t", coords={"t": [3, 4]}, attrs={"units": "mm"}))
-    assert labelled.t.values.tolist() == [3, 4]
-    assert "units" not in labelled.attrs
-    assert labelled.values.tolist() == [expected, function(separation=0.5)]
 
 
 def test_the_ends_and_no_contact():

@@ -53,14 +53,6 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, 
         np.testing.assert_allclose(*slopes, rtol=10 * bound)
 
 
-def test_exact_and_universal_island_models_agree():
-    surface = rough(count=24)
-    d = surface.h_max * (1 - DEPTHS[1:])
-    exact, table = (contact(surface, separation=d, theory="mbma", island_model=name) for name in ("exact", "universal"))
-    for name in ("pressure", "area"):
-        np.testing.assert_allclose(getattr(table, name), getattr(exact, name), rtol=1e-7)
-
-
 @pytest.mark.parametrize("variant", ["reported", "printed", "fitted"])
 @pytest.mark.parametrize(("gap", "rtol"), [(False, 2e-7), (True, 3e-5)], ids=["whole", "gap"])
 def test_totals_are_the_integral_over_islands(variant, gap, rtol):

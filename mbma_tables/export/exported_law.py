@@ -1,4 +1,4 @@
-"""A joint: the law of one surface with its units, and what every file that is written of it says at its head."""
+"""An exported law: that of one surface with its units, and what every file that is written of it says at its head."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surfac
 
 
 @dataclasses.dataclass(frozen=True)
-class Joint:
+class ExportedLaw:
     """One surface's law, whose units are known."""
 
     surface: AnySurface  # in the units of the law
@@ -184,7 +184,7 @@ def outward(value: float, rounding: str) -> str:
     return f"{float(Context(prec=4, rounding=rounding).create_decimal(value)):.4g}"
 
 
-def frozen_joint(
+def exported_law(
     surface: AnySurface,
     E_star: float | str,
     length_unit: str | None = None,
@@ -193,7 +193,7 @@ def frozen_joint(
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
     made_by: tuple[str, ...] = (),
-) -> Joint:
+) -> ExportedLaw:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
     surface = in_unit(surface, length_unit)
     plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
@@ -205,7 +205,7 @@ def frozen_joint(
     own = chosen_theory(surface, theory, variant=variant)
     law = contact_law(surface, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    return Joint(surface, law, own, modulus, float(cap), length, stress, made_by)
+    return ExportedLaw(surface, law, own, modulus, float(cap), length, stress, made_by)
 
 
 def _known(name: str, unit: str | None) -> str:
