@@ -1,4 +1,4 @@
-"""`Joint`: two rough metal parts in contact, and the interface laws that follow from one pressure range."""
+"""`Joint`: two rough metal parts and all their interface laws."""
 
 from __future__ import annotations
 
@@ -222,17 +222,18 @@ class Joint(Displayed):
         from mbma_tables.export.law_rows import describe_law
         from mbma_tables.export.targets import targets
 
-        known = {key: each for key, each in targets().items() if "kappa" in each.takes}
+        known = {key: each for key, each in targets().items() if each.rows or "kappa" in each.takes}
         if target not in known:
             raise InputError(f"no target of laws is called {target!r}: {nearest(target, known)}")
-        rows, takes = known[target].rows, known[target].takes
+        takes, (length, stress) = known[target].takes, known[target].units or ("mm", "MPa")
         options: dict[str, Any] = {"theory": self.theory, "hardness": self.hardness or self.pair.hardness or np.inf}
-        options |= {"length_unit": "mm", "stress_unit": "MPa"}
-        if heat:
+        options |= {"length_unit": length, "stress_unit": stress}
+        if heat := heat and "conductivity" in takes:
             k1, k2 = (float(text.split()[0]) for text in self.pair.conductivities)  # W/(m K) is mW/(mm K)
-            options |= {"conductivity": 2 * k1 * k2 / (k1 + k2), "conductivity_unit": "mW/(mm K)"}
+            options |= {"conductivity": 2 * k1 * k2 / (k1 + k2)}
+            options["conductivity_unit"] = "mW/(mm K)" if length == "mm" else "W/(m K)"
         named = {} if name is None else {"name": name}
-        if not rows:
+        if not known[target].rows:
             options["kappa"] = self._kappa(None)
             file = known[target].files(self.surface, self.pair.E_star, **options, **named)[""]
             return file if target.startswith("fmu") else file.decode()
@@ -240,7 +241,7 @@ class Joint(Displayed):
             raise InputError(f"{target} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')")
         if self.friction is not None and "friction" in takes:
             options |= {"friction": self.friction, "kappa": self._kappa, "friction_pressure": friction_pressure}
-        quantity = "conductance" if heat else "pressure"
+        quantity = "conductance" if heat else known[target].quantity
         law = describe_law(self.surface, self.pair.E_star, quantity=quantity, pressures=pressures, **options)
         return known[target].files(law, **named)[""].decode()
 

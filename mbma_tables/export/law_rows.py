@@ -6,83 +6,33 @@ approach, so that -dp/du = dp/dc.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, hinted, number_in, one_number
-from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.arguments import FloatArray, hinted, number_in, one_number, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_lines
 from mbma_tables.common.units import Units
-from mbma_tables.export.chords import chosen_rows
+from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
 from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
+from mbma_tables.export.film_rows import facts_of, film_rows
+from mbma_tables.export.law_table import LawTable
+from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.protocol import Theory, UserTheory
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-QUANTITIES = ("pressure", "conductance", "leakage", "tangential_stiffness")
+QUANTITIES = ("pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film")
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
 LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # of h_max, mean separations of the last points
-
-
-@dataclasses.dataclass(frozen=True)
-class Friction:
-    """What a friction card has: one stiffness, of stick before any slip, at one pressure."""
-
-    coefficient: float
-    pressure: float
-    stiffness: float  # shear stress over displacement [stress/length]
-    comments: tuple[str, ...]
-
-    @property
-    def elastic_slip(self) -> float:
-        """Displacement at which slip begins at the pressure [length]."""
-        return self.coefficient * self.pressure / self.stiffness
-
-
-@dataclasses.dataclass(frozen=True, repr=False)
-class LawTable(Displayed):
-    """Rows of a contact law, ready to be written."""
-
-    x: FloatArray  # overclosure, or pressure: zero, then rising
-    y: FloatArray  # rising from zero; or flow, which falls, to zero where contact blocks it
-    x_name: str
-    y_name: str
-    x_unit: str
-    y_unit: str
-    largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
-    comments: tuple[str, ...]  # what a reader of the file must know
-    theory: str  # whose law it is
-    floor: float = 0.0  # value below which errors are relative to it
-    behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
-    friction: Friction | None = None
-
-    def _facts(self) -> dict[str, str]:
-        columns = {self.x_name: shown(self.x, self.x_unit), self.y_name: shown(self.y, self.y_unit)}
-        return columns | {"rows": str(self.x.size), "theory": self.theory, "largest error": shown(self.largest_error)}
-
-    def _variables(self) -> dict[str, Variable]:
-        dims = (self.x_name,)
-        return {
-            self.x_name: Variable(self.x, self.x_unit, self.x_name, dims),
-            self.y_name: Variable(self.y, self.y_unit, self.y_name, dims),
-        }
-
-    def _figure(self) -> Figure:
-        labels = (f"{name} [{unit}]" for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit)))
-        return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
+FILM_ROWS = 200
 
 
 def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: float) -> tuple[FloatArray, FloatArray]:
@@ -98,11 +48,11 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: 
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure
-    if quantity == "leakage":
+    if quantity in ("leakage", "hydraulic_aperture"):
         flow = np.asarray(law.leakage(separation=d))
         # the first row that is blocked is the last
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
-        return pressure[open_], flow[open_]
+        return pressure[open_], flow[open_] if quantity == "leakage" else np.cbrt(flow[open_])
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
@@ -110,35 +60,33 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: 
 
 
 def _friction(
-    exported: ExportedLaw, coefficient: float, kappa: Any, pressure: Any, pressures: tuple[Any, Any] | None
-) -> Friction:
-    """What a friction card has, by the stiffness of a small unloading."""
+    exported: ExportedLaw, friction: float, kappa: Any, pressure: Any, pressures: tuple[Any, Any] | None
+) -> tuple[dict[str, tuple[float, str]], str]:
+    """Facts for friction cards, by the stiffness of a small unloading, and what these mean."""
     law, units = exported.law, exported.units
     if kappa is None or (pressure is None and pressures is None):
         raise InputError("friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures")
     ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
     at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
-
     ratio = checked_kappa(kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa)
 
     def stiffness(p: float) -> float:
         return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
 
-    chosen = Friction(one_number("friction", coefficient), at, stiffness(at), ())
+    stick, unit = stiffness(at), f"{exported.stress}/{exported.length}"
     places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
-    known = ", ".join(f"{stiffness(p):.4g} at {p:.4g}" for p in places)
-    comments = (
-        f"friction coefficient {chosen.coefficient:.10g}; shear stress over displacement before slip, the stiffness of "
-        f"a small unloading over kappa = {ratio:.4g}: {chosen.stiffness:.4g} {exported.stress}/{exported.length} at {at:.4g} "
-        f"{exported.stress}, where the friction card holds; {known} {exported.stress}",
+    facts = {"friction": (number_in("friction", friction, 1e-12, 1e12), "1")}
+    return facts | {"stick": (stick, unit), "stick_pressure": (at, exported.stress)}, (
+        f"friction coefficient {friction:.10g}; shear stress over displacement before slip, the stiffness of a small "
+        f"unloading over kappa = {ratio:.4g}: {stick:.4g} {unit} at {at:.4g} {exported.stress}, where the friction "
+        f"card holds; {', '.join(f'{stiffness(p):.4g} at {p:.4g}' for p in places)} {exported.stress}"
     )
-    return dataclasses.replace(chosen, comments=comments)
 
 
 @hinted
 def describe_law(
-    surface: AnySurface,
-    E_star: float | str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
     *,
     length_unit: str | None = None,
     stress_unit: str | None = None,
@@ -156,6 +104,7 @@ def describe_law(
     evenly: bool = False,
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
+    peklenik: float | None = None,
     made_by: tuple[str, ...] = (),
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
@@ -163,16 +112,19 @@ def describe_law(
     Parameters
     ----------
     surface : Surface
-        One surface.
+        One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`) alone, of pressure as force.
     E_star : float or str
         Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
-    quantity : {"pressure", "conductance", "leakage", "tangential_stiffness"}
-        Pressure against overclosure; or against pressure the conductance, the flow coefficient k h_rms^3 of the gaps
-        (`ContactLaw.leakage`), or the tangential stiffness before slip.
+    quantity : {"pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film"}
+        Pressure against overclosure, or against pressure conductance, tangential stiffness before slip, the flow
+        coefficient k h_rms^3 of the gaps (`ContactLaw.leakage`), or the hydraulic aperture k^(1/3) h_rms with the
+        aperture u, the derivative by u and the stiffness -dp/du. A film: flow factors (`flow_factors`), asperity
+        pressure and contact area against the mean gap u, from 0.2 h_rms or the largest of `pressures` to 10 h_rms, of
+        theory "calibrated" by default.
     rows : int, optional
-        How many; else as few as `rtol` needs, 1e-3 where neither is given.
+        How many; else as few as `rtol` needs, 1e-3 where neither is given; 200 of a film, which has no `rtol`.
     rtol : float, optional
         Largest relative error of the interpolation where the result is above a thousandth of its largest, or
         between `pressures`; of leakage from its largest down to that at 30% contact, or at the largest of `pressures`.
@@ -189,13 +141,15 @@ def describe_law(
         Coefficient of friction, for the friction cards of solvers; with `kappa`.
     friction_pressure : float or str, optional
         Pressure at which the one tangential stiffness of a friction card holds; by default the geometric mean of
-        `pressures`. Its comments have the stiffness at other pressures.
+        `pressures`. Comments have the stiffness at other pressures.
     variant : str or Variant
         Of the MBMA model.
     theory : str or theory
         As for `contact`.
     hardness : float or str
         As for `contact`: the law of loading, and conductance by the stiffness of the frozen contact.
+    peklenik : float, optional
+        Of a film: as for `flow_factors`.
     evenly : bool
         Equally spaced rows instead, for comparison.
     made_by : tuple of str
@@ -216,25 +170,48 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+    of_body = isinstance(surface, ForceLaw)
+    if of_body and quantity != "pressure":
+        raise InputError(f"a force law has no {quantity}")
+    if film := quantity == "film":
+        theory = "calibrated" if theory is None else theory
+        if any(given is not None for given in (rtol, largest_overclosure)):
+            raise InputError("rtol and largest_overclosure are not of a film: give rows and pressures")
+    elif peklenik is not None:
+        raise InputError("peklenik belongs to quantity='film': leave it out")
     exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
-    law, units = exported.law, exported.units
+    law = exported.law
+    units = law.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    scale, names = 1.0, (own := ("overclosure", "pressure", exported.length, exported.stress))
+    scale, names, facts = (
+        1.0,
+        (own := ("overclosure", "force" if of_body else "pressure", exported.length, exported.stress)),
+        facts_of(exported),
+    )
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
-        scale = k_s / exported.modulus
+        scale, facts = k_s / exported.modulus, facts | {"conductivity": (k_s, unit)}
         names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")
-    elif quantity == "leakage":
-        names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
     elif quantity == "tangential_stiffness":
         names = ("pressure", quantity, exported.stress, f"{exported.stress}/{exported.length}")
-        scale = 1 / checked_kappa(kappa)  # type: ignore[arg-type]
+        scale = 1 / checked_kappa(kappa)
+    elif quantity == "leakage":
+        names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
+    elif quantity == "hydraulic_aperture":
+        names = ("pressure", quantity, exported.stress, exported.length)
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
+    if film:
+        count = whole_number_in("rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS)
+        return film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
-    behaviour = _table(exported, "pressure", own, least, end, choose) if quantity == "conductance" else None
-    sheared = None if friction is None else _friction(exported, friction, kappa, friction_pressure, pressures)
-    return _table(exported, quantity, names, least, end, choose, scale, behaviour, sheared)
+    heat = quantity == "conductance"
+    behaviour = _table(exported, "pressure", own, least, end, choose, 1.0, facts_of(exported)) if heat else None
+    said: list[str] = []
+    if friction is not None:
+        more, *said = _friction(exported, friction, kappa, friction_pressure, pressures)
+        facts |= more
+    return _table(exported, quantity, names, least, end, choose, scale, facts, behaviour, *said)
 
 
 def _table(
@@ -244,18 +221,20 @@ def _table(
     least: float | None,
     end: float,
     choose: Callable[..., tuple[FloatArray, FloatArray, float]],
-    scale: float = 1.0,
+    scale: float,
+    facts: dict[str, tuple[float, str]],
     behaviour: LawTable | None = None,
-    friction: Friction | None = None,
+    *said: str,
 ) -> LawTable:
     """Rows up to an overclosure, whose error holds from the `least` pressure on, or above `FLOOR`."""
     law = exported.law
     fine_x, fine_y = _curve(exported, quantity, end, scale)
     floor = FLOOR * float(fine_y[-1])
-    if quantity == "leakage":
+    aperture, flow = quantity == "hydraulic_aperture", quantity in ("leakage", "hydraulic_aperture")
+    if flow:
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
-            floor = float(law.leakage(separation=law.separation(area=LARGEST_AREA)))
+            floor = float(law.leakage(separation=law.separation(area=LARGEST_AREA))) ** (1 / 3 if aperture else 1)
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
@@ -271,11 +250,20 @@ def _table(
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
         *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
-        *(friction.comments if friction else ()),
+        *said,
         end=end,
-        leakage=quantity == "leakage",
+        leakage=flow,
     )
-    return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, friction)
+    more = {}
+    if aperture:
+        found = law.at_pressure(x)
+        fine_u = np.asarray(law.at_pressure(fine_x).mean_separation)
+        by_u = np.interp(-np.asarray(found.mean_separation), -fine_u, np.gradient(fine_y, fine_u))
+        more = {
+            "aperture": (np.asarray(found.mean_separation), exported.length), "derivative": (by_u, "1"),
+            "stiffness": (np.asarray(found.stiffness), f"{exported.stress}/{exported.length}"),
+        }  # fmt: skip
+    return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, more, facts)
 
 
 def _why_there(law: ContactLaw, end: float, quantity: str) -> str:
