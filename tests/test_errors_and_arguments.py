@@ -1,5 +1,6 @@
 """Public names, typed errors, and the messages of the argument checks."""
 
+import contextlib
 import functools
 import math
 
@@ -85,6 +86,23 @@ def test_masked_entries_are_refused_not_uncovered(take):
     with pytest.raises(InputError, match=r"has 1 masked entries among 3: leave them out with \.compressed\(\), or put"):
         take(np.ma.masked_array([0.1, 0.2, 0.3], [False, True, False]))
     take(np.ma.masked_array([0.1, 0.2, 0.3], False))
+
+
+def test_quantities_of_other_libraries_are_refused():
+    class Quantity:
+        magnitude = 5.0
+
+        def __array__(self, dtype=None, copy=None):
+            return np.asarray(self.magnitude)
+
+    given = [Quantity()]
+    with contextlib.suppress(ImportError):
+        import pint
+
+        given += [5 * pint.UnitRegistry().MPa, np.ones(2) * pint.UnitRegistry().MPa]
+    for quantity in given:
+        with pytest.raises(InputError, match="pressure is a Quantity with a unit of its own: convert it"):
+            contact(ROAD, pressure=quantity, E_star="1 GPa")
 
 
 def test_other_containers_of_xarray_and_hdf5_are_refused(tmp_path):
