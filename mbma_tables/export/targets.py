@@ -23,7 +23,7 @@ ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "qu
 CODE = LAW | {"name", "leakage"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {
-    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code"
+    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
 }  # fmt: skip
 SI = ("m", "Pa")
 # by quantity: the options that are of it alone, and what its rows are against
