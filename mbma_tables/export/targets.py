@@ -103,8 +103,7 @@ class Grammar:
         if law.quantity not in self.body:
             taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
             raise InputError(f"{self.program} takes {taken} here, got {law.y_name} against {law.x_name}")
-        own = law.facts["h_rms"][1], law.facts["E_star"][1]
-        if self.units not in (None, own):
+        if self.units and (own := tuple(law.facts[fact][1] for fact in ("h_rms", "E_star"))) != self.units:
             raise InputError(f"{self.program} is written in {' and '.join(self.units)}, got {' and '.join(own)}")
         if law.x.size > (most := self.most.get(law.y_name, law.x.size)):
             raise InputError(

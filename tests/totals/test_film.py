@@ -76,6 +76,14 @@ def test_isotropic_factors_are_those_of_the_leakage():
     assert found.valid.all()
 
 
+def test_factors_are_continuous_at_first_contact():
+    h_max = float(BEARING.h_max)
+    found = flow_factors(BEARING, h_max * np.array([1 - 1e-9, 1 + 1e-9]), peklenik=3)
+    assert found.area[0] > found.area[1] == 0
+    for name in ("phi_x", "phi_y", "shear_x", "shear_y"):
+        np.testing.assert_allclose(*getattr(found, name), rtol=1e-5, err_msg=name)
+
+
 def test_a_lay_turned_by_a_right_angle():
     u = np.linspace(0.6, 4, 9)
     one, other = (flow_factors(BEARING, u, peklenik=gamma) for gamma in (3.0, 1 / 3))
