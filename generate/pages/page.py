@@ -29,6 +29,7 @@ _OWN = ("architecture", "cost", "explorer", "export", "fidelity", "gallery", "ma
 PAGES = {
     **{name: f"{name}:measure" for name in _OWN},
     **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
+    **{name: f"film:{name}" for name in ("lubrication", "rough_bodies")},
     **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
 }
 Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files
