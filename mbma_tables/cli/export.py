@@ -104,7 +104,7 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
     if kind.units is not None:
         specimen = specimen.in_units(*kind.units)
-    joint = {"surface": specimen.surface, "E_star": specimen.E_star, "stress_unit": specimen.stress_unit}
+    joint: dict[str, Any] = {name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")}
     ctx = click.get_current_context()
     joint["made_by"] = made_by(ctx.meta["words"], out, [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
     _write(_law_files(kind, out, joint, given))

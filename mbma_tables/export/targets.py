@@ -23,14 +23,11 @@ ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "qu
 CODE = LAW | {"name", "leakage"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {
-    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu",
-    "CODE": "code",
+    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
 }  # fmt: skip
 SI = ("m", "Pa")
 # by quantity: the options that are of it alone, and what its rows are against
-OPTIONS = {
-    "conductance": {"conductivity", "conductivity_unit"}, "film": {"peklenik"},
-}  # fmt: skip
+OPTIONS = {"conductance": {"conductivity", "conductivity_unit"}, "film": {"peklenik"}}
 AGAINST = {
     "pressure": "overclosure", "conductance": "pressure", "leakage": "pressure", "hydraulic_aperture": "pressure",
     "film": "mean_separation",
