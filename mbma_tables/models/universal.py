@@ -173,7 +173,7 @@ class UniversalModel(Ranged, Displayed):
         numbers = np.array([*ends, first - 1, buckets.size], dtype=float)
         starts, cells = places[0], np.concatenate(places[1:])
         # the core does not look whether places lie inside the table
-        if not (0 <= cells.min() and cells.max() < count and starts.max() + buckets.size <= steps.size + cells.size):
+        if not (cells.min() >= 0 and cells.max() < count and starts.max() + buckets.size <= steps.size + cells.size):
             raise TableFileError("the cells of the universal table do not cover its range")
         return records.reshape(-1), np.concatenate(places).astype(np.int32), numbers
 
