@@ -153,11 +153,11 @@ def test_many_gaps_go_through_a_law():
         return step.name, step.island_model
 
     for island_model in ("universal", "exact", "rigid"):
-        fewest = plans.MIN_LAW_GAPS.get(island_model, plans.MIN_LAW_GAPS_OF_OTHERS)
+        fewest = plans.MIN_LAW_GAPS
         assert step_of(fewest - 1, 1e-6, island_model=island_model) == ("totals", island_model)
         assert step_of(fewest, 1e-6, island_model=island_model) == ("law", island_model)
     # closer than a law can be
-    assert step_of(plans.MIN_LAW_GAPS["universal"], 1.5e-10) == ("totals", "exact")
+    assert step_of(plans.MIN_LAW_GAPS, 1.5e-10) == ("totals", "exact")
     with pytest.raises(InputError, match="too tight for stiffness"):
         scene_of("stiffness", rtol=1e-7).run()
 
@@ -337,14 +337,6 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
     assert made == ["universal", "exact"]
     assert found.attrs["island_models"] == '{"law": "exact"}'
     np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2, atol=0)
-
-
-def test_progress_in_blocks():
-    calls = []
-    gaps = np.linspace(0.2, 1.0, 130)
-    scene = scene_with(separations=gaps, rtol=1e-2)
-    run_plan(scene, with_island_model(scene, "exact"), lambda *step: calls.append(step))
-    assert calls == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
 
 
 @pytest.mark.parametrize(
