@@ -20,20 +20,20 @@ NEAREST = 1e-9  # of h_max, the smallest overclosure whose law is looked at
 NAMES = ("phi_x", "phi_y", "shear_x", "shear_y", "pressure")
 
 
-def facts_of(joint: ExportedLaw, **more: tuple[float, str]) -> dict[str, tuple[float, str]]:
+def facts_of(exported: ExportedLaw, **more: tuple[float, str]) -> dict[str, tuple[float, str]]:
     """Numbers of a joint that some programs ask for, with their units."""
-    surface = joint.surface
-    own = {"h_rms": (float(surface.h_rms), joint.length), "rms_gradient": (float(surface.rms_gradient), "1")}
-    return own | {"E_star": (joint.modulus, joint.stress)} | more
+    surface = exported.surface
+    own = {"h_rms": (float(surface.h_rms), exported.length), "rms_gradient": (float(surface.rms_gradient), "1")}
+    return own | {"E_star": (exported.modulus, exported.stress)} | more
 
 
-def film_rows(joint: ExportedLaw, rows: int, least: float | None, end: float, peklenik: float | None) -> LawTable:
+def film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float, peklenik: float | None) -> LawTable:
     """Flow factors and asperity pressure at mean gaps whose ratios are equal."""
-    h_rms, h_max, length, stress = float(joint.surface.h_rms), joint.law.h_max, joint.length, joint.stress
+    h_rms, h_max, length, stress = float(exported.surface.h_rms), exported.law.h_max, exported.length, exported.stress
     u = rounded(np.geomspace(max(RANGE[0] * h_rms, h_max - end), RANGE[1] * h_rms, rows))
     at = functools.partial(
-        flow_factors, joint.surface, peklenik=peklenik, theory=joint.theory, E_star=joint.modulus,
-        hardness=joint.hardness,
+        flow_factors, exported.surface, peklenik=peklenik, theory=exported.theory, E_star=exported.modulus,
+        hardness=exported.hardness,
     )  # fmt: skip
     found = at(u)
     tested = found.pressure[found.area >= TESTED_AREA[0]]
@@ -41,9 +41,9 @@ def film_rows(joint: ExportedLaw, rows: int, least: float | None, end: float, pe
     units = dict.fromkeys((*NAMES, "area", "scatter"), "1")
     units["pressure"] = stress
     columns = {name: (getattr(found, name), unit) for name, unit in units.items()}
-    columns["stiffness"] = (np.asarray(joint.answer(u).unloading_stiffness), f"{stress}/{length}")
+    columns["stiffness"] = (np.asarray(exported.answer(u).unloading_stiffness), f"{stress}/{length}")
     error = _film_error(at, found, floor)
-    comments = joint.header(
+    comments = exported.header(
         f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
         f"mean separation u from {u[0]:.10g} to {u[-1]:.10g} {length}",
         f"{rows} rows; largest error of linear interpolation {error:.1e}, relative, of flow factors and of pressures "
@@ -51,11 +51,10 @@ def film_rows(joint: ExportedLaw, rows: int, least: float | None, end: float, pe
         *_of_film(found, length),
         end=h_max - min(u[0], h_max * (1 - NEAREST)),
     )
-    facts = facts_of(joint, peklenik=(found.peklenik, "1"))
+    facts = facts_of(exported, peklenik=(found.peklenik, "1"))
     y, unit = columns.pop("phi_x")
-    return LawTable(
-        u, y, "mean_separation", "phi_x", length, unit, error, comments, joint.law.theory, floor, None, columns, facts
-    )
+    names, theory = ("mean_separation", "phi_x"), exported.law.theory
+    return LawTable(u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts)
 
 
 def _film_error(at: Callable[[FloatArray], FlowFactors], found: FlowFactors, floor: float) -> float:

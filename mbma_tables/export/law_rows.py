@@ -18,6 +18,7 @@ from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
 from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
 from mbma_tables.export.film_rows import facts_of, film_rows
 from mbma_tables.export.law_table import LawTable
+from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -58,8 +59,8 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: fl
 
 @hinted
 def describe_law(
-    surface: AnySurface,
-    E_star: float | str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
     *,
     length_unit: str | None = None,
     stress_unit: str | None = None,
@@ -82,7 +83,7 @@ def describe_law(
     Parameters
     ----------
     surface : Surface
-        One surface.
+        One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`) alone, of pressure as force.
     E_star : float or str
         Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
     length_unit, stress_unit : str, optional
@@ -132,6 +133,9 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+    of_body = isinstance(surface, ForceLaw)
+    if of_body and quantity != "pressure":
+        raise InputError(f"a force law has no {quantity}")
     if film := quantity == "film":
         theory = "calibrated" if theory is None else theory
         if any(given is not None for given in (rtol, largest_overclosure)):
@@ -139,9 +143,10 @@ def describe_law(
     elif peklenik is not None:
         raise InputError("peklenik belongs to quantity='film': leave it out")
     exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
-    law, units = exported.law, exported.units
+    law = exported.law
+    units = law.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    k_s, names = 1.0, (own := ("overclosure", "pressure", exported.length, exported.stress))
+    k_s, names = 1.0, (own := ("overclosure", "force" if of_body else "pressure", exported.length, exported.stress))
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
         names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")

@@ -27,9 +27,7 @@ GROUPS = {
 }  # fmt: skip
 SI = ("m", "Pa")
 # by quantity: the options that are of it alone, and what its rows are against
-OPTIONS = {
-    "conductance": {"conductivity", "conductivity_unit"}, "film": {"peklenik"},
-}  # fmt: skip
+OPTIONS = {"conductance": {"conductivity", "conductivity_unit"}, "film": {"peklenik"}}
 AGAINST = {
     "pressure": "overclosure", "conductance": "pressure", "leakage": "pressure", "hydraulic_aperture": "pressure",
     "film": "mean_separation",

@@ -118,7 +118,7 @@ def contact_law(
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:
-        return _theory_law(one, chosen, asked, facts)
+        return theory_law(one, chosen, asked, facts)
     except ConvergenceError as fault:
         raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
 
@@ -154,7 +154,7 @@ def _mbma_law(
     return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: kept.error, kept.leverage, facts)
 
 
-def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
+def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
     """A law fitted to a theory's answers: x from first contact, from u = 0, or from both where force has no bound."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
     # below the elastic theory's end, and with a hardness towards u = 0, force depends on the logarithm of u

@@ -110,21 +110,6 @@ def test_where_an_answer_is_not_valid_is_said_in_one_line():
     assert "not valid" not in run("contact", "--surface", "concrete", "-u", "0.8")
 
 
-@pytest.mark.parametrize("theory", THEORIES)
-def test_curve_of_any_theory(folder, theory):
-    arguments = ("curve", "--surface", "concrete", "--theory", theory, "--points", "9", "--plot", "c.png", "--json")
-    found = json.loads(run(*arguments))
-    columns = found["columns"]
-    # some, as Persson's, have no finite force at u = 0, the last gap
-    assert len(columns["pressure"]) == len(found["valid"])
-    assert len(columns["pressure"]) in ({8} if theory == "persson" else {9} if theory == "mbma" else {8, 9})
-    answer = contact(Surface.named("concrete"), separation=columns["separation"], theory=theory)
-    assert columns["pressure"] == answer.pressure.tolist()
-    assert columns["area"] == answer.area.tolist()
-    assert found["theory"] == theory
-    assert (found["variant"] is None) == (theory != "mbma")
-
-
 def test_csv_holds_every_digit():
     text = run("contact", "--surface", "asphalt", "-d", "0.9,0.1", "--csv")
     lines = text.splitlines()

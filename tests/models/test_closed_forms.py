@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp, island
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp
 from mbma_tables.models import closed_forms
 from mbma_tables.models.closed_forms import FUNCTIONS, RANGES, TOTALS, FormulaModel, closed_totals
 
@@ -119,14 +119,6 @@ def test_outside_the_range():
 def test_bad_arguments(form, X, mu, outside):
     with pytest.raises(InputError):
         FormulaModel(form).answer(X, mu, outside=outside)
-
-
-def test_scalars_are_answered_as_arrays_are():
-    one, many = FormulaModel().answer(1.0, 1.0), FormulaModel().answer([1.0], [1.0])
-    assert (one.phi_F, one.phi_A, one.error) == (many.phi_F[0], many.phi_A[0], many.error[0])
-    surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
-    assert island(surface, 0.5, island_model="formula").force == island(surface, [0.5], island_model="formula").force[0]
-    assert np.ndim(closed_totals(surface, 0.3).pressure) == 0
 
 
 def test_units_and_shapes_of_closed_totals():
