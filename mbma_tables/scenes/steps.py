@@ -182,7 +182,6 @@ def _totals(run: Run, step: Step) -> None:
         E_star=problem.E_star,
         rtol=step.rtol,
         outside="exact" if step.island_model_name in TABLES else "raise",
-        quantities=wanted,
     )
     run.found |= {name: (("gap",), getattr(found, name)) for name in wanted}
     run.close(step, float(found.error.max()), step.island_model_name)
