@@ -287,7 +287,7 @@ class _Planner:
 
     def seconds_of_law(self, inverse: bool) -> float:
         """Of a law's answers at the gaps."""
-        found = self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        found = self.costs.of("law", "invert") if inverse else 0.0
         return self.count * (self.costs.of("law", "lookup") + found)
 
     def seconds_of_slopes(self) -> float:
