@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 import platform
 import subprocess
@@ -66,7 +65,6 @@ HEAD = """\
 # What accuracy costs, measured by python -m generate cost; docs/cost.md says how. Costs are times over that of a
 # fixed piece of work in the same run; the row of island model unit has its seconds.
 """
-QUANTITIES = {"both": ("pressure", "area"), "pressure": ("pressure",), "area": ("area",)}
 
 
 def at(what: str, rtol: float) -> str:
@@ -166,24 +164,23 @@ def scene_rows() -> Iterator[Row]:
     surface = SURFACES[0]
     gap = 0.9 * float(surface.h_max)
     whole = measure(Scene(surface, effects=["pressure"], separations=gap, rtol=1e-4).run)[0]
-    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["pressure"]))[0]
+    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
 def gap_rows() -> Iterator[Row]:
     """Totals of each island model at several tolerances: the call, and each further gap."""
-    for island_model, (quantity, names) in itertools.product(ISLAND_MODELS, QUANTITIES.items()):
-        ask = functools.partial(gap_batch, island_model=island_model, quantities=names)
+    for island_model in ISLAND_MODELS:
+        ask = functools.partial(gap_batch, island_model=island_model)
         one, batch = (measure(functools.partial(ask, count, rtol=1e-2))[0] / len(SURFACES) for count in (1, GAPS))
         fixed = max((GAPS * one - batch) / (GAPS - 1), 1e-3 * one)
-        yield Row(island_model, "call", quantity, None, fixed)
-        tolerances = (*RTOLS, 1e-9, 1e-10) if island_model == "exact" else RTOLS
-        for rtol in tolerances if quantity == "both" else tolerances[1::3]:
+        yield Row(island_model, "call", "both", None, fixed)
+        for rtol in (*RTOLS, 1e-9, 1e-10) if island_model == "exact" else RTOLS:
             run = functools.partial(ask, GAPS, rtol=rtol)
             islands = sum(answer.islands for answer in run()) / (len(SURFACES) * GAPS)
             cost = max(measure(run)[0] / len(SURFACES) - fixed, 1e-9) / GAPS
-            error = largest_error([{name: getattr(answer, name) for name in names} for answer in run(every=EVERY)])
-            yield Row(island_model, at("gap", rtol), quantity, error, cost, islands)
+            found = [{"pressure": answer.pressure, "area": answer.area} for answer in run(every=EVERY)]
+            yield Row(island_model, at("gap", rtol), "both", largest_error(found), cost, islands)
 
 
 def law_rows() -> Iterator[Row]:

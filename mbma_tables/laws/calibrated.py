@@ -57,15 +57,16 @@ YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g) >= 0 on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
-    return _area(force, light_factor(alpha, constants), constants.area_t0)
+    return area_of(force, light_factor(alpha, constants), constants.area_t0)
 
 
 def area_persson(force: ArrayLike) -> FloatArray:
     """The same by Persson's theory, erf(sqrt(2) F)."""
-    return _area(force, 1.0, 1.0)
+    return area_of(force, 1.0, 1.0)
 
 
-def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
+def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
+    """A/A0 at F/(A0 E* g) by the light factor s0 and t0."""
     from scipy.special import erf
 
     F = np.minimum(force, MOST_FORCE)

@@ -146,11 +146,11 @@ def test_many_gaps_go_through_a_law():
         return step.name, step.island_model
 
     for island_model in ("universal", "exact", "rigid"):
-        fewest = plans.MIN_LAW_GAPS.get(island_model, plans.MIN_LAW_GAPS_OF_OTHERS)
+        fewest = plans.MIN_LAW_GAPS
         assert step_of(fewest - 1, 1e-6, island_model=island_model) == ("totals", island_model)
         assert step_of(fewest, 1e-6, island_model=island_model) == ("law", island_model)
     # closer than a law can be
-    assert step_of(plans.MIN_LAW_GAPS["universal"], 1.5e-10) == ("totals", "exact")
+    assert step_of(plans.MIN_LAW_GAPS, 1.5e-10) == ("totals", "exact")
     with pytest.raises(InputError, match="too tight for stiffness"):
         scene_of("stiffness", rtol=1e-7).run()
 
@@ -255,8 +255,6 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
         found["greenwood_williamson"] = min(found["greenwood_williamson"], 1)
     assert found == {name: times for name, times in expected.items() if times}
     assert ("yield" in calls) == yields
-    if totals and not yields:
-        assert calls["contact"][0]["quantities"] == tuple(name for name in ("pressure", "area") if name in asked)
 
 
 @pytest.mark.parametrize("name", ["comparison", "pressure_profile"])
@@ -332,14 +330,6 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
     np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2, atol=0)
 
 
-def test_progress_in_blocks():
-    calls = []
-    gaps = np.linspace(0.2, 1.0, 130)
-    scene = scene_with(separations=gaps, rtol=1e-2)
-    run_plan(scene, with_island_model(scene, "exact"), lambda *step: calls.append(step))
-    assert calls == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
-
-
 test_contradictions = refusals(
     lambda given: scene_with(**given),
     ({"without": ("pressure",)}, "is both on and off"),
@@ -367,7 +357,7 @@ def test_an_island_model_of_choice():
     """Given by name it is taken as it is, and a bound above the tolerance is an error."""
     found = scene_with(island_model="island4d", rtol=1e-3).run()
     assert found.attrs["island_models"] == '{"totals": "island4d"}'
-    alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["pressure"])
+    alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4)
     np.testing.assert_array_equal(found["pressure"], alone.pressure)
     with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
         scene_with(island_model="formula", rtol=1e-6).run()

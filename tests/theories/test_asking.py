@@ -229,15 +229,6 @@ def test_a_modulus_names_its_unit_in_lists_and_attributes():
         contact(SURFACE, pressure=0.001, E_star=named, hardness=named.assign_attrs(units="MPa"))
 
 
-def test_one_quantity_alone_has_a_mean_pressure_and_a_dataset():
-    both, one = (
-        contact(SURFACE, separation=0.5, E_star=MODULUS),
-        contact(SURFACE, separation=0.5, E_star=MODULUS, quantities=("area",)),
-    )
-    assert one.mean_pressure == pytest.approx(both.mean_pressure, rel=1e-8)
-    assert "mean_pressure" in one.to_dataset()
-
-
 def test_what_is_read_of_named_arrays_has_its_unit():
     gaps = xr.DataArray([0.5, 1.0], dims="gap", name="mine")
     found = contact(dataclasses.replace(SURFACE, unit="um"), separation=gaps, E_star="100 GPa", hardness="1.5 GPa")

@@ -153,12 +153,6 @@ def test_options_go_through():
     rigid = contact(SMOOTH, separation=gaps, **options)
     assert (rigid.island_model, rigid.variant) == ("rigid", "printed")
     np.testing.assert_array_equal(rigid.pressure, contact(SMOOTH, separation=gaps.values, **options).pressure)
-    both = contact(surfaces_over(), separation=gaps, derivatives=True)
-    for wanted, other in (("pressure", "area"), ("area", "pressure")):
-        alone = contact(surfaces_over(), separation=gaps, derivatives=True, quantities=[wanted])
-        for name, slope in getattr(both, f"{wanted}_by").items():
-            np.testing.assert_array_equal(getattr(alone, f"{wanted}_by")[name], slope)
-        assert getattr(alone, other) is getattr(alone, f"{other}_by") is None
     none = contact(surfaces_over(), separation=gaps)
     assert none.pressure_by is none.area_by is None
 
