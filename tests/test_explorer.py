@@ -327,18 +327,6 @@ def test_any_address_is_drawn_or_refused(seed, visit):
     assert 0.1 * count < drawn < count
 
 
-def test_a_page_of_a_spectrum_begins_with_it(opened, tmp_path):
-    from generate.pages.explorer import visit
-
-    path = tmp_path / "own.html"
-    surface = Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1, unit="um")
-    path.write_text(explorer_page(surface, 5.0, "GPa", theory="calibrated"), encoding="utf-8")
-    tab = visit(opened, path.as_uri())
-    assert "60 samples of a spectrum" in tab.inner_text("#subtitle")
-    assert "[GPa/um]" in tab.inner_text("#readout")
-    tab.context.close()
-
-
 def compiled_law(path):
     """The functions of a law in C at many overclosures."""
     strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-shared", "-fPIC")

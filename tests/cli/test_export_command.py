@@ -80,18 +80,6 @@ def test_javascript_without_its_compiler(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_exponential(tmp_path):
-    law = [*LAW[:-2], "--name", "JOINT"]
-    assert run("calculix", "--out", tmp_path / "law", "--exponential", *law).exit_code == 0
-    text = (tmp_path / "law").read_text()
-    assert np.all(np.array(text.splitlines()[-1].split(", "), dtype=float) > 0)
-    assert "*SURFACE INTERACTION, NAME=JOINT\n" in text
-    # what it says is of this law, not of rows that are not there
-    assert "Persson" in text
-    assert "rows" not in text
-    assert "MBMA" not in text.replace("mbma_tables", "")
-
-
 WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] != name] for name in LAW[::2]}
 
 

@@ -279,20 +279,6 @@ def test_no_contact_from_h_max_on(library):
     assert not answers.any()
 
 
-@pytest.mark.parametrize(
-    ("call", "more"), [("mbma_total_slopes_of", (1.0, 1e-8)), ("mbma_calibrated_slopes_of", (1.0,))]
-)
-def test_slopes_past_the_ends(call, more, library):
-    """Beyond first contact nothing changes; beyond full compression nothing is said."""
-    for gap, ok, known in ((3.5, True, 0.0), (-3.1, False, math.nan)):
-        answers = np.ones((3, 6))
-        places = (ctypes.c_void_p(row.ctypes.data) for row in answers)
-        status = library[call](ctypes.byref(CSurface(*SOUND)), *map(ctypes.c_double, (gap, *more)), *places)
-        assert (status == 0) == ok
-        assert np.array_equal(answers[1:], np.full((2, 6), known), equal_nan=True)
-        assert np.array_equal(answers[0, :3], np.full(3, known), equal_nan=True)
-
-
 ASK = """
 import { STATUS, calibrated, formula, islandGeometry, phi, phiSlopes, total, totalSlopes } from "./mbma.mjs";
 const surface = { hurst: 0.8, q0: 1, q1: 100, h_rms: 1, h_max: 3 };

@@ -170,44 +170,38 @@ def test_a_missing_package_is_named(target, package, monkeypatch):
         getattr(data, f"to_{target}")(law_of())
 
 
-@pytest.mark.parametrize("target", DATA)
-def test_data_come_back(target, tmp_path):
-    law = law_of()
-    path = tmp_path / "law"
-    path.write_bytes(getattr(data, f"to_{target}")(law))
+def data_of(target, path):
+    """Rows of a file by another program, and what it holds of the unit of y and of the error, if it does."""
     if target == "csv":
         assert "\noverclosure [mm],pressure [MPa]\n" in path.read_text()
-        found = np.array(parse(target, path.read_text())).T
-    elif target == "json":
+        return *np.array(parse(target, path.read_text())).T, "MPa", None
+    if target == "json":
         content = json.loads(path.read_text())
-        found = np.array(list(content["columns"].values()))
-        assert content["largest_error"] == law.largest_error
-    elif target == "matlab":
-        from scipy.io import loadmat
-
-        held = loadmat(path, appendmat=False)
-        found = np.stack([held["x"][:, 0], held["y"][:, 0]])
-        assert held["y_unit"].item() == "MPa"
-        assert held["largest_error"].item() == law.largest_error
-    elif target == "netcdf":
-        import xarray as xr
-
-        with xr.open_dataset(path, engine="netcdf4") as held:
-            found = np.stack([held.overclosure.values, held.pressure.values])
-            assert held.pressure.attrs["units"] == "MPa"
+        return *content["columns"].values(), content["y_unit"], content["largest_error"]
+    if target == "matlab":
+        held = pytest.importorskip("scipy.io").loadmat(path, appendmat=False)
+        return held["x"][:, 0], held["y"][:, 0], held["y_unit"].item(), held["largest_error"].item()
+    if target == "netcdf":
+        with pytest.importorskip("xarray").open_dataset(path, engine="netcdf4") as held:
             # CF 1.11, section 2.5.1
             assert all("_FillValue" not in variable.encoding for variable in held.variables.values())
-    elif target == "hdf5":
-        h5py = pytest.importorskip("h5py")
-        with h5py.File(path) as held:
-            found = np.stack([held["overclosure"][:], held["pressure"][:]])
-            assert held["pressure"].attrs["units"] == "MPa"
-    else:
-        parquet = pytest.importorskip("pyarrow.parquet")
-        held = parquet.read_table(io.BytesIO(path.read_bytes()))
-        found = np.stack([held["overclosure"].to_numpy(), held["pressure"].to_numpy()])
-        assert json.loads(held.schema.metadata[b"y_unit"]) == "MPa"
-    np.testing.assert_array_equal(found, np.stack([law.x, law.y]))
+            return held.overclosure.values, held.pressure.values, held.pressure.attrs["units"], None
+    if target == "hdf5":
+        with pytest.importorskip("h5py").File(path) as held:
+            return held["overclosure"][:], held["pressure"][:], held["pressure"].attrs["units"], None
+    held = pytest.importorskip("pyarrow.parquet").read_table(io.BytesIO(path.read_bytes()))
+    unit = json.loads(held.schema.metadata[b"y_unit"])
+    return held["overclosure"].to_numpy(), held["pressure"].to_numpy(), unit, None
+
+
+@pytest.mark.parametrize("target", DATA)
+def test_data_come_back(target, tmp_path):
+    law, path = law_of(), tmp_path / "law"
+    path.write_bytes(getattr(data, f"to_{target}")(law))
+    x, y, unit, error = data_of(target, path)
+    np.testing.assert_array_equal([x, y], [law.x, law.y])
+    assert unit == "MPa"
+    assert error in (None, law.largest_error)
 
 
 test_refused = refusals(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp
-from mbma_tables.models import AREA, FORCE, closed_forms
+from mbma_tables.models import closed_forms
 from mbma_tables.models.closed_forms import FUNCTIONS, RANGES, TOTALS, FormulaModel, closed_totals
 
 CERTIFICATES, RESULTS = closed_forms.CERTIFICATES, closed_forms.RESULTS
@@ -90,17 +90,6 @@ def test_totals_by_the_island_model_are_within_one_percent():
         error = np.abs(getattr(found, name) / getattr(exact, name) - 1)
         assert error.max() <= 0.01
         assert (error <= found.error).all()
-
-
-def test_one_function_alone():
-    model = FormulaModel()
-    islands = {"X": np.array([1.0, 5.0]), "mu": np.array([0.1, 10.0])}
-    both = model.of_islands(islands)
-    force, area = model.of_islands(islands, which=FORCE), model.of_islands(islands, which=AREA)
-    np.testing.assert_array_equal(force.phi_F, both.phi_F)
-    np.testing.assert_array_equal(area.phi_A, both.phi_A)
-    assert np.isnan([force.phi_A, area.phi_F]).all()
-    assert (force.error < both.error).all()
 
 
 def test_outside_the_range():

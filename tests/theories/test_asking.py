@@ -248,18 +248,6 @@ def test_what_is_read_of_named_arrays_has_its_unit():
     assert found.separation.name == "mine"
 
 
-def test_energies_hold_where_the_force_bends():
-    hurst, zeta_1 = [0.22, 0.8, 0.5], [11.0, 200.0, 40.0]
-    batch = Surface(hurst, 0.25, 0.25 * np.array(zeta_1), 0.1, 0.26)
-    u = np.linspace(0.1, 0.9, 9)[:, None] * 0.26
-    found = contact(batch, mean_separation=u).energy
-    for k in range(3):
-        law = contact_law(Surface(hurst[k], 0.25, 0.25 * zeta_1[k], 0.1, 0.26), rtol=1e-9)
-        expected = law.energy(u[:, 0])
-        assert found[:, k] == pytest.approx(expected, rel=1e-8)
-        assert contact(law.surface, mean_separation=u[:, 0]).energy == pytest.approx(expected, rel=1e-8)
-
-
 def test_a_force_without_bound_has_no_derivative():
     surface = Surface(0.8, 0.01, 2.0, 1.0, 3.0)
     with pytest.raises(ConvergenceError, match="no derivative of pressure by mean_separation was found") as caught:

@@ -6,7 +6,7 @@ import pathlib
 
 import numpy as np
 import pytest
-from helpers import fresh, refused, run
+from helpers import refused, run
 from scipy.special import erf
 
 from generate.machined.makers import Part, heights
@@ -128,22 +128,6 @@ def test_on_the_command_line(tmp_path):
     assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
     assert "leave --dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
     assert "not the map" in refused("fit", table)
-
-
-def test_an_exported_law_is_the_law(own, file, tmp_path):
-    module = tmp_path / "own_law.py"
-    run("export", "python-law", "--map", file, "--E-star", "1 GPa", "--out", module)
-    law = contact_law(own, E_star="1 GPa")
-    c = np.geomspace(1e-3, 0.99, 50) * law.h_max
-    found = fresh(
-        "import importlib.util as i, json, sys, numpy as np\n"
-        "spec = i.spec_from_file_location('own_law', sys.argv[1]); m = i.module_from_spec(spec)\n"
-        "spec.loader.exec_module(m)\n"
-        "print(json.dumps(np.asarray(m.pressure(np.array(json.loads(sys.argv[2])))).tolist()))",
-        str(module),
-        json.dumps(c.tolist()),
-    )
-    np.testing.assert_allclose(found, law.pressure(law.h_max - c), rtol=1e-12)
 
 
 class TestBeyondTheLoads:

@@ -15,7 +15,6 @@ from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.theories import BoundaryElements
-from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
 
 pytest.importorskip("tamaas")
@@ -184,12 +183,6 @@ class TestOfASurface:
         assert (np.diff(leakage.scatter[:3]) > 0).all()
         assert leakage.valid[:2].all()
         assert not leakage.valid[3]
-
-    def test_heavier_loads_of_fine_grids_are_pressed_on_half_of_them(self, part):
-        pressed = of_map("simulated", part[1]).pressed
-        assert (pressed.coarse_from < pressed.rows.shape[1]) == (part[2] >= 8)
-        assert pressed.rows[1, 0] <= 1e-3
-        assert pressed.rows[1, -1] >= 0.9
 
     def test_laws_and_other_units(self, part):
         surface = part[1]

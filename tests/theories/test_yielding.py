@@ -263,20 +263,6 @@ def test_hardnesses_of_any_size(theory, cap):
             assert found.yielded == 0
 
 
-@each
-@pytest.mark.parametrize("cap", [HARDNESS, np.inf])
-def test_batches_are_their_contacts_one_by_one(theory, cap):
-    batch = Surface([0.6, 0.8, 0.9], 0.01, [1.0, 2.0, 0.4], 1.0, [3.0, 3.4, 2.8])
-    options = {"E_star": MODULUS, "theory": theory, "hardness": cap}
-    for asked in ({"pressure": [1e-2, 30.0, 300.0]}, {"area": [1e-4, 0.03, 0.2]}):
-        whole = contact(batch, **asked, **options)
-        for k in range(3):
-            one = Surface(*(float(np.broadcast_to(getattr(batch, name), 3)[k]) for name in batch.parameters))
-            alone = contact(one, **{name: values[k] for name, values in asked.items()}, **options)
-            for name in ("mean_separation", "pressure", "area", "stiffness", "unloading_stiffness"):
-                assert getattr(whole, name)[k] == pytest.approx(getattr(alone, name), rel=1e-9), name
-
-
 @pytest.mark.parametrize(("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)])
 def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
     kind, asked = type(get_theory(theory)), []

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from catalogue import LEVEL, OWN
+from catalogue import LEVEL
 from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, Surface, contact
@@ -14,7 +14,7 @@ from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
 from mbma_tables.totals import island_sum
-from mbma_tables.totals.island_sum import Pairs, integrate, kinks, totals_of
+from mbma_tables.totals.island_sum import Pairs, integrate, totals_of
 
 
 def test_the_rule_by_its_degrees():
@@ -114,18 +114,6 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
         phi.append(np.empty((500, 7)))
         one.phi(X, mu, *universal_model().cells, 1, phi[-1], None)
         assert phi[-1].tobytes() == phi[0].tobytes()
-
-
-@pytest.mark.parametrize("variant", [REPORTED, OWN], ids=lambda variant: variant.name)
-def test_kinks_are_where_geometry_reaches_its_floors(variant):
-    rng = np.random.default_rng(6)
-    hurst, zeta_1 = rng.uniform(0.1, 1, 200), 3.51 * 10 ** rng.uniform(0, 7, 200)
-    for kink, name, floor in zip(
-        kinks(hurst, zeta_1, variant), ("zeta_d", "zeta_u"), (variant.floor_d, variant.floor_u), strict=True
-    ):
-        before, beyond = (geometry(kink * (1 + sign * 1e-9), hurst, zeta_1, variant)[name] for sign in (-1, 1))
-        assert (before > floor).all()
-        assert (beyond == floor).all()
 
 
 def integrals(function, low, high, rtol=1e-10, owner=None):

@@ -57,18 +57,6 @@ def test_dimensions_by_name():
     assert xr.Dataset({name: getattr(found, name) for name in FIELDS}).sizes == {"surface": 3, "case": 2, "gap": 7}
 
 
-@pytest.mark.parametrize("which", ["separation", "surface", "E_star"])
-def test_one_labelled_argument_is_enough(which):
-    given = {"separation": 1.5, "surface": 0.8, "E_star": 2.0}
-    plain = contact(Surface(given.pop("surface"), 0.2, 40.0, 1.0, 3.0), **given).pressure
-    for dims in ((), ("t",)):
-        own = given | {"surface": 0.8}
-        own[which] = xr.DataArray(np.full((2,) * len(dims), own[which]), dims=dims)
-        found = contact(Surface(own.pop("surface"), 0.2, 40.0, 1.0, 3.0), **own).pressure
-        assert found.dims == dims
-        assert (found.values == plain).all()
-
-
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
 @pytest.mark.parametrize("derivatives", [False, True])
 def test_dask_is_lazy_and_gives_the_same_answers(scheduler, derivatives):

@@ -149,18 +149,6 @@ def test_turning_points(surface, variant, name):
         law.separation(**{name: 1.0001 * peak})
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
-def test_a_turn_within_a_hundredth_of_the_range(rtol):
-    """Force falls by 4e-6 and rises again, between places that are further apart."""
-    surface = Surface(0.5, 0.2, 0.2 * 334390.7992055036, 0.3, 0.3 * 3.163258089330122)
-    law, gaps = contact_law(surface, rtol=rtol), np.linspace(-0.53, -0.49, 4001)
-    falls = contact(surface, separation=gaps, rtol=1e-9, derivatives=True).pressure_by["separation"] >= 0
-    assert 0 < falls.sum() < 1000
-    assert law.turning_point == pytest.approx(gaps[falls][-1], rel=1e-4, abs=0)
-    with pytest.raises(OutOfRangeError):
-        law.separation(pressure=law.pressure(separation=-surface.h_max))
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_a_pickle_is_the_same_law_and_small(case):
     law, kept = law_of(case), pickle.dumps(law_of(case))
