@@ -42,7 +42,6 @@ def fresh(code, *arguments):
 
 
 def run(*arguments):
-    """What `mbma` prints."""
     from mbma_tables.cli import main
 
     result = CliRunner().invoke(main, [str(argument) for argument in arguments])

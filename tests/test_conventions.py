@@ -31,7 +31,6 @@ def offline(monkeypatch):
 
 @pytest.mark.usefixtures("offline")
 def test_compliance_checker_finds_nothing(path, capsys, tmp_path):
-    """Of CF 1.11, of any weight."""
     suite = pytest.importorskip("compliance_checker.suite")
     from compliance_checker.runner import ComplianceChecker
 

@@ -58,7 +58,6 @@ def opened():
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    """A page about the concrete road in MPa."""
     path = tmp_path_factory.mktemp("explorer") / "page with blanks.html"
     run("explore", "--surface", "concrete", "--E-star", "13.3MPa", "--out", str(path))
     return path.as_uri()
@@ -91,7 +90,6 @@ def download(tab, button: str) -> str:
 
 
 def columns(tab) -> dict[str, np.ndarray]:
-    """The page's CSV file, without units."""
     rows = [line for line in tab.evaluate(CSV).splitlines() if not line.startswith("#")]
     head, *body = csv.reader(rows)
     numbers = np.array([[float(cell) if cell else np.nan for cell in row] for row in body])
@@ -99,7 +97,6 @@ def columns(tab) -> dict[str, np.ndarray]:
 
 
 def random_state(rng: np.random.Generator) -> dict:
-    """Any surface, modulus, theory and axis."""
     q0, h_rms = np.exp(rng.uniform(-8, 8, 2))
     hurst = rng.choice([1.0, rng.uniform(0.1, 1.0)], p=[0.1, 0.9])
     numbers = (hurst, q0, q0 * np.exp(rng.uniform(np.log(5.2), np.log(5e4))), h_rms, h_rms * rng.uniform(2.0, 6.0))
@@ -328,7 +325,6 @@ def test_any_address_is_drawn_or_refused(seed, visit):
 
 
 def compiled_law(path):
-    """The functions of a law in C at many overclosures."""
     strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-shared", "-fPIC")
     library = path.with_suffix(".so")
     subprocess.run(["gcc", *strict, str(path), "-lm", "-o", str(library)], check=True)

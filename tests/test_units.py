@@ -222,7 +222,6 @@ SOURCES = {
 
 @pytest.mark.parametrize("source", SOURCES)
 def test_an_export_converts_what_knows_its_unit(source, tmp_path):
-    """A surface in mm, asked for in m: once its numbers were written as metres."""
     laws = []
     for unit in ("mm", "m"):
         path = tmp_path / f"{unit}.json"

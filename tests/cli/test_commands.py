@@ -24,7 +24,6 @@ CONCRETE = {"hurst": 0.7, "m0": 0.071, "m2": 0.27, "m4": 62.0, "h_max": 1.1}
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    """Every command runs in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -15,7 +15,6 @@ from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS, UNIVERSAL
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Small tables in place of the shipped ones."""
     for kind in KINDS:
         write_table(tmp_path / f"{kind}.nc", small_table(kind))
     monkeypatch.setattr(tabulated, "shipped", lambda kind: tmp_path / f"{kind}.nc")

@@ -35,7 +35,6 @@ def batch(n, seed=0, top=12.0):
 
 
 def fill(rows, owner, u, used=core, pieces=None):
-    """Force, area and stiffness."""
     ends, out = np.empty((rows.shape[1], 2)), np.empty((3, u.size))
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     given = *TABLE.core_table, *rows, ends, pieces
@@ -45,7 +44,6 @@ def fill(rows, owner, u, used=core, pieces=None):
 
 
 def separations(rows, owner, force, used=core, pieces=None):
-    """Their inverse."""
     ends, out = np.empty((rows.shape[1], 2)), np.empty(force.size)
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     bad = used.calibrated_separation(*TABLE.core_table, *rows, ends, pieces, owner, force, out)
@@ -54,7 +52,6 @@ def separations(rows, owner, force, used=core, pieces=None):
 
 
 def flow(rows, owner, u, area, pieces=None):
-    """Flow coefficient."""
     return leakage_table._flow((*FLOW.core_table, *rows[:2], None, None, pieces), owner, u, area)
 
 
@@ -98,8 +95,6 @@ class TestSpline:
 
 
 class TestBits:
-    """An answer is the same, whatever is asked beside it."""
-
     def test_alone_in_a_batch_and_with_pieces(self):
         rows, u = batch(400)
         everyone = np.arange(400)
@@ -380,7 +375,6 @@ CASES = {
 
 
 def of_core(name, x):
-    """One of the core's elementary functions of an array."""
     values = np.asarray(x, float)
     out = np.empty_like(values)
     core.elementary(list(CASES).index(name), values, out)

@@ -29,7 +29,6 @@ TOLERANCES |= {"total_by": 1e-12, "calibrated_by": 1e-8}
 
 
 def random_islands():
-    """X and mu over the whole range, ends included."""
     rng = np.random.default_rng(2008)
     axis_X, axis_mu = universal_model().content.axes
     X = rng.uniform(axis_X.low, axis_X.high, POINTS)
@@ -57,7 +56,6 @@ def random_approaches():
 
 
 def random_surfaces():
-    """Surfaces of any size: hurst, q0, q1, h_rms, h_max."""
     rng = np.random.default_rng(48)
     _, hurst, zeta_1 = random_approaches()
     found = []
@@ -69,7 +67,6 @@ def random_surfaces():
 
 @functools.cache
 def points_text(variant="reported"):
-    """The points' file, made once."""
     model, rule = universal_model(), get_variant(variant)
     lines = [*phi_rows(model, *random_islands()), *status_rows(model), *formula_rows(*random_formula_islands())]
     lines += geometry_rows(*random_approaches(), rule)
@@ -86,14 +83,12 @@ def calibrated_text():
 
 
 def write_points(folder, variant="reported"):
-    """The points' file in a folder."""
     path = folder / "many_points.csv"
     path.write_text(points_text(variant) + calibrated_text(), encoding="utf-8")
     return path
 
 
 def assert_equal_to_runtime(replay):
-    """Every row was replayed, and the answers agree as closely as is asked."""
     assert replay.reason == ""
     islands = {"phi": POINTS, "slopes": POINTS, "geometry": POINTS // 10, "status": 10, "formula": POINTS}
     totals, calibrated = 4 * SURFACES, calibrated_text().count("\n") // 3

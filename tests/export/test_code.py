@@ -106,7 +106,6 @@ def test_bad_requests_leave_no_file(arguments, message, tmp_path, monkeypatch):
 
 
 def test_points_of_a_variant_with_high_floors():
-    """A surface below a floor has no islands, and so no points."""
     each = len(conformance.DEPTHS)
     ratios = [surface[2] / surface[1] for surface in conformance.SURFACES]
     for floor in (3.0, 150.0, 500.0):
@@ -143,7 +142,6 @@ def js_folder(tmp_path_factory):
 
 
 def build_and_replay(commands, work, points):
-    """Build the file `selftest` in a folder without a word from the compiler, and replay the points."""
     for command in (*commands, ["./selftest", str(points)]):
         done = subprocess.run(command, cwd=work, capture_output=True, text=True, timeout=300, check=False)
         assert done.stderr == ""

@@ -54,7 +54,6 @@ def blocks(card, steps, side, stiff, more="", kind="NODE TO SURFACE"):
 
 
 def pressed(card, compressions, side, stiff, kind="NODE TO SURFACE"):
-    """The upper block pressed down step by step."""
     steps = "".join(
         f"*STEP\n*STATIC\n1., 1.\n*BOUNDARY\n{each(LOW, '1, 3')}{each(TOP, '1, 2')}{each(TOP, f'3, 3, {-c:.12e}')}"
         f"{each(BETWEEN, '1, 2')}*NODE PRINT, NSET=TOP, TOTALS=ONLY\nRF\n*END STEP\n"
@@ -93,7 +92,6 @@ def calculix(deck, folder, side=10.0):
 
 
 def conductance(flux, side=10.0):
-    """That of the joint, in series with the blocks."""
     return 1 / (100 / flux - 2 * side / CONDUCTIVITY)
 
 
@@ -345,7 +343,6 @@ def test_newton_in_scikit_fem_from_zero_load():
 @needs("ccx")
 @pytest.mark.parametrize(("length", "stress", "theory"), [("mm", "MPa", "mbma"), ("m", "Pa", "calibrated")])
 def test_calculix_feels_the_law(tmp_path, length, stress, theory):
-    """Within 0.2% of the law itself from 1e-5 of the largest pressure asked for on."""
     surface, E_star = Surface.named("concrete").to(length), {"MPa": 13.3, "Pa": 13.3e6}[stress]
     top = 0.04 * E_star
     law = describe_law(surface, E_star, stress_unit=stress, pressures=(1e-5 * top, top), rtol=5e-4, theory=theory)
@@ -391,7 +388,6 @@ def test_ncdump_reads(tmp_path):
 @needs("ccx")
 @pytest.mark.parametrize(("length", "stress"), [("mm", "MPa"), ("m", "Pa")], ids=["mm", "SI"])
 def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
-    """Heat through two blocks and their joint, against the resistances in series."""
     asked = HEAT | {"conductivity_unit": "W/(m K)", "pressures": ("1 kPa", "2 MPa"), "rows": 20}
     law = describe_law(ROUGH, "25 MPa", length_unit=length, stress_unit=stress, quantity="conductance", **asked)
     side, unit = SIDES[length], {"MPa": 1.0, "Pa": 1e6}[stress]

@@ -24,7 +24,6 @@ def made(target, law, **options):
 
 
 def built(target, name, folder):
-    """The FMU in a folder, without problems and with its binary."""
     validation, build = pytest.importorskip("fmpy.validation"), pytest.importorskip("fmpy.build")
     (folder / "build").mkdir()
     (folder / "road.fmu").write_bytes(made(target, name, **MORE))
@@ -37,7 +36,6 @@ def built(target, name, folder):
 
 
 def simulated(path, kind, c, logger=None):
-    """Answers at overclosures, one a second."""
     times = np.arange(c.size, dtype=float)
     given = np.array(list(zip(times, c, strict=True)), [("time", float), ("overclosure", float)])
     fixed = {"stop_time": times[-1], "solver": "Euler", "step_size": 1.0, "output_interval": 1.0}

@@ -58,7 +58,6 @@ def test_rows_rise_from_first_contact(surface):
 
 @pytest.mark.parametrize("pressures", [(1, 500), (1, 550), None])
 def test_the_header_says_from_where_a_law_is_valid(pressures):
-    """Ends of validity are roots of the theory's area, whatever rows are asked for, and not points looked at."""
     surface = Surface.from_roughness(hurst=0.8, h_max=3.5e-3, Rq=1e-3, longest=0.1, shortest=2e-3, unit="mm")
     law = describe_law(surface, 115e3, stress_unit="MPa", theory="calibrated", rows=40, pressures=pressures)
     root = contact(surface, area=1e-3, E_star=115e3, theory="calibrated").pressure
@@ -271,7 +270,6 @@ def test_rows_of_leakage_without_a_block():
 @pytest.mark.parametrize("quantity", ["pressure", "conductance"])
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_light_loads_are_within_the_error_too(theory, quantity):
-    """Until now rows were within their error above a thousandth of the largest value, 94% off two decades below."""
     heat = HEAT if quantity == "conductance" else {}
     law = law_of(rows=None, rtol=1e-2, pressures=("10 Pa", 0.1), theory=theory, **heat)
     pressure = np.geomspace(1.001e-5, 0.0999, 400)
@@ -289,7 +287,6 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
 @pytest.mark.parametrize("largest", [0.1, 0.1234567890123])
 @pytest.mark.parametrize("choice", [{"rows": 20}, {"rows": 33, "evenly": True}, {"rows": None, "rtol": 3e-3}])
 def test_rows_reach_the_largest_pressure(target, largest, choice):
-    """A solver that keeps the last pressure beyond the last row carries the largest load, at its overclosure."""
     law = law_of(theory="calibrated", pressures=(1e-4, largest), **choice)
     c, p = np.array(parse(target, data.to_csv(law).decode() if target == "csv" else getattr(solvers, target)(law))).T
     assert p[-1] >= largest

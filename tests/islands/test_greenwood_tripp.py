@@ -27,7 +27,6 @@ several = settings(deadline=None, max_examples=60)
 
 
 def rigid(X, mu):
-    """Closed form for a sphere that does not deform."""
     return mu * math.pi / 5 * height_integral(2.5, -X), math.pi / 2 * height_integral(2.0, -X)
 
 
@@ -189,7 +188,6 @@ def test_bad_options(option, value):
 
 @pytest.mark.parametrize(("method", "most"), [("newton", 1024), ("classical", 2048)])
 def test_nodes_are_bounded(method, most):
-    """4096 nodes took 136 s and 1.35 GB, without a word."""
     with pytest.raises(InputError, match=rf"nodes must be a whole number in \[8, {most}\], got 4096"):
         greenwood_tripp.solve(10.0, 10.0, nodes=4096, method=method)
 

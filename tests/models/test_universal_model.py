@@ -24,7 +24,6 @@ def small():
 
 
 def largest(found, solved):
-    """Of the relative errors of force and area."""
     return np.maximum(np.abs(found.phi_F / solved.phi_F - 1), np.abs(found.phi_A / solved.phi_A - 1))
 
 
@@ -95,7 +94,6 @@ def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
 
 
 def scattered(count, seed, low=1e-8):
-    """Fresh points over the table: X even, mu even in its logarithm."""
     X_axis, mu_axis = universal_model().content.axes
     rng = np.random.default_rng(seed)
     X = rng.uniform(X_axis.low, X_axis.high, count)

@@ -94,7 +94,6 @@ class Hertz:
 
 @pytest.mark.parametrize("surface", [CONCRETE, CONCRETE.sampled()])
 def test_hertz_area_is_the_area_over_eta(surface):
-    """Against the adaptive sum over islands one by one, of five numbers and of samples."""
     found = Scene(surface, separations=GAPS, effects=("area",), without=("subscale_area",), rtol=1e-6).run()
     pairs = Pairs.of(CONCRETE, CONCRETE.h_max - np.array(GAPS))
     truth = sum_islands(pairs, REPORTED, Hertz(), 1e-9)
@@ -116,7 +115,6 @@ def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
 
 
 def test_island_statistics_add_up():
-    """Force is the sum over islands of their loads; numbers are the sum of their density; profiles carry the load."""
     found = scene_of("pressure", "island_statistics", points=4000).run()
     delta, density = found["island_delta"].values, found["island_density"].values
     load = np.trapezoid(density * found["island_force"].values, delta, axis=1)
@@ -291,7 +289,6 @@ def scene_with(surface=CONCRETE, **given):
 
 
 def with_island_model(scene, island_model):
-    """The scene's plan with that island model in every step of the model."""
     plan = scene.plan()
     steps = tuple(
         step if step.island_model is None else dataclasses.replace(step, island_model=island_model)
@@ -360,7 +357,6 @@ test_contradictions = refusals(
 
 
 def test_an_island_model_of_choice():
-    """Given by name it is taken as it is, and a bound above the tolerance is an error."""
     found = scene_with(island_model="island4d", rtol=1e-3).run()
     assert found.attrs["island_models"] == '{"totals": "island4d"}'
     alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["pressure"])
@@ -370,8 +366,6 @@ def test_an_island_model_of_choice():
 
 
 class Hertzian:
-    """An island model of one's own: the exact solver, and a bound ten times its."""
-
     name = "hertzian"
 
     def answer(self, X, mu):

@@ -39,7 +39,6 @@ def synthetic(surface, points=POINTS, *, seed=0, plateau=False, gaussian=False):
 
 
 def seen_in(truth, q0, q1):
-    """The truth's own spectrum between q0 and q1."""
     ratio = (q0 ** (-2 * truth.hurst) - q1 ** (-2 * truth.hurst)) / (
         truth.q0 ** (-2 * truth.hurst) - truth.q1 ** (-2 * truth.hurst)
     )
@@ -300,8 +299,6 @@ test_bad_spectra = refusals(
 
 
 class Charge:
-    """An object whose unpickling is seen."""
-
     def __reduce__(self):
         return pytest.fail, ("a pickle was executed",)
 

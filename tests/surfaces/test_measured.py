@@ -155,7 +155,6 @@ WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)
 
 
 def measured(end):
-    """The longer waves of `WHOLE`."""
     q = np.geomspace(1.0, end, 120)
     return Surface.from_spectrum(q, WHOLE.power_spectrum(q * (1 - 1e-12)), h_max=1.0, unit="um")
 

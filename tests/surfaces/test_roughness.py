@@ -110,7 +110,6 @@ test_numbers_that_are_refused = refusals(
 
 
 def test_the_range_named_is_the_range():
-    """Just inside the slopes that the message names there is a surface, just outside there is none."""
     with pytest.raises(OutOfRangeError) as caught:
         Surface.from_roughness(**(GOOD | {"Rdq": 1e-3}))
     low, high = (float(word) for word in str(caught.value).split("between ")[1].split(",")[0].split(" and "))

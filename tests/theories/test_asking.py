@@ -267,7 +267,6 @@ def test_forces_that_no_gap_resolves_are_refused(cap):
 
 
 def test_a_request_takes_few_calls_in_few_files():
-    """Checks stand at the door, and inversions call what is bound to the surface; in a process of its own."""
     command = [sys.executable, "-m", "benchmarks.request"]
     for row in subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout.splitlines():
         calls, files = re.search(r"(\d+) calls .* (\d+) files", row).groups()
@@ -277,7 +276,6 @@ def test_a_request_takes_few_calls_in_few_files():
 
 @each
 def test_bodies_apart(theory):
-    """Both separations are then the distance of the mean planes, and the answer states that there is no contact."""
     found = contact(SURFACE, separation=50.0, theory=theory)
     ends = get_theory(theory).ends_at_h_max
     assert found.mean_separation == (50.0 if ends else 26.5)

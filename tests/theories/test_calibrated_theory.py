@@ -33,7 +33,6 @@ ROLLOFF = {0: 0.041954782, 1: 0.037331897}  # highest points of two maps of h_rm
 
 
 def quadrature(surface, u):
-    """F/(A0 E*), A/A0 and -dF/du by the law itself."""
     law = Law(Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1)), float(surface.h_max / surface.h_rms))
     force, stiffness = law.force_and_stiffness(u / surface.h_rms)
     g = surface.rms_gradient
@@ -181,7 +180,6 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number):
 
 
 def synthetic():
-    """A periodic Gaussian map of side 1 with H = 0.8."""
     k = np.hypot(np.fft.fftfreq(192, 1 / 192)[:, None], np.arange(97)[None, :])
     inside, phases = (k >= 3) & (k <= 40), np.exp(2j * np.pi * np.random.default_rng(4).random(k.shape))
     heights = np.fft.irfft2(np.where(inside, np.where(inside, k, 1.0) ** -1.8 * phases, 0))

@@ -254,8 +254,6 @@ class TestCache:
 
 
 class TestLargeMaps:
-    """Maps of too many points, here of more than 32 x 32."""
-
     @pytest.fixture(autouse=True)
     def few(self, monkeypatch):
         monkeypatch.setattr(own_map, "MOST_POINTS", 32 * 32)

@@ -132,8 +132,6 @@ def test_without_the_engine_says_what_to_install(monkeypatch):
 
 
 class TestOfASurface:
-    """`theory="simulated"`: twelve loads of the surface's own map."""
-
     @pytest.fixture(scope="class", params=[("honed", 0), ("milled", 2)], ids=["honed", "milled"])
     @staticmethod
     def part(request):

@@ -18,7 +18,6 @@ SLOW = [pytest.param(name, marks=pytest.mark.slow if name == "persson" else ()) 
 @pytest.mark.parametrize("theory", SLOW)
 @pytest.mark.parametrize("by", HELD)
 def test_answers_scale_as_they_must(theory, by):
-    """Another unit of length or stress changes no ratio, whatever the theory."""
     found = sensitivity(SURFACE, **{by: HELD[by]}, E_star="10 GPa", theory=theory)
     powers = {"mean_separation": (1, 0), "pressure": (0, 1), "area": (0, 0), "stiffness": (-1, 1)}
     powers |= {"conductance": (-1, 0)}

@@ -178,7 +178,6 @@ def test_the_solver_does_not_jump(which):
 
 
 def test_the_solver_joins_the_rigid_sphere():
-    """Where the deformation is left out altogether."""
     X = np.random.default_rng(11).uniform(-20, 38, 200 * SCALE)
     squared = np.empty(X.size)
     assert core.island_extents(X, np.zeros(X.size), 0.03 * SOLVER_RTOL, squared) == 0
@@ -194,7 +193,6 @@ def test_the_solver_joins_the_rigid_sphere():
 @pytest.mark.parametrize("which", ["X", "mu"])
 @pytest.mark.parametrize("form", ["standard", "pocket", "long"])
 def test_the_closed_forms_do_not_jump(form, which):
-    """And where the solver takes over from them."""
     model, rng = FormulaModel(form), np.random.default_rng(12)
     count = 120 * SCALE
     (X_low, X_high), (_, mu_high) = (RANGES[form][name] for name in ("X", "mu"))
@@ -225,7 +223,6 @@ def test_the_solver_takes_over_from_the_universal_table(side):
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9])
 def test_laws_do_not_jump_at_their_breaks(rtol):
-    """Values of two pieces differ by their errors, slopes by theirs, but for the model's jump."""
     rng = np.random.default_rng(16)
     for _ in range(4 * SCALE):
         variant = sorted(VARIANTS)[rng.integers(2)]
@@ -273,7 +270,6 @@ def one_sided(function, at, step):
 
 
 def fields_of(name, hurst, zeta_1, rule):
-    """One of `FIELDS` as a function of the approach."""
     return lambda approach: geometry(
         approach, *(np.broadcast_to(a[:, None], approach.shape).copy() for a in (hurst, zeta_1)), rule
     )[name]
@@ -281,7 +277,6 @@ def fields_of(name, hurst, zeta_1, rule):
 
 @pytest.mark.parametrize("rule", EVERY, ids=lambda rule: rule.name)
 def test_numbers_of_islands(rule):
-    """At both kinks and at random approaches, which are moved away from kinks."""
     rng = np.random.default_rng(1)
     hurst, zeta_1, _ = smooth_surfaces(rng, 80 * SCALE)
     at_kinks, elsewhere = kinks(hurst, zeta_1, rule), 10 ** rng.uniform(-9, 1.3, hurst.size)
@@ -298,7 +293,6 @@ def test_numbers_of_islands(rule):
 
 
 def changed(numbers, which, value):
-    """Numbers as columns, with one of them replaced by rows of values."""
     own = {name: np.broadcast_to(given[:, None], value.shape) for name, given in numbers.items()}
     return own | {which: value}
 

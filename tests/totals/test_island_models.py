@@ -200,8 +200,6 @@ OWN_GAPS = np.array([2.09, 1.0, -1.5, 2.5])
 
 
 class Own:
-    """The least that the library asks for."""
-
     name = "own"
 
     def __init__(self, change=lambda *answer: answer):

@@ -54,7 +54,6 @@ def test_islands_are_those_of_geometry(variant):
 
 
 def totals(hurst, zeta_1, compression, peak, rtol=1e-9, slopes=0):
-    """Totals, error and status straight from the core."""
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak)))
     numbers, count = [np.ascontiguousarray(array) for array in arrays], arrays[0].size
     out, error, status = np.empty((count, 2, 5 if slopes else 1)), np.empty(count), np.empty(count, np.uint8)
@@ -82,7 +81,6 @@ def test_no_number_crashes_and_none_that_is_wrong_is_answered(slopes):
 
 
 def test_what_cannot_be_resolved_is_said(monkeypatch):
-    """A tolerance below rounding ends in a status, never in a number that looks right."""
     assert totals(0.8, 216.0, 4.0, 3.0)[2][0] == OK
     out, error, status = totals(0.8, 216.0, 4.0, 3.0, rtol=1e-30)
     assert status[0] == UNRESOLVED
@@ -117,7 +115,6 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
 
 
 def integrals(function, low, high, rtol=1e-10, owner=None):
-    """Integrate one-component `function(owner, x)`."""
     low, high = np.atleast_1d(np.asarray(low, float)), np.atleast_1d(np.asarray(high, float))
     owners = np.arange(low.size) if owner is None else np.asarray(owner)
     return integrate(lambda who, x: function(who[:, None], x)[..., None], owners, low, high, owners.max() + 1, rtol)

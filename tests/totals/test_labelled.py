@@ -28,8 +28,6 @@ def surfaces_over():
 
 
 class Tasks(Callback):
-    """Counts what dask runs."""
-
     def __init__(self):
         super().__init__()
         self.ran = 0

@@ -53,7 +53,6 @@ def depths(law, seed, least=1e-9):
 
 
 def pieces_of(law):
-    """Depths h_max - d at which a law's polynomials begin and end."""
     centre, half = law.records[1:, CENTRE], 1 / law.records[1:, RATE]
     return 2 * law.h_max * (centre - half), 2 * law.h_max * (centre + half)
 
@@ -84,7 +83,6 @@ def test_of_any_island_model(island_model):
 
 @pytest.mark.parametrize("case", CASES)
 def test_slopes_are_those_of_the_law_itself(case):
-    """A Newton iteration on a law must see the law's own slope, whatever the law's tolerance."""
     law = law_of(case, 1e-4)
     low, high = pieces_of(law)
     centres, span = (low + high) / 2, (high - low) / 40
@@ -117,7 +115,6 @@ def test_energy_is_the_integral_of_force(case):
 
 
 def test_inverses_where_newton_goes_to_and_fro():
-    """Between two gaps, each of which it takes for the step from the other."""
     law = contact_law(surface_of(0.3, 4.477099447990553, 4.7), rtol=1e-9)
     wanted = law.area(separation=np.linspace(-law.h_max, law.h_max, 4002)[1:-1])
     np.testing.assert_allclose(law.area(separation=law.separation(area=wanted)), wanted, rtol=1e-12)
@@ -191,7 +188,6 @@ def test_a_function_of_c_keeps_its_law():
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
 def test_many_gaps_agree_with_single_ones(case, rtol):
-    """A profile of the islands against the quadrature of each gap, at gaps of every size and beyond contact."""
     surface = surface_of(*case[:3])
     gaps = float(surface.h_max) * np.append(1 - 2 * np.geomspace(1e-12, 1, 400), [1.0, 1.5])
     many = contact(surface, separation=gaps, rtol=rtol, variant=case[3])
@@ -339,7 +335,6 @@ def rising_but_for(dip):
 @pytest.mark.parametrize("at", np.linspace(-0.97, 0.99, 30))
 @pytest.mark.parametrize("width", [0.3, 1e-3, 1e-5])
 def test_a_narrow_dip_is_a_turning_point(at, width, sign):
-    """A force that rises at both ends of a piece and falls between them, if only for a hundred thousandth of it."""
     t = np.polynomial.Polynomial([-at, 1.0])
     dip = (t**2 - width**2) * (1 + 0.3 * t**4)
     assert dip.degree() < DEGREE
@@ -363,7 +358,6 @@ def slope_misses(surface, law, gap, variant="reported"):
 
 
 def test_inverses_stay_within_the_law():
-    """At the largest force a gap is -h_max at least, and at the smallest one the iteration ends."""
     rng = np.random.default_rng(4)
     for _ in range(12):
         h_rms = 10 ** rng.uniform(-9, 3)

@@ -150,7 +150,6 @@ def by_zeta_1(hurst, zeta_1, h_max, depth):
     ],
 )
 def test_next_to_the_floor_of_zeta_u(hurst, left, h_max, depth):
-    """Down to zeta_1 = 3.0000001, where area goes with the sixth root of what is left."""
     surface = Surface(hurst, 1.0, 3.0 + left, 1.0, h_max)
     found = contact(surface, separation=h_max - depth, derivatives=True)
     true = by_zeta_1(hurst, surface.zeta_1, h_max, float(h_max - found.separation))

@@ -153,6 +153,5 @@ def test_a_lay_is_stiffer_across():
 
 
 def test_two_unlike_bodies_with_a_lay():
-    """Their compliances add; bodies alike are one."""
     c = lambda nu: 0.2 + 0.1 * nu  # noqa: E731
     assert tangential_ratio((0.3, 0.3), (210.0, 70.0), c) == pytest.approx(tangential_ratio(0.3, share=c))
