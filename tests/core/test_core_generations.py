@@ -20,7 +20,8 @@ QUICK = [
     "test_hardness.py",
 ]
 QUICK += [f"totals/test_{name}.py" for name in ("kernel", "law_core", "island_models")]
-MORE = ["islands/test_island.py", "models", "test_calibrated.py", "theories/test_yielding.py", "totals/test_contact.py"]
+MORE = ["islands/test_geometry.py", "models", "totals/test_contact.py"]
+MORE += ["theories/test_calibrated_theory.py", "theories/test_yielding.py"]
 pytestmark = pytest.mark.slow
 
 
