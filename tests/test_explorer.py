@@ -226,16 +226,11 @@ def test_a_slider_moves_curves_and_address_and_a_link_brings_them_back(visit):
 def test_bad_numbers_are_told_beside_their_field(visit):
     tab = visit()
     for field, text, said in (
-        ("hurst", "1.2", "H must be in (0, 1], got 1.2"),
         ("q1", "1", "more than 3 q₀"),
-        ("q1", "1e12", "at most 1e8 q₀"),
         ("h_rms", "-1", "h_rms must be positive, got -1"),
-        ("h_max", "", "h_max must be a number"),
         ("E_star", "thirteen", "E_star must be a number"),
         ("spectrum", "1 2 3", "line 1"),
-        ("spectrum", "1 2\nq C", "line 2"),
         ("spectrum", "1 1\n0.5 1", "q must rise"),
-        ("spectrum", "1 -1", "C must not be negative"),
         ("spectrum", "1 1\n2 1", "a factor 3"),
     ):
         if field == "spectrum":
@@ -299,29 +294,6 @@ def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
     tab.context.close()
     with pytest.raises(InputError, match="of five numbers"):
         explorer_page(surface, theory="mbma")
-
-
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_any_address_is_drawn_or_refused(seed, visit):
-    rng, tab, drawn = np.random.default_rng(seed), visit(), 0
-    odd = ("", "NaN", "Infinity", "-0", "1e400", "0x10", "1e-320", "-1")
-    count = 20 if seed == 0 else 400
-    for _ in range(count):
-        state = random_state(rng)
-        q0 = 10 ** rng.uniform(-150, 150)
-        state |= {"q0": q0, "q1": q0 * 10 ** rng.uniform(0.3, 8.5), "hurst": rng.choice([1.0, 1e-3, rng.uniform()])}
-        for name in rng.choice([*NAMES, "E_star", "k_s"], rng.integers(3), replace=False):
-            state[str(name)] = rng.choice([*odd, *(10 ** rng.uniform(-310, 308, 3)).astype(str)])
-        if rng.uniform() < 0.3:
-            q = np.sort(10 ** rng.uniform(-3, 5, rng.integers(1, 40)))
-            C = q**-3.5 * rng.choice([0.0, 1.0, 1.0, 1e200], q.size)
-            state["spectrum"] = rows(q, C).replace("\n", ";")
-        tab.evaluate(GO, urllib.parse.urlencode(state))
-        faults = [text for text in tab.locator(".error").all_inner_texts() if text]
-        assert bool(faults) == tab.is_disabled("#csv")
-        drawn += not faults
-    # and the fixture sees that nothing was thrown
-    assert 0.1 * count < drawn < count
 
 
 def compiled_law(path):
@@ -391,14 +363,6 @@ def test_where_a_theory_has_no_answer_the_page_says_why(visit):
     tab.locator(".chart").first.focus()
     tab.keyboard.press("End")
     assert "MBMA: has no answer here: it does not reach such a pressure." in tab.inner_text("#concerns")
-
-
-def test_an_old_browser_is_told(opened, address):
-    tab = opened.new_page()
-    tab.add_init_script("delete window.DecompressionStream")
-    tab.goto(address)
-    tab.wait_for_selector("#subtitle:not(:empty) >> text=cannot run the page")
-    tab.close()
 
 
 def test_on_a_phone_and_in_the_dark(visit, tmp_path):

@@ -196,20 +196,6 @@ def test_a_surface_file_states_both_units(tmp_path):
     assert moved["E_star"] == pytest.approx(13.3e6)
 
 
-def test_a_scene_file_with_units(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(
-        SURFACE + '"2.4 mm"\nlength_unit = "um"\n'
-        '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", "200 kPa"]\n'
-        '[effects]\non = ["pressure", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
-    )
-    found = Scene.from_toml(path).run()
-    assert found["pressure"].values == pytest.approx([1e-4, 2e-4], rel=1e-4)
-    for name, unit in {"pressure": "GPa", "stiffness": "GPa/um", "separation": "um"}.items():
-        assert found[name].attrs["units"] == unit
-    assert found.attrs["surface_h_rms"] == 800.0
-
-
 SOURCES = {
     "named": ("--surface", "concrete", "--E-star", "13.3"),
     "numbers": (
@@ -233,15 +219,6 @@ def test_an_export_converts_what_knows_its_unit(source, tmp_path):
     assert in_m["x_unit"] == "m"
     assert columns[1]["overclosure"][-1] == pytest.approx(1e-3 * columns[0]["overclosure"][-1], rel=1e-6)
     assert columns[1]["pressure"][-1] == pytest.approx(columns[0]["pressure"][-1], rel=1e-3)
-
-
-def test_an_export_keeps_the_surfaces_unit():
-    law = describe_law(CONCRETE, "13.3 MPa", rows=20, largest_overclosure="500 um")
-    assert (law.x_unit, law.y_unit, law.x[-1]) == ("mm", "MPa", 0.5)
-    other = describe_law(CONCRETE, "13.3 MPa", length_unit="um", stress_unit="kPa", rows=20, largest_overclosure=500)
-    assert (other.x_unit, other.y_unit) == ("um", "kPa")
-    np.testing.assert_allclose(other.x, 1e3 * law.x, rtol=2e-6)
-    np.testing.assert_allclose(other.y, 1e3 * law.y, rtol=1e-5)
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])

@@ -111,19 +111,10 @@ def test_scatter_of_stiffness_and_separation():
     with netCDF4.Dataset(shipped_file("calibrated.nc")) as data:
         theories, middle = data.theories.split(), float(data["contact"][3])
         row = data["stated_scatter"][:, data.quantities.split().index("stiffness"), 3]
-        hard = data["hardness"]
-        eta, cap = float(hard["eta"][2]), hard["stated_scatter"][:, hard.quantities.split().index("stiffness"), 2]
-        contacts, capped = hard["contact"][:], hard.theories.split()
     for theory in ("calibrated", "mbma", "persson"):
         stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
         assert stated == pytest.approx(row[theories.index(theory)], rel=1e-6)
-    g = float(SURFACE.rms_gradient)
-    # MBMA ends before; with a hardness that of Greenwood-Williamson was not measured
-    for theory, end in (("calibrated", -1), ("persson", -1), ("mbma", 3), ("greenwood_williamson", 3)):
-        stated = contact(SURFACE, theory=theory, hardness=eta * g, area=contacts[:end]).stiffness_scatter
-        expected = cap[capped.index(theory)][:end] if theory in capped else np.full(end, np.nan)
-        np.testing.assert_allclose(stated, expected, rtol=1e-6)
-    # nor anything on surfaces unlike those simulated
+    # nothing on surfaces unlike those simulated
     heights = np.minimum(np.random.default_rng(1).normal(size=(64, 64)), 0)
     worn = Surface.from_spectrum(*(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=heights)
     for given in ({}, {"hardness": 0.1 * float(worn.rms_gradient)}):

@@ -15,8 +15,6 @@ from mbma_tables import Surface, contact, contact_law, greenwood_tripp, height_i
 from mbma_tables.core import core
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.law.block import CENTRE, RATE
-from mbma_tables.models.closed_form_certificates import RANGES
-from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.surfaces.variants import VARIANTS, get_variant
@@ -188,20 +186,6 @@ def test_the_solver_joins_the_rigid_sphere():
     assert (other.iterations > 0).all()
     assert (apart(one.phi_F, other.phi_F, 2 * STEP) <= one.error + other.error).all()
     assert (apart(one.phi_A, other.phi_A, 0) <= one.error + other.error).all()
-
-
-@pytest.mark.parametrize("which", ["X", "mu"])
-@pytest.mark.parametrize("form", ["standard", "pocket", "long"])
-def test_the_closed_forms_do_not_jump(form, which):
-    model, rng = FormulaModel(form), np.random.default_rng(12)
-    count = 120 * SCALE
-    (X_low, X_high), (_, mu_high) = (RANGES[form][name] for name in ("X", "mu"))
-    X, mu = rng.uniform(X_low, X_high, count), 10 ** rng.uniform(-9, math.log10(mu_high), count)
-    if which == "X":
-        X[::6], X[1::6] = max(X_low, 1e-3), X_high
-    else:
-        mu[::3] = mu_high
-    islands_apart(lambda X, mu: model.answer(X, mu, outside="exact"), X, mu, which, room=1)
 
 
 @pytest.mark.parametrize("side", ["X low", "X high", "mu high"])
