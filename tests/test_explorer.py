@@ -134,7 +134,6 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
             found[f"{theory} conductance"] * state["E_star"], found[f"{theory} stiffness"], equal_nan=True
         )
     if state["against"] == "pressure":
-        # one column of pressures for all theories, which each meets
         pressures = np.nanmax([found[f"{theory} pressure"] for theory in ("mbma", "calibrated", "persson")], axis=0)
         assert np.allclose(np.diff(np.log(pressures)), np.log(1e5) / 99, rtol=1e-6)
     return worst
@@ -374,5 +373,4 @@ def test_on_a_phone_and_in_the_dark(visit, tmp_path):
     tab.screenshot(path=str(tmp_path / "dark.png"))
     picture = image.imread(tmp_path / "dark.png")[..., :3]
     assert np.median(picture) < 0.2
-    # and curves in it that can be seen
     assert (picture.max(axis=-1) > 0.6).mean() > 0.005

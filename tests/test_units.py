@@ -68,7 +68,6 @@ def test_a_surface_there_and_back(have, want):
     surface = Surface(0.8, [0.5, 1.0], 100.0, 0.2, 0.6, unit=have)
     moved = surface.to(want)
     assert moved.unit == want
-    # what has no unit stays, what has one goes with its power
     for name in ("hurst", "zeta_1", "alpha", "rms_gradient", "m2"):
         np.testing.assert_allclose(getattr(moved, name), getattr(surface, name), rtol=1e-13)
     for name in ("q0", "q1", "h_rms", "h_max", "m0", "m4"):

@@ -21,7 +21,6 @@ POINTS = 10_000
 SURFACES = 60
 SHARES = (1e-4, 0.01, 0.2, 0.5, 0.9, 0.99)  # u/h_max
 GAPS = (-0.9, 0.1, 0.6, 0.97)  # d/h_max
-# what agreement is asked of exported code
 TOLERANCES = {"phi": 1e-13, "slopes": 1e-11, "geometry": 1e-13, "total": 1e-13, "status": 0.0, "formula": 1e-13}
 TOLERANCES |= {"calibrated": 1e-12, "separation": 1e-12}  # whose logarithm is the table's
 # the library states 1e-6; those of the calibrated law are differences in the library

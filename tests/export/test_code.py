@@ -50,7 +50,6 @@ def test_every_file_says_what_it_is(target, tmp_path):
             continue
         text = path.read_text(encoding="utf-8")
         assert not re.search("@[A-Z_]+@", text)
-        # the opening comment without its marks
         head = " ".join(word for word in text[:5000].split() if word not in ("*", "!", "#"))
         assert attributes["values_sha256"] in head
         for fact in (path.name, *of_all, *of_tables) if path.suffix != ".csv" else ():
@@ -216,7 +215,6 @@ def test_the_printed_variant(tmp_path):
     write_code("c", tmp_path, variant="printed")
     found = check("c", tmp_path, code_points.write_points(tmp_path, "printed"))
     code_points.assert_equal_to_runtime(found)
-    # and the points of one variant are refused by the code of another
     assert check("c", tmp_path, code_points.write_points(tmp_path, "reported")).failed > code_points.SURFACES
 
 
@@ -229,7 +227,6 @@ def test_nothing_is_allocated_or_kept(c_folder, tmp_path):
     listed = subprocess.run(["nm", *objects], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     kinds = [line.split()[-2:] for line in listed.splitlines() if len(line.split()) > 1]
     outside = {name for kind, name in kinds if kind == "U" and not name.startswith("mbma_")} - {"__stack_chk_fail"}
-    # C's own mathematics and block copies
     mathematics = {"asinh", "cbrt", "copysign", "cos", "exp", "expm1", "fmax", "fmin", "log", "log1p", "pow", "sqrt"}
     assert outside <= {*mathematics, "memcpy", "memset"}
     assert not [name for kind, name in kinds if kind in "BbDdC"]

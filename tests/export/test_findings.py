@@ -106,7 +106,6 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     assert 0.1 < np.abs(np.log(p / PRESSURES)).max() < np.log1p(stated) + 0.06
     expected = CONDUCTIVITY / 25 * law.at_pressure(p).stiffness
     np.testing.assert_allclose(conductance(flux)[:-1], expected[:-1], rtol=1e-2)
-    # beyond the last row it is that of the last
     assert p[-1] > heat_law().x[-1]
     assert conductance(flux)[-1] == pytest.approx(heat_law().y[-1], rel=1e-2)
 
@@ -118,7 +117,6 @@ def test_calculix_uncoupled_is_an_increment_late(tmp_path):
     c = law.h_max - law.at_pressure(pressures).mean_separation
     _, p, flux = calculix(heated_and_moved(solvers.calculix(heat_law()), c, pressures, "*UNCOUPLED"), tmp_path)
     off = conductance(flux) * 25 / CONDUCTIVITY / law.at_pressure(p).stiffness - 1
-    # as the card says: loads must be held for one more increment
     assert (off[::2] < -0.3).all()
     assert np.abs(off[1::2]).max() < 1e-2
     assert "loads must be held for one more" in " ".join(solvers.calculix(heat_law()).replace("**", "").split())
@@ -304,7 +302,6 @@ def test_a_law_continued_by_its_tangents(theory, pressures):
     for end, side in ((trial.light, 1.0), (trial.heavy, -1.0)):
         beyond = end + side * np.array([1e-9, 0.1, 1e3])
         found, slope = trial.pressure_and_stiffness(beyond)
-        # the value and the slope of the law at its end, and so on
         assert (slope == law.stiffness(end)).all()
         np.testing.assert_allclose(found, law.pressure(end) - law.stiffness(end) * (beyond - end), rtol=1e-13)
         assert not trial.inside(beyond).any()
@@ -392,7 +389,6 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
     law = describe_law(ROUGH, "25 MPa", length_unit=length, stress_unit=stress, quantity="conductance", **asked)
     side, unit = SIDES[length], {"MPa": 1.0, "Pa": 1e6}[stress]
     pressures, card = unit * np.geomspace(1.1e-3, 1.9, 8), solvers.calculix(law)
-    # as its header says, of loads by forces alone
     slope = re.search(r"with the line (\S+) below", card.replace("\n** ", " "))[1]
     card = re.sub(r"=EXPONENTIAL\n.*\n", f"=LINEAR\n{slope}\n", card)
     forces = (f"*CLOAD\n{each(TOP, f'3, {-p * side**2 / 4:.9e}')}" for p in pressures)

@@ -87,7 +87,6 @@ def test_c_outside_its_range(name, compiled):
     assert np.isnan(c_function(library, "overclosure")([-1.0, math.nan, math.inf, 1.01 * most])).all()
     if not before:
         assert c_function(library, "overclosure")([0.0]) == 0
-    # the least numbers
     for quantity in (*QUANTITIES, "curvature"):
         found = c_function(library, quantity)([5e-324, 1e-320, 1e-310, 2.3e-308])
         assert np.isfinite(found).all(), quantity
@@ -465,7 +464,6 @@ end Ask;
 def test_modelica(name, tmp_path):
     rumoca, known = pytest.importorskip("rumoca"), points(name)
     text, answers = law_points.text("modelica-law", name, name="road", leakage=True, **HEAT), []
-    # in parts: the compiler hands all of an array on in each step
     for k, c in enumerate(np.array_split(known.c, 25)):
         asks = MODELICA.format(size=c.size, gaps=", ".join(map(repr, c.tolist())))
         (tmp_path / f"{k}").mkdir()

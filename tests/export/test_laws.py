@@ -32,7 +32,6 @@ def law_of(surface=CONCRETE, **changed):
 )
 def test_rows_of_any_theory(theory):
     law = law_of(theory=theory, rows=50)
-    # up to full compression too
     near = CONCRETE.h_max - np.geomspace(max(CONCRETE.h_max - law.x[-1], 1e-9), 0.5, 500)[1:]
     x = np.append(np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500), near)
     model = contact(CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory).pressure
@@ -82,7 +81,6 @@ def test_the_header_says_up_to_where_a_law_is_valid():
 def test_the_stated_error_and_better_than_even_rows(name, rows):
     surface = Surface.named(name).to("mm")
     law = law_of(surface, rows=rows)
-    # points of our own, through the totals
     x = np.random.default_rng(rows).uniform(0, law.x[-1], 2000)
     gaps = np.maximum(surface.h_max - 2 * x, -surface.h_max)
     model = contact(surface, separation=gaps, E_star=13.3, rtol=1e-9).pressure

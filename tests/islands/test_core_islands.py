@@ -56,7 +56,6 @@ def test_extremes_end_with_finite_answers_or_a_status():
     assert (phi[good] >= 0).all()
     assert np.isnan(phi[~good]).all()
     assert np.isnan(profiles[:, ~good]).all()
-    # a sphere that roughness hardly lifts is the rigid one
     still = good & (mu < 1e-200) & (np.abs(X) < 1e6)
     expected = np.empty((2, np.count_nonzero(still)))
     for row, twice_n in zip(expected, (5, 4), strict=True):

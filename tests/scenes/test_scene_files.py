@@ -166,7 +166,6 @@ def read(tmp_path, text):
         (("universal", "gap", 1e-4), 16),
         (("universal", "gap", 1e-9), 16),
         (("universal", "gap", 1e-6, "pressure"), 10),
-        # area alone was not measured
         (("universal", "gap", 1e-6, "area"), 16),
         (("universal", "call", 1e-6), 3),
         (("universal", "law", 1e-6), math.nan),
@@ -222,7 +221,6 @@ def test_it_tells_what_the_shipped_file_states(effects, prescribed, name, quanti
 
 
 def test_what_else_is_advised_and_where_there_is_nothing_to_say():
-    # conductance is a stiffness
     said = advice(Scene(SURFACE, effects=["conductance"], conductivities=(1.0, 1.0), pressures=[1e-4]))
     assert "for conductance theory 'calibrated' is nearer" in said
     assert said.count("\n") == 1

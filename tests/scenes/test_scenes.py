@@ -19,12 +19,10 @@ from mbma_tables import (
     Surface,
     contact,
     contact_law,
-    greenwood_tripp,
     island,
     open_table,
 )
-from mbma_tables.common.errors import InputError
-from mbma_tables.models import IslandAnswer, answer_islands
+from mbma_tables.models import answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import statistics as islands
 from mbma_tables.scenes.problem import ELASTIC, OUTPUTS
@@ -108,7 +106,6 @@ def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
     assert whole["pressure"][0] == pytest.approx(float(cut["pressure"][0]), rel=1e-9)
     assert (whole["pressure"][1:] > cut["pressure"][1:]).all()
     assert cut["pressure"][2] == 0
-    # a higher top adds nothing any more
     higher = Surface(CONCRETE.hurst, CONCRETE.q0, CONCRETE.q1, CONCRETE.h_rms, 4.0)
     truth = contact(higher, separation=gaps, island_model="exact", rtol=1e-8)
     np.testing.assert_allclose(whole["pressure"], truth.pressure, rtol=1e-5)
@@ -132,21 +129,6 @@ def test_explain_names_steps_and_what_is_left_out():
     steps = "first use in a process", "-> totals by universal", "-> hertz area by universal"
     for part in (*steps, "left out: stiffness, energy", "switched off: subscale_area\n"):
         assert part in text
-
-
-def test_many_gaps_go_through_a_law():
-    def step_of(count, rtol, **more):
-        (step,) = scene_of("pressure", separations=np.linspace(0, 1, count), rtol=rtol, **more).plan().steps
-        return step.name, step.island_model
-
-    for island_model in ("universal", "exact", "rigid"):
-        fewest = plans.MIN_LAW_GAPS.get(island_model, plans.MIN_LAW_GAPS_OF_OTHERS)
-        assert step_of(fewest - 1, 1e-6, island_model=island_model) == ("totals", island_model)
-        assert step_of(fewest, 1e-6, island_model=island_model) == ("law", island_model)
-    # closer than a law can be
-    assert step_of(plans.MIN_LAW_GAPS["universal"], 1.5e-10) == ("totals", "exact")
-    with pytest.raises(InputError, match="too tight for stiffness"):
-        scene_of("stiffness", rtol=1e-7).run()
 
 
 def test_the_certificate_decides_between_table_and_solver(monkeypatch):
@@ -314,7 +296,6 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
         made.append(island_model)
         if island_model != "exact":
             raise OutOfRangeError("islands outside", True)
-        # as good, and quicker
         return contact_law(surface, rtol=rtol, island_model="universal", **rest)
 
     monkeypatch.setattr("mbma_tables.law.make.contact_law", law)
@@ -363,27 +344,6 @@ def test_an_island_model_of_choice():
     np.testing.assert_array_equal(found["pressure"], alone.pressure)
     with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
         scene_with(island_model="formula", rtol=1e-6).run()
-
-
-class Hertzian:
-    name = "hertzian"
-
-    def answer(self, X, mu):
-        solved = greenwood_tripp.solve(X.ravel(), mu.ravel(), rtol=1e-9)
-        return IslandAnswer(*(part.reshape(X.shape) for part in (solved.phi_F, solved.phi_A, 10 * solved.error)))
-
-
-def test_island_models_as_objects():
-    effects = ("pressure", "area", "island_statistics")
-    scene = scene_with(effects=effects, island_model=Hertzian(), rtol=1e-5)
-    assert "by hertzian  (count=2, rtol=5.0e-06, error not certified, time=not measured)" in scene.explain()
-    found, truth = scene.run(), scene_with(effects=effects, island_model="exact", rtol=1e-8).run()
-    for name in ("pressure", "area", "island_number", "island_force"):
-        np.testing.assert_allclose(found[name], truth[name], rtol=1e-5)
-    assert found.attrs["island_models"] == '{"totals": "hertzian", "island statistics": "hertzian"}'
-    assert found.attrs["table_hashes"] == "{}"
-    law = scene_with(effects=("energy",), island_model=Hertzian(), rtol=1e-2).run()
-    np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2)
 
 
 def test_no_contact():

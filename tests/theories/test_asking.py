@@ -114,7 +114,6 @@ def test_scatter_of_stiffness_and_separation():
     for theory in ("calibrated", "mbma", "persson"):
         stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
         assert stated == pytest.approx(row[theories.index(theory)], rel=1e-6)
-    # nothing on surfaces unlike those simulated
     heights = np.minimum(np.random.default_rng(1).normal(size=(64, 64)), 0)
     worn = Surface.from_spectrum(*(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=heights)
     for given in ({}, {"hardness": 0.1 * float(worn.rms_gradient)}):
@@ -195,7 +194,6 @@ def test_ends_validity_and_advice(theory):
     found = contact(Surface(0.8, 10.0, 2000.0, 1.0, 3.0), mean_separation=2.0, theory=theory)
     assert not found.valid
     assert any("one unit?" in reason for reason in found.reasons)
-    # what is asked is what a refusal names
     with pytest.raises(OutOfRangeError, match=r"^separation must be at least -h_max"):
         contact(SURFACE, separation=-3.1, theory=theory)
     with pytest.raises(InputError, match="hardness is empty"):

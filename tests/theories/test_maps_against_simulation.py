@@ -47,7 +47,6 @@ def test_laws_of_maps_from_files(example):
     # of the force microscope's map 12% is not met below 0.9% contact
     assert np.abs(by_force[area >= (0.002 if example is BARS[0] else 0.009)]).max() < 0.12
     assert np.abs(by_force[area >= 0.002]).max() < 0.21
-    # and they are answered without options
     surface = Surface.from_map(reference(example)[0])
     for theory in ("calibrated", "mbma"):
         found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)

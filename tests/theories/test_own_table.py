@@ -66,9 +66,7 @@ def test_laws_scenes_and_other_units(surface, own):
     # all lengths twice as large, along the plane and across: nothing changes but these; heights alone: slopes
     steep = contact(own.resized(2.0, 1.0), pressure=0.02)
     assert (steep.area, steep.energy) == (pytest.approx(one.area), pytest.approx(4 * one.energy))
-    # a cut takes the simulation away
     assert contact(own.between(float(own.q0), float(own.q1) / 1.5), pressure=0.01).theory == "calibrated"
-    # a simulation knows one surface
     assert sensitivity(own, pressure=0.01).slopes["heights"]["area"] < -0.5
 
 
@@ -229,7 +227,6 @@ class TestCache:
             os.utime(place / f"{name}.npz", (used, used))
         assert cache.trim(2 * (place / "old.npz").stat().st_size) == 1
         assert [path.stem for path, _ in cache.files()] == ["middle", "new"]
-        # what is read is new again
         assert cache.load("middle", values=(1000,)) is not None
         assert cache.load("middle", values=(999,)) is None
         assert [path.stem for path, _ in cache.files()] == ["new", "middle"]

@@ -42,7 +42,6 @@ def test_it_answers_what_was_simulated(truth):
 
 
 def test_force_is_the_energys_slope(truth):
-    # two things that the simulation measures apart
     _, _, u, energy = truth.rows
     fine = np.geomspace(u[-1], u[0], 4001)
     force = contact(truth.surface, mean_separation=fine, theory=truth).pressure

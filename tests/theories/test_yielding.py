@@ -186,7 +186,6 @@ def test_a_map_yields_by_its_own_heights():
     found = contact(surface, mean_separation=u, theory="calibrated", hardness=soft)
     assert found.area == pytest.approx(0.2, rel=0.03)
     assert found.scatter < shipped().standard_deviation("calibrated", "pressure", found.area)
-    # single points at the top of a map make no steps in a law
     law = contact_law(surface, theory="calibrated", hardness=0.3 * float(surface.rms_gradient), rtol=1e-3)
     assert law.turning_point is None
 
@@ -234,7 +233,6 @@ def test_reasons_and_what_elastic_answers_say():
     for pressure, told in ((2.0, False), (4.0, True)):
         found = contact(SURFACE, pressure=pressure, E_star="100 GPa", theory="calibrated")
         assert ("above E* g/2 = 2.7" in repr(found)) is told
-    # some infinite
     found = contact(SURFACE, area=[0.1, 0.3, 0.5], hardness=[HARDNESS, np.inf, 50.0], **known)
     assert found.area == pytest.approx([0.1, 0.3, 0.5], rel=1e-10)
     # asperities that lie on one another have areas above one

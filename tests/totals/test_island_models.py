@@ -62,7 +62,6 @@ def test_a_variant_of_ones_own(variant):
     error = apart(found, true)
     assert (error <= found.error + true.error).all()
     assert found.error.max() <= 1e-7
-    # the variant matters: its name alone did not decide
     assert (np.abs(contact(surfaces, separation=gaps).area / found.area - 1) > 1e-3).any()
 
 
@@ -246,7 +245,6 @@ def test_answers_are_checked():
     assert np.isnan(found).tolist() == [False, True]
     with pytest.raises(InputError, match="derivatives come from island model 'universal', 'own' has none"):
         contact(FLAT, separation=1.0, island_model=Own(), derivatives=True)
-    # one number for all islands is enough
     one = contact(FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3)))
     assert 1e-3 <= one.error < 1.1e-3
 

@@ -132,12 +132,10 @@ def test_turning_points(surface, variant, name):
     assert name == "pressure" or turn < law.turning_point
     assert (np.diff(value(separation=np.linspace(law.h_max, turn, 200))) > 0).all()
     assert (np.diff(value(separation=np.linspace(turn, turn - 0.1 * law.h_max, 50))) < 0).all()
-    # it is the model's, not the polynomials'
     near = turn + np.array([-0.02, 0.0, 0.02]) * law.h_max
     totals = getattr(contact(surface, separation=near, rtol=1e-11, variant=variant), name)
     assert totals[1] > max(totals[0], totals[2])
     peak = float(value(separation=turn))
-    # what the falling branch carries too is answered on the first
     wanted = np.array([1e-3 * peak, 0.5 * peak, 0.999 * peak, (1 - 1e-6) * peak, value(separation=near[0])])
     gaps = law.separation(**{name: wanted})
     assert (gaps > turn).all()
@@ -291,7 +289,6 @@ test_bad_laws = refusals(
 
 
 def test_laws_that_end_early_and_of_too_many_pieces(monkeypatch):
-    # the table ends before full compression, and so does the law
     assert -3 < contact_law(Surface(0.05, 0.2, 0.2e8, 1.0, 3.0)).lowest < 3
     surface = surface_of(*CASES[0][:3])
     labelled = Surface(xr.DataArray(0.8), surface.q0, surface.q1, surface.h_rms, surface.h_max)

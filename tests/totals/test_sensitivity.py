@@ -166,7 +166,6 @@ def test_units_shapes_and_no_contact():
     one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), separation=1.0, derivatives=True)
     for name in NAMES:
         assert found.pressure_by[name].shape == found.area_by[name].shape == (2, 3)
-        # no contact is flat
         assert (found.pressure_by[name][:, 1:] == 0).all()
         assert (found.area_by[name][:, 1:] == 0).all()
         np.testing.assert_allclose(stiff.pressure_by[name], np.array([2, 3, 4]) * found.pressure_by[name], rtol=1e-15)
