@@ -236,18 +236,6 @@ def test_a_contact_keeps_its_units(theory):
     assert contact(CONCRETE, separation=0.5, theory=theory).units["stiffness"] == "1/mm"
 
 
-def test_a_labelled_contact_keeps_its_units():
-    xr = pytest.importorskip("xarray")
-    gaps = xr.DataArray([0.5, 0.2], dims="gap")
-    found = contact(CONCRETE, separation=gaps, E_star="13.3 MPa")
-    assert (found.pressure.attrs["units"], found.units["mean_separation"]) == ("MPa", "mm")
-    assert contact(CONCRETE, separation=gaps.assign_attrs(units="mm")).pressure.values == pytest.approx(
-        found.pressure.values / 13.3
-    )
-    with pytest.raises(InputError, match="separation is in 'um' by its attribute units, and asked for in 'mm'"):
-        contact(CONCRETE, separation=gaps.assign_attrs(units="um"))
-
-
 @pytest.mark.parametrize("theory", ["mbma", "persson"])
 def test_a_law_keeps_its_units(theory):
     law = contact_law(CONCRETE.to("um"), rtol=1e-5, E_star="13.3 MPa", theory=theory)

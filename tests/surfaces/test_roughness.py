@@ -159,13 +159,6 @@ def test_medians_and_spread_are_those_of_simulated_surfaces(kind, hurst, zeta_1,
     assert np.quantile(tops, [0.16, 0.84]) == pytest.approx(known[[0, 2]], abs=0.3)
 
 
-def test_it_solves_the_formula():
-    chance, area = np.array([0.1, 0.5, 0.9]), np.geomspace(1e5, 1e14, 5)[:, None]
-    x = highest_point(2.0, 0.05, area, chance) / 2.0
-    number = area * 0.05 / 4.0 * (2 * np.pi) ** -1.5 * x * np.exp(-(x**2) / 2)
-    np.testing.assert_allclose(np.exp(-number), np.broadcast_to(chance, number.shape), rtol=1e-12)
-
-
 def test_every_constructor_takes_the_area():
     made = Surface(**NUMBERS, nominal_area="4 cm^2")
     assert made.h_max == pytest.approx(float(highest_point(1.0, made.m2, 4e8)), rel=1e-15)

@@ -99,14 +99,6 @@ def test_without_gaps_leakage_is_that_of_isotropic_ones(truth):
         np.testing.assert_array_equal(own, expected)
 
 
-def test_a_coarse_grid_is_not_valid():
-    coarse = 0.1 * np.random.default_rng(1).standard_normal((48, 48))
-    truth = BoundaryElements.from_map(coarse, 1.0, periodic=True, loads=LOADS[3:])
-    found = contact(truth.surface, mean_separation=truth.rows[2], theory=truth)
-    assert not found.valid.any()
-    assert "sampling steps" in next(iter(found.reasons))
-
-
 @pytest.mark.parametrize(
     ("count", "change", "message"),
     [
