@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -33,6 +34,13 @@ def random_map(points, low, high, power=1.8, seed=1, phases=False):
     noise /= np.abs(noise) if phases else 1
     q = np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points))
     return np.fft.irfft2(np.where((q > low) & (q < high), noise * np.maximum(q, 1e-3) ** -power, 0))
+
+
+def topographies():
+    """The package SurfaceTopography, whose import warns of its own missing optional parts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return pytest.importorskip("SurfaceTopography")
 
 
 def fresh(code, *arguments):

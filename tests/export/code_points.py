@@ -4,15 +4,8 @@ import functools
 
 import numpy as np
 
+from mbma_tables.export import conformance
 from mbma_tables.export.c_code import FORM
-from mbma_tables.export.conformance import (
-    calibrated_rows,
-    formula_rows,
-    geometry_rows,
-    phi_rows,
-    status_rows,
-    total_rows,
-)
 from mbma_tables.models import closed_form_certificates
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import get_variant
@@ -67,10 +60,14 @@ def random_surfaces():
 @functools.cache
 def points_text(variant="reported"):
     model, rule = universal_model(), get_variant(variant)
-    lines = [*phi_rows(model, *random_islands()), *status_rows(model), *formula_rows(*random_formula_islands())]
-    lines += geometry_rows(*random_approaches(), rule)
+    lines = [
+        *conformance.phi_rows(model, *random_islands()),
+        *conformance.status_rows(model),
+        *conformance.formula_rows(*random_formula_islands()),
+    ]
+    lines += conformance.geometry_rows(*random_approaches(), rule)
     for surface in random_surfaces():
-        lines += total_rows(surface, surface[4] * np.array(GAPS), rule)
+        lines += conformance.total_rows(surface, surface[4] * np.array(GAPS), rule)
     return "\n".join(lines) + "\n"
 
 
@@ -78,7 +75,7 @@ def points_text(variant="reported"):
 def calibrated_text():
     """Rows of the calibrated law, of the surfaces that its table holds."""
     held = [surface for surface in random_surfaces() if 3.01 < surface[2] / surface[1] < 9.9e4]
-    return "\n".join(line for surface in held for line in calibrated_rows(surface, SHARES, 7.5)) + "\n"
+    return "\n".join(line for surface in held for line in conformance.calibrated_rows(surface, SHARES, 7.5)) + "\n"
 
 
 def write_points(folder, variant="reported"):

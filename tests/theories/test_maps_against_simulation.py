@@ -1,11 +1,11 @@
 """Maps from files and spoilt maps, against boundary elements on the maps themselves."""
 
 import os
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import topographies
 from scipy.ndimage import gaussian_filter
 
 from generate.pages import maps
@@ -14,9 +14,7 @@ from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories import BoundaryElements, Calibrated
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    pytest.importorskip("SurfaceTopography")
+topographies()
 
 
 def reference(example):
