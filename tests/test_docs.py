@@ -179,7 +179,6 @@ def test_measured_parts_of_the_readme_are_the_generators():
 
 @pytest.mark.parametrize("page", ["README.md", "formula.md"])
 def test_pocket_laws_are_printed_as_they_are_computed(page):
-    """The text's constants against the functions whose errors are stated."""
     pocket = PAGES[page][PAGES[page].index("    t = p/(E* g)/") :]
     names = {name: getattr(math, name) for name in ("log", "erf", "exp", "sqrt")}
     names |= {"p": 0.04, "alpha": 30.0, "nu": 0.6, "x": 1.3}

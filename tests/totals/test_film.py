@@ -26,7 +26,6 @@ def test_wide_gaps_have_the_known_expansion():
 
 
 def test_ridges_are_the_averages_of_one_dimension():
-    """Across ridges the mean of 1/h^3 and of 1/h^2 count, along them the mean of h^3 and h."""
     h = 1 + 0.5 * np.sin(np.linspace(0, 2 * np.pi, 64, endpoint=False))
     K, couette = flow_and_couette(np.repeat(h[:, None], 3, 1))
     np.testing.assert_allclose(K, [1 / np.mean(h**-3.0), np.mean(h**3)])
