@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(find_spec("ContactMechanics") is None, reason="C
 
 
 def theirs(solution, points):
-    """Radii over L, pressure over E* sigma/L and Phi_F by ContactMechanics, as docs/tutorials/other_program.md has it."""
+    """Radii, pressure and Phi_F by ContactMechanics, as docs/tutorials/other_program.md has them."""
     with warnings.catch_warnings():
         # of its own optional parts
         warnings.simplefilter("ignore")
