@@ -18,6 +18,7 @@ import pandas as pd
 from scipy.stats import qmc
 
 from generate import cost_distances
+from generate.classical import iterated, ring_matrix
 from generate.files import ROOT, to_csv
 from generate.tables import chunks
 from generate.timing import measure
@@ -27,7 +28,6 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.greenwood_tripp import iterate, radius, ring_matrix
 from mbma_tables.models import ISLAND_MODELS, answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.named import get_model
@@ -37,7 +37,6 @@ from mbma_tables.surfaces.variants import get_variant
 # islands, random ones: H, log10 zeta_1, log10 delta/h_rms
 ISLANDS, SEED, RANGES = 1000, 2026, ((0.32, 0.7, -4.0), (0.98, 3.9, 0.9))
 HARD, PROFILES = 12, 20  # of them, for the classical iteration and for p(r)
-DAMPING, MAX_STEPS = 0.1, 5000
 MESHES = (  # rings and tolerance
     *((25, 1e-2), (25, 1e-4), (50, 1e-3), (100, 1e-2), (100, 1e-4), (100, 1e-6)),
     *((200, 1e-5), (400, 1e-6), (800, 1e-7), (1600, 1e-8)),
@@ -116,19 +115,16 @@ def island_rows() -> Iterator[Row]:
     places = list(zip(islands["X"][chosen], islands["mu"][chosen], strict=True))
     for rings, tolerance in MESHES:
         # the matrix is made beforehand, and not timed
-        run = functools.partial(classical, places, ring_matrix(rings), tolerance)
+        matrix = ring_matrix(rings)
+
+        def run(matrix: FloatArray = matrix, tolerance: float = tolerance) -> FloatArray:
+            return np.array([iterated(X, mu, matrix, tolerance) for X, mu in places]).T
+
         steps, converged, force, area = run()
         if not converged.all():
             raise ConvergenceError(f"the classical iteration on {rings} rings did not converge", converged == 0)
         error, pressures = island_error(force, area, truth[:, chosen]), rings * (float(steps.mean()) + 1)
         yield Row("classical", at(f"rings={rings}", tolerance), "both", error, measure(run)[0] / HARD, pressures)
-
-
-def classical(places: Sequence[tuple[float, float]], matrix: FloatArray, tolerance: float) -> FloatArray:
-    """Steps, converged, Phi_F and Phi_A (4, islands) by the damped iteration."""
-    w, p = np.empty(len(matrix)), np.empty(len(matrix))
-    rows = [iterate(X, mu, radius(X, mu, tolerance), matrix, DAMPING, tolerance, MAX_STEPS, w, p) for X, mu in places]
-    return np.array(rows).T
 
 
 def gaps_of(surface: Surface, count: int = GAPS) -> FloatArray:

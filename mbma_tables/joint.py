@@ -1,4 +1,4 @@
-"""`Joint`: two rough metal parts in contact, and the interface laws that follow from one pressure range."""
+"""`Joint`: two rough metal parts and all their interface laws."""
 
 from __future__ import annotations
 

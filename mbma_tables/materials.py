@@ -1,4 +1,6 @@
-"""Elastic constants of the two bodies, joined into the one modulus that contact needs, and ranges for common metals.
+"""Elastic constants, hardness and conductivity of metals.
+
+The constants of two bodies are joined into the one modulus that contact needs.
 
 Hardnesses are converted from Brinell, Vickers or Rockwell number to the mean pressure over the projected area, which is
 the pressure that counts here. A ground or polished face is harder than its bulk at depths of micrometres: measure where

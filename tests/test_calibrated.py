@@ -9,66 +9,21 @@ from helpers import random_map
 from scipy.integrate import quad
 from scipy.special import erf
 
+from mbma_tables import Surface, contact
 from mbma_tables.laws.bearing_curve import FRACTIONS, bearing, radial_spectrum
-from mbma_tables.laws.calibrated import PERSSON, YANG_PERSSON, Law, Spectrum, mean_top_height
+from mbma_tables.laws.calibrated import Law, Spectrum, mean_top_height, self_affine_law
 from mbma_tables.laws.map_curves import MapLaw, hertz_ellipse
-from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories import Persson
 from mbma_tables.theories.calibrated_table import shipped
-
-SURFACE = Spectrum.self_affine(0.8, 64.0)
 
 
 def map_law(heights, sizes):
     return MapLaw.from_curves(bearing(heights, sizes), radial_spectrum(heights, sizes))
 
 
-def test_separation_against_nested_quadrature():
-    # u = integral of dU/F by scipy, over a spectrum of three waves
-    spectrum = Spectrum.from_shares([1.0, 3.0, 10.0], [0.7, 0.2, 0.1])
-    law = Law(spectrum)
-    for force in (0.01, 0.3, 0.9):
-
-        def integrand(log_force):
-            step = 1e-4
-            high, low = law.energy(np.exp([log_force + step, log_force - step]))
-            return (high - low) / (2 * step) * math.exp(-log_force)
-
-        expected = quad(integrand, math.log(force), 1.5, epsabs=0, epsrel=1e-9, limit=200)[0]
-        assert law.separation_persson(force)[0] == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize(("constants", "gamma"), [(PERSSON, 1.0), (YANG_PERSSON, 0.42)])
-def test_special_cases_are_perssons(constants, gamma):
-    surface = Surface(hurst=0.8, q0=1.0, q1=64.0, h_rms=1.0, h_max=3.0)
-    law = Law(Spectrum.self_affine(0.8, 64.0), None, constants)
-    loads = np.array([0.003, 0.03, 0.3, 0.8])
-    assert law.area(loads) == pytest.approx(erf(math.sqrt(2) * loads), rel=1e-12)
-    if gamma == 0.42:
-        expected = Persson().mean_separation_at(surface, "pressure", loads * surface.rms_gradient)
-        np.testing.assert_allclose(law.separation(loads), expected, rtol=1e-6)
-
-
-class TestLaw:
-    @pytest.mark.parametrize("h_max", [None, 3.2])
-    def test_inverse_and_stiffness(self, h_max):
-        law = Law(SURFACE, h_max)
-        u = np.array([0.003, 0.1, 0.8, 1.5, 2.4, 3.0])
-        force, stiffness = law.force_and_stiffness(u)
-        np.testing.assert_allclose(law.separation(force), u, rtol=1e-9)
-        step = 1e-5
-        np.testing.assert_allclose(stiffness, (law.force(u - step) - law.force(u + step)) / (2 * step), rtol=1e-4)
-
-    def test_full_contact_holds_all_energy(self):
-        # U = (1/4) sum q |h_q|^2
-        assert Law(SURFACE).energy(6.0) == pytest.approx(SURFACE.x @ SURFACE.variance / SURFACE.gradient / 4, rel=1e-9)
-
-    def test_bands_agree_with_the_power_law(self):
-        edges = np.geomspace(1, 64, 2001)
-        inside = (edges[1:] ** -1.6 - edges[:-1] ** -1.6) / -1.6
-        x = np.sqrt((edges[1:] ** 0.4 - edges[:-1] ** 0.4) / 0.4 / inside)
-        law = Law(Spectrum.from_shares(x, inside), 3.2)
-        np.testing.assert_allclose(law.force([0.1, 1.0]), Law(SURFACE, 3.2).force([0.1, 1.0]), rtol=1e-3)
+def test_full_contact_holds_all_energy():
+    # U = (1/4) sum q |h_q|^2
+    surface = Spectrum.self_affine(0.8, 64.0)
+    assert Law(surface).energy(6.0) == pytest.approx(surface.x @ surface.variance / surface.gradient / 4, rel=1e-9)
 
 
 # F/(A0 E*), A/A0, u/h_rms of a 2048 x 2048 run of the contact-mechanics challenge (rms gradient 1; Mueser et al. 2017)
@@ -142,3 +97,50 @@ class TestMap:
         top_gradient = self.law.top_gradient * np.where(FRACTIONS < 0.1, 2.0, 1.0)
         steep = dataclasses.replace(self.law, top_gradient=top_gradient)
         assert steep.area(0.005) == pytest.approx(self.law.area(0.005) / 2, rel=0.05)
+
+
+EDGES = ((0.1, 3.001), (0.1, 1e5), (1.0, 3.001), (1.0, 1e5))
+
+
+def force_by_quadrature(surface, u):
+    """F/(A0 E* g) of the law's definition: u_P by parts and `quad`, the root by bisection of its logarithm."""
+    law = self_affine_law(float(surface.hurst), float(surface.zeta_1), None)
+
+    def gap(log_force):
+        F = np.exp(log_force)
+        rest = quad(
+            lambda x: float(law.energy(np.exp(x))) * np.exp(-x), log_force, 8, epsabs=0, epsrel=1e-10, limit=500
+        )
+        return rest[0] + float(law.energy(np.exp(8.0))) * np.exp(-8.0) - float(law.energy(F)) / F
+
+    def endless(wanted):
+        low, high = -200.0, 5.0
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if gap(middle) > wanted else (low, middle)
+        return np.exp(low - law.tail * wanted**3)
+
+    return endless(u) - endless(float(surface.h_max))
+
+
+def test_far_gaps_of_one_surface_against_quadrature():
+    surface = Surface(0.5, 1.0, 100.0, 1.0, 12.0)
+    for u in (3.0, 6.0, 11.0):
+        found = contact(surface, mean_separation=u, theory="calibrated")
+        expected = force_by_quadrature(surface, u) * float(surface.rms_gradient)
+        assert abs(found.pressure / expected - 1) <= found.error + 1e-6
+
+
+@pytest.mark.parametrize("edge", [None, *EDGES])
+def test_no_gap_is_beyond_its_stated_error(edge):
+    rng, count = np.random.default_rng(7), 300 if edge is None else 60
+    for _ in range(count):
+        hurst, zeta_1 = edge or (rng.uniform(0.1, 1.0), np.exp(rng.uniform(np.log(3.001), np.log(1e5))))
+        h_max = np.exp(rng.uniform(np.log(2.0), np.log(32.0)))
+        u = h_max * (1 - np.exp(rng.uniform(np.log(1e-3), 0, 30)))
+        pressure, _, _ = self_affine_law(hurst, zeta_1, h_max).contact(u)
+        surface = Surface(hurst, 1.0, zeta_1, 1.0, h_max)
+        found = contact(surface, mean_separation=u, theory="calibrated")
+        seen = (pressure > 1e-290) & (u > 1e-5)
+        off = found.pressure[seen] / (pressure[seen] * float(surface.rms_gradient)) - 1
+        assert (np.abs(off) <= found.error[seen]).all()

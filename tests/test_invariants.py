@@ -2,19 +2,16 @@
 
 import math
 
-import dask
 import numpy as np
-import pytest
 import scipy.integrate
-import xarray as xr
 from catalogue import LEVEL, OWN
 from helpers import SCALE
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import OutOfRangeError, Scene, Surface, contact, contact_law, island
+from mbma_tables import Surface, contact, contact_law, island
 from mbma_tables.models import ISLAND_MODELS
-from mbma_tables.surfaces.variants import PRINTED, VARIANTS
+from mbma_tables.surfaces.variants import VARIANTS
 
 EPS = np.finfo(float).eps
 
@@ -32,8 +29,6 @@ def surface_of(hurst, zeta_1, top):
 
 
 surfaces = st.builds(surface_of, hursts, zetas, tops)
-# some of these have islands that the smaller table and the closed forms do not cover
-rough_surfaces = st.builds(surface_of, st.floats(0.1, 1), zetas, tops)
 # where the formulas as printed do not divide 0 by 0
 plain_surfaces = surfaces.filter(lambda surface: surface.hurst < 0.99)
 
@@ -104,35 +99,6 @@ def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, pow
         for name, degree in SLOPE_DIMENSIONS.items() if derivatives else ():
             assert found.pressure_by[name] == one.pressure_by[name] * modulus * unit**degree, name
             assert found.area_by[name] == one.area_by[name] * unit**degree, name
-
-
-@invariant(8, surface=surfaces, share=depths, power=st.floats(-12, 12), stress=st.floats(-12, 12))
-def test_laws_in_any_unit(surface, share, power, stress):
-    unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
-    law, other = contact_law(surface, rtol=1e-9), contact_law(in_unit(surface, unit), rtol=1e-9, E_star=modulus)
-    room = law.error + other.error + lost_digits(surface, gap)
-    for name, factor in {"pressure": modulus, "area": 1, "energy": modulus * unit}.items():
-        one, moved = getattr(law, name)(separation=gap), getattr(other, name)(separation=gap * unit)
-        assert abs(moved / (one * factor) - 1) <= room, name
-    assert (law.turning_point is None) == (other.turning_point is None)
-    if law.turning_point is not None:
-        # where force is flat, its error moves the end of the branch by a root
-        assert abs(other.turning_point / unit - law.turning_point) <= 2 * math.sqrt(room) * law.h_max
-
-
-@pytest.mark.slow
-@invariant(4, surface=surfaces, share=st.floats(0.05, 0.9), power=st.floats(-12, 12), stress=st.floats(-12, 12))
-def test_scenes_in_any_unit(surface, share, power, stress):
-    unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
-    effects = ("pressure", "area", "stiffness", "energy", "conductance", "island_statistics")
-    parts = {"effects": effects, "rtol": 1e-6, "conductivities": (1.0, 3.0)}
-    one = Scene(surface, separations=[gap], **parts).run()
-    other = Scene(in_unit(surface, unit), separations=[gap * unit], E_star=modulus, **parts).run()
-    degrees = {"pressure": (1, 0), "area": (0, 0), "stiffness": (1, -1), "energy": (1, 1), "conductance": (0, -1)}
-    degrees |= {"island_number": (0, -2), "island_delta": (0, 1), "island_force": (1, 2)}
-    for name, (of_stress, of_length) in degrees.items():
-        expected = one[name] * modulus**of_stress * unit**of_length
-        np.testing.assert_allclose(other[name], expected, rtol=2e-6, err_msg=name)
 
 
 @invariant(12, surface=surfaces, variant=variants)
@@ -225,35 +191,6 @@ def test_first_contact_is_a_power_law(surface, variant):
         assert abs(off[2]) < 1e-2
 
 
-@invariant(10, surface=plain_surfaces, share=st.floats(0.02, 1.5), variant=variants, seed=seeds)
-def test_random_islands_add_up(surface, share, variant, seed):
-    """The sum over islands by chance: two in each of many layers of approach, so that their scatter is known."""
-    gap = float(gaps_of(surface, share))
-    reach = surface.h_max - gap
-    # K1 steps where zeta_d reaches its floor: no layer holds both sides of that
-    floor = variant.floor_d ** (-2 * surface.hurst) - surface.zeta_1 ** (-2 * surface.hurst)
-    step = math.sqrt(floor) / (4 / 3 * variant.beta) * surface.h_rms
-    edges = np.unique(np.append(np.linspace(0, 1, 3000), math.sqrt(min(step / reach, 1))))
-    # near first contact islands are as many and carry less
-    places = edges[:-1] + np.diff(edges) * np.random.default_rng(seed).uniform(size=(2, edges.size - 1))
-    delta, measure = reach * places**2, 2 * reach * places * np.diff(edges)
-    found = island(surface, delta, variant=variant)
-    D, sigma = summits(surface.hurst, found.zeta_d, variant)
-    D, sigma = D * surface.q0**2, sigma * surface.s
-    slope = 4 / 3 * variant.beta
-    if variant.jacobian == "exact":
-        slope = slope * surface.s / surface.h_rms if variant.offset else 0
-    K1 = np.where(found.zeta_d > variant.floor_d, 1 - slope, 1)
-    height = gap + delta - (found.h_d if variant.offset else 0)
-    weight = measure * K1 * D * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
-    total = contact(surface, separation=gap, variant=variant)
-    for carried, whole in ((found.force, total.pressure), (found.area, total.area)):
-        terms = carried * weight
-        scatter = math.sqrt(np.sum((terms[0] - terms[1]) ** 2)) / 2
-        assert scatter <= 1e-3 * whole
-        assert abs(terms.mean(axis=0).sum() - whole) <= 6 * scatter
-
-
 @invariant(
     12, surface=surfaces, shares=st.lists(depths, min_size=1, max_size=30), variant=variants, digits=st.integers(2, 9)
 )
@@ -274,29 +211,6 @@ def test_a_law_and_its_inverse(surface, shares, variant, digits):
         assert (np.abs(back - gaps) * slope(separation=gaps) <= 2 * rounded * there)[
             slope(separation=gaps) * span > 0.01 * there
         ].all()
-
-
-@invariant(12, surface=rough_surfaces, share=depths, variant=st.sampled_from(list(VARIANTS.values())))
-def test_tiers_are_within_their_bounds_of_each_other(surface, share, variant):
-    gap = float(gaps_of(surface, share))
-    exact = contact(surface, separation=gap, island_model="exact", variant=variant, rtol=1e-9)
-    refused = 0
-    for island_model, rtol in (("universal", 1e-9), ("island4d", 1e-5), ("formula", 1e-4)):
-        if island_model == "island4d" and variant is PRINTED:
-            continue
-        try:
-            found = contact(surface, separation=gap, island_model=island_model, variant=variant, rtol=rtol)
-        except OutOfRangeError:
-            # closed forms and the four-parameter table end earlier
-            assert island_model != "universal"
-            refused += 1
-            continue
-        assert abs(found.pressure / exact.pressure - 1) <= found.error + exact.error, island_model
-        assert abs(found.area / exact.area - 1) <= found.error + exact.error, island_model
-    rigid = contact(surface, separation=gap, island_model="rigid", variant=variant)
-    # a sphere that gives way carries less
-    assert exact.pressure <= rigid.pressure * (1 + rigid.error + exact.error)
-    return refused
 
 
 def batch_of(rng, count):
@@ -343,28 +257,3 @@ def test_no_entry_knows_the_others(island_model, seed):
                 continue
             for name in names:
                 np.testing.assert_array_equal(getattr(alone, name), getattr(whole, name)[k])
-
-
-@invariant(
-    6, island_model=st.sampled_from(ISLAND_MODELS), seed=seeds, chunks=st.tuples(st.integers(1, 9), st.integers(1, 5))
-)
-def test_chunks_change_no_answer(island_model, seed, chunks):
-    rng = np.random.default_rng(seed)
-    numbers, gaps = batch_of(rng, 9)
-    named = [xr.DataArray(n, dims="surface") for n in some_of(numbers, slice(None))]
-    shares = xr.DataArray([0.0, 0.1, 0.5, 0.9, 1.0], dims="gap")
-    d = xr.DataArray(gaps, dims="surface") * (1 - shares) + named[4] * shares
-    asked = {"island_model": island_model, "rtol": 1e-4}
-    eager = contact(Surface(*named), separation=d, **asked)
-    chunked = Surface(*(n.chunk(surface=chunks[0]) for n in named))
-    lazy = contact(chunked, separation=d.chunk(surface=chunks[0], gap=chunks[1]), **asked)
-    plain = contact(Surface(*(n.values[:, None] for n in named)), separation=d.values, **asked)
-    for name in ("pressure", "area", "error"):
-        with dask.config.set(scheduler="synchronous"):
-            computed = getattr(lazy, name).transpose("surface", "gap").compute()
-        whole = getattr(eager, name).transpose("surface", "gap")
-        np.testing.assert_array_equal(whole, getattr(plain, name))
-        if island_model != "universal":
-            np.testing.assert_array_equal(computed, whole)
-        elif name != "error":
-            assert (np.abs(computed - whole) <= (lazy.error + eager.error).transpose("surface", "gap") * whole).all()

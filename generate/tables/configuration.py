@@ -23,6 +23,8 @@ MIN_NODES = 8  # of an axis: a quintic spline without knots at its second nodes 
 MAX_NODES = 2_000_000  # of a table: four arrays of these fit a file
 MIN_POINTS, MAX_POINTS = 100, 1_000_000  # of the certificate: the 99th percentile still is a point
 MIN_SHIPPED_POINTS = 5000  # of a table in the shipped folder
+# looser, the force of a universal table no longer increases in mu
+TARGETS = {UNIVERSAL: (1e-11, 3e-4), ISLAND4D: (1e-11, 0.1)}
 MIN_EXTENT = 1e-6  # of an axis, in its own transform: nodes must differ
 # where the solver reaches its tightest tolerance, whatever the other axes
 LIMITS = {
@@ -104,7 +106,7 @@ def _configuration(kind: str, path: pathlib.Path | None, target: float | None) -
             raise InputError(f"it is not a TOML file: {fault}") from None
     _checked(own, list(given), "the file")
     changed, shipped, axes = _checked(own.get("axes", {}), list(given["axes"]), "[axes]"), given["target"], {}
-    wanted = number_in("target", own.get("target", shipped) if target is None else target, 1e-11, 0.1)
+    wanted = number_in("target", own.get("target", shipped) if target is None else target, *TARGETS[kind])
     for name, entry in given["axes"].items():
         # cells are as small as they must be, where nodes are counted
         known = [*entry] if kind == UNIVERSAL else ["low", "high", "offset", "start", "nodes"]

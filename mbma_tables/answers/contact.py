@@ -21,7 +21,6 @@ from mbma_tables.common.arguments import (
     describe_entries,
     finite_array,
     hinted,
-    is_labelled,
     positive_array,
     require,
     require_flag,
@@ -105,7 +104,7 @@ def contact(
         Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
         theories by numerical differentiation, to 1e-6.
     quantities : iterable of {"pressure", "area"}
-        What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
+        What is wanted of MBMA; the other is then None.
     workers : int
         Threads that share MBMA's batches of surfaces, and of gaps; the bits are those of one.
 
@@ -165,17 +164,24 @@ def contact(
     chosen = chosen_theory(
         surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside, workers=workers
     )
-    # an empty hardness is refused where it is checked
-    yields = stated and (is_labelled(hardness) or not np.size(hardness) or not np.equal(hardness, np.inf).all())
+    yields = stated and not (isinstance(hardness, float | np.ndarray) and _infinite(np.asarray(hardness)))
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
     wanted = quantities if quantities is QUANTITIES else wanted_quantities(quantities)
     make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
     return make(surface, value, E_star, hardness, by, source, derivatives, wanted)
 
 
+def _infinite(hardness: Any) -> bool:
+    """Whether nothing yields; what is no number is refused where it is checked."""
+    return bool(hardness.dtype.kind == "f" and hardness.size and np.isposinf(hardness).all())
+
+
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
     """The requested theory, with MBMA's `options`, which other theories refuse."""
-    given = [] if options == OPTIONS else [name for name, value in options.items() if value != OPTIONS[name]]
+    try:
+        given = [] if options == OPTIONS else [name for name, value in options.items() if value != OPTIONS[name]]
+    except ValueError:
+        raise InputError(f"{', '.join(options)} take one value each, not an array") from None
     named = theory_name(surface, theory, **options) if theory is None else theory
     if isinstance(named, str) and named in THEORIES:
         if not given and options.get("workers") is not True:
@@ -227,8 +233,7 @@ def _contact(
     if derivatives and held:
         require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
-        wanted = QUANTITIES if derivatives else quantities
-        totals = theory.totals(surface, places["separation"], E_star, derivatives, wanted)
+        totals = theory.totals(surface, places["separation"], E_star, derivatives)
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])

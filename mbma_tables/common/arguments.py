@@ -125,6 +125,12 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
         raise InputError(
             f"{name} must be numbers, an array or a DataArray: pass the array inside that {type(value).__name__}"
         )
+    # pint's and astropy's, whose units numpy would drop
+    if hasattr(value, "magnitude") or hasattr(value, "to_value"):
+        raise InputError(
+            f"{name} is a {type(value).__name__} with a unit of its own: convert it and pass its numbers, or a "
+            "text such as '10 MPa'"
+        )
     if np.ma.is_masked(value):
         masked = np.ma.getmaskarray(np.ma.asanyarray(value))
         raise InputError(

@@ -143,8 +143,6 @@ static mbma_spline spline_of(const argument *a) {
        mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), (int)I(9), P(10), P(11), P(12), P(13))) \
     FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
        mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4))) \
-    FN(kronrod, "i wn wn wn", I(0) > 0 && I(0) < 32 && N(1) == (size_t)I(0), \
-       mbma_kronrod((int)I(0), P(1), P(2), P(3))) \
     /* profile.c */ \
     FN(profile_islands, "Dn d d d D8 D J D6 w4n w1", true, \
        mbma_profile_islands(N(0), P(0), X(1), X(2), X(3), VARIANT(4), CELLS(5), P(8), P(9))) \
@@ -196,10 +194,7 @@ static mbma_spline spline_of(const argument *a) {
     FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4))) \
     FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4))) \
-    /* hardness.c */ \
-    FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
-       mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9)))
+       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4)))
 
 /* A function of arguments: whether their sizes fit, and what was found. */
 #define DEFINE_CALL(name, kinds, fits, call) \

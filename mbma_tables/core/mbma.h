@@ -79,9 +79,6 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
                    double rtol, const mbma_variant *variant, const mbma_cells *cells, int slopes, double *out,
                    double *error, uint8_t *status, int64_t *islands);
 
-/* Nodes and weights of QUADPACK's Gauss-Kronrod rules of 21 and 31 nodes on [-1, 1]. */
-int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss);
-
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
 enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };
@@ -348,15 +345,6 @@ size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const d
  * a surface without end, before the tail's factor. */
 size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, int whole, double *u,
                                     double *slope);
-
-/* ---- hardness.c: contact with a hardness p_m ---------------------------------------------------------------------- */
-
-/* Force F and -dF/du of F^-n = F_el^-n + (eta Q)^-n, n = light + by_eta eta + by_share Q, from the elastic force and
- * -dF_el/du and from the share Q and dQ/du at a mean gap. Lengths are in h_rms, forces in A0 E* g; eta = p_m/(E* g) is
- * infinite where nothing yields. */
-size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffness, const double *share,
-                         const double *slope, const double *eta, double light, double by_eta, double by_share,
-                         double *force, double *steepness);
 
 #ifdef __cplusplus
 }

@@ -18,7 +18,7 @@ from mbma_tables import __version__
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.code import BuildError, built_by
-from mbma_tables.export.joint import Joint
+from mbma_tables.export.exported_law import ExportedLaw
 from mbma_tables.export.law_code import MORE, AskedLaw, asked_law, code_name, text_of
 from mbma_tables.export.law_numbers import LawNumbers
 from mbma_tables.export.targets import CODE, Target
@@ -95,7 +95,7 @@ def fmu(
     built = _binaries(name, source, third, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
     said = "\n".join((*found.said, f"binaries: {listed}"))
-    files = {"modelDescription.xml": _description(third, name, token, said, variables, found.joint)}
+    files = {"modelDescription.xml": _description(third, name, token, said, variables, found.exported)}
     files[f"sources/{name}.c"] = source.encode()
     if third:
         files["sources/buildDescription.xml"] = _build(name)
@@ -130,7 +130,7 @@ def _start(numbers: LawNumbers) -> float:
 
 def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """What XML says of each variable, by value reference."""
-    length, stress, numbers = found.joint.length, found.joint.stress, found.numbers
+    length, stress, numbers = found.exported.length, found.exported.stress, found.numbers
     ends = {"max": repr(numbers.c_most)} | ({} if numbers.ends else {"min": repr(numbers.c_least)})
     asked = {"start": repr(_start(numbers)), **ends, "description": "h_max less the mean separation"}
     outputs = {
@@ -147,7 +147,9 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     ]
 
 
-def _description(third: bool, name: str, token: str, text: str, variables: list[dict[str, str]], joint: Joint) -> bytes:
+def _description(
+    third: bool, name: str, token: str, text: str, variables: list[dict[str, str]], exported: ExportedLaw
+) -> bytes:
     """modelDescription.xml of either standard."""
     root = ET.Element(
         "fmiModelDescription",
@@ -161,7 +163,7 @@ def _description(third: bool, name: str, token: str, text: str, variables: list[
         if not third:
             ET.SubElement(ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"})
     units = ET.SubElement(root, "UnitDefinitions")
-    bases = _units(joint)
+    bases = _units(exported)
     for unit in dict.fromkeys(variable["unit"] for variable in variables):
         named = ET.SubElement(units, "Unit", {"name": unit})
         if unit in bases:
@@ -188,17 +190,17 @@ def _description(third: bool, name: str, token: str, text: str, variables: list[
     return _xml(root)
 
 
-def _units(joint: Joint) -> dict[str, dict[str, str]]:
+def _units(exported: ExportedLaw) -> dict[str, dict[str, str]]:
     """Units of the law by those of SI."""
-    length, stress = factor(joint.length, "m"), factor(joint.stress, "Pa", "stress")
+    length, stress = factor(exported.length, "m"), factor(exported.stress, "Pa", "stress")
     base = {
         "s": ({"s": 1}, 1.0),
         "1": ({}, 1.0),
-        joint.length: ({"m": 1}, length),
-        joint.stress: ({"kg": 1, "m": -1, "s": -2}, stress),
-        f"{joint.stress}/{joint.length}": ({"kg": 1, "m": -2, "s": -2}, stress / length),
-        f"{joint.stress} {joint.length}": ({"kg": 1, "s": -2}, stress * length),
-        f"{joint.length}^3": ({"m": 3}, length**3),
+        exported.length: ({"m": 1}, length),
+        exported.stress: ({"kg": 1, "m": -1, "s": -2}, stress),
+        f"{exported.stress}/{exported.length}": ({"kg": 1, "m": -2, "s": -2}, stress / length),
+        f"{exported.stress} {exported.length}": ({"kg": 1, "s": -2}, stress * length),
+        f"{exported.length}^3": ({"m": 3}, length**3),
     }
     return {
         unit: {key: str(power) for key, power in powers.items()} | {"factor": repr(size)}

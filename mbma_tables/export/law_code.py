@@ -14,7 +14,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
+from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
 from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
@@ -30,6 +30,7 @@ from mbma_tables.export.text import (
     wrapped,
 )
 from mbma_tables.law import block as at
+from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 
 LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
@@ -41,7 +42,13 @@ _MADE = re.compile(r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]
 
 
 def law_text(
-    target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", leakage: bool = False, **asked: Any
+    target: str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
+    *,
+    name: str = "law",
+    leakage: bool = False,
+    **asked: Any,
 ) -> str:
     """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
 
@@ -50,7 +57,8 @@ def law_text(
     target : str
         One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`.
     surface, E_star, **asked
-        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit.
+        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit. Or
+        the force law of a rough sphere or cylinder (`RoughContact.law`) alone: its "pressure" is force.
     name : str
         What functions, modules or packages are called, or begin with.
     leakage : bool
@@ -78,7 +86,13 @@ def law_text(
 
 
 def law_files(
-    target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", leakage: bool = False, **asked: Any
+    target: str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
+    *,
+    name: str = "law",
+    leakage: bool = False,
+    **asked: Any,
 ) -> dict[str, str]:
     """What `law_text` returns, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
     if target not in LANGUAGES:
@@ -86,6 +100,8 @@ def law_files(
     name, language = code_name(name, target), LANGUAGES[target]
     if leakage and language.subroutine:
         raise InputError(f"{target} has no place for leakage: leave it out")
+    if language.subroutine and isinstance(surface, ForceLaw):
+        raise InputError(f"{target} takes pressures, not the force of a body")
     found = asked_law(surface, E_star, leakage=leakage, only_conductance=language.only_conductance, **asked)
     files = {"": text_of(target, name, found)}
     for end, other in language.beside:
@@ -96,7 +112,7 @@ def law_files(
 class AskedLaw(NamedTuple):
     """A law and what every file of it says."""
 
-    joint: Joint
+    exported: ExportedLaw
     numbers: LawNumbers
     flow: FlowNumbers | None
     ratio: float  # of conductance to the tangent; NaN where it was not asked
@@ -125,8 +141,8 @@ def _words(target: str) -> frozenset[str]:
 
 
 def asked_law(
-    surface: AnySurface,
-    E_star: float | str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     leakage: bool = False,
@@ -136,26 +152,28 @@ def asked_law(
     """The law that a file is asked of, made once; arguments as for `law_text`."""
     conducts = only_conductance or conductivity is not None or conductivity_unit is not None
     k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (math.nan, "")
-    joint = frozen_joint(surface, E_star, **options)
-    if conducts and joint.hardness < math.inf:
+    if isinstance(surface, ForceLaw) and (conducts or leakage):
+        raise InputError("a force law has neither conductance nor leakage: leave conductivity and leakage out")
+    exported = exported_law(surface, E_star, **options)
+    if conducts and exported.hardness < math.inf:
         raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
-    more = {"conductance": f"{k_unit}/{joint.length}"} if conducts else {}
-    more |= {"leakage": f"{joint.length}^3"} if leakage else {}
-    numbers, flow = law_numbers(joint.law), flow_numbers(joint.law.leakage) if leakage else None
-    return AskedLaw(joint, numbers, flow, k_s / joint.modulus, more, _head(joint, numbers, more))
+    more = {"conductance": f"{k_unit}/{exported.length}"} if conducts else {}
+    more |= {"leakage": f"{exported.length}^3"} if leakage else {}
+    numbers, flow = law_numbers(exported.law), flow_numbers(exported.law.leakage) if leakage else None
+    return AskedLaw(exported, numbers, flow, k_s / exported.modulus, more, _head(exported, numbers, more))
 
 
 def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
     """The text of a target's own file, or of another template of it."""
     language, numbers, flow = LANGUAGES[target], asked.numbers, asked.flow
     lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
-    lines.append(_example(asked.joint, language))
+    lines.append(_example(asked.exported, language))
     parts = {
         "HEADER": opening((line.format(name=name) for line in lines), language.mark),
         "NAME": name,
         "SUBROUTINE": "",
-        "LENGTH": asked.joint.length,
-        "STRESS": asked.joint.stress,
+        "LENGTH": asked.exported.length,
+        "STRESS": asked.exported.stress,
         **dict(language.parts),
         **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
     }
@@ -174,7 +192,7 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
 
 def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
     """The core, as C or compiled, the law's own blocks, and what the glue about them needs."""
-    law, numbers = asked.joint.law, asked.numbers
+    law, numbers = asked.exported.law, asked.numbers
     first = 0.0 if numbers.ends else (law.h_max - law.highest) / 2
     ends = {"H_MAX": law.h_max, "FIRST": first, "TURN": numbers.c_turn}
     ends |= {"C_LEAST": numbers.c_least, "C_MOST": numbers.c_most}
@@ -215,23 +233,23 @@ def _numbers(
     return {f"{prefix}{place}".upper(): text for place, text in places.items()} | arrays(prefix, columns, rows)
 
 
-def _head(joint: Joint, numbers: LawNumbers, more: dict[str, str]) -> tuple[str, ...]:
+def _head(exported: ExportedLaw, numbers: LawNumbers, more: dict[str, str]) -> tuple[str, ...]:
     """The lines that every file has."""
-    length, stress = joint.length, joint.stress
+    length, stress = exported.length, exported.stress
     what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure"
     what += f" [{stress} {length}]"
     what += "".join(f", {quantity} [{unit}]" for quantity, unit in more.items())
     begin = "no contact below c = 0" if numbers.ends else f"c from {numbers.c_least:.10g}"
     range_ = f"{begin}, to {numbers.c_most:.10g}; there is no answer outside"
     inverse = f"overclosure at a pressure: up to c = {numbers.c_turn:.10g}"
-    inverse += "" if joint.law.turning_point is None else ", where pressure turns down"
+    inverse += "" if exported.law.turning_point is None else ", where pressure turns down"
     what += f", against overclosure c [{length}]"
-    return joint.header(what, range_, inverse, end=numbers.c_turn, leakage="leakage" in more)
+    return exported.header(what, range_, inverse, end=numbers.c_turn, leakage="leakage" in more)
 
 
-def _example(joint: Joint, language: Language) -> str:
+def _example(exported: ExportedLaw, language: Language) -> str:
     """One line with values of the library's law."""
-    law = joint.law
+    law = exported.law
     c = float(f"{(law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 8:.3g}")
     p, k = (float(value) for value in law.pressure_and_stiffness(law.h_max - c))
     answers = {"pressure": (c, p), "tangent": (c, k)} | ({"overclosure": (p, c)} if language.inverts else {})

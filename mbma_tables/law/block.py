@@ -71,7 +71,7 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     core.inverse_nodes(wanted, block, which, end, x, side)
     records = np.zeros((centre.size, INVERSE_RECORD))
     records[:, 0] = centre
-    records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > 0)
+    records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > np.finfo(float).tiny)
     records[:, 2] = side.reshape(-1, points.size)[:, points.size // 2]
     records[:, 3:] = x.reshape(-1, points.size) @ transform
     head = np.zeros(INVERSE_HEAD)

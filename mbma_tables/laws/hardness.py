@@ -29,7 +29,6 @@ from scipy.special import erf, erfc, erfcx, erfinv, ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.errors import InputError
-from mbma_tables.core import core
 from mbma_tables.laws.bearing_curve import FRACTIONS
 
 IMAGES, TERMS = 0.06, 10  # tau below which images converge faster than a series; its terms, and one
@@ -40,6 +39,7 @@ DEPTH = 30.0  # of a map's valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 LEVELS = -37.2, 9.0, 1500  # of Gaussian heights: nodes; above, the mean gap is the level itself
 LEAST_GAP = 1e-300  # mean gap at which all heights lie above the level
+MOST_ETA, MOST_RATIO = 1e100, 1e300  # what is larger leaves the same force
 ROOT_TWO_PI = np.sqrt(2 * np.pi)
 
 
@@ -135,6 +135,7 @@ def _difference(centre: FloatArray, half: FloatArray) -> FloatArray:
     return np.asarray(np.where(narrow, cancelled, erfc(centre - half) - erfc(centre + half)))
 
 
+@np.errstate(all="ignore")
 def force(
     elastic_force: ArrayLike,
     stiffness: ArrayLike,
@@ -144,19 +145,32 @@ def force(
     constants: Constants = CONSTANTS,
 ) -> tuple[FloatArray, FloatArray]:
     """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness, and from Q and dQ/du, there."""
-    exponent = constants.force_light, constants.force_eta, constants.force_share
-    found, steep = answered(core.capped_force, (elastic_force, stiffness, share, slope, eta), 2, *exponent)
-    return found, steep
+    own, Q, cap, c = np.asarray(elastic_force), np.asarray(share), np.asarray(eta), constants
+    level = np.where(cap < np.inf, cap * Q, np.inf)
+    small = np.minimum(own, level)
+    exponent = c.force_light + c.force_eta * np.minimum(cap, MOST_ETA) + c.force_share * Q
+    # a force without bound has no weight
+    gain = np.log(np.minimum(np.maximum(own, level) / small, MOST_RATIO))
+    power = np.exp(-exponent * gain)
+    weight = power / (1 + power)
+    # ln F lies so much below that of the smaller; derivatives by the exponent, by the elastic force, and by Q
+    lower = np.log1p(power) / exponent
+    by_elastic = np.where(own <= level, 1 - weight, weight)
+    by_level = (1 - by_elastic) / Q + c.force_share * (lower + weight * gain) / exponent
+    rate = np.where(own < np.inf, by_elastic * stiffness / own, 0.0) - np.where(by_level > 0, by_level * slope, 0.0)
+    # what does not touch has no force
+    touching, rest = small > 0, np.where(cap > 0, small, np.nan)
+    found = np.where(touching, small * np.exp(-lower), rest)
+    return found, np.where(touching, found * rate, rest)
 
 
 def closed(
     heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
 ) -> tuple[FloatArray, FloatArray]:
     """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
-    x, c = u / h_rms, CONSTANTS
+    x = u / h_rms
     share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
-    given = pressure / gradient, stiffness / gradient, share, slope / h_rms, eta
-    load, steep = answered(core.capped_force, given, 2, c.force_light, c.force_eta, c.force_share)
+    load, steep = force(pressure / gradient, stiffness / gradient, share, slope / h_rms, eta)
     return load * gradient, steep * gradient
 
 

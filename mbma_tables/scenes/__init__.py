@@ -1,1 +1,1 @@
-"""Scenes: a surface, materials, what is prescribed, and only the effects that are called for."""
+"""Scenes: only the effects that are called for, planned by cost."""

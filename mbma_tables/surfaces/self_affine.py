@@ -32,6 +32,7 @@ from mbma_tables.surfaces.roughness import surface_of_roughness
 if TYPE_CHECKING:
     from mbma_tables.surfaces.psd import SpectrumFit
 
+LARGEST = 1e50  # of lengths and wavenumbers, whose powers stay finite
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 
@@ -64,9 +65,11 @@ class SelfAffine(AnySurface):
             # perhaps lazy: checked block by block, where numbers are computed
             return
         given = {name: finite_array(name, getattr(self, name)) for name in PARAMETERS}
-        require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
+        require("hurst", given["hurst"], (given["hurst"] >= np.finfo(float).tiny) & (given["hurst"] <= 1), "in (0, 1]")
         for name in ("q0", "q1", "h_rms", "h_max"):
             require(name, given[name], given[name] > 0, "positive")
+            sized = (given[name] >= 1 / LARGEST) & (given[name] <= LARGEST)
+            require(name, given[name], sized, f"from {1 / LARGEST:g} to {LARGEST:g}: take another unit of length")
         shape = broadcast_shape(**given)
         vars(self).update({name: frozen(np.array(spread(array, shape)))[()] for name, array in given.items()})
         zeta_1 = np.asarray(self.zeta_1)

@@ -1,4 +1,4 @@
-"""Theories of rough contact behind one protocol: MBMA, Persson, Greenwood-Williamson, or a user-defined object."""
+"""Theories of rough contact, one file each, behind one protocol."""
 
 from __future__ import annotations
 

@@ -75,6 +75,7 @@ class Island:
 
 
 GEOMETRY = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
+SMALLEST_DELTA = 1e-250  # [length], below which its quotients are no normal numbers
 
 
 def scale_force(g: dict[str, FloatArray]) -> FloatArray:
@@ -136,6 +137,7 @@ def island(
     modulus = positive_array("E_star", E_star)
     rule = get_variant(variant)
     model = get_model(island_model, rtol, rule)
+    require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
     shape = broadcast_shape(delta=approach, surface=surface.h_rms)
     g, s, q0 = islands_of(surface, np.broadcast_to(approach, shape), rule)

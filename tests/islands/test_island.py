@@ -69,11 +69,6 @@ def test_a_band_that_ends_at_the_floor_of_zeta_u_is_refused():
     assert island(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, variant=own).force > 0
 
 
-def test_E_star_broadcasts(surface):
-    found = island(surface, [0.1, 1.0], E_star=[[1.0], [2.0], [3.0]])
-    assert found.force.shape == (3, 2)
-
-
 @pytest.mark.parametrize("approach", [1e-150, 1e-160, 1e-200, 1e-300])
 def test_vanishing_approach_is_answered_or_refused(surface, approach):
     room = surface.h_rms / surface.s

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from generate.boundary_elements.surfaces import Recipe, heights
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, sensitivity
+from mbma_tables import InputError, OutOfRangeError, Surface, contact
 from mbma_tables.scenes.specimen import from_numbers
 from mbma_tables.surfaces.extremes import highest_point
 
@@ -108,14 +108,3 @@ def test_beyond_the_heights_simulated_nothing_changes():
         for name, rtol in {"pressure": 1e-6, "mean_separation": 2e-4, "stiffness": 2e-3}.items():
             np.testing.assert_allclose(getattr(far, name), getattr(near, name), rtol=rtol)
         assert far.valid.all()
-
-
-def test_sensitivities_know_the_area():
-    drawn = {"Rq": 1.0, "longest": 250.0, "shortest": 2.0, "hurst": 0.8}
-    found = sensitivity(Surface.from_roughness(**drawn, nominal_area=1e6), mean_separation=2.5, theory="calibrated")
-    pressures = [
-        contact(Surface.from_roughness(**drawn, nominal_area=area), mean_separation=2.5, theory="calibrated").pressure
-        for area in (0.99e6, 1.01e6)
-    ]
-    slope = np.log(pressures[1] / pressures[0]) / np.log(1.01 / 0.99)
-    assert found.slopes["nominal_area"]["pressure"] == pytest.approx(slope, abs=1e-5)

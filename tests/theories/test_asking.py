@@ -10,12 +10,12 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import refusals
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.theories import THEORIES, Mbma, get_theory
-from mbma_tables.theories.differences import HALVINGS, differences
 
 ROOT = pathlib.Path(__file__).parents[2]
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
@@ -172,30 +172,18 @@ def test_labelled_arrays_keep_their_names(theory):
     assert found.area.attrs["units"] == "1"
 
 
-@pytest.mark.parametrize(
-    ("asked", "match"),
-    [
-        ({}, "exactly one of separation, mean_separation, pressure, area; got none"),
-        ({"separation": 1.0, "pressure": 1.0}, "got separation and pressure"),
-        ({"pressure": 1.0, "theory": "hertz"}, "theory must be one of"),
-        ({"pressure": 1.0, "theory": "persson", "island_model": "exact"}, "island_model: options of theory 'mbma'"),
-        ({"separation": 1.0, "theory": Mbma(), "variant": "printed"}, "variant: options of theory 'mbma' alone"),
-        ({"pressure": np.nan}, "pressure must be finite"),
-        ({"pressure": -1.0}, "pressure must be at least 0"),
-        ({"mean_separation": -1.0}, "mean_separation must be at least 0, got -1"),
-        ({"area": 0.9}, "area must be at most what theory 'mbma' reaches"),
-    ],
+test_what_cannot_be_asked = refusals(
+    lambda asked: contact(SURFACE, **asked),
+    ({}, "exactly one of separation, mean_separation, pressure, area; got none"),
+    ({"separation": 1.0, "pressure": 1.0}, "got separation and pressure"),
+    ({"pressure": 1.0, "theory": "hertz"}, "theory must be one of"),
+    ({"pressure": 1.0, "theory": "persson", "island_model": "exact"}, "island_model: options of theory 'mbma'"),
+    ({"separation": 1.0, "theory": Mbma(), "variant": "printed"}, "variant: options of theory 'mbma' alone"),
+    ({"pressure": np.nan}, "pressure must be finite"),
+    ({"pressure": -1.0}, "pressure must be at least 0"),
+    ({"mean_separation": -1.0}, "mean_separation must be at least 0, got -1"),
+    ({"area": 0.9}, "area must be at most what theory 'mbma' reaches"),
 )
-def test_what_cannot_be_asked(asked, match):
-    with pytest.raises(InputError, match=match):
-        contact(SURFACE, **asked)
-
-
-def test_a_theory_object_with_its_own_options():
-    by_object = contact(SURFACE, separation=1.0, theory=Mbma("rigid", "printed"))
-    by_name = contact(SURFACE, separation=1.0, island_model="rigid", variant="printed")
-    assert by_object.pressure == by_name.pressure
-    assert (by_object.island_model, by_object.variant, by_object.theory) == ("rigid", "printed", "mbma")
 
 
 @each
@@ -270,44 +258,6 @@ def test_energies_hold_where_the_force_bends():
         expected = law.energy(u[:, 0])
         assert found[:, k] == pytest.approx(expected, rel=1e-8)
         assert contact(law.surface, mean_separation=u[:, 0]).energy == pytest.approx(expected, rel=1e-8)
-
-
-FUNCTIONS = (np.exp, lambda x: 1 / (2 + x), lambda x: np.sqrt(1 + x) * np.cos(3 * x), lambda x: 5.0 + 0 * x)
-SLOPES = np.array([1.0, -0.25, 0.5, 0.0])
-
-
-def function(entry, x):
-    return np.choose(entry, [f(x) for f in FUNCTIONS])
-
-
-@pytest.mark.parametrize("side", [0.0, 1.0, -1.0])
-@pytest.mark.parametrize("step", [1e-4, 0.02, 0.3])
-def test_derivatives_and_their_errors(side, step):
-    found, error = differences(
-        lambda k, x: np.stack([function(k, x), 2 * function(k, x)]),
-        np.full(4, step), np.full(4, side), np.ones((2, 4)),
-    )  # fmt: skip
-    assert (np.abs(found - [SLOPES, 2 * SLOPES]) <= np.maximum(error, 1e-8)).all()
-    assert (error <= 1e-6).all()
-
-
-def test_steps_are_halved_where_that_is_needed_alone():
-    asked = []
-
-    def rough(k, x):
-        asked.append(np.unique(k))
-        return np.where(k == 1, np.tanh(300 * x), np.sin(x))[None]
-
-    found, error = differences(rough, np.full(3, 0.02), np.zeros(3), np.ones((1, 3)))
-    assert found[0] == pytest.approx([1, 300, 1], rel=1e-6)
-    assert (error < 1e-3).all()
-    assert [len(k) for k in asked] == [3] + [1] * (len(asked) - 1)
-    asked.clear()
-    found, error = differences(lambda k, x: 1.0 * (x[None] > 0), np.full(3, 0.02), np.zeros(3), np.ones((1, 3)))
-    assert (error > 0.1).all()
-    found, error = differences(lambda k, x: np.full((1, x.size), np.nan), np.ones(3), np.zeros(3), np.ones((1, 3)))
-    assert not (error <= 1).any()
-    assert len(asked) <= HALVINGS
 
 
 def test_a_force_without_bound_has_no_derivative():

@@ -7,7 +7,7 @@ import types
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import random_map
+from helpers import random_map, refusals
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -96,44 +96,15 @@ class TestAnswers:
         assert light == pytest.approx(np.sqrt(8 / np.pi / s0), rel=1e-4)
         assert light == pytest.approx(2.2, rel=0.05)
 
-    def test_batches_are_scalars_and_scales_drop_out(self):
-        batch = Surface([0.3, 0.8, 1.0], 1.0, [1000.0, 60.0, 30.0], [1.0, 0.1, 2.0], [3.0, 0.33, 7.5])
-        u = np.array([[0.1], [0.5]]) * batch.h_max
-        found = THEORY.answer(batch, u)
-        assert found.pressure.shape == (2, 3)
-        for j in range(3):
-            # lengths in another unit
-            one = Surface(batch.hurst[j], 1.0 / 7, batch.q1[j] / 7, 7 * batch.h_rms[j], 7 * batch.h_max[j])
-            alone = THEORY.answer(one, 7 * u[:, j])
-            for name, unit in (("pressure", 1), ("area", 1), ("stiffness", 7)):
-                np.testing.assert_allclose(unit * getattr(alone, name), getattr(found, name)[:, j], rtol=1e-12)
-
-    @pytest.mark.parametrize("quantity", ["pressure", "area"])
-    def test_inverse(self, quantity):
-        u = np.append(SHARES, 0.999) * SURFACE.h_max
-        wanted = getattr(THEORY.answer(SURFACE, u), quantity)
-        known = wanted < 1
-        found = THEORY.mean_separation_at(SURFACE, quantity, wanted[known])
-        back = getattr(THEORY.answer(SURFACE, found), quantity)
-        np.testing.assert_allclose(back, wanted[known], rtol=1e-11)
-        assert THEORY.mean_separation_at(SURFACE, quantity, np.array(0.0)) == SURFACE.h_max
-
-    @pytest.mark.parametrize(
-        ("asked", "match"),
-        [({"area": 1.0}, "below 1"), ({"mean_separation": -0.1}, "at least 0"), ({"pressure": 1e6}, "u is 0")],
+    test_what_no_gap_has_is_refused = staticmethod(
+        refusals(
+            lambda asked: contact(SURFACE, **asked, theory="calibrated"),
+            ({"area": 1.0}, "below 1"),
+            ({"mean_separation": -0.1}, "at least 0"),
+            ({"pressure": 1e6}, "u is 0"),
+            error=OutOfRangeError,
+        )
     )
-    def test_what_no_gap_has_is_refused(self, asked, match):
-        with pytest.raises(OutOfRangeError, match=match):
-            contact(SURFACE, **asked, theory="calibrated")
-
-    def test_stiffness_is_the_slope_and_energy_the_work(self):
-        u = SHARES[2:] * SURFACE.h_max
-        step = 1e-4 * u
-        slope = (THEORY.answer(SURFACE, u - step).pressure - THEORY.answer(SURFACE, u + step).pressure) / (2 * step)
-        np.testing.assert_allclose(THEORY.answer(SURFACE, u).stiffness, slope, rtol=1e-5)
-        fine = np.linspace(u[1], SURFACE.h_max, 20001)
-        work = np.trapezoid(THEORY.answer(SURFACE, fine).pressure, fine)
-        assert THEORY.energy(SURFACE, u[1]) == pytest.approx(work, rel=1e-6)
 
     @given(st.floats(0.1, 1.0), st.floats(np.log(3.5), np.log(1e5)), st.floats(2.0, 6.0))
     @settings(deadline=None, max_examples=60)
@@ -209,16 +180,6 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number):
         assert np.all(errors_of <= 2 * shipped().standard_deviation("calibrated", quantity, area[touching])), quantity
 
 
-def test_an_older_set_of_boundary_elements():
-    force, area, _, u = np.loadtxt(DATA / "bem_hurst0.8_zeta64.csv", delimiter=",", skiprows=4).T[:4]
-    surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
-    force *= surface.rms_gradient
-    found = contact(surface, pressure=force, theory="calibrated").area
-    np.testing.assert_allclose(found[area > 0.005], area[area > 0.005], rtol=0.03)
-    back = contact(surface, mean_separation=u, theory="calibrated").pressure
-    np.testing.assert_allclose(back[area > 0.01], force[area > 0.01], rtol=0.04)
-
-
 def synthetic():
     """A periodic Gaussian map of side 1 with H = 0.8."""
     k = np.hypot(np.fft.fftfreq(192, 1 / 192)[:, None], np.arange(97)[None, :])
@@ -260,20 +221,6 @@ class TestMap:
         assert np.all(np.diff(found.area) >= 0)
         assert np.all(np.diff(found.stiffness[1:]) >= -1e-12 * found.stiffness[2:])
 
-    def test_inverses_monotone_and_ends(self, surface):
-        top = float(surface.h_max)
-        u = np.linspace(1e-5 * top, 1.05 * top, 200)
-        found = THEORY.answer(surface, u)
-        assert np.all(np.diff(found.pressure) <= 0)
-        assert np.all(np.diff(found.area) <= 0)
-        assert found.pressure[u >= top].tolist() == [0] * int((u >= top).sum())
-        inside = (u < top) & (found.area < 0.9999)
-        for quantity, rtol in (("pressure", 1e-9), ("area", 1e-4)):
-            values = getattr(found, quantity)[inside]
-            np.testing.assert_allclose(THEORY.mean_separation_at(surface, quantity, values), u[inside], rtol=rtol)
-        work = np.trapezoid(found.pressure[100:], u[100:])
-        assert THEORY.energy(surface, u[100]) == pytest.approx(work, rel=1e-2)
-
     def test_units_drop_out_and_mirrors_stand_for_edges(self, surface):
         longer = Surface.from_map(1000 * synthetic(), 1000 / 192, periodic=True, model="measured")
         loads = np.array([1e-4, 1e-2])
@@ -282,12 +229,6 @@ class TestMap:
         mirrored = Surface.from_map(synthetic(), 1 / 192, model="measured")
         found = contact(mirrored, pressure=0.01, theory=THEORY).area
         assert found == pytest.approx(THEORY.answer(surface, expected[1:]).area, rel=0.1)
-
-    def test_heights_without_a_map_stand_between_spectrum_and_map(self, surface):
-        heights = Surface.from_spectrum(surface.q, surface.C, heights=synthetic())
-        u = 0.003 * np.array([0.5, 1.0, 2.0])
-        found, whole = (contact(s, mean_separation=u, theory=THEORY) for s in (heights, surface))
-        np.testing.assert_allclose(found.pressure, whole.pressure, rtol=0.12)
 
 
 class TestSpectrum:
@@ -365,16 +306,6 @@ def test_what_is_told_of_a_measured_surface():
     assert any("anisotropy is 6, tested from 1 to 4.1" in told for told in contact(stretched, area=0.05).reasons)
     flat = Surface(hurst=0.8, q0=0.02, q1=1.28, h_rms=1.5, h_max=4.95)
     assert contact(flat.sampled(), area=0.05, theory="calibrated").valid
-
-
-def test_separations_are_the_inverse_of_force():
-    table, rng, n = shipped(), np.random.default_rng(3), 250
-    low, high = (0.1, np.log(3), 2), (1, np.log(1e5), 12)
-    surfaces = rng.uniform(low, high, (n, 3)).T.copy()
-    u = surfaces[2] * np.concatenate([rng.uniform(0, 0.99, 150), 10 ** rng.uniform(-9, -1, 96), [0, 1, 1.5, 1e-300]])
-    force = table.fill(surfaces, np.arange(n), u)[0]
-    known = np.flatnonzero((force > 0) & (force < 1e3))
-    np.testing.assert_allclose(table.separations(surfaces, known, force[known]), u[known], rtol=1e-9)
 
 
 @pytest.mark.parametrize("h_max", [20.0, 200.0, 1e4])

@@ -79,15 +79,6 @@ class TestCorrected:
         assert contact(surface, area=0.1, theory="corrected").leakage.x > 0
 
 
-def test_a_scene_presses_the_map():
-    surface = Surface.from_map(heights(Part("honed", 1, 64)), 1.0, periodic=True, unit="um")
-    scene = Scene(surface, pressures=[0.01, 0.02], effects=["pressure", "area"], theory="simulated", rtol=0.1)
-    found = scene.run()
-    direct = contact(surface, pressure=[0.01, 0.02], theory="simulated")
-    np.testing.assert_allclose(found.area, direct.area)
-    assert found.attrs["theory"] == "simulated"
-
-
 class TestDefaultTheory:
     """Of a map: corrected, where that is possible within seconds."""
 

@@ -6,7 +6,6 @@ import pathlib
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from helpers import fresh, refused, run
 from scipy.special import erf
 
@@ -14,8 +13,6 @@ from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
 from mbma_tables.common import cache
 from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
-from mbma_tables.export import CODE, DATA, LAWS, SOLVERS
-from mbma_tables.export.targets import targets
 from mbma_tables.laws import pressing
 from mbma_tables.laws.energy_spline import Continued
 from mbma_tables.theories import BoundaryElements, own_map
@@ -131,24 +128,6 @@ def test_on_the_command_line(tmp_path):
     assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
     assert "leave --dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
     assert "not the map" in refused("fit", table)
-
-
-@pytest.mark.parametrize("target", [t for t in targets() if t not in CODE and " " not in t])
-def test_every_target_of_laws(target, file, tmp_path):
-    out = tmp_path / {"matlab": "own.mat", "onnx": "own.onnx"}.get(target, "own.txt")
-    words = ["export", target, "--map", str(file), "--E-star", "1 GPa", "--out", str(out)]
-    heat = ["--conductivity", "0.05", "--conductivity-unit", "W/(mm K)"] if "gapcon" in target else []
-    from mbma_tables.cli import main
-
-    result = CliRunner().invoke(main, words + heat)
-    if result.exit_code and "pip install" in result.stderr:
-        pytest.skip(result.stderr)
-    assert result.exit_code == 0, result.stderr
-    assert out.stat().st_size > 500
-    if target in (*SOLVERS, *LAWS, *DATA) and target not in ("matlab", "netcdf", "hdf5", "parquet", "json"):
-        text = " ".join(out.read_text().split())
-        assert "theory 'simulated'" in text
-        assert "SHA-256" in text
 
 
 def test_an_exported_law_is_the_law(own, file, tmp_path):

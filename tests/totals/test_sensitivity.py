@@ -174,17 +174,3 @@ def test_units_shapes_and_no_contact():
         np.testing.assert_array_equal(stiff.area_by[name], found.area_by[name])
         assert np.shape(one.pressure_by[name]) == ()
         assert one.pressure_by[name] == found.pressure_by[name][0, 0]
-
-
-@pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-9, 1e-11])
-def test_slopes_refine_as_totals_do(rtol):
-    """Two passes over the same integral: the same islands and the same bound."""
-    rng = np.random.default_rng(5)
-    hurst, top, share = rng.uniform(0.3, 1, 40), rng.uniform(2.5, 4.5, 40), rng.uniform(-1, 1, 40)
-    surfaces = Surface(hurst, 0.3, 0.3 * 10 ** rng.uniform(0.5, 4, 40), 0.7, 0.7 * top)
-    plain, slopes = (
-        contact(surfaces, separation=share * surfaces.h_max, rtol=rtol, derivatives=by) for by in (False, True)
-    )
-    assert slopes.islands == plain.islands
-    for name, close in (("error", 1e-6), ("pressure", 1e-12), ("area", 1e-12)):
-        np.testing.assert_allclose(getattr(slopes, name), getattr(plain, name), rtol=close)
