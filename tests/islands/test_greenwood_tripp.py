@@ -15,8 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
-from generate.pages import stability
-from generate.pages.classical import iterated, ring_matrix
+from generate.classical import iterated, ring_matrix
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, greenwood_tripp, height_integral
 
 PUBLISHED = pathlib.Path(__file__).parent.parent / "data" / "greenwood_tripp.csv"
@@ -207,12 +206,20 @@ def test_agreement_with_a_second_discretisation(rtol):
 OTHERS = pytest.mark.skipif(find_spec("ContactMechanics") is None, reason="ContactMechanics is not installed")
 
 
+@pytest.fixture(scope="module")
+def theirs():
+    """The function of the notebook that compares both programs."""
+    page, names = pathlib.Path(__file__).parents[2] / "docs" / "tutorials" / "other_program.md", {}
+    exec(page.read_text(encoding="utf-8").partition("```{code-cell}\n")[2].partition("```")[0], names)
+    return names["theirs"]
+
+
 @OTHERS
 @pytest.mark.slow
 @pytest.mark.parametrize(("X", "mu"), [(2.0, 0.1), (0.0, 1.0), (5.0, 1.0), (5.0, 4.0)])
-def test_the_difference_from_contactmechanics_is_its_discretisation(X, mu):
+def test_the_difference_from_contactmechanics_is_its_discretisation(theirs, X, mu):
     solution = greenwood_tripp.solve(X, mu)
-    forces = np.array([stability.theirs(solution, points)[2] for points in (26, 51)])
+    forces = np.array([theirs(solution, points)[2] for points in (26, 51)])
     error = forces / solution.phi_F - 1
     # of third order in its step
     assert (np.abs(error) < [5e-4, 7e-5]).all()
@@ -221,9 +228,9 @@ def test_the_difference_from_contactmechanics_is_its_discretisation(X, mu):
 
 
 @OTHERS
-def test_pressures_of_the_package_contactmechanics():
+def test_pressures_of_the_package_contactmechanics(theirs):
     solution = greenwood_tripp.solve(2.0, 0.1)
-    rho, pressure, _ = stability.theirs(solution, 21)
+    rho, pressure, _ = theirs(solution, 21)
     inside = rho < solution.rho[-1]
     own = scipy.interpolate.BarycentricInterpolator(solution.rho**2, solution.pressure)(rho[inside] ** 2)
     assert np.abs(pressure[inside] - own).max() < 1e-4 * pressure[0]
