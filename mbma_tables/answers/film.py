@@ -49,7 +49,7 @@ class FlowFactors(Displayed):
     valid : ndarray
         Whether flow through such gaps was simulated.
     reasons : dict
-        Why not, each with a mask.
+        Reasons why not `valid`, each with a mask.
     peklenik : float
         Length of the roughness along x over that along y.
     """
@@ -181,7 +181,7 @@ def flow_factors(
     touching = area > 0
     of_contact = np.where(touching, np.nan_to_num(np.ravel(leak.scatter), nan=np.inf), 0.0)
     scatter = np.sqrt(OPEN**2 + of_contact**2 + (power * area**steep * np.log(gamma)) ** 2)
-    # the lightest contacts were not pressed, but flow is nearly that before contact
+    # the lightest contacts were not simulated, but their flow is nearly that before contact
     light = f"A/A0 is below {TESTED_AREA[0]:g}"
     reasons = {text: np.ravel(mask) for text, mask in leak.reasons.items() if text != light}
     far = bool(gamma > WIDEST_LAY or gamma < 1 / WIDEST_LAY)

@@ -53,7 +53,7 @@ def batch_command(
     model: options.Model,
     output: options.Output,
 ) -> None:
-    """A row of the answer for each line of SURFACES.csv.
+    """Contact for each line of SURFACES.csv, one row each.
 
     Its header names a surface's numbers as the options of `mbma contact` do, "surface" for named ones, "map" for files
     of maps with their dx, dy, detrend, cut-offs and filters, moduli (E_star, or E1, nu1, E2, nu2), and separation,
@@ -183,11 +183,11 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
 def sensitivity_command(
     loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: options.Model, output: options.Output
 ) -> None:
-    """d ln(answer)/d ln(parameter) of force, area, stiffness and conductance, what is given being held.
+    """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
-    and lengths, h_max, cut-offs and the exponent of what is extrapolated. With --range also the smallest and largest
-    answer while one runs over its range, and over the ends of all ranges together.
+    and lengths, h_max, cut-offs and the exponent of an extrapolation. With --range also the smallest and largest
+    result while one runs over its range, and over the ends of all ranges together.
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa --range h_max=1:1.5 --range hurst=0.6:0.8
     """

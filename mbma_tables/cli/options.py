@@ -29,7 +29,7 @@ PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """What `contact` and `island` are asked for besides the surface and the gap."""
+    """Arguments of `contact` and `island` other than the surface and the gap."""
 
     island_model: str
     variant: str
@@ -52,7 +52,7 @@ class Model:
 
 @dataclasses.dataclass(frozen=True)
 class Output:
-    """Where a report goes, and in which form."""
+    """Destination and format of a report."""
 
     as_json: bool
     as_csv: bool
@@ -64,7 +64,7 @@ class Output:
 
 
 def _parse_number(ctx: click.Context, param: click.Parameter, given: str | None) -> float | str | None:
-    """A number, or the text of one with its unit, which is read where the name is known."""
+    """A number, or a number with its unit as text, which is converted later."""
     if given is None:
         return None
     try:
@@ -146,7 +146,7 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
 
 
 def _option(name: str, help: str, **kind: Any) -> Decorator:
-    """The option of one argument of the library, by its name; of a quantity where no other kind is said."""
+    """The option for one argument of the library, by its name; a quantity unless another kind is given."""
     flag, kind = f"--{name.replace('_', '-')}", kind or {"callback": _parse_number, "metavar": "X[UNIT]"}
     return click.option(flag, name.partition("/")[0], help=help, **kind)
 
@@ -209,7 +209,7 @@ _SPECIMEN_OPTIONS = (
     _option("Sds", "or summits per area [1/length^2],"),
     _option("Spd", "the same by its newer name;"),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),
-    _option("nominal_area", "or the nominal area [length^2], of which the highest point follows."),
+    _option("nominal_area", "or the nominal area [length^2], which determines the highest point."),
     _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
     _option("E1", "Instead of --E-star: Young's modulus,"),
     _option("nu1", "and Poisson's ratio of one body,", type=float),
@@ -227,7 +227,7 @@ optional_specimen_options = _group(
 
 
 def load_options(option: Callable[..., Decorator]) -> Decorator:
-    """What a contact is known by, each an `option` of numbers; those given reach a command as `loads`."""
+    """Quantities of which one is given, each an `option` of numbers; the command receives those given as `loads`."""
     return _group(
         "loads",
         _given,

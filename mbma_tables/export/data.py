@@ -63,7 +63,7 @@ def _content(law: LawTable) -> dict[str, Any]:
 
 
 def from_json(content: str | bytes) -> LawTable:
-    """The law in a file of `to_json`; anything else is refused."""
+    """The law in a file of `to_json`; other files are rejected."""
     try:
         return _law_of(json.loads(content))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
@@ -89,7 +89,7 @@ def to_matlab(law: LawTable) -> bytes:
     comments = np.array(law.comments, dtype=object)
     named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
     savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
-    # the first 116 bytes are free text, where scipy puts the time: the same law gives the same bytes
+    # the first 116 bytes are free text, where scipy writes the time: replaced, for identical bytes
     return b"MATLAB 5.0 MAT-file, mbma_tables".ljust(116) + stream.getvalue()[116:]
 
 

@@ -1,4 +1,4 @@
-"""An exported law: that of one surface with its units, and what every file that is written of it says at its head."""
+"""An exported law: the law of one surface with its units, and the header of all files written from it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
 ROUNDS, PARTS = 4, 32  # of the search for an end of validity between two of them
-OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surface that is its own spectrum
+OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a surface given by a spectrum
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ExportedLaw:
     hardness: float  # infinite where the contact is elastic
     length: str  # unit of length,
     stress: str  # and of stress
-    made_by: tuple[str, ...] = ()  # lines of a file's head that say how to write it again
+    made_by: tuple[str, ...] = ()  # header lines with the command that writes the file again
 
     @property
     def units(self) -> Units:
@@ -57,7 +57,7 @@ class ExportedLaw:
         return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """Lines of a file's head: what it holds, range, error, validity up to `end`, and with `leakage` of flow."""
+        """Lines of a file's header: contents, range, error, validity up to `end`, and with `leakage` those of flow."""
         law, stress = self.law, self.stress
         names = self.surface.parameters or OWN_NUMBERS
         numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
@@ -87,7 +87,7 @@ class ExportedLaw:
         )
 
     def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
-        """Lines that say where the law holds, how far simulations scatter about it, and where its numbers are from."""
+        """Lines on the valid range of the law, its scatter against simulations, and the origin of its numbers."""
         law, stress_unit = self.law, self.stress
         # small overclosures by their logarithm, larger ones evenly
         small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
@@ -110,7 +110,7 @@ class ExportedLaw:
         return (*lines, *self._hashes())
 
     def _hashes(self) -> Iterator[str]:
-        """Of the table that the theory reads, and of a surface that is no five numbers."""
+        """Lines on the table that the theory uses, and on a surface not given by five numbers."""
         if isinstance(self.theory, Mbma):
             from mbma_tables.models.tables import universal_model
 
@@ -122,7 +122,7 @@ class ExportedLaw:
             yield f"spectrum: values {values.hexdigest()[:16]}"
 
     def _not_valid(self, reason: str, u: FloatArray, bad: Any, leakage: bool) -> list[str]:
-        """Ranges of pressure in which a reason holds, by the outermost pressures found valid, rounded away from it."""
+        """Ranges of pressure in which a reason applies, by the outermost valid pressures, rounded outward."""
         lines = []
         steps = np.flatnonzero(np.diff(bad)) + 1
         for first, last in zip(np.append(0, steps), np.append(steps, bad.size), strict=True):
@@ -138,7 +138,7 @@ class ExportedLaw:
         return lines
 
     def _last_valid(self, reason: str, good: float, bad: float, leakage: bool) -> float:
-        """Pressure at the last mean separation where a reason does not hold, between one where not and one where so."""
+        """Pressure at the last mean separation where a reason does not apply, by bisection between two separations."""
         for _ in range(ROUNDS):
             u = np.linspace(good, bad, PARTS + 1)
             found = self.answer(u[1:-1])
@@ -156,7 +156,7 @@ class ExportedLaw:
         return f"{what}: {listed} {self.stress}" if listed else "not known"
 
     def _of_leakage(self, scatter: Numbers, pressure: FloatArray) -> tuple[str, ...]:
-        """What a reader of leakage must know."""
+        """Lines on leakage."""
         blocked, least = self.law.leakage.blocked_at, "never blocked"
         if blocked > -np.inf:
             c = (self.law.h_max - blocked) / 2
@@ -174,7 +174,7 @@ class ExportedLaw:
 
 
 def outward(value: float, rounding: str) -> str:
-    """Four digits of a number, the last one rounded as told.
+    """Four digits of a number, rounded in the given direction.
 
     Examples
     --------

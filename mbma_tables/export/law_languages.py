@@ -1,4 +1,4 @@
-"""How a contact law is written in each language: templates, numbers and arrays, and what a user must know."""
+"""How a contact law is written in each language: templates, formats of numbers and arrays, notes for the user."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ CALLED = (
     "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
     "tests; not run in Abaqus."
 )
-LAST = "At pressures beyond the law's range the last value is taken, and a line on stderr tells of the first one."
+LAST = "At pressures beyond the law's range the last value is used, with one warning on stderr."
 SUBROUTINE = C._replace(beside=())
 GAPCON = SUBROUTINE._replace(subroutine="gapcon.c", only_conductance=True)
 LANGUAGES = {

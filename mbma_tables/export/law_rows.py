@@ -1,4 +1,4 @@
-"""A contact law as rows for other codes: what it is, in which units, and rows chosen by their error.
+"""A contact law as rows for other codes, with quantity and units; the rows are chosen by their error.
 
 Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
 approach, so that -dp/du = dp/dc.
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 QUANTITIES = ("pressure", "conductance", "leakage")
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
-LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # of h_max, mean separations of the last points
+LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # mean separations of the last points, over h_max
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -47,7 +47,7 @@ class LawTable(Displayed):
     x_unit: str
     y_unit: str
     largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
-    comments: tuple[str, ...]  # what a reader of the file must know
+    comments: tuple[str, ...]  # notes for the reader of the file
     theory: str  # whose law it is
     floor: float = 0.0  # value below which errors are relative to it
     behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
@@ -73,7 +73,7 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: fl
     law = exported.law
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
-    # close to full compression pressure may run up with the logarithm of the mean separation
+    # near full compression pressure may diverge with the logarithm of the mean separation
     u = law.h_max * np.geomspace(max(1 - max_overclosure / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
     d = law.h_max - 2 * c
@@ -189,7 +189,7 @@ def _table(
     k_s: float = 1.0,
     behaviour: LawTable | None = None,
 ) -> LawTable:
-    """Rows up to an overclosure, whose error holds from the `least` pressure on, or above `FLOOR`."""
+    """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
     law = exported.law
     fine_x, fine_y = _curve(exported, quantity, end, k_s)
     floor = FLOOR * float(fine_y[-1])
@@ -202,7 +202,7 @@ def _table(
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
     if heat := quantity == "conductance":
-        # between no contact and the smallest pressure that counts there is one row alone, that of zero
+        # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
     x, y, error = choose(fine_x, fine_y, floor, jump=heat or law.highest < np.inf)
@@ -219,7 +219,7 @@ def _table(
 
 
 def _why_there(law: ContactLaw, end: float, quantity: str) -> str:
-    """Why rows end where they do."""
+    """The reason for the end of the rows."""
     if quantity == "leakage" and law.leakage.blocked_at >= law.h_max - 2 * end:
         return "where contact blocks the gaps"
     if end < _last(law) * (1 - ROUNDING):
@@ -230,14 +230,14 @@ def _why_there(law: ContactLaw, end: float, quantity: str) -> str:
 
 
 def _last(law: ContactLaw) -> float:
-    """Overclosure at full compression, or where the force turns down."""
+    """Overclosure at full compression, or where the force has its maximum."""
     return (law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 2
 
 
 def _range(
     law: ContactLaw, end: float | None, pressures: tuple[float | str, float | str] | None, units: Units
 ) -> tuple[float | None, float]:
-    """Smallest pressure whose error counts, and largest overclosure, by a range of pressures or by an overclosure."""
+    """Smallest pressure for the error, and largest overclosure, from a range of pressures or an overclosure."""
     if pressures is None:
         return None, _range_end(law, end)
     if end is not None:
@@ -255,7 +255,7 @@ def _range(
 
 
 def _range_end(law: ContactLaw, asked: float | None) -> float:
-    """The largest overclosure: as asked, or at full compression, or where the force turns down."""
+    """The largest overclosure: as requested, or at full compression, or where the force has its maximum."""
     end = _last(law)
     found = end if asked is None else one_number("largest_overclosure", asked)
     if not 0 < found <= end:

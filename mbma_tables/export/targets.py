@@ -1,7 +1,7 @@
 """Targets: programs and formats that laws are written for, each declared once, where it is written.
 
-A new one is a function and a `Target` in the tuple TARGETS of its module: what it is written from, the quantities and
-options that it takes, and, for rows, its comments, its limits and what the program does outside them.
+A new one is a function and a `Target` in the tuple TARGETS of its module, with its input, the quantities and options
+that it accepts, and, for rows, its comments, its limits and the behaviour of the program outside them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """What is written for one program, or in one format.
+    """Declaration of the output for one program, or in one format.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ class Target:
 
 @dataclasses.dataclass(frozen=True)
 class Grammar:
-    """How a program reads the rows of a law; called with a `LawTable` it gives the text of a file."""
+    """Format of the rows of a law for a program; called with a `LawTable` it returns the text of a file."""
 
     program: str
     mark: str  # of comments
     body: Mapping[str, Callable[..., str]]  # by quantity: what stands below the comments, of the law and what is named
-    beyond: str  # what the program does outside the rows, and what else its user must know
+    beyond: str  # behaviour of the program outside the rows, and further notes for its user
     most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
-    named: str | None = None  # what a name stands for that is not given; None where there is none
+    named: str | None = None  # default name; None if there is none
     first: str = ""  # line of the file
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
@@ -111,5 +111,5 @@ def targets() -> dict[str, Target]:
 
 
 def names(*groups: str) -> tuple[str, ...]:
-    """What a user may name, of some groups or of all; a target of an option, with a space in its name, is none."""
+    """Names that a user may give, of some groups or of all; targets with a space in the name belong to an option."""
     return tuple(name for key in groups or GROUPS for name in group(key) if " " not in name)

@@ -82,7 +82,7 @@ class IslandSolution:
 
     @property
     def rho(self) -> FloatArray:
-        """Radii of the profiles over L, shape (..., nodes); solved for when first asked."""
+        """Radii of the profiles over L, shape (..., nodes); solved on first access."""
         return self._profiles[0]
 
     @property
@@ -124,7 +124,7 @@ def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
 
 
 def _nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
-    """Gauss nodes that usually give `rtol`; the estimate of each solution decides."""
+    """Gauss nodes that usually give `rtol`; the error estimate of each solution is then checked."""
     digits = max(-math.log10(rtol), 3.0)
     softness = np.log10(np.maximum(mu, 1.0)) / 12
     wanted: FloatArray = digits * np.sqrt(np.maximum(X, 0) + 5) * (1 + softness)
@@ -146,7 +146,7 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
         found, taken = _newton(X[now], mu[now], rtol, int(count))
         phi[now], used[now] = found, count
         steps[now] += taken
-        # nodes that were asked for give what they give
+        # a requested number of nodes is used as it is
         failed[now] = ~(found[:, 2] <= (rtol if nodes is None else np.inf))
     return phi, steps, used, failed | ~np.isfinite(phi).all(axis=1)
 
@@ -218,7 +218,7 @@ def iterate(
 
 
 def radius(X: float, mu: float, rtol: float) -> float:
-    """Where an island ends, as far as a relative error `rtol` tells."""
+    """Radius beyond which an island contributes less than a relative error `rtol`."""
     squared = np.empty(1)
     core.island_extents(np.array([X]), np.array([mu]), 0.03 * rtol, squared)
     return math.sqrt(squared[0])
@@ -256,7 +256,7 @@ def solve(
     rtol : float
         Relative error asked of phi_F and phi_A, at least 1e-13; it sets the node count.
     nodes : int, optional
-        Use this many Gauss nodes (8 to 1024) or rings (to 2048) instead; then `error` says what accuracy they gave.
+        Use this many Gauss nodes (8 to 1024) or rings (to 2048) instead; then `error` is the accuracy reached.
     method : {"newton", "classical"}
         Newton on the spectral discretisation, or the damped iteration of Greenwood and Tripp (1967) on
         `nodes` rings (200 if not given), whose mesh error `error` states and `rtol` does not control.
@@ -272,7 +272,7 @@ def solve(
     InputError
         NaN, infinite, masked or empty input, a negative `mu`, an `rtol` outside [1e-13, 0.1].
     ConvergenceError
-        Where the accuracy was not reached; its `mask` says which entries, its `result` holds the rest.
+        Where the accuracy was not reached: at entries of its `mask`; its `result` holds the others.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Island models: force, area and error of an island at (X, mu).
 
-Totals take any of them, by name or as an object, and do not ask which. Two need no table: the exact solver and the
+Totals accept any of them, by name or as an object. Two need no table: the exact solver and the
 rigid sphere.
 """
 
@@ -17,21 +17,21 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
-OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
+OUTSIDE = ("raise", "exact", "nan")  # options for islands that a table does not cover
 QUANTITIES = ("pressure", "area")
-FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
-MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
+FORCE, AREA, BOTH = 0, 1, 2  # which of both are requested
+MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that may be requested of totals and islands
 CLOSED_FORM_ERROR = 1e-14
 
 
 def check_outside(outside: str) -> None:
-    """Refuse what is none of `OUTSIDE`."""
+    """Reject values that are not in `OUTSIDE`."""
     if outside not in OUTSIDE:
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
 
 
 class Certificate(NamedTuple):
-    """Relative errors of one function on points that no fit saw, and its number of fitted coefficients."""
+    """Relative errors of one function at held-out points, and its number of fitted coefficients."""
 
     coefficients: int
     largest: float
@@ -43,7 +43,7 @@ class Certificate(NamedTuple):
 class IslandAnswer(NamedTuple):
     """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
 
-    Where a model was asked for one of the two and the other would have cost more, the other is NaN.
+    If only one of the two was requested and the other would cost more, the other is NaN.
     """
 
     phi_F: FloatArray
@@ -65,7 +65,7 @@ class IslandModel(Protocol):
 
 @runtime_checkable
 class GeometryModel(Protocol):
-    """An island model that needs more of an island than X and mu, or has cheaper ways to answer one quantity."""
+    """An island model that needs more than X and mu of an island, or computes one quantity alone at lower cost."""
 
     @property
     def name(self) -> str:
@@ -84,7 +84,7 @@ AnyModel = IslandModel | GeometryModel
 def answer_islands(
     model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
 ) -> IslandAnswer:
-    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked."""
+    """Phi_F and Phi_A of islands by any model; results of models of X and mu are checked."""
     if isinstance(model, GeometryModel):
         return model.of_islands(islands, outside, which)
     shape = islands["X"].shape
@@ -134,5 +134,5 @@ def exact_model(rtol: float) -> ExactModel:
 
 
 def island_model_name(island_model: str | AnyModel) -> str:
-    """The name that results give an island model."""
+    """The name of an island model in results."""
     return island_model if isinstance(island_model, str) else getattr(island_model, "name", "")

@@ -1,6 +1,6 @@
 """Closed forms: the island model "formula", and total force and area without a sum over islands.
 
-The forms are in `core/closed_forms.h`, which the generator writes; docs/formula.md shows them.
+The forms are in `core/closed_forms.h`, written by `generate`; docs/formula.md lists them.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class FormulaModel(Ranged):
     def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A with the largest error that the form's certificate states, as `UniversalModel.answer`.
 
-        `which` is FORCE, AREA or BOTH; what is not asked for is NaN.
+        `which` is FORCE, AREA or BOTH; a quantity that is not requested is NaN.
         """
         wanted = RESULTS if which == BOTH else (RESULTS[which],)
 
@@ -86,7 +86,7 @@ class FormulaModel(Ranged):
         return self._answered(X, mu, outside, fill)
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, or the one asked for."""
+        """Phi_F and Phi_A of islands, or the requested one."""
         return self.answer(islands["X"], islands["mu"], outside=outside, which=which)
 
 
