@@ -88,7 +88,7 @@ def contact_map(found: Any) -> ContactMap:
     """Simulation of a contact's map at the contact's pressure; see `Contact.map`."""
     source, pressure = found._source, np.asarray(found.pressure, float)
     if pressure.ndim or np.ndim(source.E_star) or source.yields:
-        raise InputError("a map is of one elastic contact: give one pressure, one modulus and no hardness")
+        raise InputError("a map shows one elastic contact: give one pressure, one modulus and no hardness")
     surface: Any = source.surface
     whole = map_of(surface)
     modulus, force = float(source.E_star), float(pressure) / float(source.E_star)

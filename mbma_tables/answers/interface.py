@@ -31,7 +31,7 @@ from mbma_tables.materials import Pair, tangential_ratio
 from mbma_tables.surfaces.any_surface import AnySurface
 
 OF_YIELDING = (
-    "slip of a contact that yields is not known: its normal law is of loading alone; `stiffness` of full stick is"
+    "slip of a contact that yields is not known: its normal law is for loading only; `stiffness` of full stick is known"
 )
 OF_LAY = "slip of a surface with a lay was not compared with simulations; `stiffness` of full stick is known"
 DIRECTIONS = ("along", "across")

@@ -212,14 +212,14 @@ class Leakage(Displayed):
         eta, high, low, length = self._positive(
             viscosity=viscosity, pressure_in=pressure_in, pressure_out=pressure_out, width=width
         )
-        larger = "at least pressure_out: it is the larger, absolute pressure"
+        larger = "at least pressure_out: both are absolute pressures"
         require("pressure_in", np.asarray(high + 0 * low), np.asarray(high >= low), larger)
         path = self._number("mean_free_path", mean_free_path)
         require("mean_free_path", np.asarray(path), np.asarray(path >= 0), "at least 0")
         channel = self.hydraulic_aperture
         agree(K=self.K, viscosity=eta, pressure_in=high, pressure_out=low, width=length, mean_free_path=path)
         knudsen = path / np.maximum(channel, np.finfo(float).tiny) * (channel > 0)
-        limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, flow is not that of slip"
+        limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, first-order slip does not apply"
         require("mean_free_path", np.asarray(path + 0 * knudsen), np.asarray(knudsen <= LARGEST_KNUDSEN), limit)
         return self.K * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
 
@@ -280,7 +280,7 @@ def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, ar
     far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
     found = {many: area > LARGEST_AREA, far: large} if own is None else dict(own[1])
     if theory.elastic is not theory:
-        found["leakage: yielded contacts leak more, by factors"] = np.ones(np.shape(area), bool)
+        found["leakage: yielded contacts leak several times more"] = np.ones(np.shape(area), bool)
     if isinstance(theory.elastic, Mbma):
-        found["leakage: the mean separation of 'mbma' is off by factors"] = np.ones(np.shape(area), bool)
+        found["leakage: the mean separation of 'mbma' is wrong by factors"] = np.ones(np.shape(area), bool)
     return found

@@ -188,9 +188,7 @@ def _by_pressure(
         low, high = (value / times, value * times) if what == "area" else (value - width, value + width)
         axes.fill_between(pressure[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
     if simulated is not None:
-        axes.plot(
-            simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this very map"
-        )
+        axes.plot(simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this map")
     axes.set_xscale("log")
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
@@ -214,7 +212,7 @@ def table_of_loads(
     # curves of unusual maps skip some contact areas
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
     if not reached.all():
-        told.append(f"{_contacts(areas[~reached])} left out: the map's curve jumps over it")
+        told.append(f"{_contacts(areas[~reached])} omitted: the map's curve does not reach it")
     names = ("area", "pressure", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
     reasons, everywhere = found.reasons, get_theory(theory, surface).departures(surface)

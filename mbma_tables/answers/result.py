@@ -192,9 +192,9 @@ class Contact(Interface, Displayed):
         """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
         if self._source.yields:
             raise InputError(
-                "energy: what a contact that yields gives back is not known, since the shape that stays is not; "
-                "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness what a small "
-                "unloading starts with"
+                "energy: the energy that a yielded contact gives back is not known, since its residual shape is not; "
+                "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness the "
+                "initial stiffness of unloading"
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
 

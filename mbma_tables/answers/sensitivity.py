@@ -174,7 +174,7 @@ def sensitivity(
 
     here = {name: float(number[()]) for name, number in answers({}).items() if name in wanted}
     if not all(number > 0 for number in here.values()):
-        raise InputError(f"there is no contact at this {by}, or full contact: nothing to take a logarithm of")
+        raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
     varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
     slopes, errors = _slopes(answers, numbers, varied, wanted, 3 if batches else 1)
     ends = _ranges(answers, numbers, ranges or {}, units, wanted)

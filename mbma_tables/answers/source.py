@@ -42,7 +42,7 @@ MEANINGS = {
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
     "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, between simulations",
     "separation_scatter": "standard deviation of the mean separation at this force from simulation to simulation",
-    "valid": "whether the theory was tested for contacts such as these",
+    "valid": "whether the theory was tested for such contacts",
 }
 MAX_GRADIENT = 1.0  # larger rms gradients suggest that heights and wavenumbers are in different units
 

@@ -87,7 +87,7 @@ def batch_command(
         names.append(row.get("name", row.get("surface", row.get("map", f"line {number}"))))
         specimens.append(specimen)
     if len({specimen.units for specimen in specimens}) > 1:
-        raise InputError(f"{file}: some lines know their units and some do not: give --length-unit and --stress-unit")
+        raise InputError(f"{file}: some lines have units and some do not: give --length-unit and --stress-unit")
     first = specimens[0]
     moduli = [1.0 if specimen.E_star is None else specimen.E_star for specimen in specimens]
     doing(f"batch of {len(lines)} lines")
@@ -154,7 +154,7 @@ def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: s
     if "map" in row and ("surface" in row or numbers):
         raise InputError("a map and a named surface or numbers: one of them")
     if treatment and "map" not in row:
-        raise InputError(f"{', '.join(treatment)}: about a map, which is missing")
+        raise InputError(f"{', '.join(treatment)}: for a map, which is missing")
     if "map" in row:
         specimen = from_map(folder / row["map"], treatment | {"unit": length})
     else:
@@ -172,11 +172,9 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
     return name.strip().lstrip("-").replace("-", "_"), (low, high)
 
 
-@click.command("sensitivity", short_help="How much each unknown matters.")
+@click.command("sensitivity", short_help="Sensitivity of results to each parameter.")
 @options.load_options(options.quantity_option)
-@click.option(
-    "--range", "ranges", multiple=True, metavar="NAME=X:X", help="Where a parameter may lie; may be repeated."
-)
+@click.option("--range", "ranges", multiple=True, metavar="NAME=X:X", help="Range of a parameter; may be repeated.")
 @options.specimen_options
 @options.theory_options
 @options.output_options

@@ -227,7 +227,7 @@ def surfaces_command(output: options.Output) -> None:
 @click.argument("measurements", metavar="MAP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
 @options.plot_option
-@click.option("--simulate", is_flag=True, help="Press the map by boundary elements; --out OWN.nc keeps them.")
+@click.option("--simulate", is_flag=True, help="Simulate the map by boundary elements; --out OWN.nc stores results.")
 @options.map_options
 @options.output_options
 def fit_command(
@@ -282,9 +282,9 @@ def fit_command(
     report.write(output, plot, picture)
 
 
-@click.command("cost", short_help="What accuracy costs, in time.")
-@click.option("--island-model", help="Rows of this island model alone.")
-@click.option("--distance", is_flag=True, help="Theories' distance from brute force in place of numerical error.")
+@click.command("cost", short_help="Computing time against accuracy.")
+@click.option("--island-model", help="Rows of this island model only.")
+@click.option("--distance", is_flag=True, help="Theories' deviation from simulation instead of numerical error.")
 @options.json_option("a table")
 def cost_command(island_model: str | None, distance: bool, as_json: bool) -> None:
     """Error and time of every method, as measured on held-out surfaces.
@@ -300,7 +300,7 @@ def cost_command(island_model: str | None, distance: bool, as_json: bool) -> Non
     costs = shipped_costs()
     if distance:
         if island_model is not None:
-            raise InputError("--island-model is about numerical error: leave it or --distance out")
+            raise InputError("--island-model is for numerical error: leave it or --distance out")
         _show("distance", shipped_distances(), costs.seconds, as_json)
         return
     rows = [row for row in costs.rows if row.island_model != UNIT]

@@ -58,7 +58,7 @@ class _Export(click.Command):
 @click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @options.optional_specimen_options
-@click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")
+@click.option("--rows", type=int, help="Number of rows of a table; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
 @options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")

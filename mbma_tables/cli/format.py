@@ -196,7 +196,7 @@ def report_answer(
 ) -> Report:
     """The report of a command that evaluated the model; `units` are those that do not follow from names."""
     surface, notes = _surface_facts(specimen)
-    scale = "forces are over E*, none was given"
+    scale = "forces are over E*, since no modulus was given"
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
     made = (

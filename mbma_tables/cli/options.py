@@ -159,14 +159,14 @@ _MAP_OPTIONS = (
     _option("channel", "Number of the map's channel in its file.", type=int),
     _option("periodic/--not-periodic", "Whether the map continues periodically.", default=None),
     _option("detrend", "What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", metavar="MODE"),
-    _option("outliers", "Take out points N standard deviations off; try 10.", type=float, metavar="N"),
+    _option("outliers", "Remove points beyond N standard deviations; try 10.", type=float, metavar="N"),
     _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
     _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
     _option("long_cutoff", "Longest wavelength to keep [length]."),
     _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
     _option("l_filter", "and of an L-filter [length]."),
-    _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
-    _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
+    _option("tip_radius", "Of the probe or stylus [length]: keep wavelengths that it can follow."),
+    _option("reliable/--all-waves", "Whether to use the resolution stated in the file.", default=None),
     _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
     _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
     _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
@@ -250,7 +250,7 @@ variant_option = _option(
 _MODEL_OPTIONS = (
     variant_option,
     _option("island_model", "Island model.", default="universal", type=click.Choice(ISLAND_MODELS), **SHOWN),
-    _option("rtol", "Numerical relative error asked for.", type=float, default=DEFAULT_RTOL, **SHOWN),
+    _option("rtol", "Requested numerical relative error.", type=float, default=DEFAULT_RTOL, **SHOWN),
 )
 theory_option = _option(
     "theory",

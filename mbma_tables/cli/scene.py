@@ -22,7 +22,7 @@ SUFFIXES = (".nc", ".csv")
 scene_file = click.argument("file", type=click.Path(path_type=Path))
 
 
-@click.command("plan", short_help="How a scene would be computed, at what error and price.")
+@click.command("plan", short_help="Plan of a scene: steps, errors and computing times.")
 @scene_file
 @json_option("text")
 def plan_command(file: Path, as_json: bool) -> None:

@@ -99,7 +99,7 @@ def _start(surface: AnySurface) -> dict[str, Any]:
     if isinstance(surface, Surface) and surface.shape == ():
         return {name: float(getattr(surface, name)) for name in surface.parameters}
     if not isinstance(surface, MeasuredSurface):
-        raise InputError("the page is of one surface: take one of the batch")
+        raise InputError("the page shows one surface: take one of the batch")
     if surface.q.size > MAX_SAMPLES:
         raise InputError(
             f"the page takes at most {MAX_SAMPLES} samples of a spectrum, and this one has {surface.q.size}: "

@@ -211,7 +211,7 @@ def _table(
         f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
-        *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
+        *(["the first row is zero, whatever the theory gives up to the second"] if law.highest < np.inf else ()),
         end=end,
         leakage=quantity == "leakage",
     )

@@ -114,7 +114,7 @@ def exponential(
     modulus, units = modulus_and_units(E_star, surface, stress_unit)
     for kind in ("length", "stress"):
         if getattr(units, kind) in (None, "1"):
-            raise InputError(f"{kind}_unit is missing: a law without units is read wrongly sooner or later")
+            raise InputError(f"{kind}_unit is missing: a law without units is easily misread")
     h_rms = float(surface.h_rms)
     near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).pressure
     u0 = h_rms / math.log(near / far)
@@ -179,7 +179,7 @@ abaqus = Grammar(
     "Abaqus continues the last slope beyond the last row: stay within the range.",
     named="ROUGH",
 )
-STAY = "Stay within the rows: what the solver has beyond them was not tried."
+STAY = "Stay within the rows: the solver's behaviour beyond them was not tested."
 lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(QUANTITIES, _lsdyna), STAY)
 optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
 comsol = Grammar("COMSOL", "%", dict.fromkeys(QUANTITIES, _columns), "Interpolation: linear; extrapolation: none.")

@@ -124,7 +124,7 @@ def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:
     if not surface.q1 > variant.floor_u * surface.longest:
         raise OutOfRangeError(
             f"the spectrum ends at q = {surface.q1:.4g}, and MBMA's smallest band at {variant.floor_u:g} times "
-            f"{surface.longest:.4g}, where most height is: measure shorter wavelengths, or ask another theory"
+            f"{surface.longest:.4g}, where most height is: measure shorter wavelengths, or use another theory"
         )
     at_d, at_u = (surface.laws.place(floor * surface.longest) for floor in (variant.floor_d, variant.floor_u))
     root_d, root_u = (float(np.sqrt(surface.laws.above(place))) for place in (at_d, at_u))

@@ -305,9 +305,9 @@ def solve(
     if failed.any():
         first = int(np.flatnonzero(missed)[0])
         raise ConvergenceError(
-            f"{method} did not reach the accuracy asked for at {int(failed.sum())} of {failed.size} "
+            f"{method} did not reach the requested accuracy at {int(failed.sum())} of {failed.size} "
             f"entries, the first at X = {flat_X[first]:.6g}, mu = {flat_mu[first]:.6g} "
-            f"(reached {phi[first, 2]:.1e}, asked {rtol:.1e})",
+            f"(reached {phi[first, 2]:.1e}, requested {rtol:.1e})",
             failed,
             result,
         )

@@ -135,7 +135,7 @@ class Derived:
         from mbma_tables.law.leakage import leakage_law
 
         if self.surface is None:
-            raise InputError("leakage needs the surface, which this law does not hold")
+            raise InputError("leakage needs the surface, which this law does not contain")
         return leakage_law(self, self.surface)
 
     def _figure(self: Any) -> Figure:

@@ -74,7 +74,7 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
     """
     if law.theory in OF_MAPS:
         raise InputError(
-            f"a law holds the leakage of isotropic gaps alone; by theory {law.theory!r} contact(...).leakage has it "
+            f"a law has the leakage of isotropic gaps only; with theory {law.theory!r} contact(...).leakage has it "
             "along both axes, .x and .y"
         )
     threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)

@@ -67,7 +67,7 @@ def anisotropic_medium(
         if np.abs(step).max(initial=0.0) < RESOLVED:
             break
     else:
-        raise ConvergenceError(f"the medium of gaps is not found to {RESOLVED:g} in {ROUNDS} steps")
+        raise ConvergenceError(f"the effective medium of gaps did not converge to {RESOLVED:g} in {ROUNDS} steps")
     factor = _depolarisation(log_k, peklenik)
     weight = share / (1 + factor[..., None] * (cube / np.exp(log_k)[..., None] - 1))
     carried = np.sum(weight * gap, axis=-1) / (weight.sum(axis=-1) + blocked / (1 - factor))

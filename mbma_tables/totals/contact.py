@@ -1,6 +1,6 @@
 """Total force and area of a surface at a gap: the sum over its contact islands (Eqs. 44-50).
 
-Everything of an island depends on its approach delta alone; the gap enters through the Gaussian weight and
+All properties of an island depend on its approach delta alone; the gap enters through the Gaussian weight and
 the upper limit h_max - d. In units of s and 1/q0,
 
     F/(A0 E* q0 s) = integral_0^((h_max - d)/s) F_hat D_d K1 G d(delta/s),
@@ -28,17 +28,17 @@ from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, sums_by_table, totals_of
 from mbma_tables.totals.profile import profile
 
-# surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
+# most surfaces evaluated by profiles, in numpy; of more surfaces, those with enough gaps each for this to cost less
 FEW_SURFACES, MANY_GAPS = 16, 300
 LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Totals:
-    """Force and area of the MBMA model at given separations, its fields those of `Contact`.
+    """Force and area of the MBMA model at given separations, with the fields of `Contact`.
 
-    `error` is of quadrature and islands together, against the island model: for "rigid" spheres that
-    do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
+    `error` bounds that of quadrature and islands, relative to the island model ("rigid" itself is far from
+    elastic islands). Derivatives on a surface given by a spectrum are with respect to the separation only.
     """
 
     pressure: Any
@@ -88,7 +88,7 @@ def totals_at(
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
         raise
-    # what is nearly nothing has few digits
+    # nearly vanishing values have few digits
     least = np.minimum(pressure, area)
     if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(pressure, area) > 0)).any():
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
@@ -110,11 +110,11 @@ def totals_at(
 def _by_profiles(
     surface: AnySurface, depth: FloatArray, how: Sums, sums: FloatArray, error: FloatArray
 ) -> tuple[int, NDArray[np.intp]]:
-    """Fill in sums, perhaps their slopes by the compression, and errors; the islands, and the gaps not answered."""
+    """Fill in sums, perhaps their slopes by the compression, and errors; returns islands, and gaps not computed."""
     compression, islands = np.asarray(depth / surface.h_rms).ravel(), 0
     touching = np.flatnonzero(compression > 0)
     left, groups = [touching[:0]], {0: touching}
-    # what lies outside of the table is solved gap by gap
+    # gaps outside the table are solved one by one
     shapes: list[Any] = [surface]
     outside = how.outside
     if isinstance(surface, Surface):
@@ -138,7 +138,7 @@ def _by_profiles(
             left.append(places[~inside])
             places = places[inside]
         islands += kept.islands
-        # most often all gaps are of one surface and touch, and slices are faster
+        # usually all gaps are of one surface and in contact, and slices are faster
         chosen: Any = slice(None) if places.size == compression.size else places
         error[chosen] = kept.error
         sums[:, chosen] = kept.totals(compression[chosen], len(sums) > 2, how.workers)
@@ -150,7 +150,7 @@ def _sums(
 ) -> tuple[FloatArray, FloatArray, int]:
     """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
 
-    By profiles of islands where surfaces are few or have many gaps each, else gap by gap.
+    By profiles of islands if there are few surfaces or many gaps for each, else gap by gap.
     """
     size, islands, left = depth.size, 0, np.arange(depth.size)
     sums, error = np.zeros((4 if slopes else 2, size)), np.zeros(size)

@@ -39,7 +39,7 @@ core.kronrod(NODES, KRONROD, GAUSS)
 BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
 DEPTH = 64  # halvings of an interval before giving up
 MOST = 1000  # intervals of an integral before giving up
-LEAST = 1e-290  # of integrals: smaller ones have lost digits that no halving brings back
+LEAST = 1e-290  # smallest integrals; smaller ones have lost digits to underflow
 
 
 class Integrals(NamedTuple):
@@ -69,7 +69,7 @@ def _apply_rule(
 def integrate(
     integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray, count: int, rtol: float
 ) -> Integrals:
-    """Integrate `count` positive integrands, each over the intervals that it owns.
+    """Integrate `count` positive integrands, each over its own intervals.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def integrate(
     owner : (n,) int array
         Which integral an interval belongs to, 0 ... count - 1.
     low, high : (n,) arrays
-        The intervals: break points, and whatever start suits the integrand.
+        The intervals: break points, and a suitable initial subdivision.
     count : int
         Number of integrals; one that owns no interval is 0.
     rtol : float
@@ -94,7 +94,7 @@ def integrate(
         Where `DEPTH` halvings, or `MOST` intervals, did not suffice; `mask` is true for these integrals.
     """
     if owner.size == 0:
-        # one component stands for all
+        # one component represents all
         nothing = np.zeros((count, 1))
         return Integrals(nothing, nothing, 0)
     evaluations, kept = 0, list[Any]()
@@ -141,14 +141,14 @@ class Pairs(NamedTuple):
         return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
 
     def some(self, chosen: Any) -> Pairs:
-        """The pairs at these places."""
+        """The pairs at these indices."""
         return Pairs(*(field[chosen] for field in self))
 
 
 class Totals(NamedTuple):
     """F/(A0 E* q0 s) and A/A0 of pairs, the bound on their relative error, and the islands evaluated.
 
-    Of the two, one that was not requested holds the other, or NaN.
+    If one of the two was not requested, it contains the other, or NaN.
     """
 
     force: FloatArray
@@ -163,7 +163,7 @@ def island_density(height: Any, D_d: Any, sigma_d: Any) -> Any:
 
 
 def jacobian_below(rms_over_s: Any, variant: Variant) -> Any:
-    """K1 (47) below the kink, or what (46) gives."""
+    """K1 below the kink, by (47) or (46)."""
     printed = variant.jacobian == "printed"
     return 1.0 - 4.0 / 3.0 * variant.beta / (1.0 if printed else rms_over_s) if printed or variant.offset else 1.0
 
@@ -225,7 +225,7 @@ def totals_of(
     model: AnyModel, pairs: Pairs, variant: Variant, rtol: float, outside: str = "raise", which: int = BOTH,
     workers: int = 1,
 ) -> Totals:  # fmt: skip
-    """Totals by an island model, in the way that suits its class; errors carry a mask of the pairs.
+    """Totals by an island model, with the method for its class; exceptions have a mask of the pairs.
 
     `workers` threads share the pairs of the universal table.
     """
@@ -249,7 +249,7 @@ def sums_by_table(
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
     """Totals, (pairs, 2, COLUMNS or 1) with or without derivatives, the bound on their error, and the islands.
 
-    The last are the pairs that the table does not cover, which are NaN.
+    Also returns the pairs that the table does not cover, whose totals are NaN.
     """
     if not isinstance(model, UniversalModel):
         raise InputError(f"derivatives come from island model 'universal', {model.name!r} has none")

@@ -249,7 +249,7 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("heights", "options", "reason"),
         [
-            (BASE[:3, :3], {}, r"3 x 3 points hold too few scales; the least is 32 x 32"),
+            (BASE[:3, :3], {}, r"3 x 3 points have too few wavelengths; needed are at least 32 x 32"),
             (3 * X + 2 * Y + 7, {}, "flat"),
             (WHITE, {"periodic": True}, r"exponent of -[01]\.\d+ .*not above 0"),
             (np.sin(10 * np.pi * X), {"periodic": True}, "only 1 spectral points"),
