@@ -6,7 +6,10 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
+
+from mbma_tables import InputError
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))  # multiplies the counts of random tests
 
@@ -60,6 +63,31 @@ def refused(*arguments):
     return result.stderr
 
 
+def refusals(ask, *rows, error=InputError):
+    """A test of rows: arguments of `ask`, the type of the error if it is another, and what its message says."""
+
+    @pytest.mark.parametrize("row", rows, ids=lambda row: row[-1])
+    def test(row):
+        *given, said = row
+        kind = given.pop() if isinstance(given[-1], type) else error
+        with pytest.raises(kind, match=said) as caught:
+            ask(*given)
+        assert "\n" not in str(caught.value)
+
+    return test
+
+
+def told(ask, *rows):
+    """A test of rows, each of arguments of `ask` and of what is in the text that it answers."""
+
+    @pytest.mark.parametrize("row", rows, ids=lambda row: row[-1])
+    def test(row):
+        *given, said = row
+        assert said in ask(*given)
+
+    return test
+
+
 class Springs:
     """A user's theory: an exponential force, its area proportional to it."""
 
@@ -68,3 +96,30 @@ class Springs:
     def answer(self, surface, mean_separation):
         force = np.exp(-3 * mean_separation / surface.h_rms)
         return force, 0.1 * force
+
+
+WORDS = [*b' nan inf -1 1e400 [ ] { } = , # \n \x00 \xff \' " """ 1979-05-27T07:32:00Z \xef\xbb\xbf'.split(b" ")]
+WORDS += [b"0" * 400, b"9" * 5000, b"0x" + b"f" * 9000, "\u202e\u00b2\u0663".encode()]
+WORDS += [3000 * word for word in (b"[", b'{"a":', b"a=", b"a.")]
+
+
+def spoilt(content, rng):
+    """Bytes with a few cut, doubled, swapped or replaced places."""
+    data = bytearray(content)
+    for _ in range(rng.integers(1, 5)):
+        at, to = sorted(int(place) for place in rng.integers(0, len(data) + 1, 2))
+        kind = rng.integers(6)
+        if kind == 0:
+            del data[at : min(to, at + 40)]
+        elif kind == 1:
+            data[at:at] = data[at : min(to, at + 200)]
+        elif kind == 2:
+            data[at:at] = WORDS[rng.integers(len(WORDS))]
+        elif kind == 3 and data:
+            data[min(at, len(data) - 1)] = rng.integers(256)
+        elif kind == 4:
+            length = min(40, (to - at) // 2)
+            data[at : at + length], data[to - length : to] = data[to - length : to], data[at : at + length]
+        else:
+            data = data[: max(at, 1)]
+    return bytes(data)

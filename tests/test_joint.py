@@ -4,6 +4,7 @@ import pathlib
 
 import numpy as np
 import pytest
+from helpers import random_map
 
 from mbma_tables import InputError, Joint, Surface, contact
 from mbma_tables.cli import main
@@ -81,11 +82,7 @@ def test_untempered_metals_are_not_valid():
 
 
 def test_parts_may_be_maps(tmp_path):
-    rng = np.random.default_rng(0)
-    q = np.hypot(*np.meshgrid(np.fft.fftfreq(64), np.fft.fftfreq(64)))
-    phase = np.fft.fft2(rng.normal(size=(64, 64)))
-    heights = np.fft.ifft2(np.where((q > 0.03) & (q < 0.2), phase * np.maximum(q, 0.01) ** -1.8, 0)).real
-    np.save(tmp_path / "face.npy", heights / heights.std())
+    np.save(tmp_path / "face.npy", random_map(64, 0.03, 0.2) / random_map(64, 0.03, 0.2).std())
     part = '{map = "face.npy", dx = 1.0, periodic = true, unit = "um"}'
     (tmp_path / "joint.toml").write_text(f'materials = "steel 1020"\nhardness = "1.5 GPa"\npart_a = {part}\n')
     mapped = Joint.from_toml(tmp_path / "joint.toml")

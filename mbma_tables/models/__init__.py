@@ -19,7 +19,6 @@ from mbma_tables.islands import greenwood_tripp
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # options for islands that a table does not cover
 QUANTITIES = ("pressure", "area")
-FORCE, AREA, BOTH = 0, 1, 2  # which of both are requested
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that may be requested of totals and islands
 CLOSED_FORM_ERROR = 1e-14
 
@@ -41,10 +40,7 @@ class Certificate(NamedTuple):
 
 
 class IslandAnswer(NamedTuple):
-    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
-
-    If only one of the two was requested and the other would cost more, the other is NaN.
-    """
+    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape."""
 
     phi_F: FloatArray
     phi_A: FloatArray
@@ -65,28 +61,26 @@ class IslandModel(Protocol):
 
 @runtime_checkable
 class GeometryModel(Protocol):
-    """An island model that needs more than X and mu of an island, or computes one quantity alone at lower cost."""
+    """An island model that needs more of an island than X and mu."""
 
     @property
     def name(self) -> str:
         """What results call it."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
 
-        `outside` is one of `OUTSIDE`; `which` is FORCE, AREA or BOTH. Used in place of `answer` where both exist.
+        `outside` is one of `OUTSIDE`. Used in place of `answer` where both exist.
         """
 
 
 AnyModel = IslandModel | GeometryModel
 
 
-def answer_islands(
-    model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
-) -> IslandAnswer:
+def answer_islands(model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
     """Phi_F and Phi_A of islands by any model; results of models of X and mu are checked."""
     if isinstance(model, GeometryModel):
-        return model.of_islands(islands, outside, which)
+        return model.of_islands(islands, outside)
     shape = islands["X"].shape
     given: Any = model.answer(islands["X"], islands["mu"])
     try:
@@ -96,7 +90,7 @@ def answer_islands(
         raise InputError(f"island model {model.name!r} {wanted}: {fault}") from None
     bad = ~(np.isfinite(phi_F) & np.isfinite(phi_A) & (error >= 0))
     if outside != "nan" and bad.any():
-        raise OutOfRangeError(f"island model {model.name!r} has no answer for {int(bad.sum())} islands", bad)
+        raise OutOfRangeError(f"island model {model.name!r} has no result for {int(bad.sum())} islands", bad)
     return IslandAnswer(phi_F, phi_A, error)
 
 

@@ -2,6 +2,7 @@ import csv
 import inspect
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -107,21 +108,6 @@ def test_where_an_answer_is_not_valid_is_said_in_one_line():
     assert found["scatter"] == pytest.approx(contact(Surface.named("concrete"), mean_separation=[0.8, 0.01]).scatter)
     assert any(line.startswith("# not valid") for line in run(*arguments, "--csv").splitlines())
     assert "not valid" not in run("contact", "--surface", "concrete", "-u", "0.8")
-
-
-@pytest.mark.parametrize("theory", THEORIES)
-def test_curve_of_any_theory(folder, theory):
-    arguments = ("curve", "--surface", "concrete", "--theory", theory, "--points", "9", "--plot", "c.png", "--json")
-    found = json.loads(run(*arguments))
-    columns = found["columns"]
-    # some, as Persson's, have no finite force at u = 0, the last gap
-    assert len(columns["pressure"]) == len(found["valid"])
-    assert len(columns["pressure"]) in ({8} if theory == "persson" else {9} if theory == "mbma" else {8, 9})
-    answer = contact(Surface.named("concrete"), separation=columns["separation"], theory=theory)
-    assert columns["pressure"] == answer.pressure.tolist()
-    assert columns["area"] == answer.area.tolist()
-    assert found["theory"] == theory
-    assert (found["variant"] is None) == (theory != "mbma")
 
 
 def test_csv_holds_every_digit():
@@ -315,6 +301,16 @@ def test_faults_of_the_system_are_one_line(folder, fault, said, monkeypatch):
 def test_without_a_command_it_shows_its_help():
     assert run() == run("--help")
     assert run().startswith("Usage: mbma [OPTIONS] [COMMAND]")
+
+
+def test_many_options_are_in_sections():
+    headings = re.findall(r"^(\w.*):$", run("contact", "--help"), re.MULTILINE)
+    assert headings == [
+        "What is known", "Surface", "Measured map", "Surface in numbers", "Surface by roughness parameters", "Bodies",
+        "Theory", "Options",
+    ]  # fmt: skip
+    assert re.findall(r"^(\w.*):$", run("joint", "--help"), re.MULTILINE) == ["Options"]
+    assert re.fullmatch(r"mbma \d+\.\d+\.\d+, core (plain|x86_64_v\d)\n", run("--version"))
 
 
 def test_a_dash_is_standard_input_and_output(folder):

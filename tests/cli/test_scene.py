@@ -6,7 +6,7 @@ import pathlib
 import pytest
 import xarray
 from click.testing import CliRunner
-from helpers import refused, run
+from helpers import refused, run, told
 
 from mbma_tables import Surface, contact
 from mbma_tables.cli import main
@@ -47,17 +47,13 @@ def test_run_as_table_json_and_picture(tmp_path):
     assert content["variables"]["profile_pressure"]["dims"] == ["island", "node"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["run", JOINT, "--out", "joint.txt"], "--out must end with"),
-        (["run", JOINT, "--plot", "joint.jpg"], "must end with one of .png, .svg, .pdf"),
-        (["run", "none.toml"], "give the path of a scene file"),
-        (["plan", "none.toml"], "give the path of a scene file"),
-    ],
+test_mistakes_end_with_one_line = told(
+    lambda arguments: refused(*arguments),
+    (["run", JOINT, "--out", "joint.txt"], "--out must end with"),
+    (["run", JOINT, "--plot", "joint.jpg"], "must end with one of .png, .svg, .pdf"),
+    (["run", "none.toml"], "give the path of a scene file"),
+    (["plan", "none.toml"], "give the path of a scene file"),
 )
-def test_mistakes_end_with_one_line(arguments, words):
-    assert words in refused(*arguments)
 
 
 def test_the_table_has_a_line_for_each_row():

@@ -73,13 +73,6 @@ def test_solver_decks(target, law):
     assert live(write(hostile_law(law))) == live(write(law))
 
 
-def test_exponential_cards(law):
-    lines = solvers.exponential(Surface.named("concrete"), "13.3 MPa").splitlines()
-    live = [line for line in lines if not line.startswith("**")]
-    assert len(live) == 3
-    assert live[0].startswith("*SURFACE INTERACTION")
-
-
 @pytest.mark.parametrize("name", ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81, 3])
 def test_names_of_cards_and_functions(name, law):
     writers = (solvers.calculix, solvers.abaqus, solvers.modelica, data.matlab_reader)

@@ -64,16 +64,6 @@ def test_smooth_underflow(n):
         assert abs(mp.mpf(float(value)) - true) <= 5e-13 * true + 2 * mp.mpf(5e-324)
 
 
-def test_shapes():
-    assert isinstance(height_integral(1.5, 0.3), np.float64)
-    cube = np.linspace(-3, 3, 24).reshape(2, 3, 4)
-    kept = cube.copy()
-    many = height_integral(1.5, cube)
-    assert (many.shape, height_integral(1, [0, 1]).dtype) == ((2, 3, 4), np.float64)
-    np.testing.assert_array_equal(many.ravel(), height_integral(1.5, cube.ravel()))
-    np.testing.assert_array_equal(cube, kept)
-
-
 @pytest.mark.parametrize("n", [0, 3, 0.7, -0.5, math.nan])
 def test_unknown_order(n):
     with pytest.raises(InputError, match="n must be one of"):

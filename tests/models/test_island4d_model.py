@@ -42,34 +42,6 @@ def test_the_shipped_table_over_the_whole_box():
     assert np.mean(np.maximum(error_F, error_A) <= bound) > 0.995
 
 
-def inside(small, count, seed):
-    """Raw numbers of islands inside the small table, and their X."""
-    rng = np.random.default_rng(seed)
-    X_axis, spread_axis, _, hurst_axis = small.content.axes
-    hurst = rng.uniform(hurst_axis.low, hurst_axis.high, count)
-    zeta_d = SPHERE_FLOOR * 10 ** rng.uniform(0, 2, count)
-    zeta_u = zeta_d * (1 + 10 ** rng.uniform(-3, np.log10(0.99 * spread_axis.high), count))
-    X = rng.uniform(X_axis.low + 0.01, X_axis.high - 0.01, count)
-    sigma = to_axes(np.ones(count), zeta_d, zeta_u, hurst, REPORTED).sigma
-    return (X * sigma + 1) * zeta_d**-hurst, zeta_d, zeta_u, hurst
-
-
-def test_broadcasting_scalars_and_input(small):
-    raw = inside(small, 6, 33)
-    one = small.lookup(*(float(a[0]) for a in raw))
-    assert all(np.ndim(x) == 0 for x in one)
-    many = small.lookup(*raw)
-    np.testing.assert_array_equal([x[0] for x in many], list(one))
-    grid = small.lookup(np.array([[1.5], [1.6], [1.7]]), 2.0, [20.0, 21.0], 0.7)
-    assert all(x.shape == (3, 2) for x in grid)
-    np.testing.assert_array_equal([x[2, 1] for x in grid], list(small.lookup(1.7, 2.0, 21.0, 0.7)))
-    copies = [a.copy() for a in raw]
-    for a in raw:
-        a.setflags(write=False)
-    small.lookup(*raw)
-    np.testing.assert_array_equal(raw, copies)
-
-
 def test_edges_to_the_last_bit(small):
     delta, zeta_d, zeta_u = 1.5, 2.0, 20.0
     for hurst in (0.3, 1.0):

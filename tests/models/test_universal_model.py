@@ -94,17 +94,6 @@ def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
     assert open_table(path).content.attributes["history"] == "another"
 
 
-@pytest.mark.parametrize("shape", [(2, 3), (1, 2, 2)])
-def test_marks_have_the_shape_of_the_arguments(small, shape):
-    last = np.zeros(shape, dtype=bool)
-    last.flat[-1] = True
-    for bad in (np.nan, np.inf, -np.inf, 1e9, -1e9):
-        for given in ((np.where(last, bad, 0.0), np.ones(shape)), (np.zeros(shape), np.where(last, bad, 1.0))):
-            with pytest.raises(OutOfRangeError) as caught:
-                small.answer(*given)
-            np.testing.assert_array_equal(caught.value.mask, last)
-
-
 def scattered(count, seed, low=1e-8):
     """Fresh points over the table: X even, mu even in its logarithm."""
     X_axis, mu_axis = universal_model().content.axes

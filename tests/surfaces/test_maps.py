@@ -9,6 +9,7 @@ import warnings
 
 import numpy as np
 import pytest
+from helpers import refusals
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -245,76 +246,57 @@ SLOPED = np.geomspace(1, 100, 40)
 WHITE = np.random.default_rng(1).standard_normal((128, 128))
 
 
-class TestRefused:
-    @pytest.mark.parametrize(
-        ("heights", "options", "reason"),
-        [
-            (BASE[:3, :3], {}, r"3 x 3 points have too few wavelengths; needed are at least 32 x 32"),
-            (3 * X + 2 * Y + 7, {}, "flat"),
-            (WHITE, {"periodic": True}, r"exponent of -[01]\.\d+ .*not above 0"),
-            (np.sin(10 * np.pi * X), {"periodic": True}, "only 1 spectral points"),
-            (np.sin(10.6 * np.pi * X), {}, "a wavelength stands out"),
-            (BASE + 5 * np.sin(40 * np.pi * X), {"periodic": True}, r"a wavelength stands out: at q = 20\.\d+ "),
-            (np.where(X > 0.37, 1.0, 0.0), {}, "few edges"),
-            (synthetic(ROUGH, 512, gaussian=True)[::2, :256], {}, "not isotropic"),
-            (synthetic(Surface(0.8, 30.0, 91.0, 1.0, 3.0))[:, :], {"periodic": True, "band": (31, 90)}, "too narrow"),
-            (np.where((np.arange(64)[:, None] + np.arange(64)) % 2, 1.0, -1.0), {"periodic": True}, "shorter than two"),
-        ],
-    )
-    def test_maps_that_are_not_self_affine(self, heights, options, reason):
-        with pytest.raises((InputError, NotSelfAffineError), match=reason):
-            from_map(heights, STEP, **options)
+test_maps_that_are_not_self_affine = refusals(
+    lambda heights, options: from_map(heights, STEP, **options),
+    (BASE[:3, :3], {}, r"3 x 3 points have too few wavelengths; needed are at least 32 x 32"),
+    (3 * X + 2 * Y + 7, {}, "flat"),
+    (WHITE, {"periodic": True}, r"exponent of -[01]\.\d+ .*not above 0"),
+    (np.sin(10 * np.pi * X), {"periodic": True}, "only 1 spectral points"),
+    (np.sin(10.6 * np.pi * X), {}, "a wavelength stands out"),
+    (BASE + 5 * np.sin(40 * np.pi * X), {"periodic": True}, r"a wavelength stands out: at q = 20\.\d+ "),
+    (np.where(X > 0.37, 1.0, 0.0), {}, "few edges"),
+    (synthetic(ROUGH, 512, gaussian=True)[::2, :256], {}, "not isotropic"),
+    (synthetic(Surface(0.8, 30.0, 91.0, 1.0, 3.0))[:, :], {"periodic": True, "band": (31, 90)}, "too narrow"),
+    (np.where((np.arange(64)[:, None] + np.arange(64)) % 2, 1.0, -1.0), {"periodic": True}, "shorter than two"),
+    error=(InputError, NotSelfAffineError),
+)
 
-    @pytest.mark.parametrize(
-        ("C", "reason"),
-        [
-            (SLOPED**0.0, "not above 0"),
-            (SLOPED**-4.5, "exponent of 1.25 .*above 1"),
-            (SLOPED**-3.4 * np.where(np.arange(40) == 20, 50.0, 1.0), "a wavelength stands out|scatters by"),
-            (SLOPED**-3.4 * 10 ** (np.arange(40) % 2), "scatters by"),
-            (SLOPED * 0, "zero everywhere"),
-            (np.where(SLOPED < 2, SLOPED**-3.4, 0), "too narrow: q1/q0 = 1.805"),
-            (np.where(SLOPED < 1.5, SLOPED**-3.4, 0), "only 4 spectral points"),
-        ],
-    )
-    def test_spectra_that_are_not_self_affine(self, C, reason):
-        with pytest.raises(NotSelfAffineError, match=reason):
-            Surface.from_spectrum(SLOPED, C, h_max=3, model="self-affine")
+test_spectra_that_are_not_self_affine = refusals(
+    lambda C: Surface.from_spectrum(SLOPED, C, h_max=3, model="self-affine"),
+    (SLOPED**0.0, "not above 0"),
+    (SLOPED**-4.5, "exponent of 1.25 .*above 1"),
+    (SLOPED**-3.4 * np.where(np.arange(40) == 20, 50.0, 1.0), "a wavelength stands out|scatters by"),
+    (SLOPED**-3.4 * 10 ** (np.arange(40) % 2), "scatters by"),
+    (SLOPED * 0, "zero everywhere"),
+    (np.where(SLOPED < 2, SLOPED**-3.4, 0), "too narrow: q1/q0 = 1.805"),
+    (np.where(SLOPED < 1.5, SLOPED**-3.4, 0), "only 4 spectral points"),
+    error=NotSelfAffineError,
+)
 
-    @pytest.mark.parametrize(
-        ("change", "error", "message"),
-        [
-            ({"heights": np.where(BASE > 1, np.nan, BASE)}, InputError, r"has \d+ holes"),
-            ({"heights": np.ma.masked_greater(BASE, 1)}, InputError, r"has \d+ holes"),
-            ({"heights": BASE[0]}, InputError, "two-dimensional"),
-            ({"heights": BASE * 1e40}, OutOfRangeError, "at most 1e30"),
-            ({"dx": None}, InputError, "dx is missing"),
-            ({"dy": 0.0}, OutOfRangeError, "dy must be positive"),
-            ({"short_cutoff": 1.9 * STEP}, InputError, "longer than two sampling steps"),
-            ({"detrend": "cubic"}, InputError, "detrend must be one of mean, plane, quadratic, median"),
-            ({"band": (20.0, 10.0)}, InputError, "band must be two wavenumbers"),
-            ({"band": (10.0, 500.0)}, OutOfRangeError, "within the measured range"),
-        ],
-    )
-    def test_bad_maps(self, change, error, message):
-        arguments = {"heights": BASE, "dx": STEP} | change
-        with pytest.raises(error, match=message):
-            from_map(**arguments)
+test_bad_maps = refusals(
+    lambda change: from_map(**({"heights": BASE, "dx": STEP} | change)),
+    ({"heights": np.where(BASE > 1, np.nan, BASE)}, InputError, r"has \d+ holes"),
+    ({"heights": np.ma.masked_greater(BASE, 1)}, InputError, r"has \d+ holes"),
+    ({"heights": BASE[0]}, InputError, "two-dimensional"),
+    ({"heights": BASE * 1e40}, OutOfRangeError, "at most 1e30"),
+    ({"dx": None}, InputError, "dx is missing"),
+    ({"dy": 0.0}, OutOfRangeError, "dy must be positive"),
+    ({"short_cutoff": 1.9 * STEP}, InputError, "longer than two sampling steps"),
+    ({"detrend": "cubic"}, InputError, "detrend must be one of mean, plane, quadratic, median"),
+    ({"band": (20.0, 10.0)}, InputError, "band must be two wavenumbers"),
+    ({"band": (10.0, 500.0)}, OutOfRangeError, "within the measured range"),
+)
 
-    @pytest.mark.parametrize(
-        ("change", "error", "message"),
-        [
-            ({"q": SLOPED - 1}, OutOfRangeError, "leave q = 0 out"),
-            ({"q": SLOPED.reshape(2, 20), "C": SLOPED.reshape(2, 20)}, InputError, "two columns"),
-            ({"C": np.where(np.arange(40) == 9, 0, SLOPED**-3)}, OutOfRangeError, "between its first and last"),
-            ({"convention": "german"}, InputError, "paper, isotropic, profile"),
-            ({"band": (0.1, 50)}, OutOfRangeError, "within the measured range"),
-        ],
-    )
-    def test_bad_spectra(self, change, error, message):
-        arguments = {"q": SLOPED, "C": SLOPED**-3.4, "h_max": 3} | change
-        with pytest.raises(error, match=message):
-            Surface.from_spectrum(**arguments, model="self-affine")
+test_bad_spectra = refusals(
+    lambda change: Surface.from_spectrum(
+        **({"q": SLOPED, "C": SLOPED**-3.4, "h_max": 3} | change), model="self-affine"
+    ),
+    ({"q": SLOPED - 1}, OutOfRangeError, "leave q = 0 out"),
+    ({"q": SLOPED.reshape(2, 20), "C": SLOPED.reshape(2, 20)}, InputError, "two columns"),
+    ({"C": np.where(np.arange(40) == 9, 0, SLOPED**-3)}, OutOfRangeError, "between its first and last"),
+    ({"convention": "german"}, InputError, "paper, isotropic, profile"),
+    ({"band": (0.1, 50)}, OutOfRangeError, "within the measured range"),
+)
 
 
 class Charge:

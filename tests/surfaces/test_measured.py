@@ -7,7 +7,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from helpers import random_map
+from helpers import random_map, refusals
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -59,12 +59,6 @@ class TestPowerLaws:
         assert laws.above(place) == pytest.approx(wanted, rel=1e-12)
         assert Q[0] <= math.exp(laws.log_q(place)) * (1 + 1e-15)
 
-    def test_spectrum_between_samples(self):
-        laws = PowerLaws(Q, C)
-        assert laws.at(Q[[0, 1, 4, 7, 8]]) == pytest.approx(C[[0, 1, 4, 7, 8]], rel=1e-14)
-        assert laws.at(np.array([0.49, 4.0, 6.0, 40.1])).tolist() == [0, 0, 0, 0]
-        assert laws.at(np.array([math.sqrt(160.0)])) == pytest.approx(math.sqrt(1e-5), rel=1e-13)
-
 
 class TestMeasuredSurface:
     @pytest.mark.parametrize("count", [2, 3, 50])
@@ -79,17 +73,9 @@ class TestMeasuredSurface:
         assert found.fit().hurst == pytest.approx(0.8, rel=1e-6) if count > 10 else True
         assert (found.shape, found.labelled, found.skewness, found.kurtosis) == ((), False, 0, 3)
 
-    def test_nothing_given_is_changed(self):
-        q, c = Q.copy(), C.copy()
-        found = Surface.from_spectrum(q, c, h_max=9.0)
-        q[0] = c[0] = 7.0
-        assert (found.q0, found.C[0]) == (0.5, 3.0)
-        with pytest.raises(ValueError, match="read-only"):
-            found.q[0] = 1.0
-
-    @pytest.mark.parametrize(
-        ("q", "c", "options", "reason"),
-        [
+    test_what_is_no_spectrum_is_refused = staticmethod(
+        refusals(
+            lambda q, c, options: Surface.from_spectrum(q, c, **options),
             (Q, C, {}, "h_max is missing"),
             (Q, -C, {"h_max": 1.0}, "C must be zero or positive"),
             (Q, np.where(Q == 1, np.nan, C), {"h_max": 1.0}, r"C must be finite, got nan at \(1,\)"),
@@ -102,11 +88,8 @@ class TestMeasuredSurface:
             (Q, C, {"h_max": -1.0}, "h_max must be positive"),
             (Q, C, {"heights": np.ones(9)}, "heights are all the same"),
             (Q, C, {"h_max": 1.0, "convention": "profile"}, "convention must be"),
-        ],
+        )
     )
-    def test_what_is_no_spectrum_is_refused(self, q, c, options, reason):
-        with pytest.raises(InputError, match=reason):
-            Surface.from_spectrum(q, c, **options)
 
 
 class TestCombined:

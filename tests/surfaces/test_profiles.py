@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from helpers import refusals
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
@@ -113,17 +114,12 @@ def test_files_and_scans(tmp_path):
         Surface.from_profile(library.Topography(np.eye(40), (1, 1)))
 
 
-@pytest.mark.parametrize(
-    ("line", "error", "message"),
-    [
-        (np.eye(40), InputError, "one-dimensional"),
-        (np.arange(20.0), InputError, "20 points have too few wavelengths"),
-        (np.arange(200.0), InputError, "flat"),
-    ],
+test_refused = refusals(
+    lambda line: Surface.from_profile(line, 1.0),
+    (np.eye(40), InputError, "one-dimensional"),
+    (np.arange(20.0), InputError, "20 points have too few wavelengths"),
+    (np.arange(200.0), InputError, "flat"),
 )
-def test_refused(line, error, message):
-    with pytest.raises(error, match=message):
-        Surface.from_profile(line, 1.0)
 
 
 @pytest.mark.parametrize("cut", [8.0, 20.0])

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from helpers import refusals
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
@@ -121,19 +122,16 @@ class TestCutoff:
         other = library.UniformLineScan(MAP[3] - MAP[3].mean(), SIDE, periodic=True).shortcut(cutoff_wavelength=3.0)
         np.testing.assert_allclose(cut.heights, other.heights(), atol=1e-12)
 
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
+    test_refused = staticmethod(
+        refusals(
+            lambda options: treated(periodic=True, **options),
             ({"short_cutoff": 5.0, "long_cutoff": 4.0}, "long_cutoff must be larger"),
             ({"short_cutoff": 1e9}, "leaves no wavelength"),
             ({"short_cutoff": -1.0}, "short_cutoff must be a number"),
             ({"outliers": math.nan}, "outliers must be finite"),
             ({"fill": "zero"}, "fill must be one of harmonic"),
-        ],
+        )
     )
-    def test_refused(self, options, message):
-        with pytest.raises(InputError, match=message):
-            treated(periodic=True, **options)
 
 
 class TestReliability:

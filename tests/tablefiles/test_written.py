@@ -15,7 +15,7 @@ from generate.tables.writing import write_table
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models.tables import verify
-from mbma_tables.tablefiles.netcdf import digest_arrays, digest_json, read_table
+from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
 
 
@@ -85,31 +85,6 @@ def test_the_source_digest_is_that_of_the_files():
     assert source_digest(MODULES[ISLAND4D]) == hashlib.sha256(joined).hexdigest()
     with pytest.raises(ModuleNotFoundError, match=r"mbma_tables\.nowhere"):
         source_digest(("mbma_tables.nowhere",))
-
-
-def test_arrays_count_by_name_shape_type_and_bytes():
-    x = np.arange(6.0)
-    own = digest_arrays({"a": x, "b": x + 1})
-    assert own == digest_arrays({"b": x + 1, "a": x})
-    assert own == digest_arrays({"a": x.astype(">f8"), "b": np.repeat(x + 1, 2)[::2]})
-    others = [
-        {"a": x},
-        {"b": x, "a": x + 1},
-        {"a": x, "c": x + 1},
-        {"a": x.reshape(2, 3), "b": x + 1},
-        {"a": x.astype("f4"), "b": x + 1},
-        {"a": np.nextafter(x, 9.0), "b": x + 1},
-        {"a": -x, "b": x + 1},
-    ]
-    assert len({own, *(digest_arrays(other) for other in others)}) == len(others) + 1
-    by_hand = hashlib.sha256(b"a:<f8:(6,);" + x.astype("<f8").tobytes()).hexdigest()
-    assert digest_arrays({"a": x}) == by_hand
-
-
-def test_json_in_its_canonical_form():
-    assert digest_json({"b": [1, 2.5, "é"], "a": None}) == digest_json({"a": None, "b": [1, 2.5, "\u00e9"]})
-    assert digest_json({"a": 1}) == hashlib.sha256(b'{"a":1}').hexdigest()
-    assert len({digest_json(v) for v in (1, 1.0, "1", [1], {"1": 1}, None, True)}) == 7
 
 
 POINTS = 64

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from generate.pages import maps
-from generate.pages.gallery import BARS, REFINED, ratios, read_rows
+from generate.pages.maps import BARS, ratios, read_rows
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories import BoundaryElements, Calibrated
@@ -54,19 +54,6 @@ def test_laws_of_maps_from_files(example):
         assert found.pressure > 0
         assert found.area > 0
     assert any("area depends on resolution" in entry.get("told", "") for entry in surface.provenance)
-
-
-def test_light_contacts_of_that_map_are_not_resolved_by_its_own_grid():
-    rows = read_rows()
-    coarse, fine = rows[REFINED], rows[f"{REFINED} refined"]
-    count = fine.shape[1]
-    np.testing.assert_allclose(fine[0], coarse[0, :count], rtol=1e-6)
-    np.testing.assert_allclose(fine[2], coarse[2, :count], rtol=1e-3)
-    light = (fine[1] > 0.0015) & (fine[1] < 0.005)
-    change = coarse[1, :count] / fine[1] - 1
-    assert (change[light] > 0.05).all()
-    assert (change > 0).all()
-    assert change.max() < 0.15
 
 
 @pytest.mark.slow

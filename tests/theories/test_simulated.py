@@ -82,19 +82,6 @@ def test_between_loads_of_100_random_maps():
         assert over_bound(made, loads, rng.uniform(0.2, 0.8, len(loads) - 1))[0].max() < 1
 
 
-def test_it_is_a_law_like_any_other(truth):
-    law, pressure = contact_law(truth.surface, theory=truth, E_star=10.0), 10.0 * truth.rows[0, 3]
-    assert law.at_pressure(pressure).mean_separation == pytest.approx(truth.rows[2, 3], rel=0.02)
-    direct = contact(truth.surface, pressure=pressure, theory=truth, E_star=10.0)
-    assert law.at_pressure(pressure).stiffness == pytest.approx(direct.stiffness, rel=0.05)
-    # of light loads alone
-    few = BoundaryElements(truth.surface, *truth.rows[:, :4], elements=truth.elements)
-    law = contact_law(few.surface, theory=few)
-    assert law.lowest == pytest.approx(2 * truth.rows[2, 3] - few.surface.h_max)
-    assert 0.01 < law.error < 1
-    np.testing.assert_allclose(law.pressure(truth.rows[2, 1:3]), truth.rows[0, 1:3], rtol=law.error)
-
-
 def test_what_was_not_simulated_is_refused(truth):
     plain = Surface(0.8, 0.1, 2.0, 1.0, 3.0)
     for surface, u, theory, match in (

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from dask.callbacks import Callback
+from helpers import refusals
 
 from mbma_tables import InputError, Surface, contact, contact_law, island, theories
 
@@ -133,19 +134,15 @@ def labelled(values, **coords):
     return xr.DataArray(values, dims="t", coords=coords and {"t": coords["t"]})
 
 
-@pytest.mark.parametrize(
-    ("hurst", "h_rms", "gaps", "match"),
-    [
-        (labelled([0.8, 1.2]), 1.0, 1.0, r"hurst must be in \(0, 1\]"),
-        (labelled([0.05, 0.8]), 1.0, 1.0, "outside the universal table"),
-        (labelled([0.8, 0.9]), 1.0, [0.0, 1.0, 2.0], r"separation must be one or a scalar, got shape \(3,\)"),
-        (labelled([0.8, 0.9]), np.ones(2), 1.0, r"beside DataArrays, h_rms must be"),
-        (labelled([0.8, 0.9], t=[0, 1]), 1.0, labelled([1.0, 2.0], t=[1, 2]), "join|align"),
-    ],
+test_labelled_arguments_that_are_refused = refusals(
+    lambda hurst, h_rms, gaps: contact(Surface(hurst, 0.2, 0.2e8, h_rms, 3.0), separation=gaps),
+    (labelled([0.8, 1.2]), 1.0, 1.0, r"hurst must be in \(0, 1\]"),
+    (labelled([0.05, 0.8]), 1.0, 1.0, "outside the universal table"),
+    (labelled([0.8, 0.9]), 1.0, [0.0, 1.0, 2.0], r"separation must be one or a scalar, got shape \(3,\)"),
+    (labelled([0.8, 0.9]), np.ones(2), 1.0, r"beside DataArrays, h_rms must be"),
+    (labelled([0.8, 0.9], t=[0, 1]), 1.0, labelled([1.0, 2.0], t=[1, 2]), "join|align"),
+    error=ValueError,
 )
-def test_labelled_arguments_that_are_refused(hurst, h_rms, gaps, match):
-    with pytest.raises(ValueError, match=match):
-        contact(Surface(hurst, 0.2, 0.2e8, h_rms, 3.0), separation=gaps)
 
 
 def test_options_go_through():

@@ -119,15 +119,6 @@ def test_slopes_hold_in_thin_panels():
         assert kept.totals(np.array([c]), slopes=True)[:, 0] == pytest.approx(expected, rel=2e-10)
 
 
-def test_first_contact_is_a_power_of_depth():
-    surface = rough()
-    found = contact(surface, separation=surface.h_max - np.array([2**-44, 2**-43]), theory="mbma")
-    assert np.log2(found.pressure[1] / found.pressure[0]) == pytest.approx(7 / 2, rel=1e-6)
-    assert np.log2(found.area[1] / found.area[0]) == pytest.approx(10 / 3, rel=1e-6)
-    nothing = contact(surface, separation=surface.h_max + np.array([0.0, 1.0]), theory="mbma")
-    assert nothing.pressure.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
-
-
 @pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
 def test_a_law_is_the_contacts(count, h_max):
     surface = rough(count=count, h_max=h_max)
