@@ -108,7 +108,7 @@ def _numerical(
     whole: TheoryAnswer,
     answer: Callable[..., Answers],
 ) -> Slopes:
-    """By differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, and what was moved by x."""
+    """Differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, the parameter changed by x."""
     shape = np.shape(whole.pressure)
     at = {name: getattr(surface, name) for name in (*PARAMETERS[1:], *surface.parameters)} | {GAP: u, MODULUS: 1.0}
     at = {name: np.broadcast_to(np.asarray(value, dtype=float), shape).ravel() for name, value in at.items()}

@@ -214,7 +214,7 @@ def flow_factors(
 
 
 def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """phi and phi_s along both axes, shape (2, n), of the gaps of a map: pressed ones, and wider ones as they are."""
+    """phi and phi_s along both axes, shape (2, n), of the gaps of a map: simulated ones, and wider ones undeformed."""
     source = found._source
     surface, whole = source.surface, map_of(source.surface)
     h_rms, heights = float(surface.h_rms), whole.heights - whole.heights.mean()

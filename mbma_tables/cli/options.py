@@ -44,7 +44,7 @@ class Model:
         return self.hardness not in (None, math.inf)
 
     def of(self, surface: AnySurface) -> Model:
-        """The same with a theory by name."""
+        """The same options, with a theory by name."""
         from mbma_tables.theories import theory_name
 
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}

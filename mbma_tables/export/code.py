@@ -203,7 +203,7 @@ def _run(command: list[str], folder: str) -> subprocess.CompletedProcess[str]:
 
 
 def read_report(program: str, done: subprocess.CompletedProcess[str]) -> Replay:
-    """What a self-test printed: kind, rows, largest difference; then how many failed."""
+    """The output of a self-test: kind, rows, largest difference; then the number of failures."""
     points: dict[str, int] = {}
     largest: dict[str, float] = {}
     failed = -1

@@ -190,7 +190,7 @@ class ExportedForce(ExportedLaw):
         return pressed(self.force.body, self.law.h_max + self.force.first - u)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """As of `ExportedLaw`; a body has no leakage."""
+        """See `ExportedLaw`; a body has no leakage."""
         body, law = self.force.body, self.law
         return (
             f"Force law of a rough {body.shape} on a flat, theory {law.theory!r}; mbma_tables {__version__}",

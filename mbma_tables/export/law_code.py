@@ -270,7 +270,7 @@ def core_text(sources: Iterable[str], prefix: str) -> str:
 
 
 def block_rows(block: FloatArray) -> tuple[int, int]:
-    """How many rows and records a law's block has."""
+    """Numbers of rows and records of a law's block."""
     first = int(block.view(np.int64)[at.RECORDS])
     return (first - at.HEAD) // 2, (block.size - first) // at.RECORD
 

@@ -19,7 +19,7 @@ Columns = dict[str, FloatArray]
 
 
 class Language(NamedTuple):
-    """How a law is written in one language.
+    """Format of a law in one language.
 
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
     rows of polynomials by their places in the template, whose names begin with a prefix; None where the law is read by
@@ -50,7 +50,7 @@ def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str
 
 
 def _braces(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """The same in braces, as Modelica has them."""
+    """The same in braces, for Modelica."""
     return {
         place: text.replace("[", "{").replace("]", "}").replace(",\n}", "\n}")
         for place, text in _lists(prefix, columns, polynomials).items()

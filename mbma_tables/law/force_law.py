@@ -27,7 +27,7 @@ _FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Body:
-    """What is pressed, and units: forces over E* times `newtons` are in the unit of force."""
+    """The body and its units: forces over E* times `newtons` are in the unit of force."""
 
     surface: AnySurface
     theory: Theory
@@ -67,7 +67,7 @@ class Body:
 
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
-    """Units by quantity, and what one stress times areas is in that of force."""
+    """Units by quantity, and the factor from stress times area to the unit of force."""
     length, stress = units.length, units.stress
     force, newtons = unit_of("energy" if plane else "island_force", units), 1.0
     if length is not None and stress in SIZES["stress"]:
@@ -117,7 +117,7 @@ class ForceLaw:
         return self.law.pressure(self._left(approach))
 
     def stiffness(self, approach: ArrayLike | str) -> Numbers:
-        """dF by the approach."""
+        """dF/d(approach)."""
         return self.law.stiffness(self._left(approach))
 
     def area(self, approach: ArrayLike | str) -> Numbers:
@@ -125,7 +125,7 @@ class ForceLaw:
         return self.law.area(self._left(approach))
 
     def energy(self, approach: ArrayLike | str) -> Numbers:
-        """Work of the approach, the integral of F."""
+        """Work of loading, the integral of F over the approach."""
         return self.law.energy(self._left(approach))
 
     def approach(self, force: Any) -> Numbers:
@@ -139,7 +139,7 @@ class ForceLaw:
 
 @dataclasses.dataclass(frozen=True)
 class _Span:
-    """In place of a surface: first contact is where so much of the approach is left."""
+    """Stands for a surface: first contact is at this remaining approach."""
 
     h_max: float
 

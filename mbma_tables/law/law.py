@@ -184,7 +184,7 @@ class ContactLaw(Law, Derived, Displayed):
         return self._values((QUANTITIES[what],), mean_separation, separation)[0]
 
     def __call__(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Numbers:
-        """The same as `pressure`."""
+        """Same as `pressure`."""
         return self.pressure(mean_separation, separation=separation)
 
     def pressure_and_stiffness(

@@ -52,7 +52,7 @@ class Pieces(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """Of a fit: matrices from an interval's ends to its samples, from values there to a series, errors and monomials.
+    """Matrices of a fit: from an interval's ends to its samples, from values there to a series, errors and monomials.
 
     The series has the even and odd parts of what is left out in its first two terms, so that neighbours join.
     """

@@ -57,7 +57,7 @@ def wavevectors(shape: tuple[int, ...], sizes: tuple[float, float]) -> tuple[Flo
 
 
 def half_plane_weights(shape: tuple[int, ...]) -> FloatArray:
-    """How many wavevectors each column of the real transform stands for."""
+    """Number of wavevectors represented by each column of the real transform."""
     weights = np.full(shape[1] // 2 + 1, 2.0)
     weights[0] = 1.0
     if shape[1] % 2 == 0:

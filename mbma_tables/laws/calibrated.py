@@ -61,7 +61,7 @@ def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -
 
 
 def area_persson(force: ArrayLike) -> FloatArray:
-    """The same by Persson's theory, erf(sqrt(2) F)."""
+    """A/A0 by Persson's theory, erf(sqrt(2) F)."""
     return _area(force, 1.0, 1.0)
 
 
@@ -153,7 +153,7 @@ class Law:
 
     @functools.cached_property
     def coefficients(self) -> FloatArray:
-        """Of `POWERS` in W."""
+        """Coefficients of `POWERS` in W."""
         c = self.constants
         a = c.weight + c.weight_slope * (self.spectrum.narrowness - NARROWNESS)
         return np.array([a, c.cubic, 1 - a - c.cubic])

@@ -167,7 +167,7 @@ def force(
 def closed(
     heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
 ) -> tuple[FloatArray, FloatArray]:
-    """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
+    """`force` over A0 E* at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
     x = u / h_rms
     share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
     load, steep = force(pressure / gradient, stiffness / gradient, share, slope / h_rms, eta)
@@ -211,7 +211,7 @@ def _level_spline() -> Any:
 
 @functools.lru_cache(64)
 def _level_at_end(h_max: float) -> Any:
-    """The same of one highest point, kept for inversions."""
+    """Q(u) for one highest point, cached for inversions."""
     return _levels(np.asarray(h_max))
 
 

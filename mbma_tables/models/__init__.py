@@ -53,7 +53,7 @@ class IslandModel(Protocol):
 
     @property
     def name(self) -> str:
-        """What results call it."""
+        """Name of the model in results."""
 
     def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
         """Phi_F, Phi_A and a bound on their relative error at finite X and mu >= 0, arrays of one shape."""
@@ -65,7 +65,7 @@ class GeometryModel(Protocol):
 
     @property
     def name(self) -> str:
-        """What results call it."""
+        """Name of the model in results."""
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.

@@ -1,4 +1,4 @@
-"""From effects and tolerance to steps.
+"""The plan of a scene: steps from effects and tolerance.
 
 The plan depends on the scene only: the island model is the universal table where its certificate suffices, else the
 exact solver, and many gaps are evaluated by a contact law. The tolerance is divided as follows. A step whose results

@@ -259,10 +259,10 @@ class Problem:
 
     @property
     def theory_name(self) -> str:
-        """What results call the theory."""
+        """Name of the theory in results."""
         return self.theory if isinstance(self.theory, str) else self.theory.name
 
     @property
     def prescribed(self) -> str | None:
-        """Which of `PRESCRIBED` was given."""
+        """Name of the given quantity of `PRESCRIBED`."""
         return next((name for name in PRESCRIBED if getattr(self, name) is not None), None)

@@ -90,7 +90,7 @@ def _mean(parts: Sequence[Any], name: str) -> Any:
 
 
 def _heights(parts: Sequence[Heights]) -> Heights:
-    """Of all scans together; moments about their means add."""
+    """The distribution of all scans; moments about their means add."""
     h_rms = _mean(parts, "h_rms")
     skewness = np.mean([part.skewness * part.h_rms**3 for part in parts]) / h_rms**3
     kurtosis = np.mean([part.kurtosis * part.h_rms**4 for part in parts]) / h_rms**4

@@ -277,7 +277,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
 def _with_anisotropy(
     fitted: dict[str, Any], q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
 ) -> dict[str, Any]:
-    """The same with its anisotropy; an error if its fitted wavelengths have a preferred direction."""
+    """The fitted surface with its anisotropy; an error if its fitted wavelengths have a preferred direction."""
     fit = fitted["fit"]
     inside = (q >= fit.q_low) & (q <= fit.q_high)
     # whitened by the law; weights between equal ones of each wavevector and of each octave

@@ -39,7 +39,7 @@ MIN_VARIANCE_SHARE = 0.1  # of the variance; a flat roll-off leaves 1/(1 + H) > 
 
 @dataclasses.dataclass(frozen=True)
 class SpectrumFit:
-    """How well a self-affine band describes a measured spectrum. Units follow the measurement's length unit.
+    """Quality of the fit of a self-affine band to a measured spectrum, in the measurement's unit of length.
 
     Examples
     --------

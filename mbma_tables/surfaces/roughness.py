@@ -47,7 +47,7 @@ TYPICAL = "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) 
 
 
 def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str | None:
-    """Which of the names is given, at most one."""
+    """The one of the names that is given; an error for several."""
     found = [name for name in names if name in given]
     if len(found) > 1 or (needed and not found):
         raise InputError(f"{what}: give one of {', '.join(names)}; got {' and '.join(found) or 'none'}")

@@ -126,7 +126,7 @@ class Calibrated(Theory):
     name = "calibrated"
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """From full contact, or where a map's curve ends before, to last contact."""
+        """From full contact, or from the end of a map's curve, to last contact."""
         high = np.asarray(surface.h_max, dtype=float)
         return (
             np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else np.zeros_like(high)

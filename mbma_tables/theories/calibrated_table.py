@@ -47,7 +47,7 @@ class SurfaceSpline:
 
     @property
     def last(self) -> float:
-        """Where the last axis ends."""
+        """End of the last axis."""
         return float(self.first[2] + self.cells[2] * self.step[2])
 
     @functools.cached_property

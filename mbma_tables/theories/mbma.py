@@ -91,7 +91,7 @@ class Mbma(Theory):
         return TheoryAnswer(found.pressure, found.area, stiffness, found.error)
 
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
-        """By its own differentiated sums."""
+        """Derivatives by differentiated sums."""
         by_table = self.island_model_name == "universal" and self.outside != "exact"
         if not by_table and not isinstance(surface, MeasuredSurface):
             return None

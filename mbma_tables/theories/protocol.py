@@ -51,7 +51,7 @@ class UserTheory(Protocol):
 
     @property
     def name(self) -> str:
-        """What results call it."""
+        """Name of the theory in results."""
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """F/(A0 E*) and A/A0 at mean separations u [length] of the surface's broadcast shape."""

@@ -40,7 +40,7 @@ class Scatter(NamedTuple):
     weight: dict[str, FloatArray]  # d ln of force and of area by d ln of the elastic one; hardnesses, contact fractions
 
     def _at(self, rows: FloatArray, eta: FloatArray, area: FloatArray) -> FloatArray:
-        """At hardnesses and contact fractions, held constant beyond those simulated."""
+        """Errors at hardnesses and contact fractions; constant beyond those simulated."""
         shape = np.broadcast_shapes(np.shape(eta), np.shape(area))
         with np.errstate(divide="ignore"):
             log_area = np.log(np.broadcast_to(area, shape))
@@ -53,7 +53,7 @@ class Scatter(NamedTuple):
     def standard_deviation(
         self, theory: str, quantity: str, eta: FloatArray, area: FloatArray, elastic: FloatArray
     ) -> FloatArray:
-        """Of ln of the theory over simulation; where not measured, from that of the `elastic` theory and the law's.
+        """Standard deviation of ln(theory/simulation); if not measured, from those of the `elastic` theory and the law.
 
         NaN where neither is known; the effect of a hardness on errors of stiffness was not measured.
         """
@@ -131,7 +131,7 @@ class Yielding(Theory):
         self._bound: tuple[Any, Any] = None, None
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
-        """With the hardnesses at flat places of a broadcast shape."""
+        """The theory with the hardnesses at flat indices of a broadcast shape."""
         if self.hardness.ndim == 0:
             return self
         return Yielding(self.elastic, np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)])

@@ -24,7 +24,7 @@ COLUMNS, BY_COMPRESSION = 5, 3
 
 
 class Sums(NamedTuple):
-    """How islands are summed; options as of `contact`."""
+    """Options of the sum over islands, as for `contact`."""
 
     model: AnyModel
     variant: Variant
@@ -43,7 +43,7 @@ class Pairs(NamedTuple):
 
     @classmethod
     def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
-        """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+        """The pairs of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
         scaled = depth / surface.h_rms, surface.h_max / surface.h_rms
         return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
 

@@ -249,7 +249,7 @@ def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
 
 
 def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, variant: Variant) -> Fields:
-    """The same for a self-affine surface and the universal table, force and area in one pass."""
+    """Profile of a self-affine surface by the universal table, force and area in one pass."""
     hurst, zeta_1, peak = shape
 
     def fields(x: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
