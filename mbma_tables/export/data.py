@@ -65,7 +65,7 @@ def _content(law: LawTable) -> dict[str, Any]:
 
 
 def from_json(content: str | bytes) -> LawTable:
-    """The law in a file of `to_json`; anything else is refused."""
+    """The law in a file of `to_json`; other files are rejected."""
     try:
         return _law_of(json.loads(content))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
@@ -99,7 +99,7 @@ def to_matlab(law: LawTable) -> bytes:
     named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
     named |= {name: values[:, None] for name, (values, _) in law.more.items()}
     savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
-    # the first 116 bytes are free text, where scipy puts the time: the same law gives the same bytes
+    # the first 116 bytes are free text, where scipy writes the time: replaced, for identical bytes
     return b"MATLAB 5.0 MAT-file, mbma_tables".ljust(116) + stream.getvalue()[116:]
 
 

@@ -40,7 +40,7 @@ AGAINST = {
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """What is written for one program, or in one format.
+    """Declaration of the output for one program, or in one format.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ class Target:
 
 @dataclasses.dataclass(frozen=True)
 class Grammar:
-    """How a program reads the rows of a law; called with a `LawTable` it gives the text of a file."""
+    """Format of the rows of a law for a program; called with a `LawTable` it returns the text of a file."""
 
     program: str
     mark: str  # of comments
     body: Mapping[str, Callable[..., str]]  # by quantity: what stands below the comments, of the law and what is named
-    beyond: str  # what the program does outside the rows, and what else its user must know
+    beyond: str  # behaviour of the program outside the rows, and further notes for its user
     most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
-    named: str | None = None  # what a name stands for that is not given; None where there is none
+    named: str | None = None  # default name; None if there is none
     first: str = ""  # line of the file
     units: tuple[str, str] | None = None  # of length and of stress, where it has to be these
     friction: str = ""  # what the user of its friction card must know; empty where there is none
@@ -142,5 +142,5 @@ def targets() -> dict[str, Target]:
 
 
 def names(*groups: str) -> tuple[str, ...]:
-    """What a user may name, of some groups or of all; a target of an option, with a space in its name, is none."""
+    """Names that a user may give, of some groups or of all; targets with a space in the name belong to an option."""
     return tuple(name for key in groups or GROUPS for name in group(key) if " " not in name)

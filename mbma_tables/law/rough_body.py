@@ -34,10 +34,14 @@ LAYER_RTOL = 1e-8  # of the layer's law, as far as its theory allows
 ROUNDING = 1e-9  # of h_max, by which a law goes beyond the largest approach
 MOMENTS = 128  # nodes of the effective radius
 POINTS = 101  # of a profile
+<<<<<<< HEAD
 COUNTED = 0.1  # share of the force above which a reason against the layer's law counts
 # c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the width of the contact over the
 # mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate.rough_spheres`
 CELLS, NARROWEST = (0.62, 0.8), 1.5
+=======
+COUNTED = 0.1  # share of the force above which a reason against the layer's law applies
+>>>>>>> refs/heads/prose
 WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 
 
@@ -48,11 +52,11 @@ class RoughContact(Displayed):
     Attributes
     ----------
     approach : ndarray
-        How far the bodies are beyond touching with their mean planes [length]; negative where only peaks touch.
+        Approach of the bodies from the contact of their mean planes [length]; negative if only peaks are in contact.
     force : ndarray
         F, N where units are known; of a cylinder F per length, N/mm.
     stiffness : ndarray
-        dF by the approach.
+        dF/d(approach).
     area : ndarray
         Real contact area [length^2]; of a cylinder per length.
     contact_radius : ndarray
@@ -69,7 +73,7 @@ class RoughContact(Displayed):
         Whether the layer's law was tested for such contacts, where nine tenths of the force are, and the contact is
         wider than 1.5 mean wavelengths, and narrower than a tenth of R.
     reasons : dict
-        Why not, each with a mask.
+        Reasons why not `valid`, each with a mask.
     layer : ContactLaw
         The law of the surface.
     units : dict

@@ -61,8 +61,13 @@ def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -
 
 
 def area_persson(force: ArrayLike) -> FloatArray:
+<<<<<<< HEAD
     """The same by Persson's theory, erf(sqrt(2) F)."""
     return area_of(force, 1.0, 1.0)
+=======
+    """A/A0 by Persson's theory, erf(sqrt(2) F)."""
+    return _area(force, 1.0, 1.0)
+>>>>>>> refs/heads/prose
 
 
 def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
@@ -75,7 +80,7 @@ def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """F/(A0 E* g) at A/A0 = erf(e) by the light factor s0: `area` inverted, 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
+    """F/(A0 E* g) at A/A0 = erf(e) by the light-load factor s0; inverts `area`: 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
     wanted, s0, t0 = np.asarray(e, float), np.asarray(light), constants.area_t0
     # at y = e/sqrt(2) the left side is the larger, and the cubic is convex from there to its root
     y = wanted / np.sqrt(2)
@@ -127,7 +132,7 @@ class Spectrum:
 
     @classmethod
     def from_shares(cls, x: ArrayLike, variance: ArrayLike) -> Spectrum:
-        """Bands of wavenumber x (each its root mean square) that hold these shares of the height variance."""
+        """Spectrum from bands of wavenumber x (root mean square of each) with these shares of the height variance."""
         wavenumber, share = np.asarray(x, float), np.asarray(variance, float)
         held = share > 0
         wavenumber, share = wavenumber[held], share[held] / share[held].sum()
@@ -154,14 +159,14 @@ class Law:
 
     @functools.cached_property
     def coefficients(self) -> FloatArray:
-        """Of `POWERS` in W."""
+        """Coefficients of `POWERS` in W."""
         c = self.constants
         a = c.weight + c.weight_slope * (self.spectrum.narrowness - NARROWNESS)
         return np.array([a, c.cubic, 1 - a - c.cubic])
 
     @functools.cached_property
     def _prepared(self) -> FloatArray:
-        """The law as the core takes it."""
+        """The law in the core's format."""
         s, c = self.spectrum, self.constants
         highest = np.inf if self.h_max is None else self.h_max
         constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
@@ -189,7 +194,7 @@ class Law:
         return np.asarray(weights @ (s.x * s.variance / (4 * s.gradient)))
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """u_P and du_P/d ln F, before the tail factor; 0 at loads that leave no gap."""
+        """u_P and du_P/d ln F, before the tail factor; 0 at loads that close the gap."""
         u, slope = self._separations(force, False)
         return u, slope
 

@@ -300,11 +300,11 @@ test_contradictions = refusals(
     ({"without": ("energy",)}, "'energy' is off unless it is asked for"),
     (
         {"effects": ("pressure_profile",), "separations": None, "deltas": (0.1,), "without": ("finite_height",)},
-        "does not touch single islands",
+        "does not affect single islands",
     ),
     (
         {"effects": ("pressure", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
-        "pressure_profile is of the deformed sphere",
+        "pressure_profile is that of the deformed sphere",
     ),
     ({"effects": ("conductance",), "conductivities": (1.0, -2.0)}, "positive"),
     ({"effects": ("pressure_profile",), "deltas": (0.1,)}, "are not needed by any effect"),

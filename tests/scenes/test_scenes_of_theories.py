@@ -184,8 +184,8 @@ test_what_contradicts = refusals(
     lambda more: Scene(**PRESSED, **more),
     ({"effects": ["area", "yield"]}, "effect 'yield' needs hardness"),
     ({"hardness": 1500.0}, "hardness given and effect 'yield' is off"),
-    ({"effects": ["energy", "yield"], "hardness": 1500.0}, "'energy' is of elastic contacts"),
-    ({"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]}, "is of elastic contacts"),
+    ({"effects": ["energy", "yield"], "hardness": 1500.0}, "'energy' is for elastic contacts"),
+    ({"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]}, "is for elastic contacts"),
     ({"effects": ["area", "yield"], "hardness": 20.0}, "pressures must be at most the hardness"),
     ({"effects": ["area", "yield"], "hardness": -1.0}, "hardness must be a number in"),
 )

@@ -243,7 +243,7 @@ WHITE = np.random.default_rng(1).standard_normal((128, 128))
 
 test_maps_that_are_not_self_affine = refusals(
     lambda heights, options: from_map(heights, STEP, **options),
-    (BASE[:3, :3], {}, r"3 x 3 points hold too few scales; the least is 32 x 32"),
+    (BASE[:3, :3], {}, r"3 x 3 points have too few wavelengths; needed are at least 32 x 32"),
     (3 * X + 2 * Y + 7, {}, "flat"),
     (WHITE, {"periodic": True}, r"exponent of -[01]\.\d+ .*not above 0"),
     (np.sin(10 * np.pi * X), {"periodic": True}, "only 1 spectral points"),

@@ -126,7 +126,7 @@ class TestCombined:
         one, other = (Surface.from_map(rng.normal(size=(40, 40)), 1.0, step, periodic=True) for step in (2.0, 3.0))
         both = one.combined(other)
         assert both.bearing is None
-        assert "how the two lie on each other is not known" in both.provenance[0]["told"]
+        assert "the relative position of the maps is not known" in both.provenance[0]["told"]
         # parallel lays: gradients' mean squares add along both axes
         sums = [sum(float(s.m2) * share for s, share in zip((one, other), shares, strict=True)) for shares in zip(
             *((a / (1 + a), 1 / (1 + a)) for a in (one.anisotropy**2, other.anisotropy**2)), strict=True)]  # fmt: skip

@@ -113,7 +113,7 @@ def test_files_and_scans(tmp_path):
 test_refused = refusals(
     lambda line: Surface.from_profile(line, 1.0),
     (np.eye(40), InputError, "one-dimensional"),
-    (np.arange(20.0), InputError, "20 points hold too few scales"),
+    (np.arange(20.0), InputError, "20 points have too few wavelengths"),
     (np.arange(200.0), InputError, "flat"),
 )
 

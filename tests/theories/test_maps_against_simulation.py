@@ -84,7 +84,7 @@ def test_one_stiffness_over_a_range_of_forces_is_told():
     surface = Surface.from_map("docs/data/maps/frt-2.frt", fill="harmonic", outliers=10, short_cutoff="0.8 mm")
     found = contact(surface, area=[0.01, 0.3, 0.6], theory="calibrated")
     assert found.stiffness[1] == pytest.approx(found.stiffness[2])
-    masks = [mask.tolist() for reason, mask in found.reasons.items() if "one stiffness" in reason]
+    masks = [mask.tolist() for reason, mask in found.reasons.items() if "stiffness is constant" in reason]
     assert masks == [[False, True, True]]
     with pytest.raises(OutOfRangeError, match="separation vanishes"):
         contact(surface, pressure=0.1, theory="calibrated")

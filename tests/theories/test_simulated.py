@@ -84,7 +84,7 @@ def test_what_was_not_simulated_is_refused(truth):
     plain = Surface(0.8, 0.1, 2.0, 1.0, 3.0)
     for surface, u, theory, match in (
         (truth.surface, 10 * truth.rows[2, 0], truth, "which were simulated"),
-        (plain, 1.0, truth, "know that map alone"),
+        (plain, 1.0, truth, "is for that map only"),
         (plain, 1.0, "simulated", r"make it by Surface\.from_map"),
     ):
         with pytest.raises(OutOfRangeError if theory is truth else InputError, match=match):

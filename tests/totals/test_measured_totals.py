@@ -168,7 +168,7 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
         island(surface, 1.0, island_model="island4d")
     q = np.geomspace(1, 10, 30)
     blue = Surface.from_spectrum(q, q, h_max=3000.0)
-    with pytest.raises(OutOfRangeError, match="measure shorter wavelengths, or ask another theory"):
+    with pytest.raises(OutOfRangeError, match="measure shorter wavelengths, or use another theory"):
         contact(blue, separation=1.0, theory="mbma")
     assert contact(blue, mean_separation=500.0, theory="calibrated").pressure > 0
     steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
