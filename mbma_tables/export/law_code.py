@@ -127,14 +127,9 @@ class AskedLaw(NamedTuple):
     exported: ExportedLaw
     numbers: LawNumbers
     flow: FlowNumbers | None
-<<<<<<< HEAD
     slopes: dict[str, float]  # ratios of functions to the slope of a law,
     sloped: ContactLaw  # of the contact without a hardness
     more: dict[str, str]  # units of what was asked of `MORE`
-=======
-    ratio: float  # ratio of conductance to tangent; NaN if not requested
-    more: dict[str, str]  # units of the requested quantities of `MORE`
->>>>>>> refs/heads/prose
     said: tuple[str, ...]
 
 

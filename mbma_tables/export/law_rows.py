@@ -239,13 +239,8 @@ def _table(
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
-<<<<<<< HEAD
     if slope := quantity in ("conductance", "tangential_stiffness"):
         # between no contact and the smallest pressure that counts there is one row alone, that of zero
-=======
-    if heat := quantity == "conductance":
-        # below the smallest pressure of interest there is only the row of zero pressure
->>>>>>> refs/heads/prose
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or law.highest < np.inf)
@@ -254,12 +249,8 @@ def _table(
         f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
-<<<<<<< HEAD
         *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
         *said,
-=======
-        *(["the first row is zero, whatever the theory gives up to the second"] if law.highest < np.inf else ()),
->>>>>>> refs/heads/prose
         end=end,
         leakage=flow,
     )

@@ -27,13 +27,8 @@ _FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-<<<<<<< HEAD
 class Body(HalfSpace):
     """What is pressed, and units of quantities: forces over E* times `newtons` are in the unit of force."""
-=======
-class Body:
-    """The body and its units: forces over E* times `newtons` are in the unit of force."""
->>>>>>> refs/heads/prose
 
     surface: AnySurface
     theory: Theory
@@ -75,7 +70,6 @@ class Body:
 
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
-<<<<<<< HEAD
     """Units by quantity, and what one stress times areas is in that of force."""
     length, force, newtons = unit_of("approach", units), unit_of("energy" if plane else "island_force", units), 1.0
     if units.length is not None and units.stress in SIZES["stress"]:
@@ -84,18 +78,6 @@ def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
     known = {"force": force, "stiffness": f"{force}/{length}", "area": length if plane else f"{length}^2"}
     known |= dict.fromkeys(("approach", "contact_radius", "position", "mean_separation"), length)
     return known | {"pressure": unit_of("pressure", units)}, newtons
-=======
-    """Units by quantity, and the factor from stress times area to the unit of force."""
-    length, stress = units.length, units.stress
-    force, newtons = unit_of("energy" if plane else "island_force", units), 1.0
-    if length is not None and stress in SIZES["stress"]:
-        newtons = factor(stress, "Pa", "stress") * factor(length, "m", power=1 if plane else 2) / (1e3 if plane else 1)
-        force = "N/mm" if plane else "N"
-    lengths = dict.fromkeys(("approach", "contact_radius", "position", "mean_separation"), length or "length")
-    area = lengths["approach"] if plane else f"{lengths['approach']}^2"
-    known = {"force": force, "stiffness": f"{force}/{lengths['approach']}", "area": area}
-    return lengths | known | {"pressure": unit_of("pressure", units)}, newtons
->>>>>>> refs/heads/prose
 
 
 def forces(given: Any, body: Body, length: str | None) -> Any:
@@ -156,16 +138,6 @@ class ForceLaw:
         return self.law.h_max + self.first - finite_array("approach", self.law.units.number("approach", approach))
 
 
-<<<<<<< HEAD
-=======
-@dataclasses.dataclass(frozen=True)
-class _Span:
-    """Stands for a surface: first contact is at this remaining approach."""
-
-    h_max: float
-
-
->>>>>>> refs/heads/prose
 class _Pressed(Theory):
     """The contacts of a body as a theory of the approach that is left up to a largest one."""
 

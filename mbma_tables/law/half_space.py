@@ -27,12 +27,8 @@ from mbma_tables.law.law import ContactLaw
 NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn
 STEPS, SETTLED = 100, 1e-12  # of Newton's method, and the last one over the lengths that add up
 EDGE = 1e-10  # of the largest pressure: beyond it there is no contact
-<<<<<<< HEAD
 JUMPS = 0.05  # of a law's error, which its polynomials may differ by where they meet: forces need not be closer
 PLACES = 4  # times the nodes, at which the edge is looked for
-=======
-PLACES = 4  # points per node in the search for the edge
->>>>>>> refs/heads/prose
 FLAT = 0.01  # of h_max, by which a layer that is pressed flat may be thinner than its law allows
 
 

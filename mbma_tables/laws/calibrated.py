@@ -61,13 +61,8 @@ def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -
 
 
 def area_persson(force: ArrayLike) -> FloatArray:
-<<<<<<< HEAD
     """The same by Persson's theory, erf(sqrt(2) F)."""
     return area_of(force, 1.0, 1.0)
-=======
-    """A/A0 by Persson's theory, erf(sqrt(2) F)."""
-    return _area(force, 1.0, 1.0)
->>>>>>> refs/heads/prose
 
 
 def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:

@@ -49,11 +49,6 @@ class Costs(NamedTuple):
     def of(self, island_model: str, what: str, rtol: float | None = None) -> float:
         """Seconds at the loosest measured tolerance that meets `rtol`, else the tightest; NaN if none was measured."""
         rows = [row for row in self.rows if row.island_model == island_model and row.what == what]
-<<<<<<< HEAD
-=======
-        # a quantity that was not measured alone is taken to cost as much as both
-        rows = [row for row in rows if row.quantity == quantity] or [row for row in rows if row.quantity == "both"]
->>>>>>> refs/heads/prose
         if not rows:
             return math.nan
         # of a call or of opening a table there is one row, without a tolerance

@@ -24,16 +24,9 @@ ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is for its quadrature or l
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
 # p(r) at a point converges later than its integrals
 AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
-<<<<<<< HEAD
 # gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: profiles of
 # islands answer a further gap in half a microsecond
 MIN_LAW_GAPS, MIN_LAW_GAPS_OF_OTHERS = 4000, 150  # of MBMA, and of other theories
-=======
-# gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: the
-# universal table's profiles need half a microsecond for a further gap, the others sum its islands
-MIN_LAW_GAPS = {"universal": 4000, "exact": 20}
-MIN_LAW_GAPS_OF_OTHERS = 150
->>>>>>> refs/heads/prose
 MIN_THEORY_LAW_RTOL = 1e-9
 YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # times an elastic call and an elastic answer of many (docs/yield.md)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
@@ -215,14 +208,8 @@ class _Planner:
         return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use, theory)
 
     def many_gaps(self) -> bool:
-<<<<<<< HEAD
         """Whether totals at the prescribed gaps cost more than a law, where there is one."""
         if self.count < MIN_LAW_GAPS or "finite_height" in self.problem.dropped:
-=======
-        """Whether totals at the prescribed gaps cost more than a law, if one can be made."""
-        fewest = MIN_LAW_GAPS.get(_name(self.island_model(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
-        if self.count < fewest or "finite_height" in self.problem.dropped:
->>>>>>> refs/heads/prose
             return False
         from mbma_tables.law.make import MIN_LAW_RTOL
 
@@ -299,13 +286,8 @@ class _Planner:
         return float(get_theory(self.problem.theory, surface).answer(surface, 0.5 * surface.h_max).error)
 
     def seconds_of_law(self, inverse: bool) -> float:
-<<<<<<< HEAD
         """Of a law's answers at the gaps."""
         found = self.costs.of("law", "invert") if inverse else 0.0
-=======
-        """Seconds of a law's evaluations at the gaps."""
-        found = self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
->>>>>>> refs/heads/prose
         return self.count * (self.costs.of("law", "lookup") + found)
 
     def seconds_of_slopes(self) -> float:

@@ -97,8 +97,6 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
         assert phi[-1].tobytes() == phi[0].tobytes()
 
 
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
 def test_stated_errors_of_totals(name):
