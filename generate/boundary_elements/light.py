@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import pathlib
 
 import click
@@ -35,7 +36,7 @@ def recipes() -> list[Recipe]:
 
 
 def solved(recipe: Recipe) -> FloatArray:
-    """Highest point, A/A0 and mean separations [h_rms] at `LOADS`; NaN where a single point of the grid is in contact."""
+    """Highest point, A/A0 and mean separations [h_rms] at `LOADS`; NaN where one grid point is in contact."""
     surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
     model, rows = Contact(surface, recipe.sizes), np.full((3, LOADS.size), np.nan)
     rows[0] = known["h_max"]
@@ -68,7 +69,7 @@ def table(found: FloatArray) -> list[str]:
         own = [compared(r, rows) for r, rows in zip(recipes(), found, strict=True) if r.waves == count]
         area, stiffness, _ = np.concatenate(own, axis=1)
         cells = []
-        for low, high in zip(BINS[:-1], BINS[1:], strict=True):
+        for low, high in itertools.pairwise(BINS):
             part = stiffness[(area >= low) & (area < high) & np.isfinite(stiffness)]
             cells.append(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "")
         lines.append(f"| {count} | {' | '.join(cells)} |")
@@ -87,5 +88,7 @@ def light(data: pathlib.Path, collect: bool) -> None:
         write_file(data, content.getvalue(), make_folders=True)
     with np.load(data) as known:
         found = known["rows"].astype(float)
-    click.echo("| longest wavelengths a side | " + " | ".join(f"{a:.2%} to {b:.2%}" for a, b in zip(BINS, BINS[1:])))
+    click.echo(
+        "| longest wavelengths a side | " + " | ".join(f"{a:.2%} to {b:.2%}" for a, b in itertools.pairwise(BINS))
+    )
     click.echo("\n".join(table(found)))
