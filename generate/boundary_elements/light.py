@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import pathlib
 
 import click
@@ -21,7 +22,6 @@ LOADS = np.geomspace(2e-5, 0.012, 40)  # F/(A0 E* g): from first contact, a few 
 BANDS = ((1, 8), (1, 32), (2, 16), (4, 10), (8, 5), (16, 3.2))  # longest wavelengths a side, and q1/q0
 HURSTS, SEEDS, POINTS = (0.5, 0.8), (1, 2, 3, 4, 5), 256
 BINS = (2e-4, 5e-4, 1e-3, 3e-3, 1e-2)  # A/A0
-ENDLESS = 7.9  # h_max/h_rms whose last contact is lighter than any load here
 
 
 def recipes() -> list[Recipe]:
@@ -35,7 +35,7 @@ def recipes() -> list[Recipe]:
 
 
 def solved(recipe: Recipe) -> FloatArray:
-    """Highest point, A/A0 and mean separations [h_rms] at `LOADS`; NaN where a single point of the grid is in contact."""
+    """Highest point, A/A0 and mean separations [h_rms] at `LOADS`; NaN where a single point is in contact."""
     surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
     model, rows = Contact(surface, recipe.sizes), np.full((3, LOADS.size), np.nan)
     rows[0] = known["h_max"]
@@ -49,10 +49,10 @@ def solved(recipe: Recipe) -> FloatArray:
     return rows
 
 
-def compared(recipe: Recipe, rows: FloatArray, endless: bool = False) -> FloatArray:
+def compared(recipe: Recipe, rows: FloatArray) -> FloatArray:
     """A/A0, ln of simulated over the law's stiffness between loads, and of force at equal u; shape (3, loads - 1)."""
     h_max, area, u = rows[0, 0], rows[1], rows[2]
-    face = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, 1.0, ENDLESS if endless else h_max)
+    face = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, 1.0, h_max)
     scale = float(face.rms_gradient)
     known = contact(face, pressure=LOADS * scale, theory="calibrated").mean_separation
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -68,7 +68,7 @@ def table(found: FloatArray) -> list[str]:
         own = [compared(r, rows) for r, rows in zip(recipes(), found, strict=True) if r.waves == count]
         area, stiffness, _ = np.concatenate(own, axis=1)
         cells = []
-        for low, high in zip(BINS[:-1], BINS[1:], strict=True):
+        for low, high in itertools.pairwise(BINS):
             part = stiffness[(area >= low) & (area < high) & np.isfinite(stiffness)]
             cells.append(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "")
         lines.append(f"| {count} | {' | '.join(cells)} |")
@@ -87,5 +87,5 @@ def light(data: pathlib.Path, collect: bool) -> None:
         write_file(data, content.getvalue(), make_folders=True)
     with np.load(data) as known:
         found = known["rows"].astype(float)
-    click.echo("| longest wavelengths a side | " + " | ".join(f"{a:.2%} to {b:.2%}" for a, b in zip(BINS, BINS[1:])))
-    click.echo("\n".join(table(found)))
+    contacts = " | ".join(f"{low:.2%} to {high:.2%}" for low, high in itertools.pairwise(BINS))
+    click.echo("\n".join([f"| longest wavelengths a side | {contacts} |", *table(found)]))
