@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import itertools
 import pathlib
 
 import click
@@ -13,6 +12,7 @@ from tqdm import tqdm
 from generate.boundary_elements.solve import Contact, prepared
 from generate.boundary_elements.studies import DATA, PATH
 from generate.boundary_elements.surfaces import Recipe, heights
+from generate.calibrated_file import binned
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
@@ -61,31 +61,23 @@ def compared(recipe: Recipe, rows: FloatArray) -> FloatArray:
     return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
 
 
-def table(found: FloatArray) -> list[str]:
+def summary(found: FloatArray) -> list[list[str]]:
     """Mean and standard deviation of ln of simulated over the law's stiffness by wavelengths a side and contact."""
     lines, waves = [], np.array([recipe.waves for recipe in recipes()])
     for count in np.unique(waves):
         own = [compared(r, rows) for r, rows in zip(recipes(), found, strict=True) if r.waves == count]
         area, stiffness, _ = np.concatenate(own, axis=1)
-        cells = []
-        for low, high in itertools.pairwise(BINS):
-            part = stiffness[(area >= low) & (area < high) & np.isfinite(stiffness)]
-            cells.append(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "")
-        lines.append(f"| {count} | {' | '.join(cells)} |")
+        bins = binned(area, stiffness, BINS)
+        lines.append([str(count), *(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "" for part in bins)])
     return lines
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--data", type=PATH, default=DATA / "light_loads.npz", show_default=True)
-@click.option("--collect", is_flag=True, help="Compare with the data that there are, no simulations.")
-def light(data: pathlib.Path, collect: bool) -> None:
-    """Simulate light loads on 60 surfaces, four minutes, and print how far the calibrated law's stiffness is."""
-    if not collect:
-        content = io.BytesIO()
-        rows = np.array([solved(recipe) for recipe in tqdm(recipes(), disable=None)], dtype=np.float32)
-        np.savez_compressed(content, loads=LOADS, rows=rows)
-        write_file(data, content.getvalue(), make_folders=True)
-    with np.load(data) as known:
-        found = known["rows"].astype(float)
-    contacts = " | ".join(f"{low:.2%} to {high:.2%}" for low, high in itertools.pairwise(BINS))
-    click.echo("\n".join([f"| longest wavelengths a side | {contacts} |", *table(found)]))
+def light(data: pathlib.Path) -> None:
+    """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
+    content = io.BytesIO()
+    rows = np.array([solved(recipe) for recipe in tqdm(recipes(), disable=None)], dtype=np.float32)
+    np.savez_compressed(content, loads=LOADS, rows=rows)
+    write_file(data, content.getvalue(), make_folders=True)
+    click.echo(f"{data}: {rows.shape[0]} surfaces")
