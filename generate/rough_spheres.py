@@ -15,8 +15,8 @@ from collections.abc import Iterator
 import click
 import numpy as np
 
+from generate.files import DATA
 from generate.machined.makers import rough
-from generate.pages.page import DATA
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.files import write_file
 from mbma_tables.laws.boundary_elements import CORRECTION

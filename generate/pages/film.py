@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.page import Measured, panels, read_csv, table
+from generate.files import read_csv
+from generate.pages.page import Measured, panels, table
 from generate.rough_spheres import FILE, RADIUS, heights
 from mbma_tables import Surface, flow_factors, rough_contact
 from mbma_tables.common.arguments import FloatArray
