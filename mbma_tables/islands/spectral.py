@@ -63,9 +63,7 @@ def basis(nodes: int) -> Basis:
     v, weights = gauss_legendre(nodes)
     k = np.arange(nodes)
     odd = 2.0 * k + 1
-    difference = (k[:, None] - k) ** 2
-    total = (k[:, None] + k + 1) ** 2
-    overlap = (1 / (1 - 4.0 * difference) - 1 / (1 - 4.0 * total)) / 2
+    overlap = (1 / (1 - 4.0 * (k[:, None] - k) ** 2) - 1 / (1 - 4.0 * (k[:, None] + k + 1) ** 2)) / 2
     values = legendre.legvander(2 * v - 1, nodes - 1)
     return made(v, weights, values, odd, 8 / np.pi * overlap / np.sqrt(np.outer(odd, odd)))
 
@@ -77,7 +75,7 @@ def made(v: FloatArray, weights: FloatArray, values: Any, odd: Any, galerkin: Fl
     # sums in one order whatever the BLAS and its threads: tables rebuild to the bit
     half = np.einsum("ki,kl->il", modes, galerkin)
     operator = np.einsum("il,lj->ij", half, modes)
-    made = Basis(v, root_weights, modes, (operator + operator.T) / 2)
-    for array in made:
+    found = Basis(v, root_weights, modes, (operator + operator.T) / 2)
+    for array in found:
         array.setflags(write=False)
-    return made
+    return found
