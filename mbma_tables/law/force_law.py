@@ -118,7 +118,7 @@ class ForceLaw:
         return self.law.pressure(self._left(approach))
 
     def stiffness(self, approach: ArrayLike | str) -> Numbers:
-        """dF by the approach."""
+        """dF/d(approach)."""
         return self.law.stiffness(self._left(approach))
 
     def area(self, approach: ArrayLike | str) -> Numbers:
@@ -126,7 +126,7 @@ class ForceLaw:
         return self.law.area(self._left(approach))
 
     def energy(self, approach: ArrayLike | str) -> Numbers:
-        """Work of the approach, the integral of F."""
+        """Work of loading, the integral of F over the approach."""
         return self.law.energy(self._left(approach))
 
     def approach(self, force: Any) -> Numbers:

@@ -48,11 +48,11 @@ class RoughContact(Displayed):
     Attributes
     ----------
     approach : ndarray
-        How far the bodies are beyond touching with their mean planes [length]; negative where only peaks touch.
+        Approach of the bodies from the contact of their mean planes [length]; negative if only peaks are in contact.
     force : ndarray
         F, N where units are known; of a cylinder F per length, N/mm.
     stiffness : ndarray
-        dF by the approach.
+        dF/d(approach).
     area : ndarray
         Real contact area [length^2]; of a cylinder per length.
     contact_radius : ndarray
@@ -69,7 +69,7 @@ class RoughContact(Displayed):
         Whether the layer's law was tested for such contacts, where nine tenths of the force are, and the contact is
         wider than 1.5 mean wavelengths, and narrower than a tenth of R.
     reasons : dict
-        Why not, each with a mask.
+        Reasons why not `valid`, each with a mask.
     layer : ContactLaw
         The law of the surface.
     units : dict

@@ -26,7 +26,6 @@ def test_wide_gaps_have_the_known_expansion():
 
 
 def test_ridges_are_the_averages_of_one_dimension():
-    """Across ridges the mean of 1/h^3 and of 1/h^2 count, along them the mean of h^3 and h."""
     h = 1 + 0.5 * np.sin(np.linspace(0, 2 * np.pi, 64, endpoint=False))
     K, couette = flow_and_couette(np.repeat(h[:, None], 3, 1))
     np.testing.assert_allclose(K, [1 / np.mean(h**-3.0), np.mean(h**3)])
@@ -70,6 +69,14 @@ def test_isotropic_factors_are_those_of_the_leakage():
     np.testing.assert_array_equal(found.pressure, known.pressure)
     assert found.pressure[-1] == 0
     assert found.valid.all()
+
+
+def test_factors_are_continuous_at_first_contact():
+    h_max = float(BEARING.h_max)
+    found = flow_factors(BEARING, h_max * np.array([1 - 1e-9, 1 + 1e-9]), peklenik=3)
+    assert found.area[0] > found.area[1] == 0
+    for name in ("phi_x", "phi_y", "shear_x", "shear_y"):
+        np.testing.assert_allclose(*getattr(found, name), rtol=1e-5, err_msg=name)
 
 
 def test_a_lay_turned_by_a_right_angle():
