@@ -7,6 +7,13 @@ With the approach delta, counted from where the smooth bodies would touch, and t
 which is the problem of J. A. Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153) with the law of any theory in
 place of their asperities. Newton's unknown is w at the nodes of `islands.spectral`. A fully compressed layer is
 rigid. Force and pressure are over E* here, and those of a cylinder are per length.
+
+The basis of a cylinder are Legendre polynomials of even degree in x over a. The kernel is -(2/pi) ln|x - s|, and by
+Neumann's integral 2 Q_n of P_n over x - s
+
+    -integral P_m P_n ln|x - s| dx ds = (4/(2n + 1)) (1/((m-n+1) (m+n)) - 1/((m-n-1) (m+n+2)))
+
+and 6 - 4 ln 2 for m = n = 0.
 """
 
 from __future__ import annotations
@@ -21,7 +28,7 @@ from numpy.polynomial import legendre
 
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import ConvergenceError
-from mbma_tables.islands.spectral import Basis, basis, plane_basis
+from mbma_tables.islands.spectral import Basis, basis, gauss_legendre, made
 from mbma_tables.law.law import ContactLaw
 
 NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn
@@ -30,6 +37,20 @@ EDGE = 1e-10  # of the largest pressure: beyond it there is no contact
 JUMPS = 0.05  # of a law's error, which its polynomials may differ by where they meet: forces need not be closer
 PLACES = 4  # times the nodes, at which the edge is looked for
 FLAT = 0.01  # of h_max, by which a layer that is pressed flat may be thinner than its law allows
+
+
+@functools.lru_cache(maxsize=64)
+def plane_basis(nodes: int) -> Basis:
+    """The basis of pressures that are even in x, at nodes in (0, 1), v = (x/a)^2; w is against a point at x = a."""
+    x, weights = (part[nodes:] for part in gauss_legendre(2 * nodes))
+    x = 2 * x - 1
+    m, n = 2.0 * np.arange(nodes)[:, None], 2.0 * np.arange(nodes)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        overlap = 4 / (2 * n + 1) * (1 / ((m - n + 1) * (m + n)) - 1 / ((m - n - 1) * (m + n + 2)))
+    overlap[0, 0] = 6 - 4 * np.log(2)
+    odd = 2 * n + 1
+    values = legendre.legvander(x, 2 * nodes - 1)[:, ::2]
+    return made(x**2, 2 * weights, values, odd, overlap * np.sqrt(np.outer(odd, odd)) / np.pi)
 
 
 class Solved(NamedTuple):
