@@ -6,7 +6,8 @@ import ast
 import collections
 
 from benchmarks.import_circles import import_graph
-from generate.pages.page import ROOT, Measured, panels
+from generate.files import ROOT
+from generate.pages.page import Measured, panels
 
 BOX = {"boxstyle": "square,pad=0.4", "facecolor": "#e8eef7", "edgecolor": "#4a6fa5"}
 RIGHT = 0.83  # edge of the boxes

@@ -15,7 +15,8 @@ from generate.pages.page import Measured, panels, table
 from mbma_tables import Surface, contact_law
 from mbma_tables.export import LAWS
 from mbma_tables.export.law_code import law_text
-from mbma_tables.export.law_rows import LawTable, describe_law
+from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.law_table import LawTable
 
 NAMES = ("concrete", "asphalt", "yang-persson", "challenge")
 E_STAR = 13.3

@@ -104,7 +104,7 @@ def contact(
         Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
         theories by numerical differentiation, to 1e-6.
     quantities : iterable of {"pressure", "area"}
-        What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
+        What is wanted of MBMA; the other is then None.
     workers : int
         Threads that share MBMA's batches of surfaces, and of gaps; the bits are those of one.
 
@@ -233,8 +233,7 @@ def _contact(
     if derivatives and held:
         require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
-        wanted = QUANTITIES if derivatives else quantities
-        totals = theory.totals(surface, places["separation"], E_star, derivatives, wanted)
+        totals = theory.totals(surface, places["separation"], E_star, derivatives)
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])

@@ -6,6 +6,7 @@ scipy is imported where a command runs, so that ``--help`` answers at once.
 
 from __future__ import annotations
 
+import functools
 import re
 import sys
 import warnings
@@ -16,8 +17,10 @@ import click
 
 from mbma_tables import __version__
 from mbma_tables.cli import batch, cache, commands, export, joint, scene, tables
+from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.core import core
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # as shells report Ctrl-C
@@ -101,7 +104,9 @@ class Program(click.Group):
 
 
 @click.group("mbma", cls=Program, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="mbma")
+@click.version_option(
+    __version__, prog_name="mbma", message=f"%(prog)s %(version)s, core {core.__name__.rpartition('.')[2].lstrip('_')}"
+)
 @click.pass_context
 def main(context: click.Context) -> None:
     """Contact of rough surfaces: pressure, real contact area and stiffness against gap or pressure.
@@ -134,4 +139,5 @@ for command in (
     export.export_command,
     export.explore_command,
 ):
+    command.format_options = functools.partial(format_options, command)  # type: ignore[method-assign]
     main.add_command(command)

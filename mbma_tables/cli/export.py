@@ -15,11 +15,11 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.export.again import again, made_by
-from mbma_tables.export.targets import Target, group, names, targets
+from mbma_tables.export.targets import AGAINST, Target, group, names, targets
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
-    from mbma_tables.export.law_rows import LawTable
+    from mbma_tables.export.law_table import LawTable
 
 DEFAULTS = {"variant": "reported", "exponential": False, "leakage": False, "check": False}
 
@@ -64,6 +64,8 @@ class _Export(click.Command):
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option("--leakage", is_flag=True, help="Flow coefficient of the gaps: rows of it alone, laws as code with it.")
+@click.option("--quantity", type=click.Choice([*AGAINST]), help="Of the rows; by default that which TARGET takes.")
+@click.option("--peklenik", type=float, help="Of a film: length of the roughness along x over that along y.")
 @click.option(
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )
@@ -100,7 +102,9 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         raise InputError("one surface is needed: see the options --surface, --file, --map, --hurst")
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
-    joint = {"surface": specimen.surface, "E_star": specimen.E_star, "stress_unit": specimen.stress_unit}
+    if kind.units is not None:
+        specimen = specimen.in_units(*kind.units)
+    joint: dict[str, Any] = {name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")}
     ctx = click.get_current_context()
     joint["made_by"] = made_by(ctx.meta["words"], out, [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
     _write(_law_files(kind, out, joint, given))
@@ -144,8 +148,11 @@ def _rows(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any
     asked = {option: given.pop(option) for option in (*given,)}
     if "pressures" in asked:
         asked["pressures"] = _pressures(asked["pressures"])
-    heat = "conductance" if asked.keys() & {"conductivity", "conductivity_unit"} else "pressure"
-    law = describe_law(**joint, quantity="leakage" if asked.pop("leakage", False) else heat, **asked)
+    heat = "conductance" if asked.keys() & {"conductivity", "conductivity_unit"} else target.quantity
+    asked.setdefault("quantity", "leakage" if asked.pop("leakage", False) else heat)
+    if target.quantity == "conductance":  # its numbers do not depend on the conductivity
+        asked = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} | asked
+    law = describe_law(**joint, **asked)
     if "pressures" in asked:
         _warn(law)
     return law, *name

@@ -24,6 +24,7 @@ from mbma_tables.theories import OF_MAPS, THEORIES
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
+MANY = 20  # options of a command whose help has sections
 PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 
@@ -278,6 +279,33 @@ output_options = _group(
 )
 leakage_option = _option("leakage", "Add the flow coefficient of the gaps [length^3].", is_flag=True)
 plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE")
+
+
+# headings of help, and the options below them; others are below "Options"
+_SECTIONS = {
+    "What is known": "separation mean_separation pressure area over_h_rms",
+    "Surface": "surface file map",
+    "Measured map": f"{' '.join(specimens.MAP_OPTIONS)} model",
+    "Surface in numbers": "hurst q0 q1 zeta_1 h_rms h_max nominal_area m0 m2 m4",
+    "Surface by roughness parameters": "Rq Ra Sq Sa Rdq Sdq Rsm longest shortest Sds Spd Sp",
+    "Bodies": "E_star E1 nu1 E2 nu2 materials hardness conductivity length_unit stress_unit",
+    "Theory": "theory variant island_model rtol",
+}
+_SECTION_OF = {name: title for title, names in _SECTIONS.items() for name in names.split()}
+
+
+def format_options(command: click.Command, context: click.Context, formatter: click.HelpFormatter) -> None:
+    """The options of a command for its help, in sections where there are many."""
+    sections: dict[str, list[tuple[str, str]]] = {}
+    parameters = [each for each in command.get_params(context) if isinstance(each, click.Option)]
+    for parameter in parameters:
+        record = parameter.get_help_record(context)
+        if record is not None:
+            title = _SECTION_OF.get(parameter.name or "", "Options") if len(parameters) > MANY else "Options"
+            sections.setdefault(title, []).append(record)
+    for title in sorted(sections, key=[*_SECTIONS, "Options"].index):
+        with formatter.section(title):
+            formatter.write_dl(sections[title])
 
 
 def check_plot(plot: Path | None, out: Path | None) -> None:

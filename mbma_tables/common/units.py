@@ -56,7 +56,7 @@ DIMENSIONS = {
     **dict.fromkeys(
         ("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter", "extrapolate_to"), (1, 0)
     ),
-    **dict.fromkeys(("width", "mean_free_path", "displacement"), (1, 0)),
+    **dict.fromkeys(("width", "mean_free_path", "displacement", "radius", "approach", "reference"), (1, 0)),
     **dict.fromkeys(("viscosity", "pressure_drop", "pressure_in", "pressure_out"), (0, 1)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
     **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),

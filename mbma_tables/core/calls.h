@@ -143,7 +143,6 @@ static mbma_spline spline_of(const argument *a) {
        mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), (int)I(9), P(10), P(11), P(12), P(13))) \
     FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
        mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4))) \
-    FN(kronrod, "w31 w31 w31", true, (mbma_kronrod(P(0), P(1), P(2)), 0)) \
     /* profile.c */ \
     FN(profile_islands, "Dn d d d D8 D J D6 w4n w1", true, \
        mbma_profile_islands(N(0), P(0), X(1), X(2), X(3), VARIANT(4), CELLS(5), P(8), P(9))) \

@@ -79,10 +79,6 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
                    double rtol, const mbma_variant *variant, const mbma_cells *cells, int slopes, double *out,
                    double *error, uint8_t *status, int64_t *islands);
 
-/* Nodes and weights of QUADPACK's Gauss-Kronrod rule on [-1, 1]; Gauss weights are zero at nodes of Kronrod's alone. */
-enum { MBMA_KRONROD_NODES = 31 };
-void mbma_kronrod(double *nodes, double *kronrod, double *gauss);
-
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
 enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };

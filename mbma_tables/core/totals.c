@@ -22,7 +22,7 @@ enum { BY_LOG_E = BY_LOG_ZETA }; /* over nodes, derivatives are by H at given e 
 #define SAFETY_BELOW 400.0
 
 /* The whole rule, nodes filled up with 0 to whole vectors. */
-enum { COUNT = MBMA_KRONROD_NODES, MOST_NODES = 32 };
+enum { COUNT = 31, MOST_NODES = 32 };
 typedef struct {
     double nodes[MOST_NODES], kronrod[MOST_NODES], gauss[MOST_NODES];
 } rule;
@@ -290,14 +290,17 @@ static const struct {
     {0.03075324199611727, 0.07036604748810812, 0.10715922046717194, 0.13957067792615432, 0.16626920581699392,
      0.1861610000155622, 0.19843148532711158, 0.2025782419255613}};
 
-void mbma_kronrod(double *nodes, double *kronrod, double *gauss) {
+/* The whole rule; Gauss weights are zero at nodes of Kronrod's alone. */
+static rule whole_rule(void) {
+    rule r = {{0.0}, {0.0}, {0.0}};
     for (int k = 0; k < COUNT; k++) {
         const bool upper = 2 * k >= COUNT;
         const int own = upper ? COUNT - 1 - k : k;
-        nodes[k] = upper ? HALF.nodes[own] : -HALF.nodes[own];
-        kronrod[k] = HALF.kronrod[own];
-        gauss[k] = own % 2 ? HALF.gauss[own / 2] : 0.0;
+        r.nodes[k] = upper ? HALF.nodes[own] : -HALF.nodes[own];
+        r.kronrod[k] = HALF.kronrod[own];
+        r.gauss[k] = own % 2 ? HALF.gauss[own / 2] : 0.0;
     }
+    return r;
 }
 
 size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
@@ -310,7 +313,7 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
     memset(&g, 0, sizeof g);
     g.cells = cells;
     g.safety = v->floor_d >= PAPER_FLOOR ? SAFETY : SAFETY_BELOW;
-    mbma_kronrod(g.r.nodes, g.r.kronrod, g.r.gauss);
+    g.r = whole_rule();
     for (size_t k = 0; k < n; k++) {
         double sums[2][COLUMNS] = {{0.0}}, *const row = out + 2 * columns * k;
         int found = MBMA_OK;

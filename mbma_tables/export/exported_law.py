@@ -17,8 +17,10 @@ from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, in_unit, resolve
+from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
+from mbma_tables.law.rough_body import pressed
 from mbma_tables.materials import ELASTIC_PSI, hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -59,8 +61,6 @@ class ExportedLaw:
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
         """Lines of a file's head: what it holds, range, error, validity up to `end`, and with `leakage` of flow."""
         law, stress = self.law, self.stress
-        names = self.surface.parameters or OWN_NUMBERS
-        numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
         model = f"MBMA model, variant {law.variant!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
         gradient = self.modulus * float(self.surface.rms_gradient)
         plastic = f"elastic: within 5% in area for hardnesses from {gradient / ELASTIC_PSI:.4g} {stress} on"
@@ -72,8 +72,7 @@ class ExportedLaw:
         return (
             f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
             what,
-            f"surface: {numbers}; lengths in {self.length}",
-            *filter(None, [self.surface.resolution, self.theory.origin]),
+            *self._of_surface(),
             f"E* = {self.modulus:.10g} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
             "pressure is force over nominal area;",
             "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
@@ -85,6 +84,12 @@ class ExportedLaw:
             *self._validity(end, leakage),
             *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
         )
+
+    def _of_surface(self) -> Iterator[str]:
+        names = self.surface.parameters or OWN_NUMBERS
+        numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
+        yield f"surface: {numbers}; lengths in {self.length}"
+        yield from filter(None, [self.surface.resolution, self.theory.origin])
 
     def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
         """Lines that say where the law holds, how far simulations scatter about it, and where its numbers are from."""
@@ -173,6 +178,42 @@ class ExportedLaw:
         )
 
 
+@dataclasses.dataclass(frozen=True)
+class ExportedForce(ExportedLaw):
+    """The force of a rough sphere or cylinder in place of a pressure, its unit in place of that of stress."""
+
+    _: dataclasses.KW_ONLY
+    force: ForceLaw
+
+    def answer(self, u: FloatArray) -> Any:
+        """The contacts themselves at approaches that are left to the largest one."""
+        return pressed(self.force.body, self.law.h_max + self.force.first - u)
+
+    def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
+        """As of `ExportedLaw`; a body has no leakage."""
+        body, law = self.force.body, self.law
+        return (
+            f"Force law of a rough {body.shape} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
+            what,
+            f"pressure is the force [{self.stress}], A/A0 the real area [{body.units['area']}], here of a {body.shape}",
+            f"of radius {body.problem.radius:.10g} {self.length}",
+            *self._of_surface(),
+            f"E* = {self.modulus:.10g} {body.units['pressure']}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
+            f"overclosure c = approach - ({self.force.first:.10g}), zero at first contact; approach is zero where the",
+            "mean planes of the faces touch",
+            f"range: {range_}",
+            *more,
+            f"the law is within {law.error:.1e} of its theory, in force and area",
+            *(
+                []
+                if np.isinf(self.hardness)
+                else [f"hardness = {self.hardness:.10g} {body.units['pressure']}: loading"]
+            ),
+            *self._validity(end, leakage),
+            *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
+        )
+
+
 def outward(value: float, rounding: str) -> str:
     """Four digits of a number, the last one rounded as told.
 
@@ -185,8 +226,8 @@ def outward(value: float, rounding: str) -> str:
 
 
 def exported_law(
-    surface: AnySurface,
-    E_star: float | str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
     length_unit: str | None = None,
     stress_unit: str | None = None,
     variant: str | Variant = "reported",
@@ -195,17 +236,30 @@ def exported_law(
     made_by: tuple[str, ...] = (),
 ) -> ExportedLaw:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
-    surface = in_unit(surface, length_unit)
+    if isinstance(surface, ForceLaw):
+        if E_star != 1.0 or hardness != np.inf or any((length_unit, stress_unit, theory)) or variant != "reported":
+            raise InputError("a force law has its modulus, hardness, units and theory: give no others")
+        return _exported_force(surface, made_by)
+    one: AnySurface = in_unit(surface, length_unit)
     plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
-    length, stress = _known("length_unit", surface.unit), _known("stress_unit", stress_unit)
-    if surface.shape != ():
+    length, stress = _known("length_unit", one.unit), _known("stress_unit", stress_unit)
+    if one.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
     cap = hardness_in(Units(length, stress), hardness)
-    own = chosen_theory(surface, theory, variant=variant)
-    law = contact_law(surface, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
+    own = chosen_theory(one, theory, variant=variant)
+    law = contact_law(one, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    return ExportedLaw(surface, law, own, modulus, float(cap), length, stress, made_by)
+    return ExportedLaw(one, law, own, modulus, float(cap), length, stress, made_by)
+
+
+def _exported_force(force: ForceLaw, made_by: tuple[str, ...]) -> ExportedForce:
+    """The force law of a body in known units."""
+    body, layer = force.body, force.body.problem.law
+    length = _known("length_unit", body.surface.unit)
+    _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
+    numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
+    return ExportedForce(body.surface, force.law, body.theory, *numbers, force=force)
 
 
 def _known(name: str, unit: str | None) -> str:

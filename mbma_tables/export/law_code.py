@@ -30,6 +30,7 @@ from mbma_tables.export.text import (
     wrapped,
 )
 from mbma_tables.law import block as at
+from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 
 LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
@@ -41,7 +42,13 @@ _MADE = re.compile(r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]
 
 
 def law_text(
-    target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", leakage: bool = False, **asked: Any
+    target: str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
+    *,
+    name: str = "law",
+    leakage: bool = False,
+    **asked: Any,
 ) -> str:
     """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
 
@@ -50,7 +57,8 @@ def law_text(
     target : str
         One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`.
     surface, E_star, **asked
-        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit.
+        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit. Or
+        the force law of a rough sphere or cylinder (`RoughContact.law`) alone: its "pressure" is force.
     name : str
         What functions, modules or packages are called, or begin with.
     leakage : bool
@@ -78,7 +86,13 @@ def law_text(
 
 
 def law_files(
-    target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", leakage: bool = False, **asked: Any
+    target: str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
+    *,
+    name: str = "law",
+    leakage: bool = False,
+    **asked: Any,
 ) -> dict[str, str]:
     """What `law_text` returns, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
     if target not in LANGUAGES:
@@ -86,6 +100,8 @@ def law_files(
     name, language = code_name(name, target), LANGUAGES[target]
     if leakage and language.subroutine:
         raise InputError(f"{target} has no place for leakage: leave it out")
+    if language.subroutine and isinstance(surface, ForceLaw):
+        raise InputError(f"{target} takes pressures, not the force of a body")
     found = asked_law(surface, E_star, leakage=leakage, only_conductance=language.only_conductance, **asked)
     files = {"": text_of(target, name, found)}
     for end, other in language.beside:
@@ -125,8 +141,8 @@ def _words(target: str) -> frozenset[str]:
 
 
 def asked_law(
-    surface: AnySurface,
-    E_star: float | str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     leakage: bool = False,
@@ -136,6 +152,8 @@ def asked_law(
     """The law that a file is asked of, made once; arguments as for `law_text`."""
     conducts = only_conductance or conductivity is not None or conductivity_unit is not None
     k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (math.nan, "")
+    if isinstance(surface, ForceLaw) and (conducts or leakage):
+        raise InputError("a force law has neither conductance nor leakage: leave conductivity and leakage out")
     exported = exported_law(surface, E_star, **options)
     if conducts and exported.hardness < math.inf:
         raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")

@@ -6,20 +6,19 @@ approach, so that -dp/du = dp/dc.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, hinted, number_in, one_number
-from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.arguments import FloatArray, hinted, number_in, one_number, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_lines
 from mbma_tables.common.units import Units
-from mbma_tables.export.chords import chosen_rows
+from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
 from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
+from mbma_tables.export.film_rows import facts_of, film_rows
+from mbma_tables.export.law_table import LawTable
+from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -27,45 +26,11 @@ from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.conductance import conductance
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-QUANTITIES = ("pressure", "conductance", "leakage")
+QUANTITIES = ("pressure", "conductance", "leakage", "hydraulic_aperture", "film")
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
 LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # of h_max, mean separations of the last points
-
-
-@dataclasses.dataclass(frozen=True, repr=False)
-class LawTable(Displayed):
-    """Rows of a contact law, ready to be written."""
-
-    x: FloatArray  # overclosure, or pressure: zero, then rising
-    y: FloatArray  # pressure or conductance, rising from zero; or flow, which falls, to zero where contact blocks it
-    x_name: str
-    y_name: str
-    x_unit: str
-    y_unit: str
-    largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
-    comments: tuple[str, ...]  # what a reader of the file must know
-    theory: str  # whose law it is
-    floor: float = 0.0  # value below which errors are relative to it
-    behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
-
-    def _facts(self) -> dict[str, str]:
-        columns = {self.x_name: shown(self.x, self.x_unit), self.y_name: shown(self.y, self.y_unit)}
-        return columns | {"rows": str(self.x.size), "theory": self.theory, "largest error": shown(self.largest_error)}
-
-    def _variables(self) -> dict[str, Variable]:
-        dims = (self.x_name,)
-        return {
-            self.x_name: Variable(self.x, self.x_unit, self.x_name, dims),
-            self.y_name: Variable(self.y, self.y_unit, self.y_name, dims),
-        }
-
-    def _figure(self) -> Figure:
-        labels = (f"{name} [{unit}]" for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit)))
-        return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
+FILM_ROWS = 200
 
 
 def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: float) -> tuple[FloatArray, FloatArray]:
@@ -81,11 +46,11 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: fl
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure
-    if quantity == "leakage":
+    if quantity in ("leakage", "hydraulic_aperture"):
         flow = np.asarray(law.leakage(separation=d))
         # the first row that is blocked is the last
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
-        return pressure[open_], flow[open_]
+        return pressure[open_], flow[open_] if quantity == "leakage" else np.cbrt(flow[open_])
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
@@ -94,8 +59,8 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: fl
 
 @hinted
 def describe_law(
-    surface: AnySurface,
-    E_star: float | str,
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
     *,
     length_unit: str | None = None,
     stress_unit: str | None = None,
@@ -110,6 +75,7 @@ def describe_law(
     evenly: bool = False,
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
+    peklenik: float | None = None,
     made_by: tuple[str, ...] = (),
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
@@ -117,16 +83,18 @@ def describe_law(
     Parameters
     ----------
     surface : Surface
-        One surface.
+        One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`) alone, of pressure as force.
     E_star : float or str
         Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
-    quantity : {"pressure", "conductance", "leakage"}
+    quantity : {"pressure", "conductance", "leakage", "hydraulic_aperture", "film"}
         Pressure against overclosure, or conductance against pressure, or the flow coefficient k h_rms^3 of the gaps
-        (`ContactLaw.leakage`) against pressure.
+        (`ContactLaw.leakage`), or the hydraulic aperture k^(1/3) h_rms with the aperture u, the derivative by u and the
+        stiffness -dp/du. A film: flow factors (`flow_factors`), asperity pressure and contact area against the mean gap
+        u, from 0.2 h_rms or the largest of `pressures` to 10 h_rms, of theory "calibrated" by default.
     rows : int, optional
-        How many; else as few as `rtol` needs, 1e-3 where neither is given.
+        How many; else as few as `rtol` needs, 1e-3 where neither is given; 200 of a film, which has no `rtol`.
     rtol : float, optional
         Largest relative error of the interpolation where the result is above a thousandth of its largest, or
         between `pressures`; of leakage from its largest down to that at 30% contact, or at the largest of `pressures`.
@@ -143,6 +111,8 @@ def describe_law(
         As for `contact`.
     hardness : float or str
         As for `contact`: the law of loading, and conductance by the stiffness of the frozen contact.
+    peklenik : float, optional
+        Of a film: as for `flow_factors`.
     evenly : bool
         Equally spaced rows instead, for comparison.
     made_by : tuple of str
@@ -163,17 +133,32 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+    of_body = isinstance(surface, ForceLaw)
+    if of_body and quantity != "pressure":
+        raise InputError(f"a force law has no {quantity}")
+    if film := quantity == "film":
+        theory = "calibrated" if theory is None else theory
+        if any(given is not None for given in (rtol, largest_overclosure)):
+            raise InputError("rtol and largest_overclosure are not of a film: give rows and pressures")
+    elif peklenik is not None:
+        raise InputError("peklenik belongs to quantity='film': leave it out")
     exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
-    law, units = exported.law, exported.units
+    law = exported.law
+    units = law.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    k_s, names = 1.0, (own := ("overclosure", "pressure", exported.length, exported.stress))
+    k_s, names = 1.0, (own := ("overclosure", "force" if of_body else "pressure", exported.length, exported.stress))
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
         names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")
     elif quantity == "leakage":
         names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
+    elif quantity == "hydraulic_aperture":
+        names = ("pressure", quantity, exported.stress, exported.length)
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
+    if film:
+        count = whole_number_in("rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS)
+        return film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
     behaviour = _table(exported, "pressure", own, least, end, choose) if quantity == "conductance" else None
     return _table(exported, quantity, names, least, end, choose, k_s, behaviour)
@@ -193,10 +178,11 @@ def _table(
     law = exported.law
     fine_x, fine_y = _curve(exported, quantity, end, k_s)
     floor = FLOOR * float(fine_y[-1])
-    if quantity == "leakage":
+    aperture, flow = quantity == "hydraulic_aperture", quantity in ("leakage", "hydraulic_aperture")
+    if flow:
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
-            floor = float(law.leakage(separation=law.separation(area=LARGEST_AREA)))
+            floor = float(law.leakage(separation=law.separation(area=LARGEST_AREA))) ** (1 / 3 if aperture else 1)
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
@@ -213,9 +199,19 @@ def _table(
         f"above {names[1]} {floor:.4g} {names[3]}",
         *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
         end=end,
-        leakage=quantity == "leakage",
+        leakage=flow,
     )
-    return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour)
+    more = {}
+    if aperture:
+        found = law.at_pressure(x)
+        fine_u = np.asarray(law.at_pressure(fine_x).mean_separation)
+        by_u = np.interp(-np.asarray(found.mean_separation), -fine_u, np.gradient(fine_y, fine_u))
+        more = {
+            "aperture": (np.asarray(found.mean_separation), exported.length), "derivative": (by_u, "1"),
+            "stiffness": (np.asarray(found.stiffness), f"{exported.stress}/{exported.length}"),
+        }  # fmt: skip
+    facts = facts_of(exported, conductivity=(k_s, names[3].rpartition("/")[0])) if heat else facts_of(exported)
+    return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, more, facts)
 
 
 def _why_there(law: ContactLaw, end: float, quantity: str) -> str:

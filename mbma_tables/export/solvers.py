@@ -14,7 +14,8 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import in_unit, modulus_and_units
-from mbma_tables.export.law_rows import QUANTITIES, LawTable
+from mbma_tables.export.law_rows import QUANTITIES
+from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import Grammar, Target
 from mbma_tables.export.text import DIGITS, checked_name, comment, number, opening
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -156,11 +157,12 @@ def _optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
 
 
 def _columns(law: LawTable) -> str:
-    return "".join(f"{number(x)} {number(y)}\n" for x, y in zip(law.x, law.y, strict=True))
+    rows = zip(*(values for values, _ in law.columns.values()), strict=True)
+    return "".join(" ".join(map(number, row)) + "\n" for row in rows)
 
 
 def _matrix(law: LawTable, name: str) -> str:
-    return f"double {checked_name(name, MAX_NAME)}({law.x.size},2)\n{_columns(law)}"
+    return f"double {checked_name(name, MAX_NAME)}({law.x.size},{len(law.columns)})\n{_columns(law)}"
 
 
 calculix = Grammar(
@@ -180,14 +182,20 @@ abaqus = Grammar(
     named="ROUGH",
 )
 STAY = "Stay within the rows: what the solver has beyond them was not tried."
-lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(QUANTITIES, _lsdyna), STAY)
+lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(("pressure", "conductance", "leakage"), _lsdyna), STAY)
 optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
-comsol = Grammar("COMSOL", "%", dict.fromkeys(QUANTITIES, _columns), "Interpolation: linear; extrapolation: none.")
+comsol = Grammar(
+    "COMSOL",
+    "%",
+    dict.fromkeys(QUANTITIES, _columns),
+    "Data format: Spreadsheet; functions by position in file. Interpolation: linear; extrapolation: none.",
+)
 moose = Grammar(
     "MOOSE",
     "#",
     dict.fromkeys(QUANTITIES, _columns),
-    "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns; constant outside the rows",
+    "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns; constant outside the rows. Of more "
+    "than two columns: xy_in_file_only = false, y_index_in_file = 1, 2, ...",
 )
 # of Modelica's CombiTable1Ds
 modelica = Grammar(

@@ -1,7 +1,7 @@
 """Targets: programs and formats that laws are written for, each declared once, where it is written.
 
 A new one is a function and a `Target` in the tuple TARGETS of its module: what it is written from, the quantities and
-options that it takes, and, for rows, its comments, its limits and what the program does outside them.
+options that it takes, and, for rows, its comments, units, limits and what the program does outside them.
 """
 
 from __future__ import annotations
@@ -16,13 +16,22 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.export.text import comment
 
 if TYPE_CHECKING:
-    from mbma_tables.export.law_rows import LawTable
+    from mbma_tables.export.law_table import LawTable
 
 LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit"})
-ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
+ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "quantity", "peklenik"}
 CODE = LAW | {"name", "leakage"}
 # groups by the modules that declare them, in the order in which help lists them
-GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code"}
+GROUPS = {
+    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
+}  # fmt: skip
+SI = ("m", "Pa")
+# by quantity: the options that are of it alone, and what its rows are against
+OPTIONS = {"conductance": {"conductivity", "conductivity_unit"}, "film": {"peklenik"}}
+AGAINST = {
+    "pressure": "overclosure", "conductance": "pressure", "leakage": "pressure", "hydraulic_aperture": "pressure",
+    "film": "mean_separation",
+}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +51,10 @@ class Target:
         Of the first file's name, where it must be that; functions are then called by the rest of it.
     alone : bool
         Whether the first file is of use without the others.
+    quantity : str
+        Of the rows, where none is asked for; "pressure" by default.
+    units : pair of str, optional
+        Of length and of stress, where the program asks for them.
     """
 
     name: str
@@ -50,6 +63,8 @@ class Target:
     rows: bool = True
     end: str = ""
     alone: bool = True
+    quantity: str = "pressure"
+    units: tuple[str, str] | None = None
 
     def files(self, *given: Any, **options: Any) -> Mapping[str, bytes]:
         """The files by the ends of their names, that of the first being ""."""
@@ -69,6 +84,7 @@ class Grammar:
     most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
     named: str | None = None  # what a name stands for that is not given; None where there is none
     first: str = ""  # line of the file
+    units: tuple[str, str] | None = None  # of length and of stress, where it has to be these
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
         """The text of a file.
@@ -76,11 +92,15 @@ class Grammar:
         Raises
         ------
         InputError
-            For a quantity that the program does not take, more rows than it holds, and a name that it cannot read.
+            For a quantity or units that the program does not take, more rows than it holds, and a name that it cannot
+            read.
         """
-        if law.y_name not in self.body:
-            taken = " or ".join(f"{y} against {'overclosure' if y == 'pressure' else 'pressure'}" for y in self.body)
+        if law.quantity not in self.body:
+            taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
             raise InputError(f"{self.program} takes {taken} here, got {law.y_name} against {law.x_name}")
+        own = law.facts["h_rms"][1], law.facts["E_star"][1]
+        if self.units not in (None, own):
+            raise InputError(f"{self.program} is written in {' and '.join(self.units)}, got {' and '.join(own)}")
         if law.x.size > (most := self.most.get(law.y_name, law.x.size)):
             raise InputError(
                 f"{self.program} holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows"
@@ -89,12 +109,15 @@ class Grammar:
         return (
             self.first
             + comment([*law.comments, self.beyond], self.mark)
-            + self.body[law.y_name](law, **named, **numbers)
+            + self.body[law.quantity](law, **named, **numbers)
         )
 
     def target(self, name: str) -> Target:
         """The target of this name."""
-        return Target(name, self, ROWS if self.named is None else ROWS | {"name"})
+        takes = ROWS if self.named is None else ROWS | {"name"}
+        for quantity, options in OPTIONS.items():
+            takes -= options if quantity not in self.body else set()
+        return Target(name, self, takes, quantity=next(iter(self.body)), units=self.units)
 
 
 @functools.cache

@@ -36,7 +36,9 @@ def printable(text: str) -> str:
 
 
 def comment(lines: Iterable[str], mark: str) -> str:
-    """Lines as comments that reach from a mark to the end of the line."""
+    """Lines as comments that reach from a mark to the end of the line, "<!--" for comments of XML."""
+    if mark == "<!--":
+        return "".join(f"<!-- {printable(line).replace('--', '-%2D')} -->\n" for line in lines)
     return "".join(f"{mark} {printable(line)}".rstrip() + "\n" for line in lines)
 
 

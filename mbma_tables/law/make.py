@@ -10,7 +10,7 @@ import functools
 import math
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -30,13 +30,11 @@ from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.island import check_band
-from mbma_tables.totals.island_sum import Pairs, totals_of
-from mbma_tables.totals.profile import profile, source_of
+from mbma_tables.totals.profile import profile
 
 MIN_LAW_RTOL = 1e-9
 RESOLVED = 1e-3  # a polynomial this close is one whose error its coefficients show
 POWERS = (3.5, 10 / 3)  # of h_max - d, in which MBMA's force and area start
-ROUGH_LEVERAGE = 30.0  # as `Profile.leverage`, where there is no profile
 LAYER_SHARE = 0.5  # of the boundary layer, up to which those powers leave little
 FIRST_OCTAVES = 20  # below which a theory that ends at h_max is a power of h_max - u
 MOST_OCTAVES = 60
@@ -120,7 +118,7 @@ def contact_law(
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:
-        return _theory_law(one, chosen, asked, facts)
+        return theory_law(one, chosen, asked, facts)
     except ConvergenceError as fault:
         raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
 
@@ -136,27 +134,12 @@ def _mbma_law(
         check_band(surface, variant)
         stress = float(surface.q0 * surface.s)
         shape = float(surface.hurst), float(surface.zeta_1), h_max / h_rms
-    end, errors = 2 * h_max, [0.0]
-    kept: Any = None
-    try:
-        kept = profile(shape, model, variant, inner)
-    except ConvergenceError:
-        if not isinstance(surface, Surface):
-            raise
-        # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
-        source, leverage = source_of(shape, variant), ROUGH_LEVERAGE
-    else:
-        # the law ends with the island model's table; rounding may pass full compression
-        end = min(float(kept.edges[-1]) * h_rms, end)
-        source, leverage = kept.source, kept.leverage
+    kept = profile(shape, model, variant, inner)
+    # the law ends with the island model's table; rounding may pass full compression
+    end, source = min(float(kept.edges[-1]) * h_rms, 2 * h_max), kept.source
 
     def values(x: FloatArray) -> FloatArray:
-        if kept is None:
-            sums = totals_of(model, Pairs.of(cast(Surface, surface), x * end), variant, max(0.03 * inner, MIN_RTOL))
-            found, error = np.stack([sums.force, sums.area]), float(sums.error.max())
-        else:
-            found, error = kept.totals(x * end / h_rms), kept.error
-        errors.append(error)
+        found = kept.totals(x * end / h_rms)
         if not found.all():
             raise OutOfRangeError(f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow")
         found[0] *= stress
@@ -168,10 +151,10 @@ def _mbma_law(
     start, first = fit.first_record(lambda start: fit.power_record(values, start, POWERS), octaves, tolerance)
     facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
     side, limits = fit.Side(-1, start, values, tuple(kinks)), (h_max - end, math.inf)
-    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: max(errors), leverage, facts)
+    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: kept.error, kept.leverage, facts)
 
 
-def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
+def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
     """A law fitted to a theory's answers: x from first contact, from u = 0, or from both where force has no bound."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
     # below the elastic theory's end, and with a hardness towards u = 0, force depends on the logarithm of u

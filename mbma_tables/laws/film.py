@@ -94,8 +94,8 @@ def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowCons
     >>> ((1 - 1.5 / u**2) * ratio[:, 0]).round(4), [1 + 3 * (1 - 3 * c) / 400 for c in (0.8, 0.2)]
     (array([0.9895, 1.0029]), [0.9895, 1.003])
     """
-    share, gap = open_gaps(u, area, 1.0)
     held = np.minimum(area, flow.threshold - NEAREST)
+    share, gap = open_gaps(u, held, 1.0)
     blocked = np.where(area > 0, flow.obstructed(held), 0.0)
     k, carried = anisotropic_medium(share, gap, blocked, np.broadcast_to(peklenik, u.shape))
     shear = u - carried

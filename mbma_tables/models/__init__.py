@@ -19,7 +19,6 @@ from mbma_tables.islands import greenwood_tripp
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
 QUANTITIES = ("pressure", "area")
-FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
 CLOSED_FORM_ERROR = 1e-14
 
@@ -41,10 +40,7 @@ class Certificate(NamedTuple):
 
 
 class IslandAnswer(NamedTuple):
-    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
-
-    Where a model was asked for one of the two and the other would have cost more, the other is NaN.
-    """
+    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape."""
 
     phi_F: FloatArray
     phi_A: FloatArray
@@ -65,28 +61,26 @@ class IslandModel(Protocol):
 
 @runtime_checkable
 class GeometryModel(Protocol):
-    """An island model that needs more of an island than X and mu, or has cheaper ways to answer one quantity."""
+    """An island model that needs more of an island than X and mu."""
 
     @property
     def name(self) -> str:
         """What results call it."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
 
-        `outside` is one of `OUTSIDE`; `which` is FORCE, AREA or BOTH. Used in place of `answer` where both exist.
+        `outside` is one of `OUTSIDE`. Used in place of `answer` where both exist.
         """
 
 
 AnyModel = IslandModel | GeometryModel
 
 
-def answer_islands(
-    model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
-) -> IslandAnswer:
+def answer_islands(model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
     """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked."""
     if isinstance(model, GeometryModel):
-        return model.of_islands(islands, outside, which)
+        return model.of_islands(islands, outside)
     shape = islands["X"].shape
     given: Any = model.answer(islands["X"], islands["mu"])
     try:

@@ -18,7 +18,7 @@ from mbma_tables.core import core, in_blocks
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, to_axes
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
+from mbma_tables.models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.schema import TableContent, error_cell
 
@@ -172,7 +172,7 @@ class Island4dModel(Displayed):
         place = to_axes(delta, low, high, H, self.variant)
         return tuple(axis.side(x.reshape(shape)) for axis, x in zip(self.content.axes, place, strict=False))
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands, through their band and not through mu; `outside` as in `lookup`."""
         shape = np.shape(islands["X"])
         X, width, zeta_d, hurst, mu = (

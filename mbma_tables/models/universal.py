@@ -16,7 +16,7 @@ from mbma_tables.common.display import Displayed, Variable
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.plots import draw_lines
 from mbma_tables.core import core, in_blocks
-from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
+from mbma_tables.models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
 SHOWN = 65  # places along an axis of the table as a Dataset
@@ -126,8 +126,8 @@ class UniversalModel(Ranged, Displayed):
         in_blocks(fill, X.size, BLOCK, workers)
         return rows
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, both: one costs what both do."""
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A of islands."""
         return self.answer(islands["X"], islands["mu"], outside=outside)
 
     def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:

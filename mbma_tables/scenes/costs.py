@@ -1,7 +1,7 @@
 """What each way to an answer costs: the measurements shipped in tables/cost.csv.
 
 A cost is a time divided by that of a fixed piece of work timed in the same run; the row "unit" has the seconds
-of that work on the machine that measured. `python -m generate pages cost` measures.
+of that work on the machine that measured. `python -m generate cost` measures.
 """
 
 from __future__ import annotations

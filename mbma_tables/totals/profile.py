@@ -85,9 +85,7 @@ class Panels(NamedTuple):
     kind: NDArray[np.int64]  # number of the rule
     low: FloatArray
     high: FloatArray
-    fields: (
-        FloatArray  # weights of force, area and so on, shift and rate of heights; (rows + 2, panels, NODES + checks)
-    )
+    fields: FloatArray  # weights of force, area and so on, shift and rate of heights; (rows + 2, panels, nodes, checks)
 
     def some(self, chosen: Any) -> Panels:
         """Those at these places."""
@@ -312,6 +310,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
     raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
 
 
+@functools.lru_cache(maxsize=KEPT)
 def _profile(
     surface: tuple[float, float, float] | MeasuredSurface,
     model: AnyModel,
@@ -319,10 +318,11 @@ def _profile(
     rtol: float,
     outside: str = "nan",
     rows: int = 2,
+    last: float = math.inf,
 ) -> Profile:
     """The profile of a surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
 
-    With `outside` not "exact" it ends with a table. Rows three and four are the islands' number and Hertz area.
+    It ends at the compression `last`, or with a table unless `outside` is "exact". Rows 3 and 4: number and Hertz area.
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
@@ -331,14 +331,18 @@ def _profile(
         fields = _fields_by_table(surface, model, variant)
     else:
         fields = _fields(source, model, "exact" if outside == "exact" else "nan", rows)
-    edges = _edges(source, 2 * source.peak)
+    edges = _edges(source, min(2 * source.peak, last))
     # underflow to zero is correct here
     with np.errstate(under="ignore"):
-        try:
-            return _built(source, fields, edges, rtol)
-        except _EndOfTable as fault:
-            end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
+        while True:
+            try:
+                return _built(source, fields, edges, rtol)
+            except _EndOfTable as fault:
+                edges = np.append(edges[edges < fault.args[0] * (1 - 1e-12)], fault.args[0])
 
 
-profile: Callable[..., Profile] = functools.lru_cache(maxsize=KEPT)(_profile)
+def profile(surface: Any, model: Any, *more: Any, **options: Any) -> Profile:
+    """`_profile`, kept of the library's own island models; objects of users may change."""
+    own = type(model).__module__.startswith("mbma_tables.")
+    made: Profile = (_profile if own else _profile.__wrapped__)(surface, model, *more, **options)
+    return made

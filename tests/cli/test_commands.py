@@ -2,6 +2,7 @@ import inspect
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -275,6 +276,16 @@ def test_faults_of_the_system_are_one_line(folder, fault, said, monkeypatch):
 def test_without_a_command_it_shows_its_help():
     assert run() == run("--help")
     assert run().startswith("Usage: mbma [OPTIONS] [COMMAND]")
+
+
+def test_many_options_are_in_sections():
+    headings = re.findall(r"^(\w.*):$", run("contact", "--help"), re.MULTILINE)
+    assert headings == [
+        "What is known", "Surface", "Measured map", "Surface in numbers", "Surface by roughness parameters", "Bodies",
+        "Theory", "Options",
+    ]  # fmt: skip
+    assert re.findall(r"^(\w.*):$", run("joint", "--help"), re.MULTILINE) == ["Options"]
+    assert re.fullmatch(r"mbma \d+\.\d+\.\d+, core (plain|x86_64_v\d)\n", run("--version"))
 
 
 def test_a_dash_is_standard_input_and_output(folder):

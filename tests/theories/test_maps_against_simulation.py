@@ -9,7 +9,7 @@ from helpers import topographies
 from scipy.ndimage import gaussian_filter
 
 from generate.pages import maps
-from generate.pages.gallery import BARS, ratios, read_rows
+from generate.pages.maps import BARS, ratios, read_rows
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories import BoundaryElements, Calibrated

@@ -1,11 +1,10 @@
-"""Totals in the core, and the batch quadrature: rules, islands, unlike integrals, failure, independence of order."""
+"""Totals in the core: islands, failure, kinks, independence of order, stated errors."""
 
 import math
 
 import numpy as np
 import pytest
 from catalogue import LEVEL
-from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
@@ -14,23 +13,7 @@ from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
 from mbma_tables.totals import island_sum
-from mbma_tables.totals.island_sum import Pairs, integrate, totals_of
-
-
-def test_the_rule_by_its_degrees():
-    """2 n + 1 Kronrod points are exact up to degree 3 n + 1, n Gauss points up to 2 n - 1, and not beyond."""
-    nodes, kronrod, gauss = np.empty((3, 31))
-    assert core.kronrod(nodes, kronrod, gauss) == 0
-    n = 15
-    np.testing.assert_allclose(nodes[1::2], legendre.leggauss(n)[0], rtol=0, atol=2e-16)
-    np.testing.assert_allclose(gauss[1::2], legendre.leggauss(n)[1], rtol=1e-14)
-    assert (gauss[::2] == 0).all()
-    for degree in range(0, 3 * n + 6, 2):
-        integral = 2.0 if degree == 0 else 0.0
-        # Legendre polynomials show every digit, powers do not
-        shape = legendre.legval(nodes, [0] * degree + [1])
-        assert (abs(kronrod @ shape - integral) < 1e-14) == (degree <= 3 * n + 1)
-        assert (abs(gauss @ shape - integral) < 1e-14) == (degree <= 2 * n - 1)
+from mbma_tables.totals.island_sum import Pairs, Sums, sums_by_table
 
 
 @pytest.mark.parametrize("variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name)
@@ -114,30 +97,6 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
         assert phi[-1].tobytes() == phi[0].tobytes()
 
 
-def integrals(function, low, high, rtol=1e-10, owner=None):
-    low, high = np.atleast_1d(np.asarray(low, float)), np.atleast_1d(np.asarray(high, float))
-    owners = np.arange(low.size) if owner is None else np.asarray(owner)
-    return integrate(lambda who, x: function(who[:, None], x)[..., None], owners, low, high, owners.max() + 1, rtol)
-
-
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-10, 1e-13])
-def test_each_integral_to_its_own_size(rtol):
-    # integral of scale exp(-(x/width)^2) over [-1, 1]
-    width = np.array([1.0, 1e-1, 1e-3, 1e-4])
-    scale = np.array([1e-200, 1.0, 1e100, 1e-20])
-    found = integrals(lambda who, x: scale[who] * np.exp(-((x / width[who]) ** 2)), -np.ones(4), np.ones(4), rtol)
-    known = scale * math.sqrt(math.pi) * width * [math.erf(1 / w) for w in width]
-    error = np.abs(found.value[:, 0] / known - 1)
-    assert (error <= np.maximum(found.error[:, 0], 4e-15)).all()
-    assert found.error.max() <= rtol
-
-
-def test_failure_says_which():
-    with pytest.raises(ConvergenceError, match="1 of 3") as caught:
-        integrals(lambda who, x: np.where(who == 1, x**-1.0, x), np.zeros(3), np.ones(3))
-    assert caught.value.mask.tolist() == [False, True, False]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
 def test_stated_errors_of_totals(name):
@@ -146,9 +105,11 @@ def test_stated_errors_of_totals(name):
     low, high = (0.1, np.log(max(3.1, 1.01 * variant.floor_u)), 2.5, 0), (1, np.log(1e4), 5.5, 1)
     hurst, log_zeta, peak, share = rng.uniform(low, high, (count, 4)).T
     surface = Surface(hurst, np.ones(count), np.exp(log_zeta), np.ones(count), peak)
-    pairs = Pairs.of(surface, 2 * peak * share**1.5)
-    found, known = (totals_of(get_model("universal", 1e-8, variant), pairs, variant, rtol) for rtol in (1e-8, 1e-12))
+    pairs, model = Pairs.of(surface, 2 * peak * share**1.5), get_model("universal", 1e-8, variant)
+    (found, error, *_), (known, *_) = (
+        sums_by_table(model, pairs, Sums(model, variant, rtol), "raise", slopes=False) for rtol in (1e-8, 1e-12)
+    )
     with np.errstate(invalid="ignore"):
-        off = [np.nan_to_num(np.abs(a / b - 1)) for a, b in ((found.force, known.force), (found.area, known.area))]
-    assert (np.max(off, axis=0) <= found.error).all()
-    assert found.error.max() <= 1e-8
+        off = np.nan_to_num(np.abs(found / known - 1))
+    assert (off.max(axis=(1, 2)) <= error).all()
+    assert error.max() <= 1e-8

@@ -16,7 +16,7 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFAC
 from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve
 from generate.calibrated import errors
 from generate.calibrated_file import QUANTITIES, rms
-from generate.pages.page import DATA, evidence, read_csv
+from generate.files import DATA, evidence, read_csv
 from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
@@ -114,9 +114,10 @@ def earlier() -> list[Case]:
     return found
 
 
-def older(name: str) -> Case:
-    """One of `OLDER`."""
+def older(name: str, top: float | None = None) -> Case:
+    """One of `OLDER`, with another h_max/h_rms where it is given."""
     file, zeta_1, gradient, h_max = OLDER[name]
+    h_max = top or h_max
     table = read_csv(file)
     rows = [table["force"] / gradient, table["area"], table["mean_separation_over_h_rms"]]
     if name != "challenge":
@@ -168,6 +169,7 @@ def data_sets() -> dict[str, DataSet]:
         "earlier": DataSet("105 earlier surfaces", earlier(), ("MBMA fitted",)),
         "bem": DataSet("an older set, mean of 4", [older("bem")]),
         "gfmd": DataSet("molecular dynamics", [older("gfmd")]),
+        **{f"gfmd {top}": DataSet(f"the same, h_max {top} h_rms", [older("gfmd", top)]) for top in (3, 4)},
         "challenge": DataSet("contact challenge", [older("challenge")]),
         "rolloff": DataSet("two with plateau, by spectrum", [rolloff(0), rolloff(1)]),
         **{name: DataSet(title, [measured(name)]) for name, title in MEASURED.items()},

@@ -1,35 +1,42 @@
-"""Rows of tables/cost.csv: time, error and evaluations of every way to answer an island, a gap or a surface."""
+"""``python -m generate cost``: time, error and evaluations of every way to answer an island, a gap or a surface."""
 
 from __future__ import annotations
 
 import functools
 import itertools
+import json
+import platform
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from importlib import metadata
 from typing import Any
 
+import click
 import numpy as np
+import pandas as pd
 from scipy.stats import qmc
 
+from generate import cost_distances
+from generate.files import ROOT, to_csv
+from generate.pages.classical import iterated, ring_matrix
 from generate.tables import chunks
 from generate.timing import measure
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.greenwood_tripp import iterate, radius, ring_matrix
 from mbma_tables.models import ISLAND_MODELS, IslandAnswer, answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.named import get_model
-from mbma_tables.scenes.costs import Row
+from mbma_tables.scenes.costs import UNIT, Row
 from mbma_tables.surfaces.variants import get_variant
 
 # islands, random ones: H, log10 zeta_1, log10 delta/h_rms
 ISLANDS, SEED, RANGES = 1000, 2026, ((0.32, 0.7, -4.0), (0.98, 3.9, 0.9))
 HARD, PROFILES = 12, 20  # of them, for the classical iteration and for p(r)
-DAMPING, MAX_STEPS = 0.1, 5000
 MESHES = (  # rings and tolerance
     *((25, 1e-2), (25, 1e-4), (50, 1e-3), (100, 1e-2), (100, 1e-4), (100, 1e-6)),
     *((200, 1e-5), (400, 1e-6), (800, 1e-7), (1600, 1e-8)),
@@ -55,6 +62,10 @@ FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); t = time.process_time(); "
     "mbma_tables.contact(s, separation=0.1, island_model={!r}, rtol=1e-2); print(time.process_time() - t)"
 )
+HEAD = """\
+# What accuracy costs, measured by python -m generate cost; docs/cost.md says how. Costs are times over that of a
+# fixed piece of work in the same run; the row of island model unit has its seconds.
+"""
 QUANTITIES = {"both": ("pressure", "area"), "pressure": ("pressure",), "area": ("area",)}
 
 
@@ -104,19 +115,16 @@ def island_rows() -> Iterator[Row]:
     places = list(zip(islands["X"][chosen], islands["mu"][chosen], strict=True))
     for rings, tolerance in MESHES:
         # the matrix is made beforehand, and not timed
-        run = functools.partial(classical, places, ring_matrix(rings), tolerance)
+        matrix = ring_matrix(rings)
+
+        def run(matrix: FloatArray = matrix, tolerance: float = tolerance) -> FloatArray:
+            return np.array([iterated(X, mu, matrix, tolerance) for X, mu in places]).T
+
         steps, converged, force, area = run()
         if not converged.all():
             raise ConvergenceError(f"the classical iteration on {rings} rings did not converge", converged == 0)
         error, pressures = island_error(force, area, truth[:, chosen]), rings * (float(steps.mean()) + 1)
         yield Row("classical", at(f"rings={rings}", tolerance), "both", error, measure(run)[0] / HARD, pressures)
-
-
-def classical(places: Sequence[tuple[float, float]], matrix: FloatArray, tolerance: float) -> FloatArray:
-    """Steps, converged, Phi_F and Phi_A (4, islands) by the damped iteration."""
-    w, p = np.empty(len(matrix)), np.empty(len(matrix))
-    rows = [iterate(X, mu, radius(X, mu, tolerance), matrix, DAMPING, tolerance, MAX_STEPS, w, p) for X, mu in places]
-    return np.array(rows).T
 
 
 class Doubled:
@@ -232,6 +240,21 @@ def first_use_rows() -> Iterator[Row]:
         yield Row(island_model, "import", "both", None, min(taken[1:]) / seconds)
 
 
-def total_rows() -> Iterator[Row]:
-    """Every way to answer a gap."""
-    yield from itertools.chain(scene_rows(), gap_rows(), law_rows(), theory_rows(), first_use_rows())
+def study() -> bytes:
+    """Every measurement of tables/cost.csv, in a few minutes."""
+    seconds, rows = [measure(lambda: None)[1]], list[Row]()
+    for part in (island_rows, scene_rows, gap_rows, law_rows, theory_rows, first_use_rows):
+        rows += part()
+        seconds.append(measure(lambda: None)[1])
+    facts = {"machine": platform.machine()} | {name: metadata.version(name) for name in ("numpy", "scipy")}
+    head = f"{HEAD}# {json.dumps(facts | {'python': platform.python_version()})}\n"
+    # the least: other processes can only add
+    return to_csv(head, pd.DataFrame([Row(UNIT, "seconds", "both", None, min(seconds)), *rows]), "%.4g")
+
+
+@click.command()
+def cost() -> None:
+    """Measure tables/cost.csv and tables/distance.csv, for `mbma cost`, plans of scenes and docs/cost.md."""
+    for name, content in {"cost": study, "distance": cost_distances.study}.items():
+        write_file(ROOT / "tables" / f"{name}.csv", content(), make_folders=True)
+        click.echo(f"tables/{name}.csv")
