@@ -17,8 +17,8 @@ import pandas as pd
 from scipy.stats import qmc
 
 from generate import cost_distances
+from generate.classical import iterated, ring_matrix
 from generate.files import ROOT, to_csv
-from generate.pages.classical import iterated, ring_matrix
 from generate.tables import chunks
 from generate.timing import measure
 from mbma_tables import Scene, Surface, contact, contact_law, theories
@@ -27,7 +27,7 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import ISLAND_MODELS, IslandAnswer, answer_islands
+from mbma_tables.models import ISLAND_MODELS, answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.named import get_model
 from mbma_tables.scenes.costs import UNIT, Row
@@ -125,17 +125,6 @@ def island_rows() -> Iterator[Row]:
         yield Row("classical", at(f"rings={rings}", tolerance), "both", error, measure(run)[0] / HARD, pressures)
 
 
-class Doubled:
-    """The exact solver on twice the nodes that it would take."""
-
-    name = "doubled"
-
-    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
-        """Phi_F and Phi_A."""
-        force, area = chunks.phi(X.ravel(), mu.ravel(), REFERENCE_ISLANDS, 2).T.reshape(2, *X.shape)
-        return IslandAnswer(force, area, np.full(X.shape, REFERENCE_ISLANDS))
-
-
 def gaps_of(surface: Surface, count: int = GAPS) -> FloatArray:
     """Gaps evenly over [-h_max/2, h_max), the upper end left out."""
     return np.linspace(-0.5, 1.0, count, endpoint=False) * float(surface.h_max)
@@ -149,7 +138,7 @@ def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
 @functools.cache
 def reference() -> tuple[dict[str, FloatArray], ...]:
     """Force and area of every surface at every fifth of its gaps."""
-    found = gap_batch(GAPS, EVERY, island_model=Doubled(), rtol=REFERENCE_RTOL)
+    found = gap_batch(GAPS, EVERY, island_model="exact", rtol=REFERENCE_RTOL)
     return tuple({"pressure": np.asarray(one.pressure), "area": np.asarray(one.area)} for one in found)
 
 

@@ -12,11 +12,6 @@ from helpers import fresh, refusals
 
 import mbma_tables
 from mbma_tables import (
-    ConvergenceError,
-    InputError,
-    MbmaError,
-    NotSelfAffineError,
-    OutOfRangeError,
     Surface,
     contact,
     contact_law,
@@ -27,6 +22,7 @@ from mbma_tables import (
     open_table,
 )
 from mbma_tables.common.arguments import SHOWN, finite_array, require
+from mbma_tables.common.errors import ConvergenceError, InputError, MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.materials import effective_modulus
 
 

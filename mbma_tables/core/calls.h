@@ -1,4 +1,4 @@
-/* The core's functions as a table of what they take, for `binding.c` and for tests without Python: sizes of arrays are
+/* The core's functions as a table of their arguments, for `binding.c` and for tests without Python: sizes of arrays are
  * checked here, values in the core. */
 #ifndef MBMA_CALLS_H
 #define MBMA_CALLS_H
@@ -71,7 +71,7 @@ static bool are_panels(const argument *a) {
 }
 #define NODES(k) ((const mbma_nodes[]){{(int64_t)N((k) + 1), P(k), P((k) + 1), P((k) + 2)}})
 
-/* How many coefficients a table of so many nodes has; 0 of one that cannot be. */
+/* How many coefficients a table of so many nodes has; 0 for an impossible one. */
 static size_t coefficients_of(const argument *nodes) {
     const int64_t *const count = (const int64_t *)nodes->data;
     size_t product = 2;
@@ -84,7 +84,7 @@ static size_t coefficients_of(const argument *nodes) {
 #define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
 #define INVERSE(k) ((const mbma_inverse[]){mbma_inverse_open(P(k), N(k))})
 
-/* First in all calls: coefficients; first nodes, rates, ends of what is covered, three constants; cells; of surfaces
+/* First in all calls: coefficients; first nodes, rates, ends of the range, three constants; cells; of surfaces
  * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
 #define SPLINE "F D13 L3 Dn Dn "
 static bool fits_spline(const argument *a) {
@@ -180,7 +180,7 @@ static mbma_spline spline_of(const argument *a) {
     FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4)))
 
-/* A function of arguments: whether their sizes fit, and what was found. */
+/* A function of arguments: whether their sizes fit, and the result. */
 #define DEFINE_CALL(name, kinds, fits, call) \
     static bool do_##name(const argument *a, long long *found) { \
         (void)a; \

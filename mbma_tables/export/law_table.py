@@ -1,4 +1,4 @@
-"""Rows of a law as every file of rows has them: columns with names and units, and what their reader must know."""
+"""Rows of a law, common to all files of rows: columns with names and units, and notes for the reader."""
 
 from __future__ import annotations
 
@@ -19,22 +19,25 @@ class LawTable(Displayed):
     """Rows of a contact law, ready to be written."""
 
     x: FloatArray  # overclosure, or pressure: zero, then rising
-    y: FloatArray  # pressure or conductance, rising from zero; or flow, which falls, to zero where contact blocks it
+    y: FloatArray  # rising from zero; or flow, which falls, to zero where contact blocks it
     x_name: str
     y_name: str
     x_unit: str
     y_unit: str
     largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
-    comments: tuple[str, ...]  # what a reader of the file must know
+    comments: tuple[str, ...]  # notes for the reader of the file
     theory: str  # whose law it is
     floor: float = 0.0  # value below which errors are relative to it
     behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
     more: Mapping[str, tuple[FloatArray, str]] = dataclasses.field(default_factory=dict)  # other columns, their units
-    facts: Mapping[str, tuple[float, str]] = dataclasses.field(default_factory=dict)  # of the joint
+    facts: Mapping[str, tuple[float, str]] = dataclasses.field(
+        default_factory=dict
+    )  # of the joint; of friction the coefficient, and
+    # `stick`, the shear stress over displacement before slip, at one pressure, `stick_pressure`
 
     @property
     def quantity(self) -> str:
-        """As in `describe_law`."""
+        """See `describe_law`."""
         return "film" if self.x_name == "mean_separation" else self.y_name
 
     @property

@@ -31,14 +31,14 @@ class Basis(NamedTuple):
 
     v: FloatArray  # Gauss nodes in v = (rho/a)^2
     root_weights: FloatArray  # square roots of their weights; vectors of the solver are values times these
-    modes: FloatArray  # row k takes such a vector to its k-th orthonormal Legendre coefficient
+    modes: FloatArray  # row k maps such a vector to its k-th orthonormal Legendre coefficient
     operator: FloatArray  # w = a * operator @ p in such vectors; symmetric, positive definite
 
 
 def gauss_legendre(n: int) -> tuple[FloatArray, FloatArray]:
     """Gauss nodes and weights on [0, 1], relative accuracy of a few n eps at the ends too.
 
-    Made here because numpy and scipy form 1 - x^2 from a rounded x and lose up to five digits of the end weights,
+    Computed here because numpy and scipy form 1 - x^2 from a rounded x and lose up to five digits of the end weights,
     which the pressure at an island's edge needs. Here t = 1 - x is the unknown and the recurrence runs over differences
     of Legendre polynomials.
     """
@@ -98,7 +98,7 @@ def _made(v: FloatArray, weights: FloatArray, values: Any, odd: Any, galerkin: F
     """The basis of polynomials at the nodes, with their Galerkin matrix when they are orthonormal."""
     root_weights = np.sqrt(weights)
     modes = (values * root_weights[:, None] * np.sqrt(odd)).T
-    # sums in one order whatever the BLAS and its threads: tables rebuild to the bit
+    # order of summation independent of BLAS and threads, so that tables are reproducible
     half = np.einsum("ki,kl->il", modes, galerkin)
     operator = np.einsum("il,lj->ij", half, modes)
     made = Basis(v, root_weights, modes, (operator + operator.T) / 2)

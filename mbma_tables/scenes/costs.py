@@ -1,4 +1,4 @@
-"""What each way to an answer costs: the measurements shipped in tables/cost.csv.
+"""Measured costs of the methods, from tables/cost.csv.
 
 A cost is a time divided by that of a fixed piece of work timed in the same run; the row "unit" has the seconds
 of that work on the machine that measured. `python -m generate cost` measures.
@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 from mbma_tables.common.files import shipped_file
 
 UNIT = "unit"
-TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # fields that are no numbers
+TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # text fields
 
 
 class Row(NamedTuple):
-    """One measurement: what answered, what was asked of it, largest relative error found, time and evaluations."""
+    """One measurement: method, task, largest relative error found, time and evaluations."""
 
     island_model: str
     variant: str  # "gap rtol=1e-06", "island", "open"
@@ -35,7 +35,7 @@ class Row(NamedTuple):
 
     @property
     def rtol(self) -> float | None:
-        """The tolerance asked for, where the variant names one."""
+        """The requested tolerance, if the variant contains one."""
         _, found, text = self.variant.partition(" rtol=")
         return float(text) if found else None
 
@@ -58,16 +58,16 @@ class Costs(NamedTuple):
 
 
 class Distance(NamedTuple):
-    """A way to a theory's answers: its cost, and the theory's distance from boundary elements on held-out surfaces.
+    """A method for a theory: its cost, and the theory's deviation from boundary elements on held-out surfaces.
 
-    Distances are root mean squares of ln(theory/simulation), of area at equal force and of force at equal mean
+    Deviations are root mean squares of ln(theory/simulation), of area at equal force and of force at equal mean
     separation, light at 1-10% contact and deep at 10-97%.
     """
 
     theory: str
     way: str
     cost: float  # of a point, over that of the fixed work
-    once: float  # of what is made beforehand for a surface
+    once: float  # of preparation for a surface
     area_light: float
     area_deep: float
     force_light: float

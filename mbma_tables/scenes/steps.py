@@ -1,4 +1,4 @@
-"""The steps of a plan: each imports, reads and evaluates what it needs and nothing else."""
+"""The steps of a plan; each imports, reads and evaluates only what it needs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MAX_SLOPE_OF_STIFFNESS = 3.0  # of log(stiffness) by log(h_max - d); 5/2 next to
 
 @dataclasses.dataclass
 class Run:
-    """A plan on its way: what steps hand on, and what they found."""
+    """A plan in execution: values passed between steps, and results."""
 
     problem: Problem
     surface: AnySurface
@@ -40,14 +40,14 @@ class Run:
     reasons: dict[str, list[int]] | None = None
 
     def close(self, step: Step, error: float, island_model: str | None) -> None:
-        """Note the error bound that a step reached, and its island model."""
+        """Record the error bound that a step reached, and its island model."""
         self.errors[step.name] = error
         if island_model is not None:
             self.island_models[step.name] = island_model
 
 
 def _law(run: Run, step: Step) -> None:
-    """Through a law, for MBMA one tight enough for the slopes and gaps that are asked."""
+    """By a law; for MBMA its tolerance suffices for the requested slopes and gaps."""
     from mbma_tables.law.make import MIN_LAW_RTOL, contact_law
 
     problem, wanted = run.problem, run.problem.outputs
@@ -92,7 +92,7 @@ def _find_gaps(run: Run, law: ContactLaw) -> float:
 
 
 def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
-    """What was prescribed, and the quantities at gaps that were asked for, by name."""
+    """The prescribed quantity, and the requested quantities at gaps, by name."""
     problem, wanted = run.problem, run.problem.outputs
     values: dict[str, Any] = {}
     if problem.prescribed in INVERTED:
@@ -131,7 +131,7 @@ def _contact(run: Run, step: Step) -> None:
 
 
 def _asked(run: Run) -> Contact:
-    """The scene's contact, with what follows from it."""
+    """The scene's contact, with derived quantities."""
     from mbma_tables.answers.contact import contact
     from mbma_tables.theories.mbma import Mbma
 
@@ -201,7 +201,7 @@ def _islands(run: Run, step: Step) -> None:
 
 
 class OtherTheory(NamedTuple):
-    """Force and area by a theory, and standard deviations of their logarithms; NaN where there is no answer."""
+    """Force and area by a theory, and standard deviations of their logarithms; NaN where the theory has none."""
 
     pressure: FloatArray
     area: FloatArray

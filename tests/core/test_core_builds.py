@@ -125,14 +125,12 @@ def test_declarations_of_python_are_those_of_its_headers(tmp_path):
 
 
 def recording(folder):
-    """Calls of every function, as the library makes them."""
     path = folder / "calls"
     run(sys.executable, ROOT / "tests" / "core" / "record.py", path)
     return path
 
 
 def replay(compiler, folder, *options):
-    """The program that makes recorded calls again."""
     program = folder / "replay"
     begin = [*compiler, *BUILD.FLAGS, *options, "-DMBMA_MODULE=_plain", f"-I{CORE}"]
     run(*begin, ROOT / "tests" / "core" / "replay.c", *SOURCES, "-o", program, "-lm")

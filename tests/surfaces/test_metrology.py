@@ -151,7 +151,7 @@ class TestBatchOfMaps:
         [
             ("map,surface\n1.npy,challenge\n", "a map and a named surface or numbers"),
             ("map,dx\nabsent.npy,1um\n", "there is no file"),
-            ("surface,dx\nchallenge,1um\n", "about a map, which is missing"),
+            ("surface,dx\nchallenge,1um\n", "for a map, which is missing"),
         ],
     )
     def test_mistakes(self, folder, text, message):

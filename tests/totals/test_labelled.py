@@ -28,8 +28,6 @@ def surfaces_over():
 
 
 class Tasks(Callback):
-    """Counts what dask runs."""
-
     def __init__(self):
         super().__init__()
         self.ran = 0
@@ -55,18 +53,6 @@ def test_dimensions_by_name():
     assert gaps.attrs == {"units": "mm", "long_name": "separation"}
     np.testing.assert_array_equal(found.mean_separation.transpose("case", "gap"), (h_max + gaps.values) / 2)
     assert xr.Dataset({name: getattr(found, name) for name in FIELDS}).sizes == {"surface": 3, "case": 2, "gap": 7}
-
-
-@pytest.mark.parametrize("which", ["separation", "surface", "E_star"])
-def test_one_labelled_argument_is_enough(which):
-    given = {"separation": 1.5, "surface": 0.8, "E_star": 2.0}
-    plain = contact(Surface(given.pop("surface"), 0.2, 40.0, 1.0, 3.0), **given).pressure
-    for dims in ((), ("t",)):
-        own = given | {"surface": 0.8}
-        own[which] = xr.DataArray(np.full((2,) * len(dims), own[which]), dims=dims)
-        found = contact(Surface(own.pop("surface"), 0.2, 40.0, 1.0, 3.0), **own).pressure
-        assert found.dims == dims
-        assert (found.values == plain).all()
 
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
