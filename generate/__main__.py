@@ -20,6 +20,7 @@ GROUPS = {
         for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
     },
     **dict.fromkeys(("gaps", "grids", "measured_maps"), "generate.boundary_elements.studies"),
+    "light": "generate.boundary_elements.light",
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas.fit",
     "machined": "generate.machined.campaign",

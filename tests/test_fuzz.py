@@ -16,7 +16,6 @@ SPECIAL = [np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, 1e-200, 1e154, 1e300, -1e
 
 
 def odd_array(values, rng):
-    """An array like the given one in an odd type, shape, order or with odd entries."""
     array = np.array(values)
     for _ in range(rng.integers(1, 4)):
         numbers, odd = array.dtype.kind == "f" and array.size > 0, SPECIAL[rng.integers(len(SPECIAL))]
@@ -39,7 +38,6 @@ def odd_array(values, rng):
 
 
 def odd_number(rng):
-    """Something in place of a length."""
     given = [1.0, 1, np.float32(2), 1e-30, 1e30, 1e300, 5e-324, 0, -1, np.nan, np.inf, 10**400, True, "1", None, [1.0]]
     return given[rng.integers(len(given))] if rng.integers(3) == 0 else float(10 ** rng.uniform(-3, 3))
 
@@ -63,7 +61,6 @@ def read(reader, *given):
 
 
 def surface_is_right(surface):
-    """A surface of positive finite numbers; or none."""
     numbers = () if surface is None else (surface.q0, surface.q1, surface.h_rms, surface.h_max)
     numbers += (surface.hurst,) if isinstance(surface, Surface) else ()
     return all(0 < number < np.inf for number in numbers)

@@ -184,7 +184,6 @@ def test_valid_of_data_arrays_knows_the_metals():
 
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_sensitivities_hold_the_hardness(theory):
-    """Against differences of answers themselves."""
     numbers = {"pressure": 0.1, "E_star": 115.0, "hardness": 3.0}
     found = sensitivity(
         FACE, pressure="0.1 GPa", E_star="115 GPa", hardness="3 GPa", theory=theory, ranges={"hardness": (2.0, 4.0)}

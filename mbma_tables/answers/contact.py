@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,6 @@ def contact(
     rtol: float = 1e-8,
     outside: str = "raise",
     derivatives: bool = False,
-    quantities: Iterable[str] = QUANTITIES,
     workers: int = 1,
 ) -> Contact:
     """Pressure, real contact area and stiffness of a surface at given separation, pressure or area.
@@ -103,8 +102,6 @@ def contact(
     derivatives : bool
         Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
         theories by numerical differentiation, to 1e-6.
-    quantities : iterable of {"pressure", "area"}
-        What is wanted of MBMA; the other is then None.
     workers : int
         Number of threads for MBMA's batches of surfaces and gaps; results are identical for any number.
 
@@ -166,9 +163,8 @@ def contact(
     )
     yields = stated and not (isinstance(hardness, float | np.ndarray) and _infinite(np.asarray(hardness)))
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
-    wanted = quantities if quantities is QUANTITIES else wanted_quantities(quantities)
     make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
-    return make(surface, value, E_star, hardness, by, source, derivatives, wanted)
+    return make(surface, value, E_star, hardness, by, source, derivatives)
 
 
 def _infinite(hardness: Any) -> bool:
@@ -193,14 +189,6 @@ def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None,
     return get_theory(named, surface)
 
 
-def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
-    """The requested quantities, each once, in the order of `QUANTITIES`."""
-    asked = {quantities} if isinstance(quantities, str) or not isinstance(quantities, Iterable) else set(quantities)
-    if not asked or not asked <= set(QUANTITIES):
-        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
-    return tuple(filter(asked.__contains__, QUANTITIES))
-
-
 def one_known(**given: Any) -> tuple[str, Any]:
     """Name of the one quantity of `KNOWN` that is given."""
     known = []
@@ -213,9 +201,8 @@ def one_known(**given: Any) -> tuple[str, Any]:
 
 
 def _contact(
-    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
-    quantities: tuple[str, ...],
-) -> Contact:  # fmt: skip
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool
+) -> Contact:
     """`contact` of plain arrays."""
     asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
     cap = checked_hardness(hardness) if source.yields else np.asarray(np.inf)
@@ -252,9 +239,6 @@ def _contact(
         by_modulus = {"pressure": fields["pressure"] / E_star + by_log_modulus["pressure"]}
         by_modulus["area"] = by_log_modulus["area"] / E_star
         fields |= at_fixed(held, by, slopes, by_modulus)
-    for name in QUANTITIES:
-        if name not in quantities:
-            fields |= {name: None, f"{name}_by": None}
     return _made(source, fields)
 
 
@@ -310,21 +294,20 @@ def _refuse_pressures(
 
 
 def _of_labelled(
-    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
-    wanted: tuple[str, ...],
-) -> Contact:  # fmt: skip
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool
+) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
     units, held = source.units, by if by in QUANTITIES else None
-    names = (*(("separation", "mean_separation") if held else ()), *wanted, "error")
-    fields: dict[str, Any] = {"pressure": None, "area": None, "islands": None}
+    names = (*(("separation", "mean_separation") if held else ()), *QUANTITIES, "error")
+    fields: dict[str, Any] = {"islands": None}
     slopes: list[tuple[str, str]] = []
     if derivatives:
-        kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
+        kinds = [f"{kind}_by" for kind in QUANTITIES if kind != held] + (["separation_by"] if held else [])
         free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, cap, by, source, derivatives, wanted)
+        found = _contact(block, asked, modulus, cap, by, source, derivatives)
         return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
 
     arrays = {by: value, "E_star": E_star, "hardness": hardness}

@@ -221,7 +221,7 @@ class Interface:
             eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
             return (k * metre * mean_inverse(u, area, jump * metre, surface.h_rms, eta),)
 
-        found: Numbers = source.map(mean, self, 1, {"area": self._touching})[0]
+        found: Numbers = source.map(mean, self, 1, {"area": self.area})[0]
         return found
 
     def tangential(
@@ -248,7 +248,7 @@ class Interface:
         '0.0222 GPa/um, 0.000882 GPa; slip from 0.22 um'
         """
         source = self._source
-        ratio = ratio_of(nu, E, source.materials, direction, source.surface, self._touching)
+        ratio = ratio_of(nu, E, source.materials, direction, source.surface, self.area)
         last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
 
         def at(function: Any) -> Any:
@@ -261,7 +261,7 @@ class Interface:
         normal = at(lambda theory, s, u, E: (E * theory.answer(s, u).pressure,))
         energy = at(lambda theory, s, u, E: (E * theory.energy(s, u),))
         return Tangential(
-            ratio, friction, self.mean_pressure * self._touching if self.pressure is None else self.pressure,
+            ratio, friction, self.pressure,
             self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
             OF_YIELDING if source.yields else OF_LAY if direction else (normal, energy, inverse),
         )  # fmt: skip

@@ -133,16 +133,16 @@ class Leakage(Displayed):
     def valid(self) -> Any:
         """Whether flow through such contacts was simulated; if not, `reasons` explains why."""
         contact = self._contact
-        return contact.valid & contact._source.valid(contact, reasons_against, {"area": contact._touching})
+        return contact.valid & contact._source.valid(contact, reasons_against, {"area": contact.area})
 
     @functools.cached_property
     def reasons(self) -> Any:
         """Reasons why entries are not valid, each with its mask; for plain arrays."""
         contact = self._contact
-        return contact.reasons | contact._source.reasons(contact, reasons_against, {"area": contact._touching})
+        return contact.reasons | contact._source.reasons(contact, reasons_against, {"area": contact.area})
 
     def _map(self, function: Callable[..., FloatArray]) -> Any:
-        area = {"area": self._contact._touching}
+        area = {"area": self._contact.area}
         return self._contact._source.map(lambda *given: (function(*given),), self._contact, 1, area)[0]
 
     @property
@@ -251,7 +251,7 @@ def leakage_of(contact: Any) -> Leakage:
         K = flow(surface, u, share) * volume
         return K, K, K
 
-    K, x, y = contact._source.map(answer, contact, 3, {"area": contact._touching})
+    K, x, y = contact._source.map(answer, contact, 3, {"area": contact.area})
     return Leakage(K, x, y, contact)
 
 

@@ -50,10 +50,17 @@ class Contact(Interface, Displayed):
         d, between the rigid plane and the mid-plane [length].
     mean_separation : ndarray
         u = (h_max + d)/2 (50) [length].
+    <<<<<<< HEAD
+    pressure : ndarray
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
+    area : ndarray
+        A/A0. MBMA does not end at 1 under full compression, and this is not clamped.
+    =======
     pressure : ndarray or None
         F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not requested.
     area : ndarray or None
         A/A0, None where not requested. In MBMA it differs from 1 at full compression; it is not clamped.
+    >>>>>>> refs/heads/prose
     error : ndarray
         Bound on the relative numerical error of both against the theory (for "mbma" against its island model),
         NaN where not known. The deviation of the theory from simulation is given separately, as `scatter`.
@@ -94,11 +101,10 @@ class Contact(Interface, Displayed):
         if source.surface.resolution:
             facts["resolution"] = source.surface.resolution
         for name in ("mean_separation", "pressure", "area"):
-            if getattr(self, name) is not None:
-                facts[name] = shown(getattr(self, name), units[name])
+            facts[name] = shown(getattr(self, name), units[name])
         if any_labelled(source.surface, self.mean_separation) or np.size(self.error) > MOST_SHOWN:
             return facts
-        if np.all(self._touching == 0):
+        if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
@@ -108,7 +114,7 @@ class Contact(Interface, Displayed):
             facts["elastic_hardness"] = shown(self.elastic_hardness, units["pressure"])
             # reveals a pressure in an unintended unit
             light = self.elastic_hardness * ELASTIC_PSI / 2
-            if self.pressure is not None and np.any(self.pressure > light):
+            if np.any(self.pressure > light):
                 limit = shown(light, units["pressure"])
                 facts["pressure"] += f" (above E* g/2 = {limit}, the mean pressure in light contact)"
         if source.theory.advice:
@@ -132,7 +138,7 @@ class Contact(Interface, Displayed):
     def curve(self, leakage: bool = False) -> Curve:
         """A line of pictures, of one surface at several separations; optionally with its leakage."""
         surface = self._source.surface
-        if self.pressure is None or self.area is None or np.size(self.pressure) < 2 or surface.shape != ():
+        if np.size(self.pressure) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
         fields = [self.mean_separation / surface.h_rms, self.pressure, self.area, self.scatter, self.area_scatter]
@@ -176,11 +182,6 @@ class Contact(Interface, Displayed):
             return source.answer
         found: Any = source.map(lambda theory, s, u, E: theory.answer(s, u), self, 4)
         return TheoryAnswer(*found)
-
-    @property
-    def _touching(self) -> Numbers:
-        """A/A0, whether requested or not."""
-        return self._answer.area if self.area is None else self.area
 
     @described
     def stiffness(self) -> Any:
@@ -236,9 +237,8 @@ class Contact(Interface, Displayed):
     @described
     def mean_pressure(self) -> Any:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
-        pressure = self._source.E_star * self._answer.pressure if self.pressure is None else self.pressure
         with np.errstate(invalid="ignore"):
-            return pressure / self._touching
+            return self.pressure / self.area
 
     @described
     def scatter(self) -> Any:
@@ -262,7 +262,7 @@ class Contact(Interface, Displayed):
             return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 
     def _scatter(self, of: str) -> Numbers:
-        return self._source.map(lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self._touching})[0]
+        return self._source.map(lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self.area})[0]
 
     @functools.cached_property
     def leakage(self) -> Leakage:

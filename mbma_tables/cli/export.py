@@ -16,6 +16,7 @@ from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.export.again import again, made_by
 from mbma_tables.export.targets import AGAINST, Target, group, names, targets
+from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -63,6 +64,15 @@ class _Export(click.Command):
 @options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
+@click.option(
+    "--nu",
+    "kappa",
+    type=float,
+    callback=lambda _, __, nu: None if nu is None else float(tangential_ratio(nu)),
+    help="Poisson's ratio of both bodies: tangential stiffness against pressure, or as well.",
+)
+@click.option("--friction", type=float, help="Coefficient for friction cards, whose stiffness before slip needs --nu.")
+@options.quantity_option("--friction-pressure", help="At which that stiffness holds; else amid --pressures.")
 @click.option("--leakage", is_flag=True, help="Flow coefficient of the gaps: rows of it alone, laws as code with it.")
 @click.option("--quantity", type=click.Choice([*AGAINST]), help="Of the rows; by default that which TARGET takes.")
 @click.option("--peklenik", type=float, help="Of a film: length of the roughness along x over that along y.")
@@ -121,7 +131,9 @@ def _refuse_unused(target: Target, given: Mapping[str, Any]) -> None:
     """Reject options that have no effect."""
     taken = target.takes if target.name in group("CODE") else target.takes | {"specimen"}
     unused = [
-        "the surface" if name == "specimen" else f"--{name.replace('_', '-')}" for name in given if name not in taken
+        {"specimen": "the surface", "kappa": "--nu"}.get(name, f"--{name.replace('_', '-')}")
+        for name in given
+        if name not in taken
     ]
     if unused:
         raise InputError(f"without effect on {target.name}: leave {' and '.join(unused)} out")

@@ -207,6 +207,7 @@ _SPECIMEN_OPTIONS = (
     _option("Rsm", "or mean spacing of a profile's elements [length];"),
     _option("longest", "longest wavelength [length],"),
     _option("shortest", "or shortest wavelength [length],"),
+    _option("rolloff", "wavelength from which on a power law follows a flat spectrum [length],"),
     _option("Sds", "or summits per area [1/length^2],"),
     _option("Spd", "the same by its newer name;"),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),

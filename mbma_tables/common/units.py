@@ -50,7 +50,7 @@ SIZES: dict[str, dict[str, Fraction]] = {
 ALIASES = {"micron": "um", "Å": "angstrom", "inch": "in", "N/mm^2": "MPa", "N/mm2": "MPa", "N/m^2": "Pa", "N/m2": "Pa"}
 # powers of length and of stress of named quantities
 DIMENSIONS = {
-    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest"), (1, 0)),
+    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest", "rolloff"), (1, 0)),
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
     **dict.fromkeys(

@@ -6,6 +6,7 @@
 #include <float.h>
 
 #include "elementary.h"
+#include "ends.h"
 #include "mbma.h"
 
 enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
@@ -202,15 +203,15 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfac
         }
         for (size_t k = 0; k < count; k++) {
             const double endless = log_F[k] < -700.0 ? 0.0 : mbma_exp(log_F[k]);
-            /* without cancellation */
-            const double load = -endless * mbma_expm1(end[k] - log_F[k]), over = load / t->area_t0;
+            double steep;
+            const double load = endless * mbma_ended(end[k] - log_F[k], &steep), over = load / t->area_t0;
             const double share = mbma_erf(load * sqrt(2.0 * (1.0 + over) / (s0[k] + over)));
             const double known = gap[k] == gap[k] && end[k] == end[k] ? 0.0 : NAN;
             const double touching = gap[k] >= h_max[k] ? 0.0 : 1.0;
             const bool full = gap[k] <= 0.0;
             force[begin + k] = (full ? INFINITY : touching * load) + known;
             area[begin + k] = (full ? 1.0 : touching * share) + known;
-            stiffness[begin + k] = (full ? INFINITY : touching * (-slope[k] * endless / held[k])) + known;
+            stiffness[begin + k] = (full ? INFINITY : touching * (-slope[k] * endless * steep / held[k])) + known;
         }
     }
     for (size_t k = 0; k < n; k++)
@@ -218,7 +219,7 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfac
     return bad;
 }
 
-/* Newton's method in ln(F + F at h_max), which is smooth to the end, over ln u in a bracket; NaN beyond that. */
+/* Newton's method in ln F of a surface without end, which is smooth to the end, over ln u in a bracket; NaN beyond that. */
 size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u) {
     size_t bad = 0;
@@ -230,14 +231,13 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
         for (size_t k = 0; k < count; k++) {
             const size_t mine = held_owner(surfaces, owner[begin + k]);
             const double F = force[begin + k], end = surfaces->ends[2 * mine + 1];
-            const double over = mbma_log(mbma_max(F, DBL_MIN)) - end;
-            goal[k] = end + (mbma_max(over, 0.0) + mbma_log1p(mbma_exp(-fabs(over))));
+            goal[k] = mbma_endless(mbma_log(mbma_max(F, DBL_MIN)), end);
             low[k] = LEAST_LOG_SEPARATION;
             high[k] = mbma_log(surfaces->h_max[mine]);
             /* ln F is about -3 u at light loads */
             x[k] = mbma_min(mbma_log(mbma_max(-0.3 * goal[k], 1e-3)), high[k] - 0.01);
             u[begin + k] = NAN;
-            done[k] = !(F > 0.0 && fabs(goal[k]) < INFINITY && (uint64_t)owner[begin + k] < surfaces->count);
+            done[k] = !(F > 0.0 && end == end && fabs(goal[k]) < INFINITY && (uint64_t)owner[begin + k] < surfaces->count);
         }
         /* steps of all entries together, which are independent */
         for (int step = 0; step < MOST_STEPS && left > 0; step++) {

@@ -264,7 +264,8 @@ typedef struct {
     double low[2], high[2];   /* of Hurst exponent and ln zeta_1, between which surfaces are answered */
 } mbma_spline;
 
-/* The calibrated law: forces F over A0 E* g with g the rms gradient; mean separations u and other heights over h_rms. */
+/* The calibrated law: forces F over A0 E* g with g the rms gradient; mean separations u and other heights over h_rms.
+ * `ends.h` has how forces end at h_max. */
 typedef struct {
     mbma_spline log_force;               /* of a surface without end, over ln u */
     double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */

@@ -5,6 +5,7 @@
  * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F, F over g(x) of the last one.
  */
 #include "elementary.h"
+#include "ends.h"
 #include "mbma.h"
 
 enum { ORDER = MBMA_ORDER, CELLS = 85, NODES = 12, FEW_NODES = 4, MOST_STEPS = 100 };
@@ -82,12 +83,8 @@ static double integrated_down(double from, double to, const double weight[3], do
 }
 
 static void inner_integral(const double weight[3], double p[CELLS][ORDER]) {
-    const double z = 2.0 * exp(2.0 * HIGHEST);
-    double series = 1.0, at = HIGHEST, value[ORDER];
-    /* exp(z) z E1(z) */
-    for (int k = 8; k > 0; k--)
-        series = 1.0 - k / z * series;
-    double own = 0.5 * ROOT_8_PI / z * series * (weight[0] + 3.0 * weight[1] + 16.0 * weight[2]);
+    /* what lies above counts for less than exp(-80) of this */
+    double at = HIGHEST + 0.05, own = 0.0, value[ORDER];
     for (int cell = CELLS - 1; cell >= 0; cell--) {
         for (int j = 0; j < ORDER; j++) {
             const double next = LOWEST + (cell + 0.5 * (1.0 + node(j))) / CELL_RATE;
@@ -256,20 +253,21 @@ size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const d
         if (ready && gap > 0.0 && gap < law->h_max && gap <= FARTHEST) {
             double slope;
             const double value = log_force_of(law, gap, &slope) + law->shift - tail_at(law, gap), endless = exp(value);
-            const double F = -endless * expm1(law->end - value), over = F / law->t0;
+            double steep;
+            const double F = endless * mbma_ended(law->end - value, &steep), over = F / law->t0;
             force[k] = F;
             area[k] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (law->s0 + over)));
-            stiffness[k] = (3.0 * tail_at(law, gap) / gap - 1.0 / (slope * gap)) * endless;
+            stiffness[k] = (3.0 * tail_at(law, gap) / gap - 1.0 / (slope * gap)) * endless * steep;
         }
         bad += force[k] != force[k];
     }
     return bad;
 }
 
-/* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for it. */
+/* Newton's method for ln F of a surface without end, before the tail's factor ln F + tail. */
 static double separation_at(const mbma_spectrum_law *law, double log_force, double end, double tail, double *slope) {
-    const double over = log_force - end, heaviest = law->edge[law->panels];
-    const double goal = over < 700.0 ? end + fmax(over, 0.0) + log1p(exp(-fabs(over))) : log_force;
+    const double heaviest = law->edge[law->panels];
+    const double goal = log_force - end < 700.0 ? mbma_endless(log_force, end) : log_force;
     double low = -800.0, high = heaviest, x = goal - law->shift, u = 0.0;
     *slope = 0.0;
     for (int step = 0; step < MOST_STEPS && goal - law->shift < heaviest; step++) {

@@ -79,7 +79,10 @@ def _law_of(held: dict[str, Any]) -> LawTable:
     if x.ndim != 1 or any(x.shape != other.shape for other in (y, *columns.values())) or not (np.diff(x) > 0).all():
         raise ValueError("two columns of one length are needed, the first of them rising")
     more = {name: (values, str(held["units"][name])) for name, values in columns.items()}
-    facts = {str(name): (number_in(name, value, 0, 1e300), str(unit)) for name, (value, unit) in held["facts"].items()}
+    facts = {
+        str(name): (number_in(name, value, 0, 1e300), str(unit))
+        for name, (value, unit) in held.get("facts", {}).items()
+    }
     comments, behaviour = tuple(map(str, held["comments"])), _law_of(held["behaviour"]) if "behaviour" in held else None
     error, floor = (number_in(name, held[name], 0, 1e300) for name in ("largest_error", "floor"))
     theory = str(held["theory"])

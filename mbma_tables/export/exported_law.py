@@ -193,10 +193,9 @@ class ExportedForce(ExportedLaw):
         """See `ExportedLaw`; a body has no leakage."""
         body, law = self.force.body, self.law
         return (
-            f"Force law of a rough {body.shape} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
+            f"Force law of a rough {body.name} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
             what,
-            f"pressure is the force [{self.stress}], A/A0 the real area [{body.units['area']}], here of a {body.shape}",
-            f"of radius {body.problem.radius:.10g} {self.length}",
+            f"here pressure is the force [{self.stress}], and A/A0 the real area [{body.units['area']}]",
             *self._of_surface(),
             f"E* = {self.modulus:.10g} {body.units['pressure']}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
             f"overclosure c = approach - ({self.force.first:.10g}), zero at first contact; approach is zero where the",
@@ -255,7 +254,7 @@ def exported_law(
 
 def _exported_force(force: ForceLaw, made_by: tuple[str, ...]) -> ExportedForce:
     """The force law of a body in known units."""
-    body, layer = force.body, force.body.problem.law
+    body, layer = force.body, force.body.law
     length = _known("length_unit", body.surface.unit)
     _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
     numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
@@ -267,6 +266,11 @@ def _known(name: str, unit: str | None) -> str:
         sample = {"length_unit": "'0.8 um'", "stress_unit": "E_star = '115 GPa'"}[name]
         raise InputError(f"{name} is missing: give it, or numbers with units, like {sample}")
     return unit
+
+
+def checked_kappa(kappa: Any) -> float:
+    """Normal over tangential stiffness."""
+    return number_in("kappa", kappa, 0.5, 2.0)
 
 
 def checked_conductivity(conductivity: float | None, unit: str | None) -> tuple[float, str]:

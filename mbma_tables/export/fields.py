@@ -208,7 +208,8 @@ moose_function = Grammar(
     "#",
     dict.fromkeys(QUANTITIES, _moose),
     "Constant outside the rows. Of a conductance: type = GapFluxModelConduction, gap_conductivity_function, with "
-    "gap_conductivity_function_variable = the contact pressure, and gap_conductivity = min_gap above all closed gaps.",
+    "gap_conductivity_function_variable = the contact pressure, and gap_conductivity and min_gap the same length, "
+    "above all closed gaps.",
     named="rough",
 )
 getdp = Grammar(

@@ -19,7 +19,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.code import BuildError, built_by
 from mbma_tables.export.exported_law import ExportedLaw
-from mbma_tables.export.law_code import MORE, AskedLaw, asked_law, code_name, text_of
+from mbma_tables.export.law_code import AskedLaw, asked_law, code_name, text_of
 from mbma_tables.export.law_numbers import LawNumbers
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import filled
@@ -34,6 +34,7 @@ STANDARDS = {
 }
 SAID = {
     "conductance": "through the contact, over nominal area",
+    "tangential_stiffness": "shear stress over displacement before any slip",
     "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
 }
 # names of platforms in FMI 3.0; folders in FMI 2.0, which has none of ARM, ends of libraries, and zig's names
@@ -87,11 +88,17 @@ def fmu(
     law, variables = text_of("c-law", name, found), _variables(found)
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{target} {law}')}}}"
     parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "START": repr(_start(found.numbers))}
-    parts |= {name.upper(): found.more.get(name, "") and repr(found.ratio) for name in MORE}
+    parts |= {
+        "LEAKAGE": found.more.get("leakage", ""),
+        "SLOPED": "LAW" if found.sloped is found.exported.law else "ELASTIC",
+    }
     least, most = found.numbers.c_least, found.numbers.c_most
     parts |= {"LEAST": "-INFINITY" if found.numbers.ends else repr(least), "MOST": repr(most)}
     parts |= {"WRAPPER": filled(f"{parts['FMI']}.c"), "DECLARED": filled(f"{parts['FMI']}.h")}
-    source, third = filled("fmu.c", **parts), target == "fmu3"
+    source, third = (
+        filled("fmu.c", {what: repr(ratio) for what, ratio in found.slopes.items()}, **parts),
+        target == "fmu3",
+    )
     built = _binaries(name, source, third, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
     said = "\n".join((*found.said, f"binaries: {listed}"))

@@ -14,7 +14,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
+from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
 from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
@@ -31,12 +31,23 @@ from mbma_tables.export.text import (
 )
 from mbma_tables.law import block as at
 from mbma_tables.law.force_law import ForceLaw
+from mbma_tables.law.law import ContactLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 
 LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
 MAX_NAME = 31  # letters, as Fortran and C99 read them
-MORE = ("conductance", "leakage")  # asked for
+MORE = ("conductance", "tangential_stiffness", "leakage")  # asked for; all but the last are slopes times a ratio
 FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
+DATA = """\
+static const struct {{
+    mbma_law_head head;
+    mbma_law_row rows[{rows}];
+    mbma_law_record records[{records}];
+}} {name}_DATA = {{
+{data}
+}};
+static const mbma_law {name} = {{&{name}_DATA.head, {name}_DATA.rows, {name}_DATA.records, {records} - 1}};
+"""  # of a law in C
 # functions that other files see, where they are made
 _MADE = re.compile(r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M)
 
@@ -55,10 +66,11 @@ def law_text(
     Parameters
     ----------
     target : str
-        One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`.
+        One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`, kappa
+        `tangential_stiffness`, of an unloading stiffness that with a hardness is not the law's own slope.
     surface, E_star, **asked
-        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit. Or
-        the force law of a rough sphere or cylinder (`RoughContact.law`) alone: its "pressure" is force.
+        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit,
+        kappa. Or the force law of a rough sphere or cylinder (`RoughContact.law`) alone: its "pressure" is force.
     name : str
         What functions, modules or packages are called, or begin with.
     leakage : bool
@@ -72,8 +84,8 @@ def law_text(
     Raises
     ------
     InputError, OutOfRangeError
-        As `describe_law`; for conductance with a hardness, which is not the slope of the law, and for leakage of a
-        target that is a user subroutine.
+        As `describe_law`; for conductance and tangential stiffness with a hardness in Python and MATLAB, and for
+        leakage of a target that is a user subroutine.
 
     Examples
     --------
@@ -115,8 +127,9 @@ class AskedLaw(NamedTuple):
     exported: ExportedLaw
     numbers: LawNumbers
     flow: FlowNumbers | None
-    ratio: float  # ratio of conductance to tangent; NaN if not requested
-    more: dict[str, str]  # units of the requested quantities of `MORE`
+    slopes: dict[str, float]  # ratios of functions to the slope of a law,
+    sloped: ContactLaw  # of the contact without a hardness
+    more: dict[str, str]  # units of what was asked of `MORE`
     said: tuple[str, ...]
 
 
@@ -145,6 +158,7 @@ def asked_law(
     E_star: float | str = 1.0,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
+    kappa: float | None = None,
     leakage: bool = False,
     only_conductance: bool = False,
     **options: Any,
@@ -155,17 +169,27 @@ def asked_law(
     if isinstance(surface, ForceLaw) and (conducts or leakage):
         raise InputError("a force law has neither conductance nor leakage: leave conductivity and leakage out")
     exported = exported_law(surface, E_star, **options)
-    if conducts and exported.hardness < math.inf:
-        raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
+    slopes = {"conductance": k_s / exported.modulus} if conducts else {}
     more = {"conductance": f"{k_unit}/{exported.length}"} if conducts else {}
+    if kappa is not None:
+        slopes["tangential_stiffness"] = 1 / checked_kappa(kappa)
+        more["tangential_stiffness"] = f"{exported.stress}/{exported.length}"
     more |= {"leakage": f"{exported.length}^3"} if leakage else {}
+    sloped, factor = exported.law.unloading if slopes else (exported.law, 1.0)
+    slopes = {what: factor * ratio for what, ratio in slopes.items()}
     numbers, flow = law_numbers(exported.law), flow_numbers(exported.law.leakage) if leakage else None
-    return AskedLaw(exported, numbers, flow, k_s / exported.modulus, more, _head(exported, numbers, more))
+    return AskedLaw(exported, numbers, flow, slopes, sloped, more, _head(exported, numbers, more))
 
 
 def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
     """The text of a target's own file, or of another template of it."""
     language, numbers, flow = LANGUAGES[target], asked.numbers, asked.flow
+    yields = asked.sloped is not asked.exported.law
+    if yields and not language.unloads:
+        raise InputError(
+            f"{target} has no place for an unloading stiffness, which conductance and tangential stiffness of yielded "
+            "contact follow: leave the hardness out, or take c-law, fortran-law, javascript-law, modelica-law or an FMU"
+        )
     lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
     lines.append(_example(asked.exported, language))
     parts = {
@@ -175,19 +199,26 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
         "LENGTH": asked.exported.length,
         "STRESS": asked.exported.stress,
         **dict(language.parts),
-        **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
+        "ELASTIC": "yes" if yields else "",
+        "LEAKAGE": asked.more.get("leakage", ""),
     }
+    each = {what: language.number(ratio) for what, ratio in asked.slopes.items()}
+    sloped = ("LAW", "ELASTIC") if language.arrays is None else ("tangent", "unloading")
+    parts |= {"CONDUCTANCE": each.get("conductance", ""), "SLOPED": sloped[yields]}
     if template:
-        return filled(template, **parts)
+        return filled(template, each, **parts)
     if language.arrays is None:
         parts |= _core(target, name, asked, language.number)
     else:
         parts |= _numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language, language.arrays)
         if flow:
             parts |= _numbers("flow_", flow, {"p": flow.force}, language, language.arrays)
+        if yields:
+            own = law_numbers(asked.sloped)
+            parts |= _numbers("elastic_", own, {"p": own.force}, language, language.arrays)
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts)
-    return filled(language.template, **parts)
+    return filled(language.template, each, **parts)
 
 
 def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
@@ -197,23 +228,24 @@ def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str
     ends = {"H_MAX": law.h_max, "FIRST": first, "TURN": numbers.c_turn}
     ends |= {"C_LEAST": numbers.c_least, "C_MOST": numbers.c_most}
     parts = {place: number(value) for place, value in ends.items()}
-    blocks = {"": law.block}
+    blocks = {"LAW": law.block}
     if asked.flow:
-        blocks["FLOW_"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
+        blocks["FLOW"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
+    if asked.sloped is not law:
+        blocks["ELASTIC"] = asked.sloped.block
     if target == "javascript-law":
         held = {"WASM": page_file(LAW_MODULE)}
-        held |= {f"{prefix}BLOCK": block.astype("<f8", copy=False).tobytes() for prefix, block in blocks.items()}
+        held |= {f"{name}_BLOCK": block.astype("<f8", copy=False).tobytes() for name, block in blocks.items()}
         return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
     parts["CORE"] = core_text(["law.c"], name)
-    more = {quantity.upper(): asked.more.get(quantity, "") for quantity in MORE}
-    parts["DECLARED"] = filled("law.h", HEADER="", NAME=name, **more).lstrip()
+    slopes = dict.fromkeys(asked.slopes, "")
+    parts["DECLARED"] = filled("law.h", slopes, HEADER="", NAME=name, LEAKAGE=asked.more.get("leakage", "")).lstrip()
     whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
     parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
     parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
-    for prefix, block in blocks.items():
-        rows, records = block_rows(block)
-        parts |= {f"{prefix}ROWS": str(rows), f"{prefix}RECORDS": str(records), f"{prefix}DATA": block_text(block)}
-    return parts
+    rows = {own: dict(zip(("rows", "records"), block_rows(block), strict=True)) for own, block in blocks.items()}
+    laws = (DATA.format(name=own, data=block_text(block), **rows[own]) for own, block in blocks.items())
+    return parts | {"LAWS": "".join(laws).rstrip()}
 
 
 def _numbers(

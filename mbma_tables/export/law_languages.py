@@ -25,7 +25,8 @@ class Language(NamedTuple):
     rows of polynomials by their places in the template, whose names begin with a prefix; None where the law is read by
     the core's C. `subroutine` is the template of a solver's user subroutine that calls the law, `parts` what else is
     filled in. `own_name` has key words where the law's name stands alone, as that of a module or package. `beside` has
-    other files by the ends of their names, each a target or a template; `inverts` is whether it has `overclosure`.
+    other files by the ends of their names, each a target or a template; `inverts` is whether it has `overclosure`,
+    `unloads` whether it has an unloading stiffness that is not its own slope.
     """
 
     template: str
@@ -40,6 +41,7 @@ class Language(NamedTuple):
     own_name: str = ""
     beside: tuple[tuple[str, str], ...] = ()
     inverts: bool = True
+    unloads: bool = True
 
 
 def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
@@ -152,6 +154,7 @@ LANGUAGES = {
         _with_infinity("-np.inf"),
         _lists,
         parts=(("NP", "np"), ("NUMPY", "asked"), ("JAX", "")),
+        unloads=False,
     ),
     "jax-law": Language(
         "law.py",
@@ -162,6 +165,7 @@ LANGUAGES = {
         _with_infinity("-jnp.inf"),
         _lists,
         parts=(("NP", "jnp"), ("NUMPY", ""), ("JAX", "asked")),
+        unloads=False,
     ),
     "matlab-law": Language(
         "law.m",
@@ -171,6 +175,7 @@ LANGUAGES = {
         _with_infinity("-Inf"),
         _matrices,
         own_name="case catch classdef continue elseif global otherwise parfor return spmd switch try while",
+        unloads=False,
     ),
     "modelica-law": Language(
         "law.mo",

@@ -7,7 +7,9 @@ approach, so that -dp/du = dp/dc.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from mbma_tables.common.arguments import FloatArray, hinted, number_in, one_numb
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, exported_law
+from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
 from mbma_tables.export.film_rows import facts_of, film_rows
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.law.force_law import ForceLaw
@@ -24,17 +26,17 @@ from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.totals.conductance import conductance
 
-QUANTITIES = ("pressure", "conductance", "leakage", "hydraulic_aperture", "film")
+QUANTITIES = ("pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film")
+OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
 LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # mean separations of the last points, over h_max
 FILM_ROWS = 200
 
 
-def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: float) -> tuple[FloatArray, FloatArray]:
-    """The law on fine points; conductance by the frozen contact's stiffness where it is not the law's own slope."""
+def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: float) -> tuple[FloatArray, FloatArray]:
+    """The law on fine points; what follows the unloading stiffness is `scale` times that."""
     law = exported.law
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
@@ -54,7 +56,31 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, k_s: fl
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
-    return pressure[rises], np.asarray(conductance(stiffness, k_s, exported.modulus))[rises]
+    return pressure[rises], scale * stiffness[rises]
+
+
+def _friction(
+    exported: ExportedLaw, friction: float, kappa: Any, pressure: Any, pressures: tuple[Any, Any] | None
+) -> tuple[dict[str, tuple[float, str]], str]:
+    """Facts for friction cards, by the stiffness of a small unloading, and what these mean."""
+    law, units = exported.law, exported.units
+    if kappa is None or (pressure is None and pressures is None):
+        raise InputError("friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures")
+    ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
+    at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
+    ratio = checked_kappa(kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa)
+
+    def stiffness(p: float) -> float:
+        return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
+
+    stick, unit = stiffness(at), f"{exported.stress}/{exported.length}"
+    places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
+    facts = {"friction": (number_in("friction", friction, 1e-12, 1e12), "1")}
+    return facts | {"stick": (stick, unit), "stick_pressure": (at, exported.stress)}, (
+        f"friction coefficient {friction:.10g}; shear stress over displacement before slip, the stiffness of a small "
+        f"unloading over kappa = {ratio:.4g}: {stick:.4g} {unit} at {at:.4g} {exported.stress}, where the friction "
+        f"card holds; {', '.join(f'{stiffness(p):.4g} at {p:.4g}' for p in places)} {exported.stress}"
+    )
 
 
 @hinted
@@ -71,6 +97,9 @@ def describe_law(
     pressures: tuple[float | str, float | str] | None = None,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
+    kappa: float | Callable[[float], float] | None = None,
+    friction: float | None = None,
+    friction_pressure: float | str | None = None,
     variant: str | Variant = "reported",
     evenly: bool = False,
     theory: str | Theory | UserTheory | None = None,
@@ -88,11 +117,12 @@ def describe_law(
         Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
-    quantity : {"pressure", "conductance", "leakage", "hydraulic_aperture", "film"}
-        Pressure against overclosure, or conductance against pressure, or the flow coefficient k h_rms^3 of the gaps
-        (`ContactLaw.leakage`), or the hydraulic aperture k^(1/3) h_rms with the aperture u, the derivative by u and the
-        stiffness -dp/du. A film: flow factors (`flow_factors`), asperity pressure and contact area against the mean gap
-        u, from 0.2 h_rms or the largest of `pressures` to 10 h_rms, of theory "calibrated" by default.
+    quantity : {"pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film"}
+        Pressure against overclosure, or against pressure conductance, tangential stiffness before slip, the flow
+        coefficient k h_rms^3 of the gaps (`ContactLaw.leakage`), or the hydraulic aperture k^(1/3) h_rms with the
+        aperture u, the derivative by u and the stiffness -dp/du. A film: flow factors (`flow_factors`), asperity
+        pressure and contact area against the mean gap u, from 0.2 h_rms or the largest of `pressures` to 10 h_rms, of
+        theory "calibrated" by default.
     rows : int, optional
         How many; else as few as `rtol` needs, 1e-3 where neither is given; 200 of a film, which has no `rtol`.
     rtol : float, optional
@@ -105,6 +135,13 @@ def describe_law(
         smallest on. Not with `largest_overclosure`.
     conductivity : float, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
+    kappa : float or callable, optional
+        Normal over tangential stiffness (`materials.tangential_ratio`), a number or a function of the contact area.
+    friction : float, optional
+        Coefficient of friction, for the friction cards of solvers; with `kappa`.
+    friction_pressure : float or str, optional
+        Pressure at which the one tangential stiffness of a friction card holds; by default the geometric mean of
+        `pressures`. Comments have the stiffness at other pressures.
     variant : str or Variant
         Of the MBMA model.
     theory : str or theory
@@ -146,10 +183,18 @@ def describe_law(
     law = exported.law
     units = law.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    k_s, names = 1.0, (own := ("overclosure", "force" if of_body else "pressure", exported.length, exported.stress))
+    scale, names, facts = (
+        1.0,
+        (own := ("overclosure", "force" if of_body else "pressure", exported.length, exported.stress)),
+        facts_of(exported),
+    )
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
+        scale, facts = k_s / exported.modulus, facts | {"conductivity": (k_s, unit)}
         names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")
+    elif quantity == "tangential_stiffness":
+        names = ("pressure", quantity, exported.stress, f"{exported.stress}/{exported.length}")
+        scale = 1 / checked_kappa(kappa)
     elif quantity == "leakage":
         names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
     elif quantity == "hydraulic_aperture":
@@ -160,8 +205,13 @@ def describe_law(
         count = whole_number_in("rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS)
         return film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
-    behaviour = _table(exported, "pressure", own, least, end, choose) if quantity == "conductance" else None
-    return _table(exported, quantity, names, least, end, choose, k_s, behaviour)
+    heat = quantity == "conductance"
+    behaviour = _table(exported, "pressure", own, least, end, choose, 1.0, facts_of(exported)) if heat else None
+    said: list[str] = []
+    if friction is not None:
+        more, *said = _friction(exported, friction, kappa, friction_pressure, pressures)
+        facts |= more
+    return _table(exported, quantity, names, least, end, choose, scale, facts, behaviour, *said)
 
 
 def _table(
@@ -171,12 +221,14 @@ def _table(
     least: float | None,
     end: float,
     choose: Callable[..., tuple[FloatArray, FloatArray, float]],
-    k_s: float = 1.0,
+    scale: float,
+    facts: dict[str, tuple[float, str]],
     behaviour: LawTable | None = None,
+    *said: str,
 ) -> LawTable:
     """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
     law = exported.law
-    fine_x, fine_y = _curve(exported, quantity, end, k_s)
+    fine_x, fine_y = _curve(exported, quantity, end, scale)
     floor = FLOOR * float(fine_y[-1])
     aperture, flow = quantity == "hydraulic_aperture", quantity in ("leakage", "hydraulic_aperture")
     if flow:
@@ -187,17 +239,18 @@ def _table(
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
-    if heat := quantity == "conductance":
-        # below the smallest pressure of interest there is only the row of zero pressure
+    if slope := quantity in ("conductance", "tangential_stiffness"):
+        # between no contact and the smallest pressure that counts there is one row alone, that of zero
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
-    x, y, error = choose(fine_x, fine_y, floor, jump=heat or law.highest < np.inf)
+    x, y, error = choose(fine_x, fine_y, floor, jump=slope or law.highest < np.inf)
     comments = exported.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
         f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
-        *(["the first row is zero, whatever the theory gives up to the second"] if law.highest < np.inf else ()),
+        *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
+        *said,
         end=end,
         leakage=flow,
     )
@@ -210,7 +263,6 @@ def _table(
             "aperture": (np.asarray(found.mean_separation), exported.length), "derivative": (by_u, "1"),
             "stiffness": (np.asarray(found.stiffness), f"{exported.stress}/{exported.length}"),
         }  # fmt: skip
-    facts = facts_of(exported, conductivity=(k_s, names[3].rpartition("/")[0])) if heat else facts_of(exported)
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, more, facts)
 
 

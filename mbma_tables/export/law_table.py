@@ -19,7 +19,7 @@ class LawTable(Displayed):
     """Rows of a contact law, ready to be written."""
 
     x: FloatArray  # overclosure, or pressure: zero, then rising
-    y: FloatArray  # pressure or conductance, rising from zero; or flow, which falls, to zero where contact blocks it
+    y: FloatArray  # rising from zero; or flow, which falls, to zero where contact blocks it
     x_name: str
     y_name: str
     x_unit: str
@@ -30,7 +30,10 @@ class LawTable(Displayed):
     floor: float = 0.0  # value below which errors are relative to it
     behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
     more: Mapping[str, tuple[FloatArray, str]] = dataclasses.field(default_factory=dict)  # other columns, their units
-    facts: Mapping[str, tuple[float, str]] = dataclasses.field(default_factory=dict)  # of the joint
+    facts: Mapping[str, tuple[float, str]] = dataclasses.field(
+        default_factory=dict
+    )  # of the joint; of friction the coefficient, and
+    # `stick`, the shear stress over displacement before slip, at one pressure, `stick_pressure`
 
     @property
     def quantity(self) -> str:

@@ -62,14 +62,24 @@ def _exponential_card(u0: float, p0: float) -> str:
     return f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{number(u0 * math.log(100))}, {number(p0)}\n"
 
 
+def _friction(law: LawTable) -> tuple[float, float, float]:
+    """Coefficient, stick slope, and the displacement at which slip begins."""
+    friction, slope, pressure = (law.facts[name][0] for name in ("friction", "stick", "stick_pressure"))
+    return friction, slope, friction * pressure / slope
+
+
+def _stick(law: LawTable) -> str:
+    return "*FRICTION\n{:.10g}, {:.10g}\n".format(*_friction(law)) if "friction" in law.facts else ""
+
+
 def _calculix(law: LawTable, name: str) -> str:
     if (np.diff(law.x) <= MIN_CALCULIX_STEP).any():
         raise InputError(
             f"rows are closer than {MIN_CALCULIX_STEP:g} {law.x_unit}, which CalculiX cannot tell apart: take fewer "
             "rows or a smaller unit of length"
         )
-    cards = _interaction(name, _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law))
-    return _notes(CALCULIX_TABULAR, name=name) + cards
+    behaviour = _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law)
+    return _notes(CALCULIX_TABULAR, name=name) + _interaction(name, behaviour, _stick(law))
 
 
 def _calculix_heat(law: LawTable, name: str) -> str:
@@ -84,12 +94,15 @@ def _calculix_heat(law: LawTable, name: str) -> str:
     middle, spread = (off.max() + off.min()) / 2, (off.max() - off.min()) / 2
     said = {"low": f"{p[0]:.4g}", "high": f"{p[-1]:.4g}", "by_p": math.expm1(spread), "by_c": f"{spread * u0:.2g}"}
     said |= {"slope": number(p[-1] / c[-1]), "name": name, "stress": rows.y_unit, "length": rows.x_unit}
-    cards = _exponential_card(u0, math.exp(middle)), _card("*GAP CONDUCTANCE", law)
+    cards = _exponential_card(u0, math.exp(middle)), _stick(law), _card("*GAP CONDUCTANCE", law)
     return _notes(CALCULIX_HEAT, **said) + _interaction(name, *cards)
 
 
 def _abaqus(law: LawTable, name: str) -> str:
     cards = [_card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)]
+    if "friction" in law.facts:
+        friction, _, slip = _friction(law)
+        cards.append(f"*FRICTION, ELASTIC SLIP={number(slip)}\n{number(friction)}\n")
     if law.behaviour is not None:
         cards.append(_card("*GAP CONDUCTANCE, PRESSURE", law))
     return _interaction(name, *cards)
@@ -173,6 +186,7 @@ calculix = Grammar(
     # of more conductances, 2.20 keeps the last twenty, without a message
     {"pressure": 200, "conductance": 20},
     "ROUGH",
+    friction="Its stick slope is that of one pressure.",
 )
 abaqus = Grammar(
     "Abaqus",
@@ -180,6 +194,7 @@ abaqus = Grammar(
     {"pressure": _abaqus, "conductance": _abaqus},
     "Abaqus continues the last slope beyond the last row: stay within the range.",
     named="ROUGH",
+    friction="Its stiffness before slip is proportional to pressure, the coefficient times that over the elastic slip.",
 )
 STAY = "Stay within the rows: the solver's behaviour beyond them was not tested."
 lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(("pressure", "conductance", "leakage"), _lsdyna), STAY)

@@ -18,18 +18,22 @@ from mbma_tables.export.text import comment
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
-LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit"})
+LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"})
 ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "quantity", "peklenik"}
 CODE = LAW | {"name", "leakage"}
+FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {
     "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
 }  # fmt: skip
 SI = ("m", "Pa")
 # by quantity: options for it alone, and the abscissa of its rows
-OPTIONS = {"conductance": {"conductivity", "conductivity_unit"}, "film": {"peklenik"}}
+OPTIONS = {
+    "conductance": {"conductivity", "conductivity_unit"}, "tangential_stiffness": {"kappa"}, "film": {"peklenik"},
+}  # fmt: skip
 AGAINST = {
-    "pressure": "overclosure", "conductance": "pressure", "leakage": "pressure", "hydraulic_aperture": "pressure",
+    "pressure": "overclosure", "conductance": "pressure", "tangential_stiffness": "pressure",
+    "leakage": "pressure", "hydraulic_aperture": "pressure",
     "film": "mean_separation",
 }  # fmt: skip
 
@@ -85,6 +89,7 @@ class Grammar:
     named: str | None = None  # default name; None if there is none
     first: str = ""  # line of the file
     units: tuple[str, str] | None = None  # of length and of stress, if they are prescribed
+    friction: str = ""  # notes for the user of its friction card; empty without one
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
         """The text of a file.
@@ -98,17 +103,19 @@ class Grammar:
         if law.quantity not in self.body:
             taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
             raise InputError(f"{self.program} takes {taken} here, got {law.y_name} against {law.x_name}")
-        own = law.facts["h_rms"][1], law.facts["E_star"][1]
-        if self.units not in (None, own):
+        if self.units and (own := tuple(law.facts[fact][1] for fact in ("h_rms", "E_star"))) != self.units:
             raise InputError(f"{self.program} is written in {' and '.join(self.units)}, got {' and '.join(own)}")
         if law.x.size > (most := self.most.get(law.y_name, law.x.size)):
             raise InputError(
                 f"{self.program} holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows"
             )
+        if "friction" in law.facts and not self.friction:
+            raise InputError(f"{self.program} takes no friction here")
         named = {} if self.named is None else {"name": self.named if name is None else name}
+        said = [self.friction] if "friction" in law.facts else []
         return (
             self.first
-            + comment([*law.comments, self.beyond], self.mark)
+            + comment([*law.comments, *said, self.beyond], self.mark)
             + self.body[law.quantity](law, **named, **numbers)
         )
 
@@ -117,6 +124,7 @@ class Grammar:
         takes = ROWS if self.named is None else ROWS | {"name"}
         for quantity, options in OPTIONS.items():
             takes -= options if quantity not in self.body else set()
+        takes |= FRICTION if self.friction else set()
         return Target(name, self, takes, quantity=next(iter(self.body)), units=self.units)
 
 

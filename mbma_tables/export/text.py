@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.resources
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -84,10 +84,18 @@ def page_file(name: str) -> bytes:
     return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
 
 
-def filled(name: str, **parts: str) -> str:
-    """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty."""
-    chosen = re.compile(r"@IF ([A-Z]+)@(\n)?(.*?)@END@(?(2)\n)", re.S)
-    text = chosen.sub(lambda found: parts[found[1]] and found[3], template(name))
+def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
+    """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty.
+
+    @EACH@ ... @END@ is repeated for each function that is a slope times a ratio: @WHAT@, @PLACE@ and @RATIO@.
+    """
+    chosen = re.compile(r"@(?:IF ([A-Z]+)|EACH)@(\n)?(.*?)@END@(?(2)\n)", re.S)
+
+    def repeated(text: str) -> str:
+        own = ({"WHAT": what, "PLACE": what.upper(), "RATIO": ratio} for what, ratio in each.items())
+        return "".join(re.sub("@(WHAT|PLACE|RATIO)@", lambda place: one[place[1]], text) for one in own)  # noqa: B023
+
+    text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), template(name))
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 

@@ -36,19 +36,19 @@ class Derived:
 
         With a hardness it is made from the law of the elastic contact, which is fitted when this is first called.
         """
-        found: Numbers = self._elastic.stiffness(mean_separation, separation=separation)
-        if math.isinf(self.hardness):
-            return found
-        from mbma_tables.laws.hardness import frozen_factor
-
-        return found * float(frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient))))
+        law, factor = self.unloading
+        found: Numbers = factor * law.stiffness(mean_separation, separation=separation)
+        return found
 
     @functools.cached_property
-    def _elastic(self: Any) -> Any:
-        """The law of the elastic contact."""
+    def unloading(self: Any) -> tuple[Any, float]:
+        """The law of the elastic contact, and `unloading_stiffness` over its stiffness."""
         if math.isinf(self.hardness):
-            return self
-        return dataclasses.replace(self.elastic(), units=self.units)
+            return self, 1.0
+        from mbma_tables.laws.hardness import frozen_factor
+
+        factor = frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient)))
+        return dataclasses.replace(self.elastic(), units=self.units), float(factor)
 
     def tangential(
         self: Any,

@@ -123,18 +123,19 @@ def mean_inverse(
 
 
 def open_gaps(
-    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf
+    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf, deepest: float = DEEPEST
 ) -> tuple[FloatArray, FloatArray]:
     """Shares of the nominal area and gaps there [length] on a last axis of `NODES`, of contacts as for `mean_inverse`.
 
-    The shares add up to that of the open gaps; the mean gap over the nominal area is u.
+    The shares add up to that of the open gaps; the mean gap over the nominal area is u. With `deepest` 1 gaps are
+    continuous at first contact.
     """
     from scipy.special import ndtri
 
     gap, share, height, cap = (part[..., None] for part in np.broadcast_arrays(u, area, h_rms, eta))
     share = np.minimum(share, FULLEST)
     with np.errstate(divide="ignore"):
-        d = np.minimum(-ndtri(share), np.maximum(DEEPEST * gap / height, DEEP))
+        d = np.minimum(-ndtri(share), np.maximum(deepest * gap / height, DEEP))
     d = np.where(share > 0, d, gap / height)
     q = 1 + BEND * share / (share + LIGHT) * -np.expm1(-((cap / SOFT) ** POWER))
     node, weight = _rule()

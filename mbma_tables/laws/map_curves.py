@@ -33,6 +33,7 @@ from mbma_tables.laws.calibrated import (
     Law,
     Spectrum,
     area,
+    area_of,
     force_of,
     light_factor,
     mean_top_height,
@@ -187,9 +188,7 @@ class MapLaw:
         force = np.maximum(-ndtri(np.minimum(pulled, 0.5)) / 2, 0.0) * beyond
         alpha = self.spectrum.alpha
         # Hertz's elliptic factor, in the place of alpha's: s0/k^2
-        t = force / self.constants.area_t0
-        s0 = light_factor(alpha, self.constants) / self._ellipse[0] ** 2
-        return np.asarray(erf(force * np.sqrt(2 * (1 + t) / (s0 + t))))
+        return area_of(force, light_factor(alpha, self.constants) / self._ellipse[0] ** 2, self.constants.area_t0)
 
     @functools.cached_property
     def _ellipse(self) -> tuple[float, float]:

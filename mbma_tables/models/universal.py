@@ -170,14 +170,12 @@ class UniversalModel(Ranged, Displayed):
         strip_cells = np.split(np.arange(count), firsts[1:])
         places += [own[np.searchsorted(mu_low[own], buckets, side="right") - 1] for own in strip_cells]
         ends = self._X.low, self._X.high, float(X_STEPS), self._mu.high
-        found = (
-            records.reshape(-1),
-            np.concatenate(places).astype(np.int32),
-            np.array([*ends, first - 1, buckets.size], dtype=float),
-        )
-        if not core.table_fits(*found):
+        numbers = np.array([*ends, first - 1, buckets.size], dtype=float)
+        starts, cells = places[0], np.concatenate(places[1:])
+        # the core does not look whether places lie inside the table
+        if not (cells.min() >= 0 and cells.max() < count and starts.max() + buckets.size <= steps.size + cells.size):
             raise TableFileError("the cells of the universal table do not cover its range")
-        return found
+        return records.reshape(-1), np.concatenate(places).astype(np.int32), numbers
 
 
 def fractions_of_mu(low: FloatArray, high: FloatArray) -> FloatArray:

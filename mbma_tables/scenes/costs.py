@@ -23,7 +23,7 @@ class Row(NamedTuple):
 
     island_model: str
     variant: str  # "gap rtol=1e-06", "island", "open"
-    quantity: str  # "both", "pressure" or "area"
+    quantity: str  # "both", or "pressure" that a law is inverted for
     error: float | None
     cost: float  # time over that of the fixed work; seconds in the row of island model `UNIT`
     evaluations: float | None = None  # islands for a gap, pressures for an exact island, height integrals for a table
@@ -46,11 +46,9 @@ class Costs(NamedTuple):
     rows: tuple[Row, ...]
     seconds: float
 
-    def of(self, island_model: str, what: str, rtol: float | None = None, quantity: str = "both") -> float:
+    def of(self, island_model: str, what: str, rtol: float | None = None) -> float:
         """Seconds at the loosest measured tolerance that meets `rtol`, else the tightest; NaN if none was measured."""
         rows = [row for row in self.rows if row.island_model == island_model and row.what == what]
-        # a quantity that was not measured alone is taken to cost as much as both
-        rows = [row for row in rows if row.quantity == quantity] or [row for row in rows if row.quantity == "both"]
         if not rows:
             return math.nan
         # calls and opening a table have one row, without a tolerance

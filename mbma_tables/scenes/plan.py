@@ -24,10 +24,9 @@ ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadratur
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
 # p(r) at a point converges later than its integrals
 AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
-# gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: the
-# universal table's profiles need half a microsecond for a further gap, the others sum its islands
-MIN_LAW_GAPS = {"universal": 4000, "exact": 20}
-MIN_LAW_GAPS_OF_OTHERS = 150
+# gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: profiles of
+# islands answer a further gap in half a microsecond
+MIN_LAW_GAPS, MIN_LAW_GAPS_OF_OTHERS = 4000, 150  # of MBMA, and of other theories
 MIN_THEORY_LAW_RTOL = 1e-9
 YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # over an elastic call, and over one of many elastic gaps (docs/yield.md)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
@@ -182,8 +181,7 @@ class _Planner:
             steps.append(self.law(of_law))
         elif totals:
             what = f"sum over islands at {self.count} gaps (Eqs. 48, 49)"
-            both = (", ".join(totals), what, None, totals[0] if len(totals) == 1 else "both")
-            steps.append(self.law(totals) if self.many_gaps() else self.summed("totals", *both))
+            steps.append(self.law(totals) if self.many_gaps() else self.summed("totals", ", ".join(totals), what, None))
         if hertz:
             what = "adaptive sum over islands with eta = 1, the Hertz area"
             steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
@@ -210,9 +208,8 @@ class _Planner:
         return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use, theory)
 
     def many_gaps(self) -> bool:
-        """Whether totals at the prescribed gaps cost more than a law, if one can be made."""
-        fewest = MIN_LAW_GAPS.get(_name(self.island_model(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
-        if self.count < fewest or "finite_height" in self.problem.dropped:
+        """Whether totals at the prescribed gaps cost more than a law, where there is one."""
+        if self.count < MIN_LAW_GAPS or "finite_height" in self.problem.dropped:
             return False
         from mbma_tables.law.make import MIN_LAW_RTOL
 
@@ -235,12 +232,14 @@ class _Planner:
         what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
         return Step("law", ", ".join(why), what, island_model, asked, self.count, error, seconds)
 
-    def summed(self, name: str, why: str, what: str, priced_as: str | None, quantity: str = "both") -> Step:
+    def summed(self, name: str, why: str, what: str, priced_as: str | None) -> Step:
         """A sum over islands at every gap; `priced_as` is an island model whose totals cost about the same."""
         island_model = self.island_model(self.rtol)
         asked = (1 - ISLAND_SHARE) * self.rtol
         priced = priced_as or _name(island_model)
-        seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked, quantity)
+        # its islands are answered once, as for a law
+        seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked)
+        seconds = min(seconds, self.costs.of(priced, "law", asked))
         error = asked + certified_error(island_model, asked)
         return Step(name, why, what, island_model, asked, self.count, error, seconds)
 
@@ -287,8 +286,8 @@ class _Planner:
         return float(get_theory(self.problem.theory, surface).answer(surface, 0.5 * surface.h_max).error)
 
     def seconds_of_law(self, inverse: bool) -> float:
-        """Seconds of a law's evaluations at the gaps."""
-        found = self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        """Of a law's answers at the gaps."""
+        found = self.costs.of("law", "invert") if inverse else 0.0
         return self.count * (self.costs.of("law", "lookup") + found)
 
     def seconds_of_slopes(self) -> float:

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]
 TABLES = ("universal", "island4d")  # island models that are tables
-BLOCK = 64  # gaps between two reports of progress, where a gap is slow
 MAX_SLOPE_OF_STIFFNESS = 3.0  # largest d log(stiffness)/d log(h_max - d); 5/2 next to first contact
 
 
@@ -175,24 +174,17 @@ def _totals(run: Run, step: Step) -> None:
     assert step.island_model is not None
     own = {"pressure"} if "subscale_area" in problem.dropped else {"pressure", "area"}
     wanted = tuple(sorted(problem.outputs & own, reverse=True))
-    block = run.gap.size if step.island_model_name in ("universal", "rigid") else BLOCK
-    answers = []
-    for first in range(0, run.gap.size, block):
-        answer = contact(
-            run.surface,
-            separation=run.gap[first : first + block],
-            island_model=step.island_model,
-            variant=problem.variant,
-            E_star=problem.E_star,
-            rtol=step.rtol,
-            outside="exact" if step.island_model_name in TABLES else "raise",
-            quantities=wanted,
-        )
-        answers.append(answer)
-        run.progress(step.name, min(first + block, run.gap.size), run.gap.size)
-    for name in wanted:
-        run.found[name] = (("gap",), np.concatenate([getattr(answer, name) for answer in answers]))
-    run.close(step, max(float(answer.error.max()) for answer in answers), step.island_model_name)
+    found = contact(
+        run.surface,
+        separation=run.gap,
+        island_model=step.island_model,
+        variant=problem.variant,
+        E_star=problem.E_star,
+        rtol=step.rtol,
+        outside="exact" if step.island_model_name in TABLES else "raise",
+    )
+    run.found |= {name: (("gap",), getattr(found, name)) for name in wanted}
+    run.close(step, float(found.error.max()), step.island_model_name)
 
 
 def _islands(run: Run, step: Step) -> None:

@@ -22,7 +22,7 @@ SLOPES = ("Rdq", "Sdq", "Rsm")
 SUMMITS = ("Sds", "Spd")
 WAVES = ("longest", "shortest")
 TOPS = ("h_max", "Sp", "nominal_area")
-ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, *TOPS[1:])
+ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, "rolloff", *TOPS[1:])
 ASSUMED = "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled or worn face"
 SAID = {
     "Rq": "h_rms = Rq: the profile is long and no filter removed wavelengths of the surface",
@@ -36,9 +36,10 @@ SAID = {
     "Sds": "m4 = 6 pi sqrt(3) m2 Sds: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted",
     "Spd": "m4 = 6 pi sqrt(3) m2 Spd: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted; where "
     "small ones are pruned, as ISO 25178-2 does, the curvature found here is a lower bound",
-    "longest": "q0 = 2 pi/longest: no roughness of longer wavelengths",
-    "shortest": "q1 = 2 pi/shortest: no roughness of shorter wavelengths",
-    "hurst": "the spectrum is one power law with this Hurst exponent between its longest and its shortest wavelength",
+    "longest": "q0 = 2 pi/longest: no roughness of longer waves",
+    "shortest": "q1 = 2 pi/shortest: no roughness of shorter waves",
+    "rolloff": "the spectrum is flat from the longest wave to this one, and one power law from there on",
+    "hurst": "the spectrum is one power law with this Hurst exponent between its longest and its shortest wave",
     "h_max": "contact begins at h_max above the mid-plane",
     "nominal_area": "contact begins at the highest point of a Gaussian surface of this area, the median",
     "Sp": "h_max = Sp: contact begins at the highest point of the map; a larger map has a higher one",
@@ -71,6 +72,8 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
             "the band of wavelengths needs a slope (Rdq, Sdq or Rsm) with one of longest, shortest and Sds, or longest "
             f"and shortest; got {' and '.join(band) or 'none'}"
         )
+    if "rolloff" in given and slope is not None:
+        raise InputError("rolloff needs longest and shortest: from a slope no band follows")
     arrays = {name: finite_array(name, value) for name, value in given.items()}
     for name, array in arrays.items():
         require(name, array, array > 0, "positive")
@@ -88,7 +91,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         few = long <= spectrum.MIN_ZETA_1 * short
         require(f"longest{said}", long, ~few, f"more than 3 times shortest, {describe_entries(short, few)}")
     q0, q1 = _band(at, h_rms, slope, summits)
-    used = ("hurst", height, top, *band)
+    used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
     record = {
         "step": "from_roughness",
@@ -96,9 +99,25 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         "unit": unit,
         "assumed": [ASSUMED, *(SAID[name] for name in used)],
     }
-    surface = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms}
+    surface: dict[str, Any] = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms}
     surface[top if top == "nominal_area" else "h_max"] = at[top]
-    return surface | {"unit": unit, "provenance": (record,)}
+    surface |= {"unit": unit, "provenance": (record,)}
+    return surface if "rolloff" not in given else _rolled_off(surface, at["rolloff"])
+
+
+def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
+    """Arguments of a surface whose spectrum is flat down to a wavelength."""
+    if rolloff.ndim:
+        raise InputError(f"rolloff is of one surface, got shape {rolloff.shape}")
+    hurst, q0, q1, h_rms = (float(surface.pop(name)) for name in ("hurst", "q0", "q1", "h_rms"))
+    start = 2 * math.pi / float(rolloff)
+    good = np.asarray(q0 < start < q1 / spectrum.MIN_ZETA_1)
+    allowed = f"between 3 times shortest, {6 * math.pi / q1:.6g}, and longest, {2 * math.pi / q0:.6g}"
+    require("rolloff", rolloff, good, allowed)
+    law = -math.expm1(-2 * hurst * math.log(q1 / start)) / (2 * hurst)
+    level = h_rms**2 / (2 * math.pi * start**2 * ((1 - (q0 / start) ** 2) / 2 + law))
+    C = level * np.array([1.0, 1.0, (q1 / start) ** (-2 - 2 * hurst)])
+    return surface | {"q": np.array([q0, start, q1]), "C": C}
 
 
 def _band(

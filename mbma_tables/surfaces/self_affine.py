@@ -160,10 +160,11 @@ class SelfAffine(AnySurface):
         Spd: Any = None,
         longest: Any = None,
         shortest: Any = None,
+        rolloff: Any = None,
         nominal_area: Any = None,
         unit: str | None = None,
-    ) -> Self:
-        """The self-affine surface that numbers of a drawing or a profilometer describe.
+    ) -> Any:
+        """The surface that numbers of a drawing or a profilometer describe.
 
         One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength (or slope
         and density of summits); nothing is filled in. `provenance` holds the meaning assumed for each number;
@@ -183,12 +184,16 @@ class SelfAffine(AnySurface):
             Summits per area [1/length^2].
         longest, shortest : array_like, optional
             Wavelengths at which the roughness ends [length].
+        rolloff : float or str, optional
+            Wavelength down from which the spectrum follows its power law [length]; between `longest` and it the
+            spectrum is flat, as of most machined faces. Without, the law holds from `longest` on.
         unit : str, optional
             The unit of length.
 
         Returns
         -------
         Surface
+            Self-affine; with a `rolloff` a `MeasuredSurface` with this spectrum.
 
         Raises
         ------
@@ -205,7 +210,12 @@ class SelfAffine(AnySurface):
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
         given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
-        return cls(**surface_of_roughness(unit, given))
+        return cls._made(surface_of_roughness(unit, given))
+
+    @classmethod
+    def _made(cls, numbers: dict[str, Any]) -> Any:
+        """Of numbers, which may be those of a spectrum."""
+        return cls(**numbers)
 
     @classmethod
     def named(cls, name: str) -> Self:

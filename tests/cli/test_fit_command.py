@@ -1,19 +1,16 @@
 """`mbma fit`, and options of measured maps on the command line and in TOML."""
 
 import json
-import warnings
 
 import numpy as np
 import pytest
-from helpers import random_map, refused, run
+from helpers import random_map, refused, run, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.specimen import read_specimen
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    library = pytest.importorskip("SurfaceTopography")
+library = topographies()
 POINTS, STEP = 64, 0.5
 
 

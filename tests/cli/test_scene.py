@@ -32,7 +32,6 @@ def test_run_to_netcdf_and_csv(tmp_path):
         assert found.attrs["variant"] == "reported"
         assert found.attrs["error"] <= 1e-5
         assert found["nominal_pressure"].attrs["units"] == "Pa"
-    # the picture is of force and area, whatever else is asked for
     out, picture = tmp_path / "joint.csv", tmp_path / "joint.svg"
     assert run("run", JOINT, "--out", out, "--plot", picture) == ""
     assert b"svg" in picture.read_bytes()

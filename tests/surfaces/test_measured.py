@@ -155,7 +155,6 @@ WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)
 
 
 def measured(end):
-    """The longer waves of `WHOLE`."""
     q = np.geomspace(1.0, end, 120)
     return Surface.from_spectrum(q, WHOLE.power_spectrum(q * (1 - 1e-12)), h_max=1.0, unit="um")
 
@@ -187,18 +186,6 @@ def test_the_true_power_law_gives_the_whole_surface_back():
     record = longer.provenance[-1]
     assert record["area"] == pytest.approx(float(measured(50.0).rms_gradient / WHOLE.rms_gradient), rel=2e-3)
     assert "which was not measured" in record["told"]
-
-
-def test_as_options_of_a_map():
-    heights = random_map(64, 0, 1)
-    options = {"dx": 1.0, "periodic": True, "unit": "um", "model": "measured"}
-    plain = Surface.from_map(heights, **options)
-    longer = Surface.from_map(heights, **options, extrapolate_to="100 nm", extrapolate_hurst=0.8)
-    assert longer.q1 == pytest.approx(2 * np.pi / 0.1)
-    assert longer.rms_gradient > 1.2 * plain.rms_gradient
-    assert [entry["step"] for entry in longer.provenance[-2:]] == ["resolution", "extrapolated"]
-    with pytest.raises(InputError, match="both or neither"):
-        Surface.from_map(heights, **options, extrapolate_to=0.1)
 
 
 def test_every_answer_of_a_map_says_so():

@@ -169,8 +169,6 @@ def test_a_law_is_the_contact():
 
 
 class Noisy(Cones):
-    """A theory whose forces carry noise."""
-
     def answer(self, surface, u):
         force, area = super().answer(surface, u)
         return force * (1 + 1e-5 * np.sin(1e9 * np.asarray(u))), area

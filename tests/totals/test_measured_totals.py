@@ -178,7 +178,6 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_area_at_a_force_of_boundary_elements(number):
-    """Two surfaces with a plateau; no constant of MBMA saw them."""
     hurst, waves, last, top = ((0.8, 8, 128, 0.041954782), (0.6, 4, 64, 0.037331897))[number]
     q = 2 * np.pi * np.geomspace(1, last, 300)
     C = np.minimum(1, (q / (2 * np.pi * waves)) ** (-2 - 2 * hurst))
