@@ -37,8 +37,8 @@ THEORIES = ("mbma", "calibrated", "persson")
 SHOWN_READINGS = (REPORTED, PRINTED, FITTED)
 SCRIPTS = ("model.js", "state.js", "hardness.js", "curves.js", "downloads.js", "charts.js", "main.js")
 FEW = 1000  # numbers up to which they stay doubles
-FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
-MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # of whole numbers in the page, and of numbers before they are scaled
+FRACTION_BITS, ORDER = 43, 3  # packed tables: steps of 1e-13; order of differences
+MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # limits of integers in the page, and of numbers before they are scaled
 MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
