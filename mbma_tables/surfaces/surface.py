@@ -337,10 +337,12 @@ class MeasuredSurface(SpectralSurface):
 
         Examples
         --------
-        >>> from mbma_tables import Surface  # the spectrum is flat up to q = 1
-        >>> face = Surface.from_spectrum([0.2, 1, 50], [0.01, 0.01, 7.6e-9], h_max=1.1)
-        >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
-        H = 0.80 from q = 1.00
+        >>> import numpy as np
+        >>> from mbma_tables import Surface
+        >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
+        >>> nearest = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1).fit()
+        >>> f"H = {nearest.hurst:.2f} from q = {nearest.q0:.2f}, {nearest.fit.variance_share:.0%} of the variance"
+        'H = 0.80 from q = 1.00, 58% of the variance'
         """
         from mbma_tables.surfaces.psd import fit_samples
 
