@@ -216,7 +216,6 @@ OPTIONS: dict[str, list[Any]] = {
     "island_model": ["universal", "formula", "rigid", "exact", "none", 1],
     "variant": ["reported", "printed", "fitted", "none"],
     "outside": ["raise", "exact", "nan", "clamp"],
-    "quantities": [("pressure",), "area", None, ["stiffness"]],
 }
 METHODS = ("pressure", "area", "stiffness", "energy", "at_pressure", "pressure_and_stiffness", "slope_error")
 CALLS: dict[str, Callable[..., Any]] = {

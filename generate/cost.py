@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 import platform
 import subprocess
@@ -18,8 +17,8 @@ import pandas as pd
 from scipy.stats import qmc
 
 from generate import cost_distances
+from generate.classical import iterated, ring_matrix
 from generate.files import ROOT, to_csv
-from generate.pages.classical import iterated, ring_matrix
 from generate.tables import chunks
 from generate.timing import measure
 from mbma_tables import Scene, Surface, contact, contact_law, theories
@@ -28,7 +27,7 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import ISLAND_MODELS, IslandAnswer, answer_islands
+from mbma_tables.models import ISLAND_MODELS, answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.named import get_model
 from mbma_tables.scenes.costs import UNIT, Row
@@ -66,7 +65,6 @@ HEAD = """\
 # What accuracy costs, measured by python -m generate cost; docs/cost.md says how. Costs are times over that of a
 # fixed piece of work in the same run; the row of island model unit has its seconds.
 """
-QUANTITIES = {"both": ("pressure", "area"), "pressure": ("pressure",), "area": ("area",)}
 
 
 def at(what: str, rtol: float) -> str:
@@ -127,17 +125,6 @@ def island_rows() -> Iterator[Row]:
         yield Row("classical", at(f"rings={rings}", tolerance), "both", error, measure(run)[0] / HARD, pressures)
 
 
-class Doubled:
-    """The exact solver on twice the nodes that it would take."""
-
-    name = "doubled"
-
-    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
-        """Phi_F and Phi_A."""
-        force, area = chunks.phi(X.ravel(), mu.ravel(), REFERENCE_ISLANDS, 2).T.reshape(2, *X.shape)
-        return IslandAnswer(force, area, np.full(X.shape, REFERENCE_ISLANDS))
-
-
 def gaps_of(surface: Surface, count: int = GAPS) -> FloatArray:
     """Gaps evenly over [-h_max/2, h_max), the upper end left out."""
     return np.linspace(-0.5, 1.0, count, endpoint=False) * float(surface.h_max)
@@ -151,7 +138,7 @@ def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
 @functools.cache
 def reference() -> tuple[dict[str, FloatArray], ...]:
     """Force and area of every surface at every fifth of its gaps."""
-    found = gap_batch(GAPS, EVERY, island_model=Doubled(), rtol=REFERENCE_RTOL)
+    found = gap_batch(GAPS, EVERY, island_model="exact", rtol=REFERENCE_RTOL)
     return tuple({"pressure": np.asarray(one.pressure), "area": np.asarray(one.area)} for one in found)
 
 
@@ -166,24 +153,23 @@ def scene_rows() -> Iterator[Row]:
     surface = SURFACES[0]
     gap = 0.9 * float(surface.h_max)
     whole = measure(Scene(surface, effects=["pressure"], separations=gap, rtol=1e-4).run)[0]
-    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["pressure"]))[0]
+    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
 def gap_rows() -> Iterator[Row]:
     """Totals of each island model at several tolerances: the call, and each further gap."""
-    for island_model, (quantity, names) in itertools.product(ISLAND_MODELS, QUANTITIES.items()):
-        ask = functools.partial(gap_batch, island_model=island_model, quantities=names)
+    for island_model in ISLAND_MODELS:
+        ask = functools.partial(gap_batch, island_model=island_model)
         one, batch = (measure(functools.partial(ask, count, rtol=1e-2))[0] / len(SURFACES) for count in (1, GAPS))
         fixed = max((GAPS * one - batch) / (GAPS - 1), 1e-3 * one)
-        yield Row(island_model, "call", quantity, None, fixed)
-        tolerances = (*RTOLS, 1e-9, 1e-10) if island_model == "exact" else RTOLS
-        for rtol in tolerances if quantity == "both" else tolerances[1::3]:
+        yield Row(island_model, "call", "both", None, fixed)
+        for rtol in (*RTOLS, 1e-9, 1e-10) if island_model == "exact" else RTOLS:
             run = functools.partial(ask, GAPS, rtol=rtol)
             islands = sum(answer.islands for answer in run()) / (len(SURFACES) * GAPS)
             cost = max(measure(run)[0] / len(SURFACES) - fixed, 1e-9) / GAPS
-            error = largest_error([{name: getattr(answer, name) for name in names} for answer in run(every=EVERY)])
-            yield Row(island_model, at("gap", rtol), quantity, error, cost, islands)
+            found = [{"pressure": answer.pressure, "area": answer.area} for answer in run(every=EVERY)]
+            yield Row(island_model, at("gap", rtol), "both", largest_error(found), cost, islands)
 
 
 def law_rows() -> Iterator[Row]:

@@ -1,6 +1,6 @@
 """Contact of rough surfaces by the magnification-based multi-asperity (MBMA) model.
 
-The public names load what they need when first used, so that importing the package stays cheap.
+The public names load what they need when first used, so that importing the package is fast.
 """
 
 from __future__ import annotations

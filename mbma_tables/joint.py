@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 
 Part = AnySurface | Mapping[str, Any]
 CONDUCTANCE = "W/(m^2 K)"
-RANGE, POINTS = (1e-5, 0.3), 41  # of pressures over the hardness, in pictures
+RANGE, POINTS = (1e-5, 0.3), 41  # pressures over the hardness, and their number, in pictures
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Joint(Displayed):
-    """Two rough metal parts pressed together: stiffness, real area, gap and conductance by one description.
+    """Two rough metal parts pressed together: stiffness, real area, gap and conductance from one description.
 
     Parameters
     ----------
@@ -49,10 +49,10 @@ class Joint(Displayed):
         `Surface.from_roughness` without a highest point; or those of `Surface.from_map`, with the file under "map".
         Without `part_b` the other face is smooth.
     materials : str, Metal, or pair of them
-        Metals of the parts, of `mbma_tables.materials.METALS`; of one that is in contact with itself, one.
+        Metals of the parts, from `mbma_tables.materials.METALS`; one if both are the same.
     nominal_area : float or str, optional
         A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`); needed for parts that are
-        mappings. Surfaces have their own highest point, and keep it without.
+        mappings. Without it, surfaces keep their own highest point.
     hardness : float or str, optional
         Of the softer metal, as for `contact`; by default that of `materials`, whose temper must then be named.
     friction : float, optional
@@ -70,7 +70,7 @@ class Joint(Displayed):
     Attributes
     ----------
     surface : AnySurface
-        The one rough surface that stands for both.
+        The equivalent surface of both parts.
     pair : Pair
         The metals.
 
@@ -139,7 +139,7 @@ class Joint(Displayed):
         Raises
         ------
         InputError
-            For a file that is no TOML, and for arguments that are unknown or missing.
+            For a file that is not valid TOML, and for unknown or missing arguments.
 
         Examples
         --------
@@ -177,7 +177,7 @@ class Joint(Displayed):
         return contact_law(self.surface, **self._asked)
 
     def sensitivity(self, pressure: float | str, ranges: Mapping[str, tuple[Any, Any]] | None = None) -> Sensitivity:
-        """How much each number of the joint matters at a pressure, as of `sensitivity`."""
+        """Sensitivity to each parameter of the joint at a pressure, from `sensitivity`."""
         return sensitivity(self.surface, pressure=pressure, ranges=ranges, **self._asked)
 
     def export(
@@ -200,6 +200,7 @@ class Joint(Displayed):
         name : str, optional
             Of the surface interaction, or what functions begin with.
         heat : bool
+        <<<<<<< HEAD
             Whether conductance of the solid spots is written, too.
         friction_pressure : float or str, optional
             Where the one tangential stiffness of a friction card holds; else at the geometric mean of `pressures`.
@@ -209,6 +210,9 @@ class Joint(Displayed):
         str or bytes
             The first file of the target, bytes of an FMU. Solvers have a friction card where the joint has a
             coefficient of friction, functions the tangential stiffness.
+        =======
+            Whether the conductance of the solid spots is also written.
+        >>>>>>> refs/heads/prose
 
         Examples
         --------
@@ -293,7 +297,7 @@ class Joint(Displayed):
         return self.at_pressure(np.geomspace(*RANGE, POINTS) * float(hardness_in(Units(stress="GPa"), hardness)))
 
     def facts(self) -> dict[str, str]:
-        """What the joint was made of, by name."""
+        """The arguments of the joint, by name."""
         a, b = self.pair.metals
         hardness = self.hardness or self.pair.hardness or f"not known: name the temper of {self.pair.softer.name}"
         theory = self.theory if isinstance(self.theory, str) else self.theory.name

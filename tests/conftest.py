@@ -28,7 +28,6 @@ def generations():
 
 @pytest.fixture(scope="session")
 def table_files(tmp_path_factory):
-    """One small table file of each kind."""
     from small_tables import KINDS, small_table
 
     from generate.tables.writing import write_table
@@ -39,5 +38,4 @@ def table_files(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def sources(table_files):
-    """The bytes of one good table file of each kind."""
     return {kind: path.read_bytes() for kind, path in table_files.items()}

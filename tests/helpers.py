@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -35,6 +36,13 @@ def random_map(points, low, high, power=1.8, seed=1, phases=False):
     return np.fft.irfft2(np.where((q > low) & (q < high), noise * np.maximum(q, 1e-3) ** -power, 0))
 
 
+def topographies():
+    """The package SurfaceTopography, whose import warns of its own missing optional parts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return pytest.importorskip("SurfaceTopography")
+
+
 def fresh(code, *arguments):
     """What `code` prints as JSON in a new interpreter."""
     command = [sys.executable, "-W", "error", "-c", code, *arguments]
@@ -42,7 +50,6 @@ def fresh(code, *arguments):
 
 
 def run(*arguments):
-    """What `mbma` prints."""
     from mbma_tables.cli import main
 
     result = CliRunner().invoke(main, [str(argument) for argument in arguments])

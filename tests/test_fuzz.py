@@ -1,4 +1,4 @@
-"""Odd maps and spectra; damaged scenes."""
+"""Odd maps; damaged scenes."""
 
 import contextlib
 import pathlib
@@ -16,7 +16,6 @@ SPECIAL = [np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, 1e-200, 1e154, 1e300, -1e
 
 
 def odd_array(values, rng):
-    """An array like the given one in an odd type, shape, order or with odd entries."""
     array = np.array(values)
     for _ in range(rng.integers(1, 4)):
         numbers, odd = array.dtype.kind == "f" and array.size > 0, SPECIAL[rng.integers(len(SPECIAL))]
@@ -39,7 +38,6 @@ def odd_array(values, rng):
 
 
 def odd_number(rng):
-    """Something in place of a length."""
     given = [1.0, 1, np.float32(2), 1e-30, 1e30, 1e300, 5e-324, 0, -1, np.nan, np.inf, 10**400, True, "1", None, [1.0]]
     return given[rng.integers(len(given))] if rng.integers(3) == 0 else float(10 ** rng.uniform(-3, 3))
 
@@ -63,7 +61,6 @@ def read(reader, *given):
 
 
 def surface_is_right(surface):
-    """A surface of positive finite numbers; or none."""
     numbers = () if surface is None else (surface.q0, surface.q1, surface.h_rms, surface.h_max)
     numbers += (surface.hurst,) if isinstance(surface, Surface) else ()
     return all(0 < number < np.inf for number in numbers)
@@ -77,17 +74,6 @@ def test_map_arrays():
         found = read(lambda: Surface.from_map(heights, odd_number(rng), **options(rng)))  # noqa: B023
         assert surface_is_right(found)
         assert np.asarray(heights).tobytes() == before
-
-
-def test_spectra():
-    rng = np.random.default_rng(13)
-    q = np.geomspace(1.0, 100.0, 50)
-    for _ in range(50 * SCALE):
-        given = (odd_array(q, rng), q**-3.4) if rng.integers(2) else (q, odd_array(q**-3.4, rng))
-        own = {key: value for key, value in options(rng).items() if key == "band"}
-        own["convention"] = ["paper", "isotropic", "profile", "none", None][rng.integers(5)]
-        own["model"] = ["self-affine", "measured"][rng.integers(2)]
-        assert surface_is_right(read(lambda: Surface.from_spectrum(*given, h_max=odd_number(rng), **own)))  # noqa: B023
 
 
 EXAMPLES = pathlib.Path(__file__).parents[1] / "examples"

@@ -38,7 +38,6 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
     np.testing.assert_array_equal(table["tangential_stiffness"], known.tangential().stiffness)
     assert table["pressure"].attrs["units"] == "GPa"
     assert table["conductance"].attrs["units"] == "W/(m^2 K)"
-    # variances of independent heights add
     assert joint.surface.h_rms == pytest.approx(np.hypot(0.4, 0.7), rel=1e-6)
 
 

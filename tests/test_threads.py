@@ -18,7 +18,6 @@ ROUNDS = 4  # of every question by every thread: about a million lookups in all
 
 @pytest.fixture(scope="module")
 def questions():
-    """Functions of a seed, each with lookups of its own."""
     model, law = universal_model(), contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
     X_axis, mu_axis = model.content.axes
 
@@ -95,7 +94,6 @@ def test_workers_change_no_bit(derivatives):
 
 
 def test_workers_stop_at_an_interrupt():
-    """What waits is given up; only blocks at work are finished."""
     begun = []
 
     def fill(block):

@@ -68,7 +68,6 @@ def test_a_surface_there_and_back(have, want):
     surface = Surface(0.8, [0.5, 1.0], 100.0, 0.2, 0.6, unit=have)
     moved = surface.to(want)
     assert moved.unit == want
-    # what has no unit stays, what has one goes with its power
     for name in ("hurst", "zeta_1", "alpha", "rms_gradient", "m2"):
         np.testing.assert_allclose(getattr(moved, name), getattr(surface, name), rtol=1e-13)
     for name in ("q0", "q1", "h_rms", "h_max", "m0", "m4"):
@@ -196,20 +195,6 @@ def test_a_surface_file_states_both_units(tmp_path):
     assert moved["E_star"] == pytest.approx(13.3e6)
 
 
-def test_a_scene_file_with_units(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(
-        SURFACE + '"2.4 mm"\nlength_unit = "um"\n'
-        '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", "200 kPa"]\n'
-        '[effects]\non = ["pressure", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
-    )
-    found = Scene.from_toml(path).run()
-    assert found["pressure"].values == pytest.approx([1e-4, 2e-4], rel=1e-4)
-    for name, unit in {"pressure": "GPa", "stiffness": "GPa/um", "separation": "um"}.items():
-        assert found[name].attrs["units"] == unit
-    assert found.attrs["surface_h_rms"] == 800.0
-
-
 SOURCES = {
     "named": ("--surface", "concrete", "--E-star", "13.3"),
     "numbers": (
@@ -222,7 +207,6 @@ SOURCES = {
 
 @pytest.mark.parametrize("source", SOURCES)
 def test_an_export_converts_what_knows_its_unit(source, tmp_path):
-    """A surface in mm, asked for in m: once its numbers were written as metres."""
     laws = []
     for unit in ("mm", "m"):
         path = tmp_path / f"{unit}.json"
@@ -234,15 +218,6 @@ def test_an_export_converts_what_knows_its_unit(source, tmp_path):
     assert in_m["x_unit"] == "m"
     assert columns[1]["overclosure"][-1] == pytest.approx(1e-3 * columns[0]["overclosure"][-1], rel=1e-6)
     assert columns[1]["pressure"][-1] == pytest.approx(columns[0]["pressure"][-1], rel=1e-3)
-
-
-def test_an_export_keeps_the_surfaces_unit():
-    law = describe_law(CONCRETE, "13.3 MPa", rows=20, largest_overclosure="500 um")
-    assert (law.x_unit, law.y_unit, law.x[-1]) == ("mm", "MPa", 0.5)
-    other = describe_law(CONCRETE, "13.3 MPa", length_unit="um", stress_unit="kPa", rows=20, largest_overclosure=500)
-    assert (other.x_unit, other.y_unit) == ("um", "kPa")
-    np.testing.assert_allclose(other.x, 1e3 * law.x, rtol=2e-6)
-    np.testing.assert_allclose(other.y, 1e3 * law.y, rtol=1e-5)
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
@@ -259,18 +234,6 @@ def test_a_contact_keeps_its_units(theory):
     assert joint.pressure == pytest.approx(0.01, rel=1e-9)
     assert plain.units["pressure"] == "stress"
     assert contact(CONCRETE, separation=0.5, theory=theory).units["stiffness"] == "1/mm"
-
-
-def test_a_labelled_contact_keeps_its_units():
-    xr = pytest.importorskip("xarray")
-    gaps = xr.DataArray([0.5, 0.2], dims="gap")
-    found = contact(CONCRETE, separation=gaps, E_star="13.3 MPa")
-    assert (found.pressure.attrs["units"], found.units["mean_separation"]) == ("MPa", "mm")
-    assert contact(CONCRETE, separation=gaps.assign_attrs(units="mm")).pressure.values == pytest.approx(
-        found.pressure.values / 13.3
-    )
-    with pytest.raises(InputError, match="separation is in 'um' by its attribute units, and asked for in 'mm'"):
-        contact(CONCRETE, separation=gaps.assign_attrs(units="um"))
 
 
 @pytest.mark.parametrize("theory", ["mbma", "persson"])

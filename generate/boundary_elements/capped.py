@@ -8,6 +8,7 @@ that are allowed; scaling the load instead can cycle. Loading only, frictionless
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib.metadata
 import itertools
 import time
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
+from scipy.sparse.linalg import LinearOperator, cg
 from scipy.special import erfinv
 
 from generate.boundary_elements.solve import Contact, prepared
@@ -168,28 +170,20 @@ class CappedContact:
         touching = self.pressure > 0
         count = int(touching.sum())
 
-        def inside(field: FloatArray) -> FloatArray:
-            """On the area, of mean zero."""
-            return np.where(touching, field - field[touching].mean(), 0.0)
+        def inside(field: FloatArray, filter_: FloatArray) -> FloatArray:
+            """Filtered, on the area, of mean zero."""
+            found = self._filtered(field.reshape(touching.shape), filter_)
+            return np.where(touching, found - found[touching].mean(), 0.0).ravel()
 
-        p = np.where(touching, touching.size / count, 0.0)
-        rest = -inside(self.deflect(p))
-        z = inside(self._filtered(rest, self._stiffness))
-        direction, gain = z, float(np.sum(rest * z))
-        first = gain
-        for _ in range(MAX_ITERATIONS):
-            if gain <= STIFFNESS_RTOL**2 * first or count < 2:
-                break
-            moved = inside(self.deflect(direction))
-            step = gain / float(np.sum(direction * moved))
-            p = p + step * direction
-            rest = rest - step * moved
-            z = inside(self._filtered(rest, self._stiffness))
-            gain, before = float(np.sum(rest * z)), gain
-            direction = z + gain / before * direction
-        else:
+        flat = np.where(touching, touching.size / count, 0.0)
+        moves, stiffens = (
+            LinearOperator((flat.size, flat.size), functools.partial(inside, filter_=own), dtype=float)
+            for own in (self._compliance, self._stiffness)
+        )
+        found, failed = cg(moves, -moves @ flat.ravel(), rtol=STIFFNESS_RTOL, maxiter=MAX_ITERATIONS, M=stiffens)
+        if failed:
             raise RuntimeError("the stiffness of a frozen contact was not found")
-        return 1 / float(self.deflect(p)[touching].mean())
+        return 1 / float(self.deflect(flat + found.reshape(flat.shape))[touching].mean())
 
 
 def load_at(area: float, eta: float) -> float:

@@ -22,10 +22,11 @@ from click.testing import CliRunner
 from generate.files import ROOT
 from mbma_tables.common.files import write_file
 
-_OWN = ("architecture", "cost", "explorer", "export", "fidelity", "joints", "machined", "stability", "tables")
+_OWN = ("architecture", "cost", "explorer", "fidelity", "joints", "machined", "stability", "tables")
 PAGES = {
     **{name: f"{name}:measure" for name in _OWN},
     **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
+    **{name: f"film:{name}" for name in ("lubrication", "rough_bodies")},
     **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
     **{"gallery": "maps:gallery", "maps": "maps:measure"},
 }
@@ -67,17 +68,10 @@ def printed(command: str) -> str:
 
 
 def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> str:
-    """A Markdown table.
+    """A Markdown table, of names and formats of columns with bars between them; the last format holds for the rest.
 
-    Parameters
-    ----------
-    header : str
-        Names of the columns, with bars between them.
-    rows : iterable of iterables
-        Cells. Strings are copied, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple
-        fills a format of several fields.
-    formats : str
-        Formats of the columns, likewise; the last one holds for all that follow.
+    Strings are copied, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple fills a format
+    of several fields.
     """
     known = formats.split(" | ")
 

@@ -1,8 +1,6 @@
-"""docs/stability.md: corners of parameter space, counted and drawn, and the island solver beside another program's.
+"""docs/stability.md: corners of parameter space, counted and drawn.
 
-The reference at corners is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter
-tolerance. The other program is `GreenwoodTripp` of ContactMechanics, which solves (34), (36) and (37) too; it takes the
-gap in the middle, d(0), instead of X, and scales pressure by E* sqrt(sigma/8B), which is half of E* sigma/L.
+The reference is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter tolerance.
 """
 
 from __future__ import annotations
@@ -17,8 +15,6 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
-from scipy.integrate import simpson
-from scipy.interpolate import BarycentricInterpolator
 
 from generate.pages.page import Measured, panels, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
@@ -27,7 +23,6 @@ from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.greenwood_tripp import IslandSolution
 from mbma_tables.models import answer_islands
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import get_variant
@@ -56,12 +51,6 @@ DEPTHS = (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, 6.0)  # h_max - d
 TOTAL_BANDS = (3.0000001, 3.1, 10.0, 216.0, 1e4, 1e6, 1e8)
 TOTAL_HURSTS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
 TOP, TOTAL_TRUTH = 3.0, 1e-10
-
-# islands of the comparison: X and mu
-CASES = ((2.0, 0.1), (0.0, 1.0), (5.0, 1.0), (8.0, 0.3), (5.0, 4.0))
-POINTS = (26, 51, 101, 201)  # each with half the step of the one before
-BEYOND = 1.02  # of our outer radius, beyond which both pressures vanish
-TOLERANCE, MAX_ITERATIONS = 1e-9, 10_000
 
 Answer = tuple[Sequence[Any], float]  # values, and a bound on their relative error
 Counted = tuple[list["Tally"], dict[str, FloatArray]]  # and the error at each corner by way
@@ -224,55 +213,10 @@ def draw(geometry_errors: dict[str, FloatArray], island_errors: dict[str, FloatA
     return figure
 
 
-def theirs(solution: IslandSolution, points: int) -> tuple[FloatArray, FloatArray, float]:
-    """Radii over L, pressure over E* sigma/L and Phi_F by ContactMechanics on so many points."""
-    with warnings.catch_warnings():
-        # of its own optional parts
-        warnings.simplefilter("ignore")
-        from ContactMechanics.ReferenceSolutions.GreenwoodTripp import GreenwoodTripp
-
-    # profiles are polynomials of rho^2 through the Gauss nodes
-    middle = float(BarycentricInterpolator(solution.rho**2, solution.gap)(0.0))
-    mix = 0.1 if solution.mu < 2 else 0.02  # its iteration diverges with more
-    end = BEYOND * solution.rho[-1]
-    _, pressure, rho = GreenwoodTripp(middle, solution.mu, end, points, tol=TOLERANCE, mix=mix, maxiter=MAX_ITERATIONS)
-    return rho, pressure / 2, math.pi * float(simpson(rho * pressure, x=rho))
-
-
-def comparison() -> tuple[str, Any]:
-    """Forces and pressures of both solvers, and their differences against the other's number of points."""
-    figure, (left, right) = panels(1, 2, (10, 4))
-    rows, largest = [], np.zeros(len(POINTS))
-    for X, mu in CASES:
-        solution = greenwood_tripp.solve(X, mu)
-        found = [theirs(solution, points) for points in POINTS]
-        forces = np.array([force for _, _, force in found])
-        differences = forces / solution.phi_F - 1
-        # what is left of an error of third order
-        extrapolated = abs((8 * forces[-1] - forces[-2]) / 7 / solution.phi_F - 1)
-        rows.append([X, mu, float(solution.phi_F), float(solution.error), *differences, extrapolated])
-        rho, pressure, _ = found[1]
-        (line,) = left.plot(solution.rho, solution.pressure / pressure[0], label=f"X = {X:g}, mu = {mu:g}")
-        left.plot(rho[::3], pressure[::3] / pressure[0], ".", color=line.get_color())
-        right.loglog(POINTS, np.abs(differences), ".-", color=line.get_color())
-        largest = np.maximum(largest, np.abs(differences))
-    right.loglog(POINTS, largest[-1] * (POINTS[-1] / np.array(POINTS)) ** 3, "k:", label="third order")
-    left.set(xlabel="radius  rho/L", ylabel="pressure  p/p(0)", title="lines: this library; dots: ContactMechanics")
-    right.set(xlabel="points of ContactMechanics", ylabel="relative difference of force")
-    right.set_xticks(POINTS, [f"{points}" for points in POINTS], minor=False)
-    right.minorticks_off()
-    left.legend()
-    right.legend()
-    header = f"X | mu | Phi_F | its error | {' points | '.join(map(str, POINTS))} points | extrapolated"
-    return table(header, rows, "{:g} | {:g} | {:.10f} | {:.1e}"), figure
-
-
 def measure() -> Measured:
-    """The measured blocks of the page, and its figures."""
+    """The measured block of the page, and its figure."""
     (island_tallies, island_errors), (geometry_tallies, geometry_errors) = islands(), island_geometry()
-    compared, beside = comparison()
     header = "corners | tried | refused | not finite | warnings | largest error of answers | beyond their bound"
     rows = (vars(tally).values() for tally in (*island_tallies, *geometry_tallies, *totals()))
     text = table(header, rows, "{} | {} | {} | {} | {} | {:.1e} | {}").replace("—", "-")
-    figures = {"stability": draw(geometry_errors, island_errors), "islands": beside}
-    return {"corners": text, "comparison": compared}, {f"docs/figures/{n}.svg": f for n, f in figures.items()}
+    return {"corners": text}, {"docs/figures/stability.svg": draw(geometry_errors, island_errors)}

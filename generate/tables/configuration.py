@@ -49,31 +49,14 @@ class AxisRange:
 
 @dataclasses.dataclass(frozen=True)
 class Configuration:
-    """What a table is to cover, and how well.
+    """What a table is to cover, and how well."""
 
-    Attributes
-    ----------
-    kind : str
-        "universal" or "island4d".
-    target : float
-        Largest relative error allowed on held-out points.
-    max_nodes : int
-        Size limit: nodes of the whole table.
-    variant : str
-        Variant of an island4d table; a universal one serves all.
-    certificate_points : int
-        Held-out points, at least 100; 5,000 for a table that goes into the shipped folder.
-    seed : int
-        Of the low-discrepancy sequences.
-    axes : dict of AxisRange
-    """
-
-    kind: str
-    target: float
-    max_nodes: int
-    variant: str
-    certificate_points: int
-    seed: int
+    kind: str  # universal or island4d
+    target: float  # largest relative error allowed on held-out points
+    max_nodes: int  # of the whole table
+    variant: str  # of an island4d table; a universal one serves all
+    certificate_points: int  # held-out ones
+    seed: int  # of the low-discrepancy sequences
     axes: dict[str, AxisRange]
 
     def digest(self) -> str:
@@ -144,13 +127,7 @@ def _configuration(kind: str, path: pathlib.Path | None, target: float | None) -
 
 
 def load(kind: str, path: pathlib.Path | None = None, target: float | None = None) -> Configuration:
-    """The configuration of a kind of table: the shipped one, changed by a TOML file and by `target`.
-
-    Raises
-    ------
-    InputError
-        For an unreadable file, unknown keys, or values that make no table.
-    """
+    """The configuration of a kind of table: the shipped one, changed by a TOML file and by `target`."""
     try:
         return _configuration(kind, path, target)
     except ValueError as fault:

@@ -1,4 +1,4 @@
-"""Where a map touches: pressures and gaps at every point at one load, simulated by boundary elements."""
+"""Pressures and gaps at every point of a map at one load, simulated by boundary elements."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ContactMap(Displayed):
-    """One map at one load, as `Contact.map` finds it; `to_dataset` is its xarray Dataset, `plot` its picture.
+    """Contact of one map at one load, from `Contact.map`; `to_dataset` gives an xarray Dataset, `plot` a picture.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ContactMap(Displayed):
 
     @property
     def contact(self) -> Any:
-        """Where the map touches, shape (nx, ny)."""
+        """True where the map is in contact, shape (nx, ny)."""
         return self.pressure > 0
 
     def _facts(self) -> dict[str, str]:
@@ -85,17 +85,17 @@ class ContactMap(Displayed):
 
 
 def contact_map(found: Any) -> ContactMap:
-    """The map of a contact's surface pressed with its pressure; see `Contact.map`."""
+    """Simulation of a contact's map at the contact's pressure; see `Contact.map`."""
     source, pressure = found._source, np.asarray(found.pressure, float)
     if pressure.ndim or np.ndim(source.E_star) or source.yields:
-        raise InputError("a map is of one elastic contact: give one pressure, one modulus and no hardness")
+        raise InputError("a map shows one elastic contact: give one pressure, one modulus and no hardness")
     surface: Any = source.surface
     whole = map_of(surface)
     modulus, force = float(source.E_star), float(pressure) / float(source.E_star)
     if not 0 < force < np.inf:
         raise InputError(f"a map needs a pressure above 0, got {float(pressure):g}")
     values, sizes = continued(whole)
-    # of rms gradient one, heights of order one
+    # scaled to an rms gradient of one and heights of order one
     scale, gradient = float(np.abs(values).max()), float(surface.bearing.gradient)
     stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
     engine = Simulation(values / scale, stretched, TOLERANCE)

@@ -1,7 +1,7 @@
-"""Derivatives of a theory's force and area by the gap and by the surface's parameters.
+"""Derivatives of a theory's force and area with respect to the gap and the surface's parameters.
 
-Where a theory has none in closed form they are finite differences, with steps inside the range of contact, refused
-where their estimated error is too large. With a hardness the derivatives of the elastic contact go through its law.
+Where a theory has none in closed form they are finite differences with steps inside the range of contact; an error is
+raised if their estimated error is too large. With a hardness, the elastic derivatives enter its law by the chain rule.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
-STEP = 0.02  # of a parameter, or of the room that it has
-RTOL = 1e-6  # of a derivative that is given out, or of the quantity over the parameter
+STEP = 0.02  # relative step of a parameter, or of its distance to a limit
+RTOL = 1e-6  # tolerance relative to the derivative, or to quantity/parameter
 GAP, MODULUS = "mean_separation", "E_star"
 KINDS = ("pressure", "area")
 
 Answers = tuple[FloatArray, FloatArray]  # force and area
-Slopes = tuple[dict[str, FloatArray], ...]  # of force and of area, by names
+Slopes = tuple[dict[str, FloatArray], ...]  # slopes of force and of area, by names
 
 
 def differentiate(
@@ -35,7 +35,7 @@ def differentiate(
 
     With a hardness, which is held, also by the logarithm of "E_star"; `lighter` is that of `Yielding.loaded`.
 
-    Where differences do not settle, at corners of a theory or where force has no bound, it is a ConvergenceError.
+    Raises ConvergenceError where differences do not converge: at kinks of a theory, or where force is unbounded.
     """
     u = np.asarray(mean_separation, dtype=float)
     slopes = _elastic(theory, surface, u) if theory is theory.elastic else _yielding(theory, surface, u, lighter)
@@ -63,7 +63,7 @@ def _elastic(theory: Theory, surface: AnySurface, u: FloatArray) -> Slopes:
 
 @np.errstate(all="ignore")
 def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArray | None) -> Slopes:
-    # what needs scipy is imported for a hardness alone
+    # imports scipy: needed for a hardness only
     from mbma_tables.laws import hardness as law
 
     elastic, names = capped.elastic, (GAP, *surface.parameters, MODULUS)
@@ -79,7 +79,7 @@ def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArr
     )
     at_force, rise = np.broadcast_to(whole.elastic_area, shape).ravel(), np.zeros(0)
     if lighter is not None:
-        # of the area at a force by the force, and by parameters
+        # slopes of the area at given force: by the force, and by parameters
         rise = np.nan_to_num(area[0, 1] / pressure[0, 1])
         tilt = area[:, 1] - pressure[:, 1] * rise
 
@@ -108,7 +108,7 @@ def _numerical(
     whole: TheoryAnswer,
     answer: Callable[..., Answers],
 ) -> Slopes:
-    """By differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, and what was moved by x."""
+    """Differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, the parameter changed by x."""
     shape = np.shape(whole.pressure)
     at = {name: getattr(surface, name) for name in (*PARAMETERS[1:], *surface.parameters)} | {GAP: u, MODULUS: 1.0}
     at = {name: np.broadcast_to(np.asarray(value, dtype=float), shape).ravel() for name, value in at.items()}
@@ -135,7 +135,7 @@ def _numerical(
 
 
 def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[FloatArray, FloatArray]:
-    """First steps, and on which side of a parameter to step: 0 for both."""
+    """Initial steps, and the side of a parameter on which to step: 0 for both."""
     centre = at[name]
     room = np.abs(centre)
     side: FloatArray = np.zeros(centre.shape)
@@ -145,7 +145,7 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
     if name in (GAP, "h_max") and theory.ends_at_h_max:
         beyond = np.abs(at["h_max"] - at[GAP])
         room = np.where(beyond > 0, np.minimum(room, beyond), room)
-        # at first contact only what lies below it has a derivative
+        # at first contact only one-sided derivatives exist, from smaller gaps
         side = np.where(beyond == 0, -1.0 if name == GAP else 1.0, side)
     step = STEP * room
     if name == "hurst":
@@ -158,7 +158,7 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
 
 
 def at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
-    """Derivatives where pressure or area is held: of the separation, and of the quantity that is not held."""
+    """Derivatives at fixed pressure or area: of the separation, and of the other quantity."""
     other = "area" if held == "pressure" else "pressure"
     steep, follows = slopes[held]["separation"], slopes[other]["separation"]
     names = [name for name in slopes[held] if name != "separation"]

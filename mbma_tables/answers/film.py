@@ -56,7 +56,7 @@ class FlowFactors(Displayed):
     valid : ndarray
         Whether flow through such gaps was simulated.
     reasons : dict
-        Why not, each with a mask.
+        Reasons why not `valid`, each with a mask.
     peklenik : float
         Length of the roughness along x over that along y.
     """
@@ -171,7 +171,7 @@ def flow_factors(
     >>> bearing = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
     >>> film = flow_factors(bearing, ["1 um", "1.5 um", "3 um"], peklenik=3, E_star="110 GPa")
     >>> print(film.phi_x.round(2), film.phi_y.round(2), film.shear_y.round(2))
-    [1.03 1.03 1.02] [0.51 0.73 0.9 ] [0.8  0.57 0.37]
+    [1.03 1.06 1.02] [0.51 0.7  0.9 ] [0.8  0.69 0.37]
     """
     one: Any = surface
     theory = "calibrated" if theory is None else theory
@@ -179,7 +179,7 @@ def flow_factors(
         surface, mean_separation=mean_separation, theory=theory, E_star=E_star, hardness=hardness, materials=materials
     )
     if surface.labelled or surface.shape != ():
-        raise InputError("flow factors are of one surface, not of a batch")
+        raise InputError("flow factors need one surface, not a batch")
     u = np.ravel(found.mean_separation)
     low, high = (end * float(surface.h_rms) for end in RANGE)
     require("mean_separation", u, (u >= low) & (u <= high), f"from {RANGE[0]:g} to {RANGE[1]:g} h_rms")
@@ -198,7 +198,7 @@ def flow_factors(
         far = bool(gamma > WIDEST_LAY or gamma < 1 / WIDEST_LAY)
     of_contact = np.where(area > 0, np.nan_to_num(np.ravel(leak.scatter), nan=np.inf), 0.0)
     scatter = np.sqrt((OWN if own else OPEN) ** 2 + of_contact**2 + of_lay**2)
-    # the lightest contacts were not pressed, but flow is nearly that before contact
+    # the lightest contacts were not simulated, but their flow is nearly that before contact
     light = f"A/A0 is below {TESTED_AREA[0]:g}"
     reasons = {text: np.ravel(mask) for text, mask in leak.reasons.items() if text != light}
     reasons |= {f"the lay is longer than {WIDEST_LAY:g} to 1, beyond simulated flow": np.full(u.shape, far)}
@@ -214,7 +214,7 @@ def flow_factors(
 
 
 def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """phi and phi_s along both axes, shape (2, n), of the gaps of a map: pressed ones, and wider ones as they are."""
+    """phi and phi_s along both axes, shape (2, n), of the gaps of a map: simulated ones, and wider ones undeformed."""
     source = found._source
     surface, whole = source.surface, map_of(source.surface)
     h_rms, heights = float(surface.h_rms), whole.heights - whole.heights.mean()
@@ -234,7 +234,7 @@ def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     top = float(heights.max())
     rows += [flow(known - heights) for known in np.geomspace(top * CLEAR, max(u.max(), 2 * top), KNOTS)]
     at, phi, shear = (np.array(part) for part in zip(*rows, strict=True))
-    leak, wide = found.leakage, slice(knots.size, None)  # by their own knots, whose flow is far from blocked
+    leak, wide = found.leakage, slice(knots.size, None)  # at their own knots, whose flow is far from blocked
     curve = PchipInterpolator(np.log(at[wide]), np.log(phi[wide]))
     beyond = np.exp(curve(np.log(np.maximum(u, at[knots.size])))).T
     own = np.where(u > at[knots.size], beyond, np.stack([np.ravel(leak.x), np.ravel(leak.y)]) / u**3)

@@ -1,7 +1,7 @@
 """The command line `mbma`: results as tables, JSON, CSV or pictures.
 
-Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Whatever needs
-scipy is imported where a command runs, so that ``--help`` answers at once.
+Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Modules that
+need scipy are imported by the commands that use them, so that ``--help`` is fast.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ INTERRUPTED = 130  # as shells report Ctrl-C
 
 
 def _describe(fault: Exception) -> str:
-    """One line for what went wrong, and for misuse of the command line a second with a hint."""
+    """One line that describes the error, and for misuse of the command line a second one with a hint."""
     if isinstance(fault, click.ClickException):
         line = " ".join(fault.format_message().split())
         if isinstance(fault, click.UsageError) and fault.ctx is not None:
@@ -38,7 +38,7 @@ def _describe(fault: Exception) -> str:
     return " ".join(str(fault).split())
 
 
-# of Python, in a shell
+# texts for Python, in a shell
 SAID = {
     "surface.fit()": "--model self-affine",
     "outside='exact'": "--island-model exact",
@@ -49,14 +49,14 @@ SAID = {
     "k1 must be": "--conductivity must be",
     "k2 must be": "--conductivity must be",
 }
-# where a name that is an English word too is that of an option: at a verb, and in lists of options
+# contexts in which an English word is the name of an option: after a verb, and in lists of options
 BEFORE = r"^|\b(?:leave|give|got|one of|needs) |--[\w-]+(?:,|,? and|,? or) "
 AFTER = r"[,;:]| = | (?:must|has|is|are|and|or|out|without)\b|$"
 
 
 def _in_options(text: str, command: click.Command, words: list[str]) -> str:
-    """A message of the library, which names arguments, with the options of a command for them."""
-    # what the command line says by itself, and what is of a file that was given, in whose words it is
+    """A message of the library with its argument names replaced by the options of a command."""
+    # messages of the command line itself, and messages on a file, which keep the file's own names
     if "--" in text or text.startswith(tuple(word + end for word in words for end in ":,")):
         return text
     for python, shell in SAID.items():
@@ -81,7 +81,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 class Program(click.Group):
-    """A group of commands whose every known fault ends in a short message."""
+    """A group of commands whose expected errors end in a short message."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run, and exit with 0, with 2 for bad input, or with 130 where it was interrupted."""

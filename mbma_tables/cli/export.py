@@ -26,7 +26,7 @@ DEFAULTS = {"variant": "reported", "exponential": False, "leakage": False, "chec
 
 
 class _Target(click.ParamType[str]):
-    """One of the targets; of a mistaken one the nearest is told."""
+    """One of the targets; for an unknown name the error suggests the nearest."""
 
     name = "target"
 
@@ -37,7 +37,7 @@ class _Target(click.ParamType[str]):
 
 
 class _Export(click.Command):
-    """The command, whose help lists the targets, and which knows its words."""
+    """The command, whose help lists the targets."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if "--again" in args:
@@ -59,7 +59,7 @@ class _Export(click.Command):
 @click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @options.optional_specimen_options
-@click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")
+@click.option("--rows", type=int, help="Number of rows of a table; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
 @options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
@@ -128,7 +128,7 @@ def _write(files: Mapping[Path, bytes]) -> None:
 
 
 def _refuse_unused(target: Target, given: Mapping[str, Any]) -> None:
-    """Refuse options that would be without effect."""
+    """Reject options that have no effect."""
     taken = target.takes if target.name in group("CODE") else target.takes | {"specimen"}
     unused = [
         {"specimen": "the surface", "kappa": "--nu"}.get(name, f"--{name.replace('_', '-')}")
@@ -140,7 +140,7 @@ def _refuse_unused(target: Target, given: Mapping[str, Any]) -> None:
 
 
 def _law_files(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
-    """What is written of one surface's law, by its files."""
+    """Contents of the files of one surface's law."""
     if target.end and out.suffix != target.end:
         raise InputError(f"--out of {target.name} must be NAME{target.end}, got {out.name!r}")
     if str(out) == "-" and not target.alone:
@@ -148,12 +148,12 @@ def _law_files(target: Target, out: Path, joint: dict[str, Any], given: dict[str
     files = target.files(*_rows(target, out, joint, given), **given) if target.rows else target.files(**joint, **given)
     if str(out) == "-":
         return {out: files[""]}
-    # what the first file needs is written before it
+    # files that the first one needs are written before it
     return {out.with_name(f"{out.stem}{end}") if end else out: files[end] for end in sorted(files, reverse=True)}
 
 
 def _rows(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> tuple[Any, ...]:
-    """Rows of a law, and what is named in their file; taken out of `given`."""
+    """Rows of a law, and the names in their file; removed from `given`."""
     from mbma_tables.export.law_rows import describe_law
 
     name = (out.stem,) if target.end else (given.pop("name"),) if "name" in given else ()
@@ -171,10 +171,10 @@ def _rows(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any
 
 
 def _warn(law: LawTable) -> None:
-    """Tell of pressures asked for at which the law is not valid."""
+    """Report requested pressures at which the law is not valid."""
     rows = law.behaviour or law
     for line in rows.comments:
-        # a limit below the smallest pressure asked for does not matter
+        # a limit below the smallest requested pressure does not matter
         below = line.startswith("not valid below") and rows.y_name == "pressure"
         if line.startswith("not valid") and not (below and float(line.split("p = ")[1].split()[0]) <= rows.floor):
             echo(line, err=True)

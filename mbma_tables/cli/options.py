@@ -30,7 +30,7 @@ PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """What `contact` and `island` are asked for besides the surface and the gap."""
+    """Arguments of `contact` and `island` other than the surface and the gap."""
 
     island_model: str
     variant: str
@@ -44,7 +44,7 @@ class Model:
         return self.hardness not in (None, math.inf)
 
     def of(self, surface: AnySurface) -> Model:
-        """The same with a theory by name."""
+        """The same options, with a theory by name."""
         from mbma_tables.theories import theory_name
 
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
@@ -53,7 +53,7 @@ class Model:
 
 @dataclasses.dataclass(frozen=True)
 class Output:
-    """Where a report goes, and in which form."""
+    """Destination and format of a report."""
 
     as_json: bool
     as_csv: bool
@@ -65,7 +65,7 @@ class Output:
 
 
 def _parse_number(ctx: click.Context, param: click.Parameter, given: str | None) -> float | str | None:
-    """A number, or the text of one with its unit, which is read where the name is known."""
+    """A number, or a number with its unit as text, which is converted later."""
     if given is None:
         return None
     try:
@@ -147,27 +147,27 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
 
 
 def _option(name: str, help: str, **kind: Any) -> Decorator:
-    """The option of one argument of the library, by its name; of a quantity where no other kind is said."""
+    """The option for one argument of the library, by its name; a quantity unless another kind is given."""
     flag, kind = f"--{name.replace('_', '-')}", kind or {"callback": _parse_number, "metavar": "X[UNIT]"}
     return click.option(flag, name.partition("/")[0], help=help, **kind)
 
 
 PATH: Any = click.Path(path_type=Path)
-# of `MAP_OPTIONS`, in the words of `mbma_tables.surfaces.treatment.Treatment`
+# options of `MAP_OPTIONS`, named as in `mbma_tables.surfaces.treatment.Treatment`
 _MAP_OPTIONS = (
     _option("dx", "Sampling step [length], of a map whose file has none;"),
     _option("dy", "and along its second axis, if another."),
     _option("channel", "Number of the map's channel in its file.", type=int),
     _option("periodic/--not-periodic", "Whether the map continues periodically.", default=None),
     _option("detrend", "What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", metavar="MODE"),
-    _option("outliers", "Take out points N standard deviations off; try 10.", type=float, metavar="N"),
+    _option("outliers", "Remove points beyond N standard deviations; try 10.", type=float, metavar="N"),
     _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
     _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
     _option("long_cutoff", "Longest wavelength to keep [length]."),
     _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
     _option("l_filter", "and of an L-filter [length]."),
-    _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
-    _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
+    _option("tip_radius", "Of the probe or stylus [length]: keep wavelengths that it can follow."),
+    _option("reliable/--all-waves", "Whether to use the resolution stated in the file.", default=None),
     _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
     _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
     _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
@@ -211,7 +211,7 @@ _SPECIMEN_OPTIONS = (
     _option("Sds", "or summits per area [1/length^2],"),
     _option("Spd", "the same by its newer name;"),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),
-    _option("nominal_area", "or the nominal area [length^2], of which the highest point follows."),
+    _option("nominal_area", "or the nominal area [length^2], which determines the highest point."),
     _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
     _option("E1", "Instead of --E-star: Young's modulus,"),
     _option("nu1", "and Poisson's ratio of one body,", type=float),
@@ -229,7 +229,7 @@ optional_specimen_options = _group(
 
 
 def load_options(option: Callable[..., Decorator]) -> Decorator:
-    """What a contact is known by, each an `option` of numbers; those given reach a command as `loads`."""
+    """Quantities of which one is given, each an `option` of numbers; the command receives those given as `loads`."""
     return _group(
         "loads",
         _given,
@@ -252,7 +252,7 @@ variant_option = _option(
 _MODEL_OPTIONS = (
     variant_option,
     _option("island_model", "Island model.", default="universal", type=click.Choice(ISLAND_MODELS), **SHOWN),
-    _option("rtol", "Numerical relative error asked for.", type=float, default=DEFAULT_RTOL, **SHOWN),
+    _option("rtol", "Requested numerical relative error.", type=float, default=DEFAULT_RTOL, **SHOWN),
 )
 theory_option = _option(
     "theory",
@@ -260,7 +260,7 @@ theory_option = _option(
     "corrected where Tamaas is installed.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
-# of islands, which MBMA alone has
+# for islands, which only MBMA has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
 hardness_option = _option(
     "hardness",

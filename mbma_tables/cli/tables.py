@@ -1,4 +1,4 @@
-"""The command group `mbma tables`: which tables there are, what their files hold, whether they are sound."""
+"""The command group `mbma tables`: list tables, show their contents, verify their files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL, TableCont
 
 
 def _place(name: str) -> tuple[Path, str | None]:
-    """Path and kind of a table by its kind, or of a file, whose kind is not known."""
+    """Path and kind of a table; for a file, whose kind is unknown, None."""
     from mbma_tables.models.tables import shipped
 
     if name in KINDS:
@@ -81,7 +81,7 @@ def info_command(table: str, as_json: bool) -> None:
 def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     """Check hashes and conformance points of TABLES (kinds or files; all shipped ones if none is named).
 
-    The conformance points are answered by the table and by the exact solver, and compared with the stored answers.
+    The conformance points are evaluated by the table and by the exact solver, and compared with the stored results.
     """
     from mbma_tables.models.tables import verify
 

@@ -1,7 +1,7 @@
 /* The law calibrated on boundary elements, by quintic splines over the numbers of a surface and a third axis.
  *
  * Sums over the first two axes are made in the same order for one entry and for all cells of the third axis, so that
- * answers do not depend on what is asked beside them.
+ * results do not depend on the other entries of a call.
  */
 #include <float.h>
 
@@ -11,9 +11,9 @@
 
 enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
 
-#define LEAST 1e-300                /* u that counts as none */
+#define LEAST 1e-300                /* smaller u count as zero */
 #define LEAST_LOG_SEPARATION -690.0 /* ln u at which full contact counts as reached */
-#define CLOSE 1e-9                  /* of ln F: the next miss would be about the square of this one */
+#define CLOSE 1e-9                  /* of ln F: the next error would be about the square of this one */
 
 /* 120 times the six cardinal quintic B-splines that reach a cell: rows by powers of the place in [0, 1] of it. */
 static const double QUINTIC[6][COLUMNS] = {{1.0, 26.0, 66.0, 26.0, 1.0},    {-5.0, -50.0, 0.0, 50.0, 5.0},
@@ -32,7 +32,7 @@ MBMA_INLINE size_t cell_of(const mbma_spline *s, int axis, double x, double *z) 
     return (size_t)cell;
 }
 
-/* What a surface's polynomials are: made before, or sums over the first two axes by weights w from a corner on. */
+/* A surface's polynomials: made before, or sums over the first two axes by weights w from a corner on. */
 typedef struct {
     const double *pieces;
     const float *corner;
@@ -105,7 +105,7 @@ size_t mbma_spline_pieces(const mbma_spline *s, const mbma_surfaces *surfaces, d
     return bad;
 }
 
-/* The number of an entry's surface; the first for one that there is not, whose answer is NaN. */
+/* The number of an entry's surface; the first if there is none, with NaN as the result. */
 MBMA_INLINE size_t held_owner(const mbma_surfaces *surfaces, int64_t owner) {
     return (uint64_t)owner < surfaces->count ? (size_t)owner : 0;
 }
@@ -128,8 +128,8 @@ size_t mbma_spline_values(const mbma_spline *s, const mbma_surfaces *surfaces, s
 
 /* ---- the calibrated law ------------------------------------------------------------------------------------------ */
 
-/* ln F of a surface without end, and its slope. Beyond the ends of the third axis: below, full contact rules, F^2 linear
- * in ln u; above, ln F is linear in u. */
+/* ln F of a surface without end, and its slope. Beyond the ends of the third axis: below, as near full contact, F^2
+ * linear in ln u; above, ln F is linear in u. */
 MBMA_INLINE double log_force(const mbma_spline *s, const own_spline *own, double log_u, double *slope) {
     const double first = s->first[2], last = first + (double)s->cells[2] / s->rate[2];
     const double value = value_at(s, own, log_u, slope);
@@ -239,7 +239,7 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
             u[begin + k] = NAN;
             done[k] = !(F > 0.0 && end == end && fabs(goal[k]) < INFINITY && (uint64_t)owner[begin + k] < surfaces->count);
         }
-        /* steps of all together, which do not wait for each other */
+        /* steps of all entries together, which are independent */
         for (int step = 0; step < MOST_STEPS && left > 0; step++) {
             left = 0;
             for (size_t k = 0; k < count; k++) {

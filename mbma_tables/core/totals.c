@@ -1,10 +1,10 @@
 /* Force and area of a surface at a gap: adaptive Gauss-Kronrod quadrature over the approaches of its islands (44-50).
  *
  * Below the floor of zeta_d the approach is mapped by x = scale sinh(t)^2, a power at 0 and geometric beyond the
- * boundary layer; above it the integrand is little more than a Gaussian of x, and x itself serves.
+ * boundary layer; above it the integrand is nearly a Gaussian of x, and x itself is used.
  */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("no-thread-jumps") /* which makes branches that keep the loop over nodes from vectorising */
+#pragma GCC optimize("no-thread-jumps") /* which adds branches that prevent vectorisation of the loop over nodes */
 #endif
 #include "island.h"
 #include "phi.h"
@@ -12,11 +12,11 @@
 enum { MAX_INTERVALS = 200, BY_HURST = 1, BY_LOG_ZETA, BY_COMPRESSION, BY_PEAK, BELOW_KINK, COLUMNS };
 enum { BY_LOG_E = BY_LOG_ZETA }; /* over nodes, derivatives are by H at given e = zeta_1^(-2H), and by ln e */
 
-#define LEAST (-700.0) /* of exponents: below it a Gaussian is nothing */
+#define LEAST (-700.0) /* of exponents: below it a Gaussian is negligible */
 #define NEAR_ONE 0.1   /* p l below which a difference goes by its series */
 
 /* A Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8. With a lower floor
- * of zeta_d than the paper's the difference counts more. */
+ * of zeta_d than the paper's the difference has a larger factor. */
 #define PAPER_FLOOR 1.5
 #define SAFETY 4.0
 #define SAFETY_BELOW 400.0
@@ -27,7 +27,7 @@ typedef struct {
     double nodes[MOST_NODES], kronrod[MOST_NODES], gauss[MOST_NODES];
 } rule;
 
-/* A surface with the gap asked for, by what its sums are made, and what they have cost. */
+/* A surface and gap, the settings of its sums, and the number of evaluations. */
 typedef struct {
     surface s;
     double compression, peak; /* (h_max - d)/h_rms and h_max/h_rms */
@@ -178,7 +178,7 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
                                                    found.by_X[q] * at.by[by][0][k] + found.by_mu[q] * at.by[by][1][k]);
         }
     }
-    /* of both sums: both integrands resolve alike, and one may agree by chance */
+    /* the larger of both: both integrands are resolved alike, and one may agree by chance */
     const double difference = mbma_max(fabs(gauss[0] / sums[0][0] - 1.0), fabs(gauss[1] / sums[1][0] - 1.0));
     const double scaled = g->safety * difference;
     p->error = sums[0][0] > 0.0 && sums[1][0] > 0.0 ? mbma_min(difference, scaled * sqrt(scaled)) : 0.0;
@@ -215,7 +215,7 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
         if (!(force > 0.0 && area > 0.0))
             return MBMA_OK;
         if (errors[0] <= rtol * force && errors[1] <= rtol * area) {
-            /* no less than was asked for: sums of an interval may agree by chance */
+            /* at least the requested one: sums of an interval may agree by chance */
             *bound = mbma_max(mbma_max(errors[0] / force, errors[1] / area), rtol) + g->table_error;
             return MBMA_OK;
         }
@@ -231,7 +231,7 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
             intervals[count] = *p;
             p->high = intervals[count++].low = 0.5 * (p->low + p->high);
         }
-        if (count == present) /* of NaN, in rtol for instance */
+        if (count == present) /* for NaN, for example in rtol */
             return MBMA_UNRESOLVED;
     }
 }

@@ -65,7 +65,7 @@ def _content(law: LawTable) -> dict[str, Any]:
 
 
 def from_json(content: str | bytes) -> LawTable:
-    """The law in a file of `to_json`; anything else is refused."""
+    """The law in a file of `to_json`; other files are rejected."""
     try:
         return _law_of(json.loads(content))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
@@ -79,7 +79,10 @@ def _law_of(held: dict[str, Any]) -> LawTable:
     if x.ndim != 1 or any(x.shape != other.shape for other in (y, *columns.values())) or not (np.diff(x) > 0).all():
         raise ValueError("two columns of one length are needed, the first of them rising")
     more = {name: (values, str(held["units"][name])) for name, values in columns.items()}
-    facts = {str(name): (number_in(name, value, 0, 1e300), str(unit)) for name, (value, unit) in held["facts"].items()}
+    facts = {
+        str(name): (number_in(name, value, 0, 1e300), str(unit))
+        for name, (value, unit) in held.get("facts", {}).items()
+    }
     comments, behaviour = tuple(map(str, held["comments"])), _law_of(held["behaviour"]) if "behaviour" in held else None
     error, floor = (number_in(name, held[name], 0, 1e300) for name in ("largest_error", "floor"))
     theory = str(held["theory"])
@@ -96,7 +99,7 @@ def to_matlab(law: LawTable) -> bytes:
     named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
     named |= {name: values[:, None] for name, (values, _) in law.more.items()}
     savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
-    # the first 116 bytes are free text, where scipy puts the time: the same law gives the same bytes
+    # the first 116 bytes are free text, where scipy writes the time: replaced, for identical bytes
     return b"MATLAB 5.0 MAT-file, mbma_tables".ljust(116) + stream.getvalue()[116:]
 
 

@@ -1,4 +1,4 @@
-"""An exported law: that of one surface with its units, and what every file that is written of it says at its head."""
+"""An exported law: the law of one surface with its units, and the header of all files written from it."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from mbma_tables.theories.protocol import Theory, UserTheory
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
-ROUNDS, PARTS = 4, 32  # of the search for an end of validity between two of them
-OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surface that is its own spectrum
+ROUNDS, PARTS = 4, 32  # rounds and parts of the search for an end of validity between two of them
+OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a surface given by a spectrum
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ExportedLaw:
     hardness: float  # infinite where the contact is elastic
     length: str  # unit of length,
     stress: str  # and of stress
-    made_by: tuple[str, ...] = ()  # lines of a file's head that say how to write it again
+    made_by: tuple[str, ...] = ()  # header lines with the command that writes the file again
 
     @property
     def units(self) -> Units:
@@ -59,7 +59,7 @@ class ExportedLaw:
         return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """Lines of a file's head: what it holds, range, error, validity up to `end`, and with `leakage` of flow."""
+        """Lines of a file's header: contents, range, error, validity up to `end`, and with `leakage` those of flow."""
         law, stress = self.law, self.stress
         model = f"MBMA model, variant {law.variant!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
         gradient = self.modulus * float(self.surface.rms_gradient)
@@ -92,7 +92,7 @@ class ExportedLaw:
         yield from filter(None, [self.surface.resolution, self.theory.origin])
 
     def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
-        """Lines that say where the law holds, how far simulations scatter about it, and where its numbers are from."""
+        """Lines on the valid range of the law, its scatter against simulations, and the origin of its numbers."""
         law, stress_unit = self.law, self.stress
         # small overclosures by their logarithm, larger ones evenly
         small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
@@ -115,7 +115,7 @@ class ExportedLaw:
         return (*lines, *self._hashes())
 
     def _hashes(self) -> Iterator[str]:
-        """Of the table that the theory reads, and of a surface that is no five numbers."""
+        """Lines on the table that the theory uses, and on a surface not given by five numbers."""
         if isinstance(self.theory, Mbma):
             from mbma_tables.models.tables import universal_model
 
@@ -127,7 +127,7 @@ class ExportedLaw:
             yield f"spectrum: values {values.hexdigest()[:16]}"
 
     def _not_valid(self, reason: str, u: FloatArray, bad: Any, leakage: bool) -> list[str]:
-        """Ranges of pressure in which a reason holds, by the outermost pressures found valid, rounded away from it."""
+        """Ranges of pressure in which a reason applies, by the outermost valid pressures, rounded outward."""
         lines = []
         steps = np.flatnonzero(np.diff(bad)) + 1
         for first, last in zip(np.append(0, steps), np.append(steps, bad.size), strict=True):
@@ -143,7 +143,7 @@ class ExportedLaw:
         return lines
 
     def _last_valid(self, reason: str, good: float, bad: float, leakage: bool) -> float:
-        """Pressure at the last mean separation where a reason does not hold, between one where not and one where so."""
+        """Pressure at the last mean separation where a reason does not apply, by bisection between two separations."""
         for _ in range(ROUNDS):
             u = np.linspace(good, bad, PARTS + 1)
             found = self.answer(u[1:-1])
@@ -161,7 +161,7 @@ class ExportedLaw:
         return f"{what}: {listed} {self.stress}" if listed else "not known"
 
     def _of_leakage(self, scatter: Numbers, pressure: FloatArray) -> tuple[str, ...]:
-        """What a reader of leakage must know."""
+        """Lines on leakage."""
         blocked, least = self.law.leakage.blocked_at, "never blocked"
         if blocked > -np.inf:
             c = (self.law.h_max - blocked) / 2
@@ -190,13 +190,12 @@ class ExportedForce(ExportedLaw):
         return pressed(self.force.body, self.law.h_max + self.force.first - u)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """As of `ExportedLaw`; a body has no leakage."""
+        """See `ExportedLaw`; a body has no leakage."""
         body, law = self.force.body, self.law
         return (
-            f"Force law of a rough {body.shape} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
+            f"Force law of a rough {body.name} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
             what,
-            f"pressure is the force [{self.stress}], A/A0 the real area [{body.units['area']}], here of a {body.shape}",
-            f"of radius {body.problem.radius:.10g} {self.length}",
+            f"here pressure is the force [{self.stress}], and A/A0 the real area [{body.units['area']}]",
             *self._of_surface(),
             f"E* = {self.modulus:.10g} {body.units['pressure']}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
             f"overclosure c = approach - ({self.force.first:.10g}), zero at first contact; approach is zero where the",
@@ -215,7 +214,7 @@ class ExportedForce(ExportedLaw):
 
 
 def outward(value: float, rounding: str) -> str:
-    """Four digits of a number, the last one rounded as told.
+    """Four digits of a number, rounded in the given direction.
 
     Examples
     --------
@@ -255,7 +254,7 @@ def exported_law(
 
 def _exported_force(force: ForceLaw, made_by: tuple[str, ...]) -> ExportedForce:
     """The force law of a body in known units."""
-    body, layer = force.body, force.body.problem.law
+    body, layer = force.body, force.body.law
     length = _known("length_unit", body.surface.unit)
     _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
     numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by

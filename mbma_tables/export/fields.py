@@ -1,6 +1,6 @@
-"""Tables and numbers that lubrication, fracture and heat codes ask for; each target is a `Grammar` of rows.
+"""Tables and numbers for lubrication, fracture and heat codes; each target is a `Grammar` of rows.
 
-Read for this: MBDyn's `module-hydrodynamic_plain_bearing2.cc` (`GreenwoodTrippCM`, `LinFDMesh`, `LugreFriction`), its
+Sources: MBDyn's `module-hydrodynamic_plain_bearing2.cc` (`GreenwoodTrippCM`, `LinFDMesh`, `LugreFriction`), its
 input manual and the deck `mbdyn_post_ehd_load_output_13.tst` of mboct-mbdyn-pkg; GEOS's `TableFunction`,
 `HydraulicApertureTable` and `BartonBandis`; MOOSE's `PiecewiseTabularBase`, `GapFluxModelConduction` and its base;
 Lethe's manual (Lagrangian physical properties) and `particle_heat_transfer.cc`. GetDP 3.2 was run.
@@ -25,12 +25,12 @@ from mbma_tables.materials import tangential_ratio
 MAX_NAME = 40
 # p = 4.4086e-5 K E* (4 - (u - delta)/sigma)^6.804, K = 16 sqrt(2) pi/15 (eta beta sigma)^2 sqrt(sigma/beta)
 GREENWOOD_TRIPP, POWER, END, OF_K = 4.4086e-5, 6.804, 4.0, 16 * math.sqrt(2) * math.pi / 15
-CROWDING = 0.05  # eta beta sigma, for K alone counts
+CROWDING = 0.05  # eta beta sigma; the result depends on K only
 HEAVY, FEWEST = 0.1, 3  # largest A/A0 of that fit, and its rows
 NU = 0.3  # of the micro-slip stiffness
 BANDIS = 9.0  # w = w0/(1 + 9 stress/reference)
 OF_APERTURE = ("pressure", "aperture", "derivative", "stiffness")
-STEEPEST = 0.999  # slope of the last two rows for GEOS, which refuses 1 and more
+STEEPEST = 0.999  # slope of the last two rows for GEOS, which rejects 1 and more
 YOVANOVICH, EXPONENT = 1.25, 0.96  # h = 1.25 k_s m/sigma (p/H)^0.96, of which Lethe has the mean over Hertz's pressure
 MBDYN = """\
 # in the element "hydrodynamic plain bearing2", at their places:
@@ -44,7 +44,7 @@ MBDYN = """\
 
 
 def _nearest(shape: Callable[[float], FloatArray], log_y: FloatArray) -> tuple[float, float, FloatArray]:
-    """t and f of the least mean square of shape(exp(t)) + f - log_y, and this difference."""
+    """t and f that minimise the mean square of shape(exp(t)) + f - log_y, and this difference."""
     from scipy.optimize import minimize_scalar
 
     t = math.exp(minimize_scalar(lambda t: np.var(shape(math.exp(t)) - log_y), bounds=(-9.0, 9.0), method="bounded").x)
@@ -208,7 +208,8 @@ moose_function = Grammar(
     "#",
     dict.fromkeys(QUANTITIES, _moose),
     "Constant outside the rows. Of a conductance: type = GapFluxModelConduction, gap_conductivity_function, with "
-    "gap_conductivity_function_variable = the contact pressure, and gap_conductivity = min_gap above all closed gaps.",
+    "gap_conductivity_function_variable = the contact pressure, and gap_conductivity and min_gap the same length, "
+    "above all closed gaps.",
     named="rough",
 )
 getdp = Grammar(

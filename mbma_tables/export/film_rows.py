@@ -16,12 +16,12 @@ from mbma_tables.laws.calibrated import TESTED_AREA
 
 RANGE = (0.2 * (1 + 1e-9), 10.0)  # u/h_rms
 LOOKED_AT = 20  # intervals between whose rows the error is measured
-NEAREST = 1e-9  # of h_max, the smallest overclosure whose law is looked at
+NEAREST = 1e-9  # smallest overclosure evaluated, over h_max
 NAMES = ("phi_x", "phi_y", "shear_x", "shear_y", "pressure")
 
 
 def facts_of(exported: ExportedLaw, **more: tuple[float, str]) -> dict[str, tuple[float, str]]:
-    """Numbers of a joint that some programs ask for, with their units."""
+    """Numbers of a joint required by some programs, with their units."""
     surface = exported.surface
     own = {"h_rms": (float(surface.h_rms), exported.length), "rms_gradient": (float(surface.rms_gradient), "1")}
     return own | {"E_star": (exported.modulus, exported.stress)} | more
@@ -58,7 +58,7 @@ def film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float,
 
 
 def _film_error(at: Callable[[FloatArray], FlowFactors], found: FlowFactors, floor: float) -> float:
-    """Largest relative error of linear interpolation, in the middle of those intervals where rows bend most."""
+    """Largest relative error of linear interpolation, in the middle of the intervals with the largest curvature."""
     u = found.mean_separation
     rows = np.stack([np.maximum(getattr(found, name), floor if name == "pressure" else 0.0) for name in NAMES])
     bend = np.zeros(u.size)
@@ -77,7 +77,7 @@ def _film_error(at: Callable[[FloatArray], FlowFactors], found: FlowFactors, flo
 
 
 def _of_film(found: FlowFactors, length: str) -> list[str]:
-    """What a reader of flow factors must know."""
+    """Notes for the reader of flow factors."""
     lines = [
         "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
         "stiffness is that of a small change of the gap, with the contact area as it is",

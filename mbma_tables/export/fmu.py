@@ -25,7 +25,7 @@ from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
 
-# what the C of both standards calls by different names
+# names that differ in the C of both standards
 STANDARDS = {
     "fmu": {"FMI": "fmi2", "INSTANCE": "fmi2Component", "REAL": "Real", "SIZE": "", "SEEDS": ""}
     | {"LOGGER": "fmi2CallbackLogger", "NAMED": "m->name, ", "FORMAT": '"%s", '},
@@ -136,7 +136,7 @@ def _start(numbers: LawNumbers) -> float:
 
 
 def _variables(found: AskedLaw) -> list[dict[str, str]]:
-    """What XML says of each variable, by value reference."""
+    """XML attributes of each variable, by value reference."""
     length, stress, numbers = found.exported.length, found.exported.stress, found.numbers
     ends = {"max": repr(numbers.c_most)} | ({} if numbers.ends else {"min": repr(numbers.c_least)})
     asked = {"start": repr(_start(numbers)), **ends, "description": "h_max less the mean separation"}

@@ -106,7 +106,7 @@ def law_files(
     leakage: bool = False,
     **asked: Any,
 ) -> dict[str, str]:
-    """What `law_text` returns, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
+    """The result of `law_text`, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     name, language = code_name(name, target), LANGUAGES[target]
@@ -122,7 +122,7 @@ def law_files(
 
 
 class AskedLaw(NamedTuple):
-    """A law and what every file of it says."""
+    """A law and the contents common to its files."""
 
     exported: ExportedLaw
     numbers: LawNumbers
@@ -134,7 +134,7 @@ class AskedLaw(NamedTuple):
 
 
 def code_name(name: str, target: str = "c-law") -> str:
-    """A name that functions of a law may begin with, or its module or package be called."""
+    """A valid prefix for the functions of a law, or name for its module or package."""
     if checked_name(name, MAX_NAME).lower() in FUNCTIONS:
         raise InputError(f"name must not be that of a function of the law, {', '.join(FUNCTIONS)}")
     if name.lower() in _words(target):
@@ -144,7 +144,7 @@ def code_name(name: str, target: str = "c-law") -> str:
 
 @functools.cache
 def _words(target: str) -> frozenset[str]:
-    """Words that a file's own name must not be: those in its templates, but for comments and texts, and key words."""
+    """Names that a law must not have: identifiers in its templates (without comments and strings), and key words."""
     language = LANGUAGES[target]
     if not language.own_name:
         return frozenset()
@@ -163,7 +163,7 @@ def asked_law(
     only_conductance: bool = False,
     **options: Any,
 ) -> AskedLaw:
-    """The law that a file is asked of, made once; arguments as for `law_text`."""
+    """The law for a requested file, made once; arguments as for `law_text`."""
     conducts = only_conductance or conductivity is not None or conductivity_unit is not None
     k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (math.nan, "")
     if isinstance(surface, ForceLaw) and (conducts or leakage):
@@ -222,7 +222,7 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
 
 
 def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
-    """The core, as C or compiled, the law's own blocks, and what the glue about them needs."""
+    """The core, as C or compiled, the law's own blocks, and the values for the wrapper around them."""
     law, numbers = asked.exported.law, asked.numbers
     first = 0.0 if numbers.ends else (law.h_max - law.highest) / 2
     ends = {"H_MAX": law.h_max, "FIRST": first, "TURN": numbers.c_turn}
@@ -255,7 +255,7 @@ def _numbers(
     language: Language,
     arrays: Callable[[str, Columns, Columns], dict[str, str]],
 ) -> dict[str, str]:
-    """All numbers by their places, flags and counts as whole ones."""
+    """All numbers by their placeholders, flags and counts as integers."""
     known = {field.name: getattr(numbers, field.name) for field in dataclasses.fields(numbers)}
     places = {"RECORDS": str(numbers.centre.size)}
     for name, value in known.items():
@@ -302,7 +302,7 @@ def core_text(sources: Iterable[str], prefix: str) -> str:
 
 
 def block_rows(block: FloatArray) -> tuple[int, int]:
-    """How many rows and records a law's block has."""
+    """Numbers of rows and records of a law's block."""
     first = int(block.view(np.int64)[at.RECORDS])
     return (first - at.HEAD) // 2, (block.size - first) // at.RECORD
 

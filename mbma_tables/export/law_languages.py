@@ -1,4 +1,4 @@
-"""How a contact law is written in each language: templates, numbers and arrays, and what a user must know."""
+"""How a contact law is written in each language: templates, formats of numbers and arrays, notes for the user."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Columns = dict[str, FloatArray]
 
 
 class Language(NamedTuple):
-    """How a law is written in one language.
+    """Format of a law in one language.
 
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
     rows of polynomials by their places in the template, whose names begin with a prefix; None where the law is read by
@@ -52,7 +52,7 @@ def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str
 
 
 def _braces(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """The same in braces, as Modelica has them."""
+    """The same in braces, for Modelica."""
     return {
         place: text.replace("[", "{").replace("]", "}").replace(",\n}", "\n}")
         for place, text in _lists(prefix, columns, polynomials).items()
@@ -121,7 +121,7 @@ CALLED = (
     "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
     "tests; not run in Abaqus."
 )
-LAST = "At pressures beyond the law's range the last value is taken, and a line on stderr tells of the first one."
+LAST = "At pressures beyond the law's range the last value is used, with one warning on stderr."
 SUBROUTINE = C._replace(beside=())
 GAPCON = SUBROUTINE._replace(subroutine="gapcon.c", only_conductance=True)
 LANGUAGES = {

@@ -1,4 +1,4 @@
-"""A contact law as rows for other codes: what it is, in which units, and rows chosen by their error.
+"""A contact law as rows for other codes, with quantity and units; the rows are chosen by their error.
 
 Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
 approach, so that -dp/du = dp/dc.
@@ -31,7 +31,7 @@ QUANTITIES = ("pressure", "conductance", "tangential_stiffness", "leakage", "hyd
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
-LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # of h_max, mean separations of the last points
+LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # mean separations of the last points, over h_max
 FILM_ROWS = 200
 
 
@@ -40,7 +40,7 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: 
     law = exported.law
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
-    # close to full compression pressure may run up with the logarithm of the mean separation
+    # near full compression pressure may diverge with the logarithm of the mean separation
     u = law.h_max * np.geomspace(max(1 - max_overclosure / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
     d = law.h_max - 2 * c
@@ -226,7 +226,7 @@ def _table(
     behaviour: LawTable | None = None,
     *said: str,
 ) -> LawTable:
-    """Rows up to an overclosure, whose error holds from the `least` pressure on, or above `FLOOR`."""
+    """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
     law = exported.law
     fine_x, fine_y = _curve(exported, quantity, end, scale)
     floor = FLOOR * float(fine_y[-1])
@@ -267,25 +267,25 @@ def _table(
 
 
 def _why_there(law: ContactLaw, end: float, quantity: str) -> str:
-    """Why rows end where they do."""
+    """The reason for the end of the rows."""
     if quantity == "leakage" and law.leakage.blocked_at >= law.h_max - 2 * end:
         return "where contact blocks the gaps"
     if end < _last(law) * (1 - ROUNDING):
         return "the largest asked for"
     if law.turning_point is None:
         return "where the law ends"
-    return "where the force of this surface turns down; nothing is known beyond"
+    return "where the force of this surface has its maximum; the law ends there"
 
 
 def _last(law: ContactLaw) -> float:
-    """Overclosure at full compression, or where the force turns down."""
+    """Overclosure at full compression, or where the force has its maximum."""
     return (law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 2
 
 
 def _range(
     law: ContactLaw, end: float | None, pressures: tuple[float | str, float | str] | None, units: Units
 ) -> tuple[float | None, float]:
-    """Smallest pressure whose error counts, and largest overclosure, by a range of pressures or by an overclosure."""
+    """Smallest pressure for the error, and largest overclosure, from a range of pressures or an overclosure."""
     if pressures is None:
         return None, _range_end(law, end)
     if end is not None:
@@ -303,10 +303,10 @@ def _range(
 
 
 def _range_end(law: ContactLaw, asked: float | None) -> float:
-    """The largest overclosure: as asked, or at full compression, or where the force turns down."""
+    """The largest overclosure: as requested, or at full compression, or where the force has its maximum."""
     end = _last(law)
     found = end if asked is None else one_number("largest_overclosure", asked)
     if not 0 < found <= end:
-        why = "full compression" if law.turning_point is None else "where the force of this surface turns down"
+        why = "full compression" if law.turning_point is None else "where the force of this surface has its maximum"
         raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {found:g}")
     return found

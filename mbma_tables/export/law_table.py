@@ -1,4 +1,4 @@
-"""Rows of a law as every file of rows has them: columns with names and units, and what their reader must know."""
+"""Rows of a law, common to all files of rows: columns with names and units, and notes for the reader."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LawTable(Displayed):
     x_unit: str
     y_unit: str
     largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
-    comments: tuple[str, ...]  # what a reader of the file must know
+    comments: tuple[str, ...]  # notes for the reader of the file
     theory: str  # whose law it is
     floor: float = 0.0  # value below which errors are relative to it
     behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
@@ -37,7 +37,7 @@ class LawTable(Displayed):
 
     @property
     def quantity(self) -> str:
-        """As in `describe_law`."""
+        """See `describe_law`."""
         return "film" if self.x_name == "mean_separation" else self.y_name
 
     @property

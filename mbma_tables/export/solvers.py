@@ -1,6 +1,6 @@
-"""Contact laws in the words of finite-element and system codes; each target is a `Grammar` of rows.
+"""Contact laws in the formats of finite-element and system codes; each target is a `Grammar` of rows.
 
-CalculiX 2.20 was run with what is written here, force and conductance; the others are written from their manuals.
+CalculiX 2.20 was run with these cards, force and conductance; the others follow the manuals.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from mbma_tables.export.targets import Grammar, Target
 from mbma_tables.export.text import DIGITS, checked_name, comment, number, opening
 from mbma_tables.surfaces.any_surface import AnySurface
 
-MIN_CALCULIX_STEP = 1e-10  # overclosures that are closer are moved apart when they are read
-MAX_ID = 99_999_999  # of a card: eight columns
+MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
+MAX_ID = 99_999_999  # largest id in a card: eight columns
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
-DEPARTURES = (0.01, 0.1)  # of the exponential law from Persson's theory: the pressures of these are stated
+DEPARTURES = (0.01, 0.1)  # deviations of the exponential law from Persson's theory whose pressures are stated
 PAIR = "*CONTACT PAIR, INTERACTION={name}, TYPE="
 CALCULIX_TABULAR = (
     f"Use this interaction with {PAIR}NODE TO SURFACE",
@@ -53,7 +53,7 @@ def _interaction(name: str, *cards: str) -> str:
 
 
 def _card(head: str, law: LawTable) -> str:
-    """A card with its rows, the other way about than in the law: pressure, overclosure, or conductance, pressure."""
+    """A card with the columns swapped: pressure, overclosure, or conductance, pressure."""
     return f"{head}\n" + "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True))
 
 
@@ -88,7 +88,7 @@ def _calculix_heat(law: LawTable, name: str) -> str:
     assert rows is not None
     c = np.linspace(np.interp(max(rows.floor, law.x[1]), rows.y, rows.x), rows.x[-1], 1001)
     p = np.interp(c, rows.x, rows.y)
-    # of a concave ln p the chord has the slope of the line with the least largest distance
+    # for concave ln p, the chord has the slope of the line with the least largest distance
     u0 = (c[-1] - c[0]) / math.log(p[-1] / p[0])
     off = np.log(p) - c / u0
     middle, spread = (off.max() + off.min()) / 2, (off.max() - off.min()) / 2
@@ -119,8 +119,8 @@ def exponential(
 ) -> str:
     """CalculiX's card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20).
 
-    Its header states the pressures up to which it is within 1% and 10% of Persson's theory. Abaqus has a card of that
-    name for another curve, which ends at a clearance.
+    Its header states the pressures up to which it is within 1% and 10% of Persson's theory. In Abaqus the card of that
+    name defines another curve, which ends at a clearance.
     """
     from mbma_tables.theories import Persson
 
@@ -128,7 +128,7 @@ def exponential(
     modulus, units = modulus_and_units(E_star, surface, stress_unit)
     for kind in ("length", "stress"):
         if getattr(units, kind) in (None, "1"):
-            raise InputError(f"{kind}_unit is missing: a law without units is read wrongly sooner or later")
+            raise InputError(f"{kind}_unit is missing: a law without units is easily misread")
     h_rms = float(surface.h_rms)
     near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).pressure
     u0 = h_rms / math.log(near / far)
@@ -151,7 +151,7 @@ def exponential(
 
 
 def _lsdyna(law: LawTable, curve: int = 1) -> str:
-    """To be included: without *END, which would end the deck that it is pasted into."""
+    """For inclusion: without *END, which would end the including deck."""
     curve = whole_number_in("curve", curve, 1, MAX_ID)
     head = f"*DEFINE_CURVE\n{curve:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
     return head + "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
@@ -196,7 +196,7 @@ abaqus = Grammar(
     named="ROUGH",
     friction="Its stiffness before slip is proportional to pressure, the coefficient times that over the elastic slip.",
 )
-STAY = "Stay within the rows: what the solver has beyond them was not tried."
+STAY = "Stay within the rows: the solver's behaviour beyond them was not tested."
 lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(("pressure", "conductance", "leakage"), _lsdyna), STAY)
 optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
 comsol = Grammar(

@@ -27,7 +27,7 @@ GROUPS = {
     "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
 }  # fmt: skip
 SI = ("m", "Pa")
-# by quantity: the options that are of it alone, and what its rows are against
+# by quantity: options for it alone, and the abscissa of its rows
 OPTIONS = {
     "conductance": {"conductivity", "conductivity_unit"}, "tangential_stiffness": {"kappa"}, "film": {"peklenik"},
 }  # fmt: skip
@@ -40,7 +40,7 @@ AGAINST = {
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """What is written for one program, or in one format.
+    """Declaration of the output for one program, or in one format.
 
     Parameters
     ----------
@@ -79,17 +79,17 @@ class Target:
 
 @dataclasses.dataclass(frozen=True)
 class Grammar:
-    """How a program reads the rows of a law; called with a `LawTable` it gives the text of a file."""
+    """Format of the rows of a law for a program; called with a `LawTable` it returns the text of a file."""
 
     program: str
     mark: str  # of comments
-    body: Mapping[str, Callable[..., str]]  # by quantity: what stands below the comments, of the law and what is named
-    beyond: str  # what the program does outside the rows, and what else its user must know
+    body: Mapping[str, Callable[..., str]]  # by quantity: text below the comments, from the law and the names
+    beyond: str  # behaviour of the program outside the rows, and further notes for its user
     most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
-    named: str | None = None  # what a name stands for that is not given; None where there is none
+    named: str | None = None  # default name; None if there is none
     first: str = ""  # line of the file
-    units: tuple[str, str] | None = None  # of length and of stress, where it has to be these
-    friction: str = ""  # what the user of its friction card must know; empty where there is none
+    units: tuple[str, str] | None = None  # of length and of stress, if they are prescribed
+    friction: str = ""  # notes for the user of its friction card; empty without one
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
         """The text of a file.
@@ -103,8 +103,7 @@ class Grammar:
         if law.quantity not in self.body:
             taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
             raise InputError(f"{self.program} takes {taken} here, got {law.y_name} against {law.x_name}")
-        own = law.facts["h_rms"][1], law.facts["E_star"][1]
-        if self.units not in (None, own):
+        if self.units and (own := tuple(law.facts[fact][1] for fact in ("h_rms", "E_star"))) != self.units:
             raise InputError(f"{self.program} is written in {' and '.join(self.units)}, got {' and '.join(own)}")
         if law.x.size > (most := self.most.get(law.y_name, law.x.size)):
             raise InputError(
@@ -143,5 +142,5 @@ def targets() -> dict[str, Target]:
 
 
 def names(*groups: str) -> tuple[str, ...]:
-    """What a user may name, of some groups or of all; a target of an option, with a space in its name, is none."""
+    """Names that a user may give, of some groups or of all; targets with a space in the name belong to an option."""
     return tuple(name for key in groups or GROUPS for name in group(key) if " " not in name)

@@ -1,4 +1,4 @@
-"""How text and numbers are written into other codes: nothing that a user or a table says becomes code there."""
+"""Writing text and numbers into other codes, so that no text of a user or a table is executed there."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from mbma_tables.common.errors import InputError
 COMMENT_WIDTH = 108
 DIGITS = 10  # of the numbers in a law's file
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
-# what ends or begins a comment in C, ends a script in a page, or is a trigraph
+# begin or end of a C comment, end of a script in a page, trigraphs
 _MARKS = re.compile(r"\*(?=/)|/(?=\*)|<(?=[/!])|\?(?=\?)")
-# what a spreadsheet would take for a formula
+# first characters of a formula in a spreadsheet
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
@@ -57,7 +57,7 @@ def block_comment(lines: Iterable[str]) -> str:
 
 
 def opening(paragraphs: Iterable[str], mark: str) -> str:
-    """What a source file begins with: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
+    """Head of a source file: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
     wrap = textwrap.TextWrapper(COMMENT_WIDTH, break_long_words=False, break_on_hyphens=False).wrap
     lines = [line for text in paragraphs for line in wrap(text)]
     return (block_comment(lines) if mark == "/*" else comment(lines, mark)).rstrip()
@@ -101,7 +101,7 @@ def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
 
 
 def csv_cell(text: str) -> str:
-    """A header of a CSV column, which no spreadsheet takes for a formula; the csv module quotes it."""
+    """A header of a CSV column that no spreadsheet interprets as a formula; the csv module quotes it."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 

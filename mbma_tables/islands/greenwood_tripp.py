@@ -27,7 +27,7 @@ LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), 
 MIN_SOLVER_RTOL = 1e-13
 MAX_NODES = 1024  # a few seconds for an island
 BLOCK = 1 << 22  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
-COARSE_NODES = 12  # of the first guess
+COARSE_NODES = 12  # nodes of the initial guess
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class IslandSolution:
 
     @property
     def rho(self) -> FloatArray:
-        """Radii of the profiles over L, shape (..., nodes); solved for when first asked."""
+        """Radii of the profiles over L, shape (..., nodes); solved on first access."""
         return self._profiles[0]
 
     @property
@@ -107,7 +107,7 @@ def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
 
 
 def _nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
-    """Gauss nodes that usually give `rtol`; the estimate of each solution decides."""
+    """Gauss nodes that usually give `rtol`; the error estimate of each solution is then checked."""
     digits = max(-math.log10(rtol), 3.0)
     softness = np.log10(np.maximum(mu, 1.0)) / 12
     wanted: FloatArray = digits * np.sqrt(np.maximum(X, 0) + 5) * (1 + softness)
@@ -129,7 +129,7 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
         found, taken = _newton(X[now], mu[now], rtol, int(count))
         phi[now], used[now] = found, count
         steps[now] += taken
-        # nodes that were asked for give what they give
+        # a requested number of nodes is used as it is
         failed[now] = ~(found[:, 2] <= (rtol if nodes is None else np.inf))
     return phi, steps, used, failed | ~np.isfinite(phi).all(axis=1)
 
@@ -152,7 +152,7 @@ def solve(
     rtol : float
         Relative error asked of phi_F and phi_A, at least 1e-13; it sets the node count.
     nodes : int, optional
-        Use this many Gauss nodes (8 to 1024) instead; then `error` says what accuracy they gave.
+        Use this many Gauss nodes (8 to 1024) instead; then `error` is the accuracy reached.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def solve(
     InputError
         NaN, infinite, masked or empty input, a negative `mu`, an `rtol` outside [1e-13, 0.1].
     ConvergenceError
-        Where the accuracy was not reached; its `mask` says which entries, its `result` holds the rest.
+        Where the accuracy was not reached: at entries of its `mask`; its `result` holds the others.
 
     Examples
     --------
@@ -187,9 +187,9 @@ def solve(
     if failed.any():
         first = int(np.flatnonzero(missed)[0])
         raise ConvergenceError(
-            f"the solver did not reach the accuracy asked for at {int(failed.sum())} of {failed.size} "
+            f"the solver did not reach the requested accuracy at {int(failed.sum())} of {failed.size} "
             f"entries, the first at X = {flat_X[first]:.6g}, mu = {flat_mu[first]:.6g} "
-            f"(reached {phi[first, 2]:.1e}, asked {rtol:.1e})",
+            f"(reached {phi[first, 2]:.1e}, requested {rtol:.1e})",
             failed,
             result,
         )

@@ -1,8 +1,8 @@
-"""A contact law's block, whose layout `core/mbma.h` describes: its places, its inverse, and softening.
+"""The block of a contact law (layout in `core/mbma.h`): its indices, its inverse, and softening.
 
 The inverse is polynomials of x in buckets of force or area, found from their bits: `INVERSE_HEAD` numbers, then records
-of centre, rate, the sign of the side and INVERSE_DEGREE + 1 coefficients. They are guesses, which a Newton step on the
-law itself makes exact.
+of centre, rate, the sign of the side and INVERSE_DEGREE + 1 coefficients. They are starting values for a Newton step on
+the law itself.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mbma_tables.core import core
 DEGREE = 8
 CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = 0, 1, 2, 3 + DEGREE, 4 + 2 * DEGREE  # in a record
 RECORD = 5 + 2 * DEGREE
-# quantities, by which questions name them
+# names of the quantities
 QUANTITIES = ("pressure", "area", "stiffness", "area_slope", "energy")
 FORCE, AREA = range(2)
 
@@ -33,7 +33,7 @@ FORCE, AREA = range(2)
 HEAD = 18
 
 INVERSE_DEGREE = 5
-INVERSE_BITS = 2  # of the mantissa: 4 buckets an octave of force or area
+INVERSE_BITS = 2  # bits of the mantissa: 4 buckets per octave of force or area
 INVERSE_RECORD = 3 + INVERSE_DEGREE + 1
 INVERSE_HEAD = 6
 Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)

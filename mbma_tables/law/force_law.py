@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+import types
 from typing import Any
 
 import numpy as np
@@ -19,64 +20,64 @@ from mbma_tables.law.make import theory_law
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
-RTOL = 1e-7  # of the force of one contact
-LIGHT = 1e-9  # of the largest force, from which on laws without a last contact begin
+RTOL = 1e-7  # tolerance of the force of one contact
+LIGHT = 1e-9  # share of the largest force at which laws without a last contact begin
 NEWTONS = {"uN": 1e-6, "mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6}
 _FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N)\s*(?:/\s*(\w+))?\s*")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Body:
-    """What is pressed, and units: forces over E* times `newtons` are in the unit of force."""
+class Body(HalfSpace):
+    """What is pressed, and units of quantities: forces over E* times `newtons` are in the unit of force."""
 
     surface: AnySurface
     theory: Theory
-    problem: HalfSpace
-    shape: str
     units: dict[str, str]
     newtons: float
 
     @property
     def first(self) -> float:
         """Approach of first contact, or from which on a law without one is covered."""
-        return -self.problem.ends[1]
+        return -self.ends[1]
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
 
     def smooth_approach(self, force: FloatArray) -> FloatArray:
         """Hertz's approach at a force over E*."""
-        R = self.problem.radius
-        if not self.problem.plane:
-            return np.asarray((0.75 * force / math.sqrt(R)) ** (2 / 3))
-        a = np.sqrt(4 * R * force / math.pi)
-        return np.asarray(force / math.pi * (2 * np.log(2 * self.problem.reference / a) + 1))
+        if not self.plane:
+            return np.asarray((0.75 * force / math.sqrt(self.radius)) ** (2 / 3))
+        a = np.sqrt(4 * self.radius * force / math.pi)
+        return np.asarray(force / math.pi * (2 * np.log(2 * self.reference / a) + 1))
 
     def approach_at(self, force: float) -> float:
         """Approach at a force over E*: between those of the smooth body, and of one larger by h_max."""
         from scipy.optimize import brentq
 
-        smooth, ends = float(self.smooth_approach(np.asarray(force))), self.problem.ends
+        smooth, (thin, wide) = float(self.smooth_approach(np.asarray(force))), self.ends
 
         def miss(approach: float) -> float:
-            found = self.problem.solved(approach, RTOL)
-            return math.log(self.problem.integral(found, found.p) / force)
+            found = self.solved(approach, RTOL)
+            return math.log(self.integral(found, found.p) / force)
 
-        low, high = smooth - ends[1] * (1 - 1e-9), smooth - ends[0] + 2 * FLAT * ends[1]
+        low, high = smooth - wide * (1 - 1e-9), smooth - thin + 2 * FLAT * wide
         # no layer is thinner than its law allows: there may be no such force
         if miss(high) < 0:
-            self.problem.quantities(self.problem.solved(high, RTOL))
-        return float(brentq(miss, low, high, xtol=1e-12 * ends[1], rtol=1e-12))
+            self.quantities(self.solved(high, RTOL))
+        return float(brentq(miss, low, high, xtol=1e-12 * wide, rtol=1e-12))
 
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
     """Units by quantity, and what one stress times areas is in that of force."""
-    length, stress = units.length, units.stress
-    force, newtons = unit_of("energy" if plane else "island_force", units), 1.0
-    if length is not None and stress in SIZES["stress"]:
-        newtons = factor(stress, "Pa", "stress") * factor(length, "m", power=1 if plane else 2) / (1e3 if plane else 1)
-        force = "N/mm" if plane else "N"
-    lengths = dict.fromkeys(("approach", "contact_radius", "position", "mean_separation"), length or "length")
-    area = lengths["approach"] if plane else f"{lengths['approach']}^2"
-    known = {"force": force, "stiffness": f"{force}/{lengths['approach']}", "area": area}
-    return lengths | known | {"pressure": unit_of("pressure", units)}, newtons
+    length, force, newtons = unit_of("approach", units), unit_of("energy" if plane else "island_force", units), 1.0
+    if units.length is not None and units.stress in SIZES["stress"]:
+        force, per = ("N/mm", 1e-3) if plane else ("N", 1.0)
+        newtons = per * factor(units.stress, "Pa", "stress") * factor(units.length, "m", power=1 if plane else 2)
+    known = {"force": force, "stiffness": f"{force}/{length}", "area": length if plane else f"{length}^2"}
+    known |= dict.fromkeys(("approach", "contact_radius", "position", "mean_separation"), length)
+    return known | {"pressure": unit_of("pressure", units)}, newtons
 
 
 def forces(given: Any, body: Body, length: str | None) -> Any:
@@ -86,7 +87,7 @@ def forces(given: Any, body: Body, length: str | None) -> Any:
     if not isinstance(given, str):
         return given
     found, unit = _FORCE.fullmatch(given), body.units["force"]
-    if found is None or (found[3] is None) == body.problem.plane or unit not in ("N", "N/mm"):
+    if found is None or (found[3] is None) == body.plane or unit not in ("N", "N/mm"):
         known = "the units of surface and E_star are known" if unit not in ("N", "N/mm") else "it"
         raise InputError(f"force must be a number or, where {known} is, like '10 {unit}', got {given!r}")
     return float(found[1]) * NEWTONS[found[2]] * (1.0 if found[3] is None else factor("mm", found[3]))
@@ -117,7 +118,7 @@ class ForceLaw:
         return self.law.pressure(self._left(approach))
 
     def stiffness(self, approach: ArrayLike | str) -> Numbers:
-        """dF by the approach."""
+        """dF/d(approach)."""
         return self.law.stiffness(self._left(approach))
 
     def area(self, approach: ArrayLike | str) -> Numbers:
@@ -125,7 +126,7 @@ class ForceLaw:
         return self.law.area(self._left(approach))
 
     def energy(self, approach: ArrayLike | str) -> Numbers:
-        """Work of the approach, the integral of F."""
+        """Work of loading, the integral of F over the approach."""
         return self.law.energy(self._left(approach))
 
     def approach(self, force: Any) -> Numbers:
@@ -137,25 +138,18 @@ class ForceLaw:
         return self.law.h_max + self.first - finite_array("approach", self.law.units.number("approach", approach))
 
 
-@dataclasses.dataclass(frozen=True)
-class _Span:
-    """In place of a surface: first contact is where so much of the approach is left."""
-
-    h_max: float
-
-
 class _Pressed(Theory):
     """The contacts of a body as a theory of the approach that is left up to a largest one."""
 
     def __init__(self, body: Body, top: float, rtol: float) -> None:
-        self.name, self.ends_at_h_max = body.problem.law.theory, body.problem.touches
-        self._problem, self._top, self._rtol = body.problem, top, rtol
+        self.name, self.ends_at_h_max = body.law.theory, body.touches
+        self._body, self._top, self._rtol = body, top, rtol
 
     def answer(self, surface: Any, mean_separation: FloatArray) -> TheoryAnswer:
         """Force over E*, real area and stiffness."""
         approaches = self._top - np.asarray(mean_separation, float)
-        found = [self._problem.solved(approach, self._rtol) for approach in map(float, approaches.ravel())]
-        rows = np.array([(*self._problem.quantities(at), at.error + self._problem.law.error) for at in found])
+        found = [self._body.solved(approach, self._rtol) for approach in map(float, approaches.ravel())]
+        rows = np.array([(*self._body.quantities(at), at.error + self._body.law.error) for at in found])
         force, stiffness, area, error = (part.reshape(approaches.shape) for part in rows.T)
         return TheoryAnswer(force, area, stiffness, error)
 
@@ -167,12 +161,12 @@ class _Pressed(Theory):
 
 def force_law(body: Body, top: float, rtol: float) -> ForceLaw:
     """Force against approach up to `top`."""
-    problem, first = body.problem, body.first
-    if not problem.touches:
-        largest = problem.solved(top, RTOL)
-        first = body.approach_at(LIGHT * problem.integral(largest, largest.p))
-    span: Any = _Span(top - first)
-    units = Units(problem.law.units.length)
-    facts = {"surface": span, "E_star": problem.law.E_star * body.newtons, "units": units}
+    first = body.first
+    if not body.touches:
+        largest = body.solved(top, RTOL)
+        first = body.approach_at(LIGHT * body.integral(largest, largest.p))
+    # in place of a surface: first contact is where so much of the approach is left
+    span: Any = types.SimpleNamespace(h_max=top - first)
+    facts = {"surface": span, "E_star": body.law.E_star * body.newtons, "units": Units(body.law.units.length)}
     law = theory_law(span, _Pressed(body, top, 0.01 * rtol), rtol, facts)
     return ForceLaw(dataclasses.replace(law, surface=None), first, body)

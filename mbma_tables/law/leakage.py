@@ -20,13 +20,13 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply
 from mbma_tables.theories import OF_MAPS
 
-RTOL, SHARE = 1e-4, 0.1  # of the polynomials, or this share of the law's own error
-MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is a power
+RTOL, SHARE = 1e-4, 0.1  # tolerance of the polynomials, or this share of the law's own error
+MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow is a power
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LeakageLaw:
-    """Flow coefficient k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it."""
+    """Flow coefficient k h_rms^3 [length^3] of one surface against its gap, from `ContactLaw.leakage`."""
 
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
@@ -74,7 +74,7 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
     """
     if law.theory in OF_MAPS:
         raise InputError(
-            f"a law holds the leakage of isotropic gaps alone; by theory {law.theory!r} contact(...).leakage has it "
+            f"a law has the leakage of isotropic gaps only; with theory {law.theory!r} contact(...).leakage has it "
             "along both axes, .x and .y"
         )
     threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)
@@ -103,7 +103,7 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
     try:
         pieces = fit.side_pieces(side, rtol)
     except ConvergenceError:
-        # what the law's polynomials miss of each other where they meet grows towards the blocked gap
+        # jumps between the law's polynomials are amplified towards the blocked gap
         pieces = fit.side_pieces(side, max(RTOL, law.error))
     block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[at.LOWEST], top))
     block.view(np.int64)[at.ENDS] = blocked
@@ -113,7 +113,7 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
 
 
 def _between_nodes(pieces: fit.Pieces, values: fit.Values) -> float:
-    """Relative error midway between the nodes of the fit: kinks of the flow may show in no coefficient."""
+    """Relative error midway between the nodes of the fit, because kinks of the flow may not affect its coefficients."""
     t = np.cos(np.pi * np.arange(fit.SAMPLES + 1) / fit.SAMPLES)
     records = pieces.records
     x = np.minimum(records[:, at.CENTRE, None] + t / records[:, at.RATE, None], 1.0)

@@ -1,6 +1,6 @@
-"""`contact_law`: one surface's pressure and area by any theory, frozen into polynomials of the gap.
+"""`contact_law`: one surface's pressure and area by any theory, fitted by polynomials of the gap.
 
-MBMA's laws are made from a profile of the surface's islands, other theories' from their answers; `law_pieces` fits
+MBMA's laws are made from a profile of the surface's islands, others from the theory's results; `law_pieces` fits
 the polynomials and bounds their errors.
 """
 
@@ -33,15 +33,15 @@ from mbma_tables.totals.island import check_band
 from mbma_tables.totals.profile import profile
 
 MIN_LAW_RTOL = 1e-9
-RESOLVED = 1e-3  # a polynomial this close is one whose error its coefficients show
-POWERS = (3.5, 10 / 3)  # of h_max - d, in which MBMA's force and area start
-LAYER_SHARE = 0.5  # of the boundary layer, up to which those powers leave little
+RESOLVED = 1e-3  # for polynomials this accurate the last coefficients estimate the error
+POWERS = (3.5, 10 / 3)  # leading powers of h_max - d of MBMA's force and area
+LAYER_SHARE = 0.5  # of the boundary layer, up to which these powers dominate
 FIRST_OCTAVES = 20  # below which a theory that ends at h_max is a power of h_max - u
 MOST_OCTAVES = 60
 MAX_SPAN = 10.0  # u/h_max up to which a theory without last contact is covered
 LOWEST = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # u/h_max from which a theory may answer
-LOOKED_AT = 24  # places at which a theory's own error is looked at
-SHARE = 0.1  # of the median of a theory's own errors: the polynomials need not be closer to it
+LOOKED_AT = 24  # points at which a theory's own error is evaluated
+SHARE = 0.1  # of the median of a theory's own errors: sufficient accuracy of the polynomials
 
 
 @hinted
@@ -56,7 +56,7 @@ def contact_law(
     hardness: float | str | None = None,
     materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> ContactLaw:
-    """Pressure and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
+    """Pressure and area of one surface as functions of its gap, for many gaps and for inverses.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def contact_law(
     island model, variant, E_star
         As for `contact`; `island_model` may be a user-defined island model.
     hardness, materials : optional
-        As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
+        As for `contact`: the law of loading. Its `energy` is then the work of loading, not that recovered on unloading.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def contact_law(
     if one.labelled:
         one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))
     if one.shape != ():
-        raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
+        raise InputError(f"a law needs one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, **yields}
     if isinstance(chosen, Mbma):
@@ -120,7 +120,7 @@ def contact_law(
     try:
         return theory_law(one, chosen, asked, facts)
     except ConvergenceError as fault:
-        raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
+        raise ConvergenceError(f"theory {chosen.name!r}: {fault}; use a larger rtol", fault.mask) from None
 
 
 def _mbma_law(
@@ -173,7 +173,7 @@ def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str
         return np.stack([found.pressure, found.area])
 
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
-    # where it has far larger errors at some gaps, as at the lightest contact of a small map, these do not count
+    # far larger errors at some gaps, as at the lightest contact of a small map, are ignored
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
     bends = np.asarray(theory.elastic.bends(surface), dtype=float)
 

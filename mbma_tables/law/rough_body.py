@@ -20,6 +20,7 @@ from mbma_tables.law.force_law import RTOL, Body, ForceLaw, force_law, forces, u
 from mbma_tables.law.half_space import HalfSpace, Solved
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
+from mbma_tables.laws.calibrated import Spectrum, spectrum_of
 from mbma_tables.materials import Metal, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory
@@ -30,10 +31,13 @@ if TYPE_CHECKING:
 SHAPES = ("sphere", "cylinder")
 JOHNSON = 2 / math.e  # reference over R: approaches are Johnson's (5.57) in Hertz's contact
 LAYER_RTOL = 1e-8  # of the layer's law, as far as its theory allows
-ROUNDING = 1e-9  # of h_max, by which a law goes beyond the largest approach
+ROUNDING = 1e-3  # of h_max, by which a law goes beyond the largest approach, so that it has the largest force
 MOMENTS = 128  # nodes of the effective radius
-POINTS = 101  # of a profile
-COUNTED = 0.1  # share of the force above which a reason against the layer's law counts
+POINTS = 101  # points of a profile
+COUNTED = 0.1  # share of the force above which a reason against the layer's law applies
+# c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the width of the contact over the
+# mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate.rough_spheres`
+CELLS, NARROWEST = (0.62, 0.8), 1.5
 WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 
 
@@ -44,11 +48,11 @@ class RoughContact(Displayed):
     Attributes
     ----------
     approach : ndarray
-        How far the bodies are beyond touching with their mean planes [length]; negative where only peaks touch.
+        Approach of the bodies from the contact of their mean planes [length]; negative if only peaks are in contact.
     force : ndarray
         F, N where units are known; of a cylinder F per length, N/mm.
     stiffness : ndarray
-        dF by the approach.
+        dF/d(approach).
     area : ndarray
         Real contact area [length^2]; of a cylinder per length.
     contact_radius : ndarray
@@ -59,12 +63,13 @@ class RoughContact(Displayed):
     error : ndarray
         Estimate of the relative numerical error of the force, with that of the layer's law.
     scatter : ndarray
-        Standard deviation of ln F at the approach that follows from the layer's model uncertainty.
+        Standard deviation of ln F at the approach: of the layer's model uncertainty, and from place to place on the
+        faces, whose mean plane below a narrow contact is uncertain.
     valid : ndarray
-        Whether the layer's law was tested for such contacts, where nine tenths of the force are, and the contact is no
-        wider than a tenth of R.
+        Whether the layer's law was tested for such contacts, where nine tenths of the force are, and the contact is
+        wider than 1.5 mean wavelengths, and narrower than a tenth of R.
     reasons : dict
-        Why not, each with a mask.
+        Reasons why not `valid`, each with a mask.
     layer : ContactLaw
         The law of the surface.
     units : dict
@@ -83,17 +88,9 @@ class RoughContact(Displayed):
     scatter: Numbers
     valid: Any
     reasons: dict[str, Any]
+    layer: ContactLaw
+    units: dict[str, str]
     _body: Body
-
-    @property
-    def layer(self) -> ContactLaw:
-        """The law of the surface."""
-        return self._body.problem.law
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Units of the quantities."""
-        return self._body.units
 
     def law(self, rtol: float = 1e-5) -> ForceLaw:
         """Force against approach from first contact to the largest approach of these, as polynomials.
@@ -101,7 +98,7 @@ class RoughContact(Displayed):
         Parameters
         ----------
         rtol : float
-            Of the polynomials, in [1e-6, 0.1]: at 1e-5 some 400 contacts are solved in about a second.
+            Of the polynomials, in [1e-6, 0.1]: at 1e-5 some 400 contacts are solved.
 
         Examples
         --------
@@ -117,7 +114,7 @@ class RoughContact(Displayed):
 
     def _facts(self) -> dict[str, str]:
         names = ("approach", "force", "stiffness", "area", "contact_radius", "valid")
-        facts = {"shape": self._body.shape, "radius": shown(self._body.problem.radius, self.units["approach"])}
+        facts = {"body": self._body.name}
         facts |= {name: shown(getattr(self, name), self.units.get(name, "1")) for name in names}
         return facts | {"theory": self.layer.theory, "surface": repr(self._body.surface)}
 
@@ -132,7 +129,7 @@ class RoughContact(Displayed):
             "pressure": "mean pressure",
             "mean_separation": "mean separation of the deformed faces",
             "error": "estimate of the relative numerical error of force",
-            "scatter": "standard deviation of ln F at the approach, of the law's model uncertainty",
+            "scatter": "standard deviation of ln F at the approach from place to place and simulation to simulation",
             "valid": "whether the law was tested for such contacts",
         }
         loads = ("load",) * np.ndim(self.approach)
@@ -222,8 +219,9 @@ def rough_contact(
     fixed = JOHNSON * R if reference is None else units.number("reference", reference)
     if not plane and reference is not None:
         raise InputError("reference is of a cylinder: leave it out")
-    problem = HalfSpace(law, R, plane, number_in("reference", fixed, 1e-30 * R, largest))
-    body = Body(surface, chosen_theory(surface, theory), problem, shape, *units_of(units, plane))
+    own = chosen_theory(surface, theory)
+    fixed = number_in("reference", fixed, 1e-30 * R, largest)
+    body = Body(law, R, plane, fixed, surface, own, *units_of(units, plane))
     if (approach is None) == (force is None):
         raise InputError("give approach or force, one of them")
     if force is None:
@@ -241,43 +239,73 @@ def rough_contact(
 
 def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     """The contacts at some approaches [length]."""
-    problem, rows, profiles = body.problem, [], []
+    rows, profiles = [], []
     reasons: dict[str, list[bool]] = {}
-    scale = problem.law.E_star * body.newtons
+    scale = body.law.E_star * body.newtons
     for k, approach in enumerate(map(float, wanted.ravel())):
-        found = problem.solved(approach, RTOL)
-        force, stiffness, area = problem.quantities(found)
+        found = body.solved(approach, RTOL)
+        force, stiffness, area = body.quantities(found)
+        a = _effective(body, found)
         scatter, against = _trust(body, found, force)
+        width = 2 * a / mean_wavelength(body.surface)
+        # the mean plane below the contact: that of a cell
+        scatter = math.hypot(scatter, CELLS[0] / width ** CELLS[1] * float(body.surface.h_rms) * stiffness / force)
+        if width < NARROWEST:
+            against.append(f"the contact is narrower than {NARROWEST:g} mean wavelengths")
         for text in against:
             reasons.setdefault(text, [False] * wanted.size)[k] = True
         t = np.linspace(0, 1, POINTS)
-        p, u = (problem.between(found, values, t) for values in (found.p, found.u))
-        rows.append((scale * force, scale * stiffness, area, _effective(problem, found), found.error, scatter))
-        profiles.append((found.radius * t, np.maximum(p, 0) * problem.law.E_star, u))
+        p, u = (body.between(found, values, t) for values in (found.p, found.u))
+        rows.append((scale * force, scale * stiffness, area, a, found.error, scatter))
+        profiles.append((found.radius * t, np.maximum(p, 0) * body.law.E_star, u))
     F, stiffness, area, a, error, scatter = (part.reshape(wanted.shape)[()] for part in np.array(rows).T)
     position, pressure, u = np.array(profiles).swapaxes(0, 1).reshape(3, *wanted.shape, POINTS)
     masks = {text: np.reshape(mask, wanted.shape) for text, mask in reasons.items()}
-    masks |= {"the contact is wider than a tenth of the radius": a > WIDEST * problem.radius}
+    masks |= {"the contact is wider than a tenth of the radius": a > WIDEST * body.radius}
     masks = {text: mask for text, mask in masks.items() if np.any(mask)}
     valid = ~np.logical_or.reduce([np.zeros(wanted.shape, bool), *masks.values()])
     return RoughContact(
-        wanted[()], F, stiffness, area, a, position, pressure, u, error + problem.law.error, scatter, valid, masks, body
+        wanted[()],
+        F,
+        stiffness,
+        area,
+        a,
+        position,
+        pressure,
+        u,
+        error + body.law.error,
+        scatter,
+        valid,
+        masks,
+        body.law,
+        body.units,
+        body,
     )
 
 
 def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
     """Standard deviation of ln F by that of the law, alike at all places, and reasons against the law."""
-    law, ends = body.problem.law, body.problem.ends
-    u, touching = np.clip(found.u, *ends), found.p > 0
+    law, ends = body.law, body.ends
+    u = np.clip(found.u, *ends)
     known = contact(body.surface, mean_separation=u, theory=body.theory, E_star=law.E_star, hardness=law.hardness)
-    spread = np.where(touching, np.nan_to_num(known.scatter, nan=0.0), 0.0)
-    scatter = body.problem.integral(found, found.raised(spread * found.p)) / force
-    shares = {text: body.problem.integral(found, found.p * mask) / force for text, mask in known.reasons.items()}
+    spread = np.nan_to_num(known.scatter, nan=0.0)
+    scatter = body.integral(found, found.raised(spread * found.p)) / force
+    if body.integral(found, found.p * np.isnan(known.scatter)) > COUNTED * force:
+        scatter = math.nan
+    shares = {text: body.integral(found, found.p * mask) / force for text, mask in known.reasons.items()}
     return scatter, [text for text, share in shares.items() if share > COUNTED]
 
 
-def _effective(problem: HalfSpace, found: Solved) -> float:
+def mean_wavelength(surface: Any) -> float:
+    """2 pi over the mean wavenumber, weighted by height variance [length]."""
+    known = getattr(surface, "q", None) is not None
+    spectrum = spectrum_of(surface) if known else Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
+    steep = float(surface.rms_gradient) / float(surface.h_rms) / spectrum.gradient
+    return 2 * math.pi / (steep * float(np.sum(spectrum.variance * spectrum.x)))
+
+
+def _effective(body: HalfSpace, found: Solved) -> float:
     """3 pi/4 times the mean of r weighted by p dr."""
     rule = basis(MOMENTS)
-    p = rule.root_weights**2 * problem.between(found, found.p, rule.v)
+    p = rule.root_weights**2 * body.between(found, found.p, rule.v)
     return float(0.75 * math.pi * found.radius * np.sum(p * rule.v) / np.sum(p))

@@ -1,4 +1,4 @@
-"""Boundary elements: a periodic height map pressed flat by Tamaas (the extra `simulate`)."""
+"""Boundary elements (BEM): contact of a periodic height map with a rigid plane, by Tamaas (the extra `simulate`)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
 
 
 class Contact:
-    """A periodic map against a rigid plane: Polonsky and Keer's conjugate gradients as Tamaas has them, E* = 1.
+    """A periodic map against a rigid plane: Polonsky and Keer's conjugate gradients in Tamaas, E* = 1.
 
     Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact.
     """
@@ -49,7 +49,7 @@ class Contact:
         try:
             residual = self._solver.solve(force)
         except (ArithmeticError, RuntimeError) as fault:
-            # of a single element in contact, for instance
+            # for example with a single element in contact
             raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}") from None
         if not residual <= self._tolerance:
             raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")

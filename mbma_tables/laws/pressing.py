@@ -1,9 +1,9 @@
-"""One map pressed at a list of loads by boundary elements, on a coarser grid where that resolves its contacts.
+"""BEM of one map at a list of loads, on a coarser grid where that resolves its contacts.
 
 Grids of eight or more sampling steps along the shortest wavelength are halved for the heavier loads. Flow is solved on
 gaps of the full grid: displacements of a coarser one are smooth, the heights are not, so the former are interpolated.
 
-Each load, and each flow, is kept in `mbma_tables.common.cache` as soon as it is found.
+Each load, and each flow, is stored in `mbma_tables.common.cache` as soon as it is computed.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from mbma_tables.common.progress import doing, shown
 from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.reynolds import flow_conductance
 
-MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary elements are too large
-HALVED = 8.0  # sampling steps a wave, from which on heavier loads are pressed on half of the grid
-LIGHT = 0.06  # contact from which on that is so
+MIN_POINTS = 4.0  # sampling steps per wavelength; with fewer, areas of boundary elements are too large
+HALVED = 8.0  # sampling steps per wavelength, from which heavier loads use half of the grid
+LIGHT = 0.06  # contact area above which half of the grid is used
 TOLERANCE = 1e-3
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
 ROUNDING = 1e-6
-KEPT = "pressed 1"  # of what is cached: another text where this file finds other numbers
+KEPT = "pressed 1"  # version of cached results: change it when this file gives other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
 
 
 def coarser(values: FloatArray, points: float = 0.0) -> FloatArray:
-    """A periodic map on every second sampling step along each axis, by its waves of at least `points` of these."""
+    """A periodic map on every second sampling step along each axis, without wavelengths below `points` of these."""
     from scipy.signal import resample
 
     if points:
@@ -62,9 +62,9 @@ class Pressed:
     rows: FloatArray
     coarse_from: int
     gaps: tuple[FloatArray, ...]
-    names: tuple[str, ...]  # under which loads are cached
+    names: tuple[str, ...]  # key of the cached loads
     left_out: float = 0.0  # wavelength [length] below which a large map was cut off; 0 if it was not
-    cut: float = 0.0  # sampling steps of the coarse grid along its shortest waves, where shorter ones were left out
+    cut: float = 0.0  # sampling steps of the coarse grid per shortest wavelength, where shorter ones were omitted
 
     def flow(self) -> FloatArray:
         """Flow coefficient along both axes [length^3], shape (n, 2); 0 where blocked."""
@@ -79,7 +79,7 @@ class Pressed:
                     kept = {"flow": flow_conductance(self.gap(k), self.sizes) / scale**3}
                     cache.keep(name, **kept)
                 found[k] = kept["flow"] * scale**3
-                # once blocked both ways, heavier loads are
+                # once blocked along both axes, heavier loads are blocked as well
                 if not found[k].any():
                     break
         return found
@@ -95,7 +95,7 @@ class Pressed:
         for axis, count in enumerate(self.heights.shape):
             moved = resample(moved, count, axis=axis)
         gap = moved - self.heights
-        # the level at which what is cut at zero has the mean gap
+        # level at which the gaps cut off at zero have the given mean
         ordered = np.sort(gap, axis=None)
         below = np.cumsum(ordered[::-1])[::-1] - ordered * np.arange(gap.size, 0, -1)
         level = np.interp(-self.rows[2, k] * gap.size, -below, ordered)
@@ -104,7 +104,7 @@ class Pressed:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table:
-    """What was found of a map, without the map and its gaps: rows and flow as of `Pressed`.
+    """Results for a map, without the map and its gaps: rows and flow as in `Pressed`.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Table:
     left_out : float
         As of `Pressed`.
     origin : str
-        What it was found of, and by what.
+        Description of the map and of the simulation.
     """
 
     rows: FloatArray
@@ -129,13 +129,13 @@ class Table:
         return self.flows
 
     def resized(self, up: float, along: float) -> Table:
-        """Of the surface with its heights `up` times as large, and its lengths along the plane `along` times."""
+        """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
         by = np.array([[up / along], [1.0], [up], [up**2 / along]])
         return dataclasses.replace(self, rows=self.rows * by, flows=self.flows * up**3, left_out=self.left_out * along)
 
 
 def _digest(*parts: Any) -> str:
-    """SHA-256 of arrays and numbers; of arrays in single precision, which another unit of length leaves as they are."""
+    """SHA-256 of numbers and of arrays, these in single precision, so that it is independent of the unit of length."""
     digest = hashlib.sha256(KEPT.encode())
     for part in parts:
         array = isinstance(part, np.ndarray)
@@ -156,12 +156,12 @@ def press(
     area: Any = None,
     tolerance: float = TOLERANCE,
 ) -> Pressed:
-    """Press a periodic map; `loads` over A0 E*, `points` along its shortest wave, about its rms gradient.
+    """Simulate a periodic map; `loads` over A0 E*, `points` per shortest wavelength, `gradient` its rms gradient.
 
-    Where its approximate `area` at a load is known, heavier loads are pressed on half of the grid, and loads are added
+    If its approximate `area` at a load is known, heavier loads use half of the grid, and loads are added
     until contacts from `LOWEST` to `HIGHEST` are covered.
     """
-    # of rms gradient one, heights of order one
+    # scaled to an rms gradient of one and heights of order one
     scale = float(np.abs(heights).max())
     stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
     halved = area is not None and points >= HALVED * (1 - ROUNDING)
@@ -171,7 +171,7 @@ def press(
     own = _digest(heights / scale, heights.shape, *(f"{side:.9g}" for side in stretched), tolerance)
 
     def add(load: float, coarse: bool) -> None:
-        # loads of a map are added after those asked for
+        # further loads are added after those requested
         doing(f"boundary elements {_bar(len(found), max(len(loads), len(found) + 1))}")
         name = _digest(own, coarse, f"{load / gradient:.9g}")
         shape = tuple(count // (1 + coarse) for count in heights.shape)
@@ -191,7 +191,7 @@ def press(
             add(load, halved and float(area(np.array(load))) > LIGHT)
         for _ in range(MORE if area is not None else 0):
             low, high = min(found), max(found)
-            # where one element touches, the solver may fail
+            # with a single element in contact the solver may fail
             if found[low][1][0] > LOWEST:
                 with contextlib.suppress(ConvergenceError):
                     add(low * LIGHTER, False)

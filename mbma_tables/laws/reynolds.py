@@ -1,7 +1,7 @@
 """Flow through the gaps of a contact: Reynolds' equation div(h^3 grad p) = 0 on a periodic grid of gaps.
 
 Finite volumes with the harmonic mean of h^3 at faces; mean pressure gradients along both axes share one sparse
-factorisation. What is closed by contact is found by labelling connected gaps, never from a small number.
+factorisation. Closed gaps are found by labelling connected gaps, not by a small conductance.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
                 if there not in place:
                     place[there] = met
                     heap.append(there)
-                # the same gap reached in two cells: a path around the torus
+                # the same gap reached in two cells: a closed path around the periodic cell
                 winds[start] |= np.not_equal(met, place[there])
     component[~winds[component].any(axis=1)] = 0
     along: Any = winds.any(axis=0)
@@ -124,7 +124,7 @@ def flow_and_couette(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) ->
         uniform[axis] = face.sum() * steps[axis] ** 2
     matrix = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))))
     matrix = matrix - diags_array(matrix.sum(axis=1))
-    # pressure is free by a constant in each connected gap
+    # pressure is determined up to a constant in each connected gap
     fixed = np.unique(owner[owner > 0], return_index=True)[1]
     free = np.delete(np.arange(len(forces)), fixed)
     factors = splu(

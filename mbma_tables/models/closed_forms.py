@@ -1,6 +1,6 @@
 """Closed forms: the island model "formula", and total force and area without a sum over islands.
 
-The forms are in `core/closed_forms.h`, which the generator writes; docs/formula.md shows them.
+The forms are in `core/closed_forms.h`, written by `generate`; docs/formula.md lists them.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Scenes: only the effects that are called for, planned by cost."""
+"""Scenes: simulation of the requested effects only, planned by cost."""

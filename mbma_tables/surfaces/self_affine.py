@@ -1,4 +1,4 @@
-"""Five numbers that make a self-affine surface, or arrays of them, and what follows from them."""
+"""The five numbers of a self-affine surface, or arrays of them, and derived quantities."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from mbma_tables.surfaces.roughness import surface_of_roughness
 if TYPE_CHECKING:
     from mbma_tables.surfaces.psd import SpectrumFit
 
-LARGEST = 1e50  # of lengths and wavenumbers, whose powers stay finite
+LARGEST = 1e50  # limit of lengths and wavenumbers, so that their powers stay finite
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class SelfAffine(AnySurface):
-    """The numbers of `Surface`, checked, and the constructors that need no measurement."""
+    """The numbers of `Surface`, checked, and the constructors without a measurement."""
 
     hurst: Any
     q0: Any
@@ -80,7 +80,7 @@ class SelfAffine(AnySurface):
         """Set the highest point of a Gaussian surface of that area."""
         units = Units(self.unit)
         numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
-        # what follows from the other numbers, checked as they are
+        # derived from the other numbers; checked like them
         like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
         h_max, provenance = of_area(like, nominal_area, self.h_max)
         vars(self).update(h_max=h_max, provenance=provenance)
@@ -90,7 +90,7 @@ class SelfAffine(AnySurface):
         return f"Surface({', '.join([*numbers, *([f'unit={self.unit!r}'] if self.unit else [])])})"
 
     def scaled(self, factor: float, unit: str | None) -> Self:
-        """The same surface in another length unit, of which the old one is `factor`."""
+        """The same surface in another length unit; `factor` is the old unit in the new one."""
         numbers = {name: getattr(self, name) / factor for name in ("q0", "q1")}
         numbers |= {name: getattr(self, name) * factor for name in ("h_rms", "h_max")}
         return dataclasses.replace(self, **numbers, unit=unit)
@@ -124,7 +124,7 @@ class SelfAffine(AnySurface):
         Returns
         -------
         Surface
-            zeta_1 from alpha = m0 m4/m2^2, which rises with it, then q0 from m2/m0.
+            zeta_1 from alpha = m0 m4/m2^2, which increases with it, then q0 from m2/m0.
 
         Raises
         ------
@@ -224,7 +224,7 @@ class SelfAffine(AnySurface):
         Raises
         ------
         InputError
-            For an unknown name; the message lists those there are.
+            For an unknown name; the message lists the known ones.
 
         Examples
         --------
@@ -276,7 +276,7 @@ class SelfAffine(AnySurface):
 
 
 def check_model(model: str, band: Any) -> None:
-    """Refuse an unknown model of a measurement, and a band to be fitted where nothing is."""
+    """Reject an unknown model of a measurement, and a band without a fit."""
     if model not in ("measured", "self-affine"):
         raise InputError(f"model must be 'measured' or 'self-affine', got {model!r}")
     if model == "measured" and band is not None:

@@ -1,7 +1,7 @@
 """Moments and summits of a self-affine spectrum over a band of magnifications (Eqs. 2, 3, 6, 7, 22, 31), and back.
 
 Units: heights in s = h_rms / sqrt(1 - zeta_1^(-2H)), lengths in 1/q0. A band [za, zb] is given by log(za) and
-log(zb/za), so that a band of any width, however narrow, keeps its digits.
+log(zb/za), so that narrow bands keep their accuracy.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_arr
 NAYAK = 6 * math.pi * math.sqrt(3)  # summit density is m4 / (NAYAK m2), Eq. (2)
 RADIUS = 3 * math.sqrt(math.pi) / 8  # summit radius is RADIUS / sqrt(m4), Eq. (2)
 BROADENING = 0.8968  # summit variance is (1 - BROADENING/alpha) m0, Eq. (2)
-MIN_ZETA_1, MAX_ZETA_1 = 3.0, 1e8  # of a whole surface; above 3 for the floors 1.5 and 3 of (27), (30)
+MIN_ZETA_1, MAX_ZETA_1 = 3.0, 1e8  # limits for a surface; above 3 for the floors 1.5 and 3 of (27), (30)
 SHARES = {0: 2.0, 2: 1.0, 4: 0.75}  # of moments of order n, Eq. (7)
-BISECTIONS = 56  # of log(zeta_1), to rounding
+BISECTIONS = 56  # bisections of log(zeta_1), to rounding
 TINY = 1e-300  # in place of 0, where a quotient tends to 1
 
 
@@ -39,7 +39,7 @@ def moment_of(order: int, hurst: Any, log_za: Any, log_ratio: Any) -> Any:
 def alpha_of(hurst: Any, log_ratio: Any) -> Any:
     """Nayak's bandwidth parameter m0 m4/m2^2, Eq. (3): a function of zb/za alone, 1.5 where that is 1."""
     g2 = growth(2.0 - 2.0 * hurst, log_ratio)
-    # grouped so that nothing overflows
+    # grouped to avoid overflow
     return 1.5 * (growth(-2.0 * hurst, log_ratio) / g2) * (growth(4.0 - 2.0 * hurst, log_ratio) / g2)
 
 

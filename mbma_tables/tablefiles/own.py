@@ -1,4 +1,4 @@
-"""Tables of a user's own surface: what boundary elements found of one map, in a sealed netCDF-4 file like other tables.
+"""Tables of a user's own surface: BEM results of one map, in a netCDF-4 file with a checksum like other tables.
 
 Each variable has its dimensions named, a `long_name` and `units`; hashes and the seal are those of `netcdf`.
 """
@@ -32,7 +32,7 @@ ADVICE = "make it anew: `mbma fit MAP --simulate --out OWN.nc`"
 
 
 def is_own(path: os.PathLike[str] | str) -> bool:
-    """Whether a file ends as a sealed table does."""
+    """Whether a file ends with a table's checksum."""
     try:
         with open(path, "rb") as stream:
             stream.seek(-SEAL_LENGTH, os.SEEK_END)
@@ -89,7 +89,7 @@ def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, An
             raise ValueError(f"has variable {lost[0]}, which is not finite")
     except TableFileError as fault:
         raise TableFileError(f"{str(fault).partition('; rebuild')[0]}; {ADVICE}") from None
-    # what netCDF4 raises on bytes that are no netCDF file
+    # raised by netCDF4 for bytes that are not a netCDF file
     except (ValueError, OSError, RuntimeError, LookupError) as fault:
         raise TableFileError(f"{source}: {fault}; {ADVICE}") from None
     return values, own

@@ -1,11 +1,11 @@
 """The quick law of a map corrected by boundary elements on half of its grid: `theory="corrected"`.
 
-The half grid, c, is pressed at the loads of `theory="simulated"` and carried to the full map by the law's own change::
+The half grid, c, is simulated at the loads of `theory="simulated"`; the law's change gives the full map::
 
     u = u_c + u_law - u_law,c        A = erf(e),  e = e_c e_law/e_law,c
 
 with the geometric mean of A and the law's own where A is below 1%, and u = u_c exp((u_law - u_law,c)/u_c) where that
-change is negative. What the law, and the quarter grid carried likewise, differ from it by measures its scatter.
+The half grid, c, is simulated at the loads of `theory="simulated"`; the law's change carries it to the full map::
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from mbma_tables.theories.calibrated_curves import OwnLaw, own_law
 from mbma_tables.theories.protocol import TheoryAnswer
 from mbma_tables.theories.simulated import BoundaryElements
 
-LIGHT = 0.01  # contact below which the law's own area counts, too
+LIGHT = 0.01  # contact below which the law's own area is included
 FINE = 4000  # loads over which the law's change is integrated
 LOWEST, HIGHEST = 3e-3, 0.8  # A/A0 that was tested
 # points along a side, and of the map with its continuation, between which it is the default
 LEAST_SIDE, MOST_POINTS = 64, 2**18
-# a, b and c of the scatter, root of a^2 + (b D1)^2 + (c D2)^2: D1 is what the law differs by from the answer, D2 what
-# that by the quarter grid does; fitted to the 65 maps of `python -m generate machined` (generate/machined/coverage.py)
+# a, b and c of the scatter sqrt(a^2 + (b D1)^2 + (c D2)^2), D1 the difference of the law from the result, D2 that
+# of the quarter grid; fitted to the 65 maps of `python -m generate machined` (generate/machined/coverage.py)
 SCATTER = {"pressure": (0.021, 0.51, 0.43), "area": (0.0095, 0.28, 0.61), "stiffness": (0.034, 0.44, 0.27)}
-OF_FLOW = (0.065, 0.061, 0.16, 0.83, 2.8, 2.8, 2.8)  # of ln of the flow, at `TESTED_AREAS` of simulated maps
+OF_FLOW = (0.065, 0.061, 0.16, 0.83, 2.8, 2.8, 2.8)  # scatter of ln of the flow at `simulated.TESTED_AREAS`
 
 
 class Corrected(BoundaryElements):
@@ -69,7 +69,7 @@ class Corrected(BoundaryElements):
 
     @classmethod
     def of(cls, surface: AnySurface, loads: Any = None, tolerance: float = TOLERANCE) -> Corrected:
-        """Press half and quarter of the grid of a surface from `mbma_tables.Surface.from_map`."""
+        """Simulate half and quarter of the grid of a surface from `mbma_tables.Surface.from_map`."""
         own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
         return cls(surface, _carried(surface, 1, tolerance), _carried(surface, 2, tolerance).rows)
@@ -84,12 +84,12 @@ class Corrected(BoundaryElements):
         return odd | {f"A/A0 is below {LOWEST:g}": low, f"A/A0 is above {HIGHEST:g}": high}
 
     def apart(self, quantity: str, area: FloatArray) -> list[FloatArray]:
-        """What the law, and the quarter grid, differ from the answer at contact areas, as errors of that quantity."""
+        """Differences of law and quarter grid from the result at contact areas, as errors of that quantity."""
         x = self.fit.log_force_at(np.clip(area, *self.rows[1, [0, -1]]))
         return [np.interp(x, self.fit.x, difference) for difference in self._apart_by[quantity]]
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
-        """Standard deviation against the full grid, by what the law and the quarter grid differ from the answer."""
+        """Standard deviation against the full grid, from the differences of law and quarter grid."""
         if quantity == "flow":
             with np.errstate(divide="ignore"):
                 found = np.interp(np.log(area), np.log(simulated.TESTED_AREAS), OF_FLOW)
@@ -101,7 +101,7 @@ class Corrected(BoundaryElements):
 
 
 def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Pressed:
-    """The map pressed on a coarser grid, and carried to the full one; loads end where the gap no longer falls."""
+    """Results for the full map from a coarser grid; loads end where the gap no longer decreases."""
     values, sizes = own_map.continued(own_map.map_of(surface))
     coarse = values
     for _ in range(halvings):
@@ -119,7 +119,7 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
     carried = erf(root[0] * root[1] / root[2])
     weight = np.exp(-carried / LIGHT) / 2
     carried = np.maximum.accumulate(carried ** (1 - weight) * law.area(pressure) ** weight)
-    # dU = -F du of the change alone, which adds nothing at the lightest load
+    # dU = -F du of the change alone, zero at the lightest load
     fine = np.geomspace(pressure[0], pressure[-1], FINE)
     changes = law.separations(fine) - other.separations(fine)
     added = np.append(0.0, np.cumsum((changes[1:] + changes[:-1]) / 2 * np.diff(fine)))
@@ -127,14 +127,14 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
     rows = np.array([pressure, carried, gap, work - pressure * gap])
     kept = int(np.count_nonzero(np.cumprod((np.diff(gap, prepend=np.inf) < 0) & (rows[3] > 0))))
     if kept < simulated.MIN_LOADS:
-        raise ConvergenceError("the law of this map changes so much with its grid that nothing is left to correct")
+        raise ConvergenceError("the law of this map changes too much with its grid for a correction")
     return dataclasses.replace(
         found, heights=values, rows=rows[:, :kept], coarse_from=kept, gaps=found.gaps[:kept], cut=MIN_POINTS
     )
 
 
 def applies(surface: AnySurface) -> bool:
-    """Whether it is the default for a surface: Tamaas is installed, the map resolved, and pressed within seconds."""
+    """Whether it is the default for a surface: Tamaas is installed, the map is resolved, and BEM takes seconds."""
     if not isinstance(surface, MeasuredSurface) or surface.map is None or surface.bands is None:
         return False
     whole = surface.map
@@ -152,5 +152,5 @@ def applies(surface: AnySurface) -> bool:
 
 @functools.lru_cache(maxsize=8)
 def of_map(name: str, surface: AnySurface) -> BoundaryElements:
-    """The theory of that name of a surface's map, kept while it is asked again."""
+    """The theory of that name for a surface's map, cached."""
     return {kind.name: kind for kind in (BoundaryElements, Corrected)}[name].of(surface)

@@ -1,4 +1,4 @@
-"""The MBMA model as a theory: totals of its islands at separations d = 2 u - h_max (50), and where they end."""
+"""The MBMA model as a theory: totals of its islands at separations d = 2 u - h_max (50), and their range."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from mbma_tables.totals.island_sum import QUADRATURE_SHARE, Sums, kinks
 from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
-SECTIONS = 24  # of a scan's step, to 1e-6
+SECTIONS = 24  # golden sections of a scan's step, to 1e-6
 MOST_WORKERS = 1024
-MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md)
+MAX_AREA = 0.1  # above it islands begin to overlap (docs/fidelity.md)
 
 
 class Mbma(Theory):
@@ -60,7 +60,7 @@ class Mbma(Theory):
 
     @functools.cached_property
     def _scanned(self) -> Mbma:
-        """As it is, but with NaN in place of errors where islands are not covered."""
+        """The same theory, but with NaN instead of errors for islands that are not covered."""
         if self.outside != "raise":
             return self
         return Mbma(self.island_model, self.variant, self.rtol, "nan", self.workers)
@@ -91,7 +91,7 @@ class Mbma(Theory):
         return TheoryAnswer(found.pressure, found.area, stiffness, found.error)
 
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
-        """By its own differentiated sums."""
+        """Derivatives by differentiated sums."""
         by_table = self.island_model_name == "universal" and self.outside != "exact"
         if not by_table and not isinstance(surface, MeasuredSurface):
             return None
@@ -135,16 +135,16 @@ class Mbma(Theory):
         return self._maximum(surface, "stiffness", np.full(surface.shape, np.nan))
 
     def scatter_name(self, surface: AnySurface) -> str:
-        """That of the variant: those with a name were compared with boundary elements, no other was."""
+        """Scatter of the variant: only the named ones were compared with boundary elements."""
         name = self.variant.name
         if self.variant not in NAMED.values():
             return f"{self.name}, user-defined variant"
         return self.name if name == "reported" else f"{self.name}_{name}"
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Where the paper's own assumptions fail."""
+        """Reasons where the paper's assumptions fail."""
         return {
-            f"areas of islands are added, A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
+            f"areas of islands are added without overlap, but A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
             & (self.variant.addition == "sum"),
             "stiffness falls with compression here, which no simulation shows": mean_separation
             < self.softening(surface),
@@ -156,7 +156,7 @@ class Mbma(Theory):
         depth = np.arange(1, SCAN + 1) / SCAN
         h_max = np.asarray(surface.h_max, dtype=float)
         batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))
-        # where some islands are not covered, it is looked for among the rest
+        # entries whose islands are not covered are ignored
         found = self._scanned.curve(batch, kind)(h_max[..., None] * (1 - depth))[row]
         falls = np.diff(np.reshape(found, (-1, SCAN)), axis=-1) < 0
         turns = np.flatnonzero(falls.any(axis=-1))
@@ -177,7 +177,7 @@ def _at_mean_separation(by: Any) -> dict[str, FloatArray]:
 
 
 def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
-    """Where a function of arrays is highest between `low` and `high`, by golden sections."""
+    """Maximum of a function of arrays between `low` and `high`, by golden sections."""
     inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_inner, at_outer = value(inner), value(outer)
     for _ in range(SECTIONS):

@@ -1,6 +1,6 @@
 """Total force and area of a surface at a gap: the sum over its contact islands (Eqs. 44-50).
 
-Everything of an island depends on its approach delta alone; the gap enters through the Gaussian weight and
+All properties of an island depend on its approach delta alone; the gap enters through the Gaussian weight and
 the upper limit h_max - d. In units of s and 1/q0,
 
     F/(A0 E* q0 s) = integral_0^((h_max - d)/s) F_hat D_d K1 G d(delta/s),
@@ -27,17 +27,17 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, Sums, sums_by_table
 from mbma_tables.totals.profile import profile
 
-# surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
+# most surfaces evaluated by profiles, in numpy; of more surfaces, those with enough gaps each for this to cost less
 FEW_SURFACES, MANY_GAPS = 16, 300
 LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Totals:
-    """Force and area of the MBMA model at given separations, its fields those of `Contact`.
+    """Force and area of the MBMA model at given separations, with the fields of `Contact`.
 
-    `error` is of quadrature and islands together, against the island model: for "rigid" spheres that
-    do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
+    `error` bounds that of quadrature and islands, relative to the island model ("rigid" itself is far from
+    elastic islands). Derivatives on a surface given by a spectrum are with respect to the separation only.
     """
 
     pressure: Any
@@ -75,7 +75,7 @@ def totals_at(
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
         raise
-    # what is nearly nothing has few digits
+    # nearly vanishing values have few digits
     least = np.minimum(pressure, area)
     if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(pressure, area) > 0)).any():
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
@@ -125,7 +125,7 @@ def _by_profiles(
             left.append(mine[~inside])
             mine = mine[inside]
         islands += kept.islands
-        # most often all gaps are of one surface and touch, and slices are faster
+        # usually all gaps are of one surface and in contact, and slices are faster
         chosen: Any = slice(None) if mine.size == gaps.size else mine
         rows[-1, chosen] = kept.error
         rows[:-1, chosen] = kept.totals(gaps[chosen], len(rows) > 3, how.workers)

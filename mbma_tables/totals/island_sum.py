@@ -24,7 +24,7 @@ COLUMNS, BY_COMPRESSION = 5, 3
 
 
 class Sums(NamedTuple):
-    """How islands are summed; options as of `contact`."""
+    """Options of the sum over islands, as for `contact`."""
 
     model: AnyModel
     variant: Variant
@@ -43,12 +43,12 @@ class Pairs(NamedTuple):
 
     @classmethod
     def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
-        """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+        """The pairs of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
         scaled = depth / surface.h_rms, surface.h_max / surface.h_rms
         return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
 
     def some(self, chosen: Any) -> Pairs:
-        """The pairs at these places."""
+        """The pairs at these indices."""
         return Pairs(*(field[chosen] for field in self))
 
 
@@ -58,7 +58,7 @@ def island_density(height: Any, D_d: Any, sigma_d: Any) -> Any:
 
 
 def jacobian_below(rms_over_s: Any, variant: Variant) -> Any:
-    """K1 (47) below the kink, or what (46) gives."""
+    """K1 below the kink, by (47) or (46)."""
     printed = variant.jacobian == "printed"
     return 1.0 - 4.0 / 3.0 * variant.beta / (1.0 if printed else rms_over_s) if printed or variant.offset else 1.0
 
@@ -76,7 +76,7 @@ def sums_by_table(
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
     """Totals, (pairs, 2, COLUMNS or 1) with or without derivatives, the bound on their error, and the islands.
 
-    The last are the pairs that the table does not cover, which are NaN.
+    Also returns the pairs that the table does not cover, whose totals are NaN.
     """
     if not isinstance(model, UniversalModel):
         raise InputError(f"derivatives come from island model 'universal', {model.name!r} has none")

@@ -24,7 +24,6 @@ def test_files_of_laws(target, tmp_path):
     result = run(target, "--out", tmp_path / "law.mat", *LAW)
     assert result.exit_code == 0, result.output
     assert (tmp_path / "law.mat").stat().st_size > 500
-    # a reader beside its data
     assert {p.name for p in tmp_path.iterdir()} == {"law.mat"} | ({"law.m"} if target == "matlab" else set())
 
 
@@ -40,7 +39,6 @@ def test_fortran_writes_its_c_too(tmp_path):
     assert run("fortran-law", *law, tmp_path / "own.f90").exit_code == 0
     assert run("c-law", *law, tmp_path / "own.c").exit_code == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["own.c", "own.f90", "own.h", "own_c.c"]
-    # but for the command in their heads
     beside, own = ((tmp_path / name).read_text().partition("*/")[2] for name in ("own_c.c", "own.c"))
     assert beside == own
     result = run("fortran-law", *law, "-")
@@ -78,18 +76,6 @@ def test_javascript_without_its_compiler(tmp_path, monkeypatch):
     assert result.output.count("\n") == 1
     assert "pip install 'mbma_tables[javascript]'" in result.output
     assert list(tmp_path.iterdir()) == []
-
-
-def test_exponential(tmp_path):
-    law = [*LAW[:-2], "--name", "JOINT"]
-    assert run("calculix", "--out", tmp_path / "law", "--exponential", *law).exit_code == 0
-    text = (tmp_path / "law").read_text()
-    assert np.all(np.array(text.splitlines()[-1].split(", "), dtype=float) > 0)
-    assert "*SURFACE INTERACTION, NAME=JOINT\n" in text
-    # what it says is of this law, not of rows that are not there
-    assert "Persson" in text
-    assert "rows" not in text
-    assert "MBMA" not in text.replace("mbma_tables", "")
 
 
 WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] != name] for name in LAW[::2]}

@@ -32,7 +32,6 @@ def test_run_to_netcdf_and_csv(tmp_path):
         assert found.attrs["variant"] == "reported"
         assert found.attrs["error"] <= 1e-5
         assert found["nominal_pressure"].attrs["units"] == "Pa"
-    # the picture is of force and area, whatever else is asked for
     out, picture = tmp_path / "joint.csv", tmp_path / "joint.svg"
     assert run("run", JOINT, "--out", out, "--plot", picture) == ""
     assert b"svg" in picture.read_bytes()
@@ -130,7 +129,7 @@ def test_named_surfaces_loads_in_columns_and_other_kinds_of_numbers():
         pytest.param("surface\n" + "x" * 200_000, "bad.csv cannot be read: field larger than field limit", id="long"),
         ("surface,hurst\nconcrete,0.8\n", "line 2: a named surface and numbers"),
         ("surface,pressure\nconcrete,1\n", "one of --separation, --mean-separation, --pressure and --area"),
-        ("surface,E_star\nconcrete,1\nasphalt,\n", "some lines know their units"),
+        ("surface,E_star\nconcrete,1\nasphalt,\n", "some lines have units"),
     ],
 )
 def test_what_is_refused(tmp_path, lines, message):

@@ -16,19 +16,15 @@ MOST_BYTES = 5_000_000  # of an array
 
 
 def functions():
-    """The functions of the core by their names."""
     found = vars(package.core).items()
     return [(name, one) for name, one in found if type(one).__name__ == "builtin_function_or_method"]
 
 
 def copied(given):
-    """Arguments that nothing else changes."""
     return [np.copy(one) if isinstance(one, np.ndarray) else one for one in given]
 
 
 class Call(NamedTuple):
-    """A call of a function of the core."""
-
     name: str
     given: list[Any]  # arguments, arrays as they were before
     returned: int
@@ -51,7 +47,6 @@ class Call(NamedTuple):
 
 
 def recorded(using):
-    """The first calls of every function that something makes."""
     calls = {}
 
     def recording(name, function):
@@ -90,7 +85,7 @@ def use():
     for form in range(8):
         more = [surfaces[2] if form > 5 else None] * 2
         core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
-    greenwood_tripp.radius(2.0, 0.5, 1e-6)
+    core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
 
     open_table("island4d").lookup(np.linspace(1.0, 2.0, 100), 3.0, 20.0, 0.8)
     universal = open_table("universal")

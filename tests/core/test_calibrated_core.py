@@ -35,7 +35,6 @@ def batch(n, seed=0, top=12.0):
 
 
 def fill(rows, owner, u, used=core, pieces=None):
-    """Force, area and stiffness."""
     ends, out = np.empty((rows.shape[1], 2)), np.empty((3, u.size))
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     given = *TABLE.core_table, *rows, ends, pieces
@@ -45,7 +44,6 @@ def fill(rows, owner, u, used=core, pieces=None):
 
 
 def separations(rows, owner, force, used=core, pieces=None):
-    """Their inverse."""
     ends, out = np.empty((rows.shape[1], 2)), np.empty(force.size)
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     bad = used.calibrated_separation(*TABLE.core_table, *rows, ends, pieces, owner, force, out)
@@ -54,7 +52,6 @@ def separations(rows, owner, force, used=core, pieces=None):
 
 
 def flow(rows, owner, u, area, pieces=None):
-    """Flow coefficient."""
     return leakage_table._flow((*FLOW.core_table, *rows[:2], None, None, pieces), owner, u, area)
 
 
@@ -98,8 +95,6 @@ class TestSpline:
 
 
 class TestBits:
-    """An answer is the same, whatever is asked beside it."""
-
     def test_alone_in_a_batch_and_with_pieces(self):
         rows, u = batch(400)
         everyone = np.arange(400)
@@ -325,38 +320,6 @@ class TestAnyInputOfSpectra:
             np.testing.assert_array_equal(out[:, [1, 8, 9]], 0.0)
             assert np.isinf(out[0]).tolist() == (x <= 0).tolist()
 
-    def test_of_laws_that_were_not_prepared(self, used):
-        one, out = np.ones(1), np.empty((3, 1))
-        for fill in (0.0, math.nan, 1e300, -1.0, 5e-324 * 120):
-            law = np.full(used.words_of_spectrum_law(), fill)
-            for whole in (0, 1):
-                used.spectrum_law_separation(law, one, whole, *out[:2])
-            used.spectrum_law_contact(law, one, *out)
-        with pytest.raises(ValueError, match="sizes"):
-            used.spectrum_law_contact(law[:-1], one, *out)
-
-    def test_of_spectra(self, used):
-        none, facts = np.empty(0), np.empty(4)
-        # falls and rises that no quotient holds, between samples as close as numbers are
-        near = np.nextafter(2.0, 3.0)
-        for C in ([1e308, 5e-324, 1.0, 1.0], [1.0, 1e308, 5e-324, 1.0], [5e-324, 1.0, 5e-324, 1e308]):
-            for q in ([1.0, 2.0, 3.0, 4.0], [1.0, 2.0, near, 3.0], [2.0, near, 3.0, 4.0]):
-                assert used.spectrum_waves(np.array(q), np.array(C), none, none, none, facts) < 100_000
-        for count in (0, 1, 9):
-            assert used.spectrum_waves(np.ones(count), np.ones(count), none, none, none, facts) == 0
-        spectrum = Spectrum.self_affine(0.8, 64.0)
-        few = np.full((3, 10), -7.0)
-        count = used.spectrum_waves(*self_affine(0.8, 64.0), *few[:, :9].copy(), facts)
-        assert count == spectrum.x.size
-        constants = np.array([spectrum.gradient, spectrum.alpha, 0.5, 0.03, 0.34, 0.44, 0.09, 0.43, 0.06, 3.2])
-        for bad in ODD:
-            for column, place in [(3, k) for k in range(10)] + [(c, k) for c in range(3) for k in (0, 200, count - 1)]:
-                own = [spectrum.x.copy(), spectrum.variance.copy(), spectrum.below.copy(), constants.copy()]
-                own[column][place] = bad
-                law, out = np.empty(used.words_of_spectrum_law()), np.empty((3, 3))
-                status = used.spectrum_law_of(*own, np.empty(3 * count), law)
-                assert used.spectrum_law_contact(law, np.array([0.01, 1.0, 2.5]), *out) == 3 or status == 0
-
 
 def test_what_is_no_spectrum_is_refused():
     with pytest.raises(InputError, match="no spectrum"):
@@ -380,7 +343,6 @@ CASES = {
 
 
 def of_core(name, x):
-    """One of the core's elementary functions of an array."""
     values = np.asarray(x, float)
     out = np.empty_like(values)
     core.elementary(list(CASES).index(name), values, out)

@@ -25,7 +25,6 @@ ASKED = {
     "persson": (ROAD, {"theory": "persson"}),
     # its area turns down without blocking, and its slopes are flat where coefficients are rounded
     "flat": (Surface(0.23, 1.0, 1.5e4, 0.125, 0.1875, unit="mm"), {}),
-    # its force turns down
     "turning": (Surface(0.35, 1.0, 1e4, 0.125, 0.375, unit="mm"), {}),
 }
 
@@ -81,7 +80,6 @@ def points(name):
     ends = math.isinf(law.highest)
     near = h - 2 * h * 10 ** rng.uniform(-12, -0.6, POINTS // 2)
     grid = 2.0**-30
-    # where pieces may meet, and beside
     joints = h * np.array([0.5, 0.25, 0.125, 0.75, 0.375, 0.5 + 2.0**-30, 0.5 - 2.0**-30, 1 - 2.0**-9])
     rest = grid * np.floor(rng.uniform(law.lowest, h if ends else law.highest, POINTS // 2) / grid)
     c = (h - np.concatenate([near, rest, h - 2 * joints])) / 2

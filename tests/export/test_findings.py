@@ -54,7 +54,6 @@ def blocks(card, steps, side, stiff, more="", kind="NODE TO SURFACE"):
 
 
 def pressed(card, compressions, side, stiff, kind="NODE TO SURFACE"):
-    """The upper block pressed down step by step."""
     steps = "".join(
         f"*STEP\n*STATIC\n1., 1.\n*BOUNDARY\n{each(LOW, '1, 3')}{each(TOP, '1, 2')}{each(TOP, f'3, 3, {-c:.12e}')}"
         f"{each(BETWEEN, '1, 2')}*NODE PRINT, NSET=TOP, TOTALS=ONLY\nRF\n*END STEP\n"
@@ -93,7 +92,6 @@ def calculix(deck, folder, side=10.0):
 
 
 def conductance(flux, side=10.0):
-    """That of the joint, in series with the blocks."""
     return 1 / (100 / flux - 2 * side / CONDUCTIVITY)
 
 
@@ -108,7 +106,6 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     assert 0.1 < np.abs(np.log(p / PRESSURES)).max() < np.log1p(stated) + 0.06
     expected = CONDUCTIVITY / 25 * law.at_pressure(p).stiffness
     np.testing.assert_allclose(conductance(flux)[:-1], expected[:-1], rtol=1e-2)
-    # beyond the last row it is that of the last
     assert p[-1] > heat_law().x[-1]
     assert conductance(flux)[-1] == pytest.approx(heat_law().y[-1], rel=1e-2)
 
@@ -120,7 +117,6 @@ def test_calculix_uncoupled_is_an_increment_late(tmp_path):
     c = law.h_max - law.at_pressure(pressures).mean_separation
     _, p, flux = calculix(heated_and_moved(solvers.calculix(heat_law()), c, pressures, "*UNCOUPLED"), tmp_path)
     off = conductance(flux) * 25 / CONDUCTIVITY / law.at_pressure(p).stiffness - 1
-    # as the card says: loads must be held for one more increment
     assert (off[::2] < -0.3).all()
     assert np.abs(off[1::2]).max() < 1e-2
     assert "loads must be held for one more" in " ".join(solvers.calculix(heat_law()).replace("**", "").split())
@@ -306,7 +302,6 @@ def test_a_law_continued_by_its_tangents(theory, pressures):
     for end, side in ((trial.light, 1.0), (trial.heavy, -1.0)):
         beyond = end + side * np.array([1e-9, 0.1, 1e3])
         found, slope = trial.pressure_and_stiffness(beyond)
-        # the value and the slope of the law at its end, and so on
         assert (slope == law.stiffness(end)).all()
         np.testing.assert_allclose(found, law.pressure(end) - law.stiffness(end) * (beyond - end), rtol=1e-13)
         assert not trial.inside(beyond).any()
@@ -345,7 +340,6 @@ def test_newton_in_scikit_fem_from_zero_load():
 @needs("ccx")
 @pytest.mark.parametrize(("length", "stress", "theory"), [("mm", "MPa", "mbma"), ("m", "Pa", "calibrated")])
 def test_calculix_feels_the_law(tmp_path, length, stress, theory):
-    """Within 0.2% of the law itself from 1e-5 of the largest pressure asked for on."""
     surface, E_star = Surface.named("concrete").to(length), {"MPa": 13.3, "Pa": 13.3e6}[stress]
     top = 0.04 * E_star
     law = describe_law(surface, E_star, stress_unit=stress, pressures=(1e-5 * top, top), rtol=5e-4, theory=theory)
@@ -391,12 +385,10 @@ def test_ncdump_reads(tmp_path):
 @needs("ccx")
 @pytest.mark.parametrize(("length", "stress"), [("mm", "MPa"), ("m", "Pa")], ids=["mm", "SI"])
 def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
-    """Heat through two blocks and their joint, against the resistances in series."""
     asked = HEAT | {"conductivity_unit": "W/(m K)", "pressures": ("1 kPa", "2 MPa"), "rows": 20}
     law = describe_law(ROUGH, "25 MPa", length_unit=length, stress_unit=stress, quantity="conductance", **asked)
     side, unit = SIDES[length], {"MPa": 1.0, "Pa": 1e6}[stress]
     pressures, card = unit * np.geomspace(1.1e-3, 1.9, 8), solvers.calculix(law)
-    # as its header says, of loads by forces alone
     slope = re.search(r"with the line (\S+) below", card.replace("\n** ", " "))[1]
     card = re.sub(r"=EXPONENTIAL\n.*\n", f"=LINEAR\n{slope}\n", card)
     forces = (f"*CLOAD\n{each(TOP, f'3, {-p * side**2 / 4:.9e}')}" for p in pressures)

@@ -32,7 +32,6 @@ def law_of(surface=CONCRETE, **changed):
 )
 def test_rows_of_any_theory(theory):
     law = law_of(theory=theory, rows=50)
-    # up to full compression too
     near = CONCRETE.h_max - np.geomspace(max(CONCRETE.h_max - law.x[-1], 1e-9), 0.5, 500)[1:]
     x = np.append(np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500), near)
     model = contact(CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory).pressure
@@ -58,7 +57,6 @@ def test_rows_rise_from_first_contact(surface):
 
 @pytest.mark.parametrize("pressures", [(1, 500), (1, 550), None])
 def test_the_header_says_from_where_a_law_is_valid(pressures):
-    """Ends of validity are roots of the theory's area, whatever rows are asked for, and not points looked at."""
     surface = Surface.from_roughness(hurst=0.8, h_max=3.5e-3, Rq=1e-3, longest=0.1, shortest=2e-3, unit="mm")
     law = describe_law(surface, 115e3, stress_unit="MPa", theory="calibrated", rows=40, pressures=pressures)
     root = contact(surface, area=1e-3, E_star=115e3, theory="calibrated").pressure
@@ -83,7 +81,6 @@ def test_the_header_says_up_to_where_a_law_is_valid():
 def test_the_stated_error_and_better_than_even_rows(name, rows):
     surface = Surface.named(name).to("mm")
     law = law_of(surface, rows=rows)
-    # points of our own, through the totals
     x = np.random.default_rng(rows).uniform(0, law.x[-1], 2000)
     gaps = np.maximum(surface.h_max - 2 * x, -surface.h_max)
     model = contact(surface, separation=gaps, E_star=13.3, rtol=1e-9).pressure
@@ -170,44 +167,38 @@ def test_a_missing_package_is_named(target, package, monkeypatch):
         getattr(data, f"to_{target}")(law_of())
 
 
-@pytest.mark.parametrize("target", DATA)
-def test_data_come_back(target, tmp_path):
-    law = law_of()
-    path = tmp_path / "law"
-    path.write_bytes(getattr(data, f"to_{target}")(law))
+def data_of(target, path):
+    """Rows of a file by another program, and what it holds of the unit of y and of the error, if it does."""
     if target == "csv":
         assert "\noverclosure [mm],pressure [MPa]\n" in path.read_text()
-        found = np.array(parse(target, path.read_text())).T
-    elif target == "json":
+        return *np.array(parse(target, path.read_text())).T, "MPa", None
+    if target == "json":
         content = json.loads(path.read_text())
-        found = np.array(list(content["columns"].values()))
-        assert content["largest_error"] == law.largest_error
-    elif target == "matlab":
-        from scipy.io import loadmat
-
-        held = loadmat(path, appendmat=False)
-        found = np.stack([held["x"][:, 0], held["y"][:, 0]])
-        assert held["y_unit"].item() == "MPa"
-        assert held["largest_error"].item() == law.largest_error
-    elif target == "netcdf":
-        import xarray as xr
-
-        with xr.open_dataset(path, engine="netcdf4") as held:
-            found = np.stack([held.overclosure.values, held.pressure.values])
-            assert held.pressure.attrs["units"] == "MPa"
+        return *content["columns"].values(), content["y_unit"], content["largest_error"]
+    if target == "matlab":
+        held = pytest.importorskip("scipy.io").loadmat(path, appendmat=False)
+        return held["x"][:, 0], held["y"][:, 0], held["y_unit"].item(), held["largest_error"].item()
+    if target == "netcdf":
+        with pytest.importorskip("xarray").open_dataset(path, engine="netcdf4") as held:
             # CF 1.11, section 2.5.1
             assert all("_FillValue" not in variable.encoding for variable in held.variables.values())
-    elif target == "hdf5":
-        h5py = pytest.importorskip("h5py")
-        with h5py.File(path) as held:
-            found = np.stack([held["overclosure"][:], held["pressure"][:]])
-            assert held["pressure"].attrs["units"] == "MPa"
-    else:
-        parquet = pytest.importorskip("pyarrow.parquet")
-        held = parquet.read_table(io.BytesIO(path.read_bytes()))
-        found = np.stack([held["overclosure"].to_numpy(), held["pressure"].to_numpy()])
-        assert json.loads(held.schema.metadata[b"y_unit"]) == "MPa"
-    np.testing.assert_array_equal(found, np.stack([law.x, law.y]))
+            return held.overclosure.values, held.pressure.values, held.pressure.attrs["units"], None
+    if target == "hdf5":
+        with pytest.importorskip("h5py").File(path) as held:
+            return held["overclosure"][:], held["pressure"][:], held["pressure"].attrs["units"], None
+    held = pytest.importorskip("pyarrow.parquet").read_table(io.BytesIO(path.read_bytes()))
+    unit = json.loads(held.schema.metadata[b"y_unit"])
+    return held["overclosure"].to_numpy(), held["pressure"].to_numpy(), unit, None
+
+
+@pytest.mark.parametrize("target", DATA)
+def test_data_come_back(target, tmp_path):
+    law, path = law_of(), tmp_path / "law"
+    path.write_bytes(getattr(data, f"to_{target}")(law))
+    x, y, unit, error = data_of(target, path)
+    np.testing.assert_array_equal([x, y], [law.x, law.y])
+    assert unit == "MPa"
+    assert error in (None, law.largest_error)
 
 
 test_refused = refusals(
@@ -277,7 +268,6 @@ def test_rows_of_leakage_without_a_block():
 @pytest.mark.parametrize("quantity", ["pressure", "conductance"])
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_light_loads_are_within_the_error_too(theory, quantity):
-    """Until now rows were within their error above a thousandth of the largest value, 94% off two decades below."""
     heat = HEAT if quantity == "conductance" else {}
     law = law_of(rows=None, rtol=1e-2, pressures=("10 Pa", 0.1), theory=theory, **heat)
     pressure = np.geomspace(1.001e-5, 0.0999, 400)
@@ -295,7 +285,6 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
 @pytest.mark.parametrize("largest", [0.1, 0.1234567890123])
 @pytest.mark.parametrize("choice", [{"rows": 20}, {"rows": 33, "evenly": True}, {"rows": None, "rtol": 3e-3}])
 def test_rows_reach_the_largest_pressure(target, largest, choice):
-    """A solver that keeps the last pressure beyond the last row carries the largest load, at its overclosure."""
     law = law_of(theory="calibrated", pressures=(1e-4, largest), **choice)
     c, p = np.array(parse(target, data.to_csv(law).decode() if target == "csv" else getattr(solvers, target)(law))).T
     assert p[-1] >= largest

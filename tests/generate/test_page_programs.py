@@ -51,7 +51,7 @@ def test_shapes_are_told_with_extremes_and_validity():
 
 
 def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):
-    parts = {"corners": "of corners", "comparison": "of programs"}
+    parts = {"corners": "of corners"}
     monkeypatch.setattr("generate.pages.stability.measure", lambda: (parts, {"docs/a/b.svg": SVG}))
     place = tmp_path / "docs"
     assert run(main, "pages", "stability", "--out", tmp_path).split() == [

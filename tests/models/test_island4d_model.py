@@ -1,7 +1,5 @@
 """`Island4dModel` against islands by geometry and solver, at every edge and beyond its axes; its derivatives."""
 
-import math
-
 import numpy as np
 import pytest
 from small_tables import small_table
@@ -19,27 +17,6 @@ from mbma_tables.totals.island import scale_area, scale_force
 @pytest.fixture(scope="module")
 def small():
     return Island4dModel(small_table(ISLAND4D))
-
-
-def test_the_shipped_table_over_the_whole_box():
-    model = open_table("island4d")
-    rng = np.random.default_rng(31)
-    hurst = rng.uniform(0.3, 1.0, 600)
-    zeta_d = SPHERE_FLOOR * 10 ** rng.uniform(0, 4, 600)
-    zeta_u = zeta_d * (1 + 10 ** rng.uniform(-12, math.log10(2499), 600))
-    X = rng.uniform(0.501, 25.9, 600)
-    sigma = to_axes(np.ones(600), zeta_d, zeta_u, hurst, REPORTED).sigma
-    delta = (X * sigma + 1) * zeta_d**-hurst
-    place = to_axes(delta, zeta_d, zeta_u, hurst, REPORTED)
-    # where X cannot be had from delta to six digits there is nothing to compare
-    kept = (np.abs(place.X / X - 1) < 1e-6) & (place.X > 0.5) & (place.X < 26)
-    assert kept.sum() > 400
-    solved = greenwood_tripp.solve(place.X[kept], place.mu[kept], rtol=1e-11)
-    found_F, found_A, bound = model.lookup(*(a[kept] for a in (delta, zeta_d, zeta_u, hurst)))
-    error_F = np.abs(found_F / (place.force[kept] * solved.phi_F) - 1)
-    error_A = np.abs(found_A / (place.area[kept] * solved.phi_A) - 1)
-    assert np.maximum(error_F, error_A).max() < 1e-3
-    assert np.mean(np.maximum(error_F, error_A) <= bound) > 0.995
 
 
 def test_edges_to_the_last_bit(small):

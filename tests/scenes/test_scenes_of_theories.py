@@ -64,12 +64,10 @@ def test_a_budget_needs_a_measured_cost():
 @each
 def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
     u = np.linspace(0.3, 1.0, 200_000)
-    # a law states the error of its worst gap
     own = contact(CONCRETE, mean_separation=[0.5, 0.99 * CONCRETE.h_max], theory=theory).error.max()
     rtol = max(1e-5, 3 * own)
     some = slice(None, None, 3700)
     truth = contact(CONCRETE, mean_separation=u[some], E_star=MODULUS, theory=theory)
-    # between the two counts the measured costs decide
     for asked, by_law, seen in ((u, True, some), (u[some], False, slice(None))):
         scene = scene_of(theory, mean_separations=asked, rtol=rtol)
         (step,) = scene.plan().steps
@@ -143,7 +141,6 @@ def test_a_scene_yields_as_contact_does(theory):
         assert found[name].values == pytest.approx(getattr(known, name), rel=1e-6), name
     assert found.attrs["psi"] == pytest.approx(known.psi)
     assert found.stiffness.values == pytest.approx(known.stiffness, rel=1e-6)
-    # not by the loading curve's slope
     own = conductance(known.unloading_stiffness, mean_conductivity(16.0, 167.0), 100e3)
     assert found.conductance.values == pytest.approx(own, rel=1e-6)
     assert found.separation_scatter.values == pytest.approx(known.separation_scatter, rel=1e-6)
@@ -187,8 +184,8 @@ test_what_contradicts = refusals(
     lambda more: Scene(**PRESSED, **more),
     ({"effects": ["area", "yield"]}, "effect 'yield' needs hardness"),
     ({"hardness": 1500.0}, "hardness given and effect 'yield' is off"),
-    ({"effects": ["energy", "yield"], "hardness": 1500.0}, "'energy' is of elastic contacts"),
-    ({"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]}, "is of elastic contacts"),
+    ({"effects": ["energy", "yield"], "hardness": 1500.0}, "'energy' is for elastic contacts"),
+    ({"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]}, "is for elastic contacts"),
     ({"effects": ["area", "yield"], "hardness": 20.0}, "pressures must be at most the hardness"),
     ({"effects": ["area", "yield"], "hardness": -1.0}, "hardness must be a number in"),
 )

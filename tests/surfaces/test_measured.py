@@ -126,7 +126,7 @@ class TestCombined:
         one, other = (Surface.from_map(rng.normal(size=(40, 40)), 1.0, step, periodic=True) for step in (2.0, 3.0))
         both = one.combined(other)
         assert both.bearing is None
-        assert "how the two lie on each other is not known" in both.provenance[0]["told"]
+        assert "the relative position of the maps is not known" in both.provenance[0]["told"]
         # parallel lays: gradients' mean squares add along both axes
         sums = [sum(float(s.m2) * share for s, share in zip((one, other), shares, strict=True)) for shares in zip(
             *((a / (1 + a), 1 / (1 + a)) for a in (one.anisotropy**2, other.anisotropy**2)), strict=True)]  # fmt: skip
@@ -155,7 +155,6 @@ WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)
 
 
 def measured(end):
-    """The longer waves of `WHOLE`."""
     q = np.geomspace(1.0, end, 120)
     return Surface.from_spectrum(q, WHOLE.power_spectrum(q * (1 - 1e-12)), h_max=1.0, unit="um")
 
@@ -187,18 +186,6 @@ def test_the_true_power_law_gives_the_whole_surface_back():
     record = longer.provenance[-1]
     assert record["area"] == pytest.approx(float(measured(50.0).rms_gradient / WHOLE.rms_gradient), rel=2e-3)
     assert "which was not measured" in record["told"]
-
-
-def test_as_options_of_a_map():
-    heights = random_map(64, 0, 1)
-    options = {"dx": 1.0, "periodic": True, "unit": "um", "model": "measured"}
-    plain = Surface.from_map(heights, **options)
-    longer = Surface.from_map(heights, **options, extrapolate_to="100 nm", extrapolate_hurst=0.8)
-    assert longer.q1 == pytest.approx(2 * np.pi / 0.1)
-    assert longer.rms_gradient > 1.2 * plain.rms_gradient
-    assert [entry["step"] for entry in longer.provenance[-2:]] == ["resolution", "extrapolated"]
-    with pytest.raises(InputError, match="both or neither"):
-        Surface.from_map(heights, **options, extrapolate_to=0.1)
 
 
 def test_every_answer_of_a_map_says_so():

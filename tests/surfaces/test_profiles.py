@@ -1,10 +1,8 @@
 """Line scans: traces of surfaces that are known."""
 
-import warnings
-
 import numpy as np
 import pytest
-from helpers import refusals
+from helpers import refusals, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
@@ -94,9 +92,7 @@ def test_what_one_trace_cannot_tell():
 
 
 def test_files_and_scans(tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        library = pytest.importorskip("SurfaceTopography")
+    library = topographies()
     line = rough_line()
     plain = Surface.from_profile(line, 0.5)
     np.savetxt(tmp_path / "a.csv", np.c_[0.5 * np.arange(POINTS), line], delimiter=",")
@@ -117,7 +113,7 @@ def test_files_and_scans(tmp_path):
 test_refused = refusals(
     lambda line: Surface.from_profile(line, 1.0),
     (np.eye(40), InputError, "one-dimensional"),
-    (np.arange(20.0), InputError, "20 points hold too few scales"),
+    (np.arange(20.0), InputError, "20 points have too few wavelengths"),
     (np.arange(200.0), InputError, "flat"),
 )
 

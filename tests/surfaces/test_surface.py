@@ -199,7 +199,6 @@ def relative(found, exact):
 
 @pytest.mark.parametrize("order", [0, 2, 4])
 def test_band_moments(order):
-    """Between any ends to 2e-14, of whole surfaces to 1e-14."""
     rng = np.random.default_rng(order)
     start = 10 ** rng.uniform(0, 7, 300)
     zeta_1 = np.tile([math.nextafter(3, 4), 3.01, 10.0, 216.0, 1e4, 1e6, 1e8], len(HURSTS))

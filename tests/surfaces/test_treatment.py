@@ -1,20 +1,17 @@
 """What is done to a measurement before its spectrum is taken, and what is said of it."""
 
 import math
-import warnings
 
 import numpy as np
 import pytest
-from helpers import refusals
+from helpers import refusals, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.measurements import read_measurement
 from mbma_tables.surfaces.treatment import Treatment, treat
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    library = pytest.importorskip("SurfaceTopography")
+library = topographies()
 
 # of numpy, to that library, when a test calls it
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")

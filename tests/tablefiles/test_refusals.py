@@ -149,8 +149,6 @@ def test_a_file_larger_than_any_table(tmp_path):
 
 
 def rehashed(path, source, edit):
-    """At `path` the table file `source` after `edit(dataset)`, with right hashes and checksum."""
-
     def both(dataset):
         edit(dataset)
         dataset.setncattr("attributes_sha256", attributes_digest(dataset))
@@ -209,7 +207,6 @@ def changed(content, name, values):
 
 
 def with_edges(content, **changes):
-    """With the edges of cells changed."""
     labels = dict(content.auxiliary)
     for name, change in changes.items():
         over, values, text = labels[name]

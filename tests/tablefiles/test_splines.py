@@ -18,7 +18,6 @@ SHAPE = (8, 7, 6, 5)
 
 
 def node_values(shape, seed=1):
-    """Smooth values and noise, two components."""
     rng = np.random.default_rng(seed)
     grid = np.meshgrid(*(np.linspace(0, 2, n) for n in shape), indexing="ij")
     smooth = np.stack([np.sin(sum(grid)), np.exp(-grid[0] * grid[1])], axis=-1)
@@ -26,7 +25,6 @@ def node_values(shape, seed=1):
 
 
 def by_scipy(values, degree, axes):
-    """The not-a-knot tensor spline of scipy."""
     knots = []
     for axis in range(axes):
         one = make_interp_spline(np.arange(values.shape[axis]), values, k=degree, axis=axis)

@@ -96,7 +96,6 @@ class TestDefaultTheory:
         assert found.area[0] == 0
         assert found.valid.tolist() == [True, False, True, True, False]
         assert contact(surface, separation=2 * float(surface.h_max)).pressure == 0
-        # changed surfaces have no map that is known
         assert contact(surface.combined(surface), pressure=0.01).theory == "calibrated"
         assert theory_name(surface, None, variant="printed") == "mbma"
 

@@ -24,7 +24,6 @@ REFERENCE = pathlib.Path(__file__).parents[2] / "docs" / "data" / "leakage.csv"
 
 
 def k_of(found):
-    """K over h_rms^3."""
     return found.K / np.asarray(found._contact._source.surface.h_rms) ** 3
 
 

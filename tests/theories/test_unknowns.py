@@ -18,7 +18,6 @@ SLOW = [pytest.param(name, marks=pytest.mark.slow if name == "persson" else ()) 
 @pytest.mark.parametrize("theory", SLOW)
 @pytest.mark.parametrize("by", HELD)
 def test_answers_scale_as_they_must(theory, by):
-    """Another unit of length or stress changes no ratio, whatever the theory."""
     found = sensitivity(SURFACE, **{by: HELD[by]}, E_star="10 GPa", theory=theory)
     powers = {"mean_separation": (1, 0), "pressure": (0, 1), "area": (0, 0), "stiffness": (-1, 1)}
     powers |= {"conductance": (-1, 0)}
@@ -57,7 +56,6 @@ def test_numbers_of_a_drawing_are_the_unknowns():
     slopes = {name: row["area"] for name, row in found.slopes.items()}
     assert slopes["Rdq"] == pytest.approx(-slopes["pressure"], abs=1e-6)
     assert max(abs(slopes[name]) for name in ("hurst", "Ra", "h_max", "longest")) < 1e-6
-    # in another unit it is a surface by its five numbers
     assert "q1" in sensitivity(surface.to("mm"), pressure=0.02, E_star=10.0).parameters
     moved = sensitivity(dataclasses.replace(surface, h_max=2.5), mean_separation=1.0, theory="calibrated")
     assert moved.parameters["h_max"] == 2.5

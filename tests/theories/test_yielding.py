@@ -186,7 +186,6 @@ def test_a_map_yields_by_its_own_heights():
     found = contact(surface, mean_separation=u, theory="calibrated", hardness=soft)
     assert found.area == pytest.approx(0.2, rel=0.03)
     assert found.scatter < shipped().standard_deviation("calibrated", "pressure", found.area)
-    # single points at the top of a map make no steps in a law
     law = contact_law(surface, theory="calibrated", hardness=0.3 * float(surface.rms_gradient), rtol=1e-3)
     assert law.turning_point is None
 
@@ -234,7 +233,6 @@ def test_reasons_and_what_elastic_answers_say():
     for pressure, told in ((2.0, False), (4.0, True)):
         found = contact(SURFACE, pressure=pressure, E_star="100 GPa", theory="calibrated")
         assert ("above E* g/2 = 2.7" in repr(found)) is told
-    # some infinite
     found = contact(SURFACE, area=[0.1, 0.3, 0.5], hardness=[HARDNESS, np.inf, 50.0], **known)
     assert found.area == pytest.approx([0.1, 0.3, 0.5], rel=1e-10)
     # asperities that lie on one another have areas above one
@@ -261,20 +259,6 @@ def test_hardnesses_of_any_size(theory, cap):
             for name in ("mean_separation", "pressure", "area", "stiffness", "unloading_stiffness"):
                 assert getattr(found, name) == pytest.approx(getattr(elastic, name), rel=1e-10), name
             assert found.yielded == 0
-
-
-@each
-@pytest.mark.parametrize("cap", [HARDNESS, np.inf])
-def test_batches_are_their_contacts_one_by_one(theory, cap):
-    batch = Surface([0.6, 0.8, 0.9], 0.01, [1.0, 2.0, 0.4], 1.0, [3.0, 3.4, 2.8])
-    options = {"E_star": MODULUS, "theory": theory, "hardness": cap}
-    for asked in ({"pressure": [1e-2, 30.0, 300.0]}, {"area": [1e-4, 0.03, 0.2]}):
-        whole = contact(batch, **asked, **options)
-        for k in range(3):
-            one = Surface(*(float(np.broadcast_to(getattr(batch, name), 3)[k]) for name in batch.parameters))
-            alone = contact(one, **{name: values[k] for name, values in asked.items()}, **options)
-            for name in ("mean_separation", "pressure", "area", "stiffness", "unloading_stiffness"):
-                assert getattr(whole, name)[k] == pytest.approx(getattr(alone, name), rel=1e-9), name
 
 
 @pytest.mark.parametrize(("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)])

@@ -122,25 +122,11 @@ def test_failure_has_the_shape_of_the_arguments(monkeypatch):
         *(("island_model", name) for name in ("magic", None)),
         ("variant", "guessed"),
         *(("E_star", modulus) for modulus in (0.0, -2.0)),
-        *(("quantities", names) for names in ((), ["pressure", "stiffness"], "energy")),
     ],
 )
 def test_bad_options(option, value):
     with pytest.raises(InputError, match=option):
         contact(one_surface(0.8, 216.0), separation=1.0, **{option: value})
-
-
-@pytest.mark.parametrize("island_model", ["universal", "exact", "rigid", "island4d"])
-@pytest.mark.parametrize("wanted", ["pressure", "area"])
-def test_one_quantity_alone(island_model, wanted):
-    surface = Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)
-    gaps = [1.0, -2.0]
-    both = contact_by_island_model(surface, separation=gaps, island_model=island_model)
-    alone = contact_by_island_model(surface, separation=gaps, island_model=island_model, quantities=[wanted])
-    other = "area" if wanted == "pressure" else "pressure"
-    assert getattr(alone, other) is None
-    np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=max(1e-8, 2 * both.error.max()))
-    assert alone.islands <= both.islands
 
 
 ROUGH = Surface(0.8, 1.0, 216.0, 1.0, 3.0)

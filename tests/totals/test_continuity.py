@@ -15,8 +15,6 @@ from mbma_tables import Surface, contact, contact_law, greenwood_tripp, height_i
 from mbma_tables.core import core
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.law.block import CENTRE, RATE
-from mbma_tables.models.closed_form_certificates import RANGES
-from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.surfaces.variants import VARIANTS, get_variant
@@ -178,7 +176,6 @@ def test_the_solver_does_not_jump(which):
 
 
 def test_the_solver_joins_the_rigid_sphere():
-    """Where the deformation is left out altogether."""
     X = np.random.default_rng(11).uniform(-20, 38, 200 * SCALE)
     squared = np.empty(X.size)
     assert core.island_extents(X, np.zeros(X.size), 0.03 * SOLVER_RTOL, squared) == 0
@@ -189,21 +186,6 @@ def test_the_solver_joins_the_rigid_sphere():
     assert (other.iterations > 0).all()
     assert (apart(one.phi_F, other.phi_F, 2 * STEP) <= one.error + other.error).all()
     assert (apart(one.phi_A, other.phi_A, 0) <= one.error + other.error).all()
-
-
-@pytest.mark.parametrize("which", ["X", "mu"])
-@pytest.mark.parametrize("form", ["standard", "pocket", "long"])
-def test_the_closed_forms_do_not_jump(form, which):
-    """And where the solver takes over from them."""
-    model, rng = FormulaModel(form), np.random.default_rng(12)
-    count = 120 * SCALE
-    (X_low, X_high), (_, mu_high) = (RANGES[form][name] for name in ("X", "mu"))
-    X, mu = rng.uniform(X_low, X_high, count), 10 ** rng.uniform(-9, math.log10(mu_high), count)
-    if which == "X":
-        X[::6], X[1::6] = max(X_low, 1e-3), X_high
-    else:
-        mu[::3] = mu_high
-    islands_apart(lambda X, mu: model.answer(X, mu, outside="exact"), X, mu, which, room=1)
 
 
 @pytest.mark.parametrize("side", ["X low", "X high", "mu high"])
@@ -225,7 +207,6 @@ def test_the_solver_takes_over_from_the_universal_table(side):
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9])
 def test_laws_do_not_jump_at_their_breaks(rtol):
-    """Values of two pieces differ by their errors, slopes by theirs, but for the model's jump."""
     rng = np.random.default_rng(16)
     for _ in range(4 * SCALE):
         variant = sorted(VARIANTS)[rng.integers(2)]
@@ -273,7 +254,6 @@ def one_sided(function, at, step):
 
 
 def fields_of(name, hurst, zeta_1, rule):
-    """One of `FIELDS` as a function of the approach."""
     return lambda approach: geometry(
         approach, *(np.broadcast_to(a[:, None], approach.shape).copy() for a in (hurst, zeta_1)), rule
     )[name]
@@ -281,7 +261,6 @@ def fields_of(name, hurst, zeta_1, rule):
 
 @pytest.mark.parametrize("rule", EVERY, ids=lambda rule: rule.name)
 def test_numbers_of_islands(rule):
-    """At both kinks and at random approaches, which are moved away from kinks."""
     rng = np.random.default_rng(1)
     hurst, zeta_1, _ = smooth_surfaces(rng, 80 * SCALE)
     at_kinks, elsewhere = kinks(hurst, zeta_1, rule), 10 ** rng.uniform(-9, 1.3, hurst.size)
@@ -298,7 +277,6 @@ def test_numbers_of_islands(rule):
 
 
 def changed(numbers, which, value):
-    """Numbers as columns, with one of them replaced by rows of values."""
     own = {name: np.broadcast_to(given[:, None], value.shape) for name, given in numbers.items()}
     return own | {which: value}
 

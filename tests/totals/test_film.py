@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from generate.pages.film import PATIR_CHENG, published
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, flow_factors
 from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.laws.film import factors
@@ -10,9 +11,6 @@ from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.theories import BoundaryElements
 
 BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
-# phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978, Table 1
-PATIR_CHENG = {1 / 9: (1.48, 0.42), 1 / 6: (1.38, 0.42), 1 / 3: (1.18, 0.42), 1: (0.90, 0.56), 3: (0.225, 1.5),
-               6: (0.520, 1.5), 9: (0.870, 1.5)}  # fmt: skip
 
 
 def test_wide_gaps_have_the_known_expansion():
@@ -28,7 +26,6 @@ def test_wide_gaps_have_the_known_expansion():
 
 
 def test_ridges_are_the_averages_of_one_dimension():
-    """Across ridges the mean of 1/h^3 and of 1/h^2 count, along them the mean of h^3 and h."""
     h = 1 + 0.5 * np.sin(np.linspace(0, 2 * np.pi, 64, endpoint=False))
     K, couette = flow_and_couette(np.repeat(h[:, None], 3, 1))
     np.testing.assert_allclose(K, [1 / np.mean(h**-3.0), np.mean(h**3)])
@@ -38,12 +35,10 @@ def test_ridges_are_the_averages_of_one_dimension():
 @pytest.mark.parametrize("gamma", PATIR_CHENG)
 def test_published_curves(gamma):
     """Fits to simulations of 20 x 20 points; within 8% of theirs from h = 3 h_rms on."""
-    C, r = PATIR_CHENG[gamma]
     H = np.array([3.0, 4.0, 6.0])
-    known = 1 + C * H**-r if gamma > 1 else 1 - C * np.exp(-r * H)
     peklenik = min(max(gamma, 1 / 8.5), 8.5)
     found = flow_factors(Surface(0.8, 0.05, 1.5, 1.0, 2.9), H, peklenik=peklenik).phi_x
-    np.testing.assert_allclose(found, known, rtol=0.08)
+    np.testing.assert_allclose(found, published(gamma, H), rtol=0.08)
 
 
 def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
@@ -74,6 +69,14 @@ def test_isotropic_factors_are_those_of_the_leakage():
     np.testing.assert_array_equal(found.pressure, known.pressure)
     assert found.pressure[-1] == 0
     assert found.valid.all()
+
+
+def test_factors_are_continuous_at_first_contact():
+    h_max = float(BEARING.h_max)
+    found = flow_factors(BEARING, h_max * np.array([1 - 1e-9, 1 + 1e-9]), peklenik=3)
+    assert found.area[0] > found.area[1] == 0
+    for name in ("phi_x", "phi_y", "shear_x", "shear_y"):
+        np.testing.assert_allclose(*getattr(found, name), rtol=1e-5, err_msg=name)
 
 
 def test_a_lay_turned_by_a_right_angle():

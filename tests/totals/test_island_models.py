@@ -13,7 +13,6 @@ from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 from helpers import refusals
 
 from mbma_tables import InputError, OutOfRangeError, Scene, Surface, contact, contact_law, greenwood_tripp, island
-from mbma_tables.models.tables import open_table, shipped
 from mbma_tables.surfaces.variants import REPORTED, VARIANTS
 
 SHALLOW = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
@@ -63,7 +62,6 @@ def test_a_variant_of_ones_own(variant):
     error = apart(found, true)
     assert (error <= found.error + true.error).all()
     assert found.error.max() <= 1e-7
-    # the variant matters: its name alone did not decide
     assert (np.abs(contact(surfaces, separation=gaps).area / found.area - 1) > 1e-3).any()
 
 
@@ -84,16 +82,6 @@ def test_a_floor_above_the_largest_magnification_or_at_it(island_model):
 def test_the_four_parameter_table_is_of_one_variant(variant):
     with pytest.raises(InputError, match=r"island4d table was made for the variant 'reported', not for .*'universal'"):
         contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, island_model="island4d", variant=variant)
-
-
-def test_the_four_parameter_table_serves_variants_that_share_its_islands():
-    # floors, beta and K1 move along the table's axes and do not change it
-    near = dataclasses.replace(REPORTED, name="near", jacobian="exact", floor_d=1.6, beta=0.3)
-    surface, gaps = Surface(0.7, 0.2, 40.0, 1.0, 3.0), np.array([2.5, 1.0, -2.0])
-    found = contact(surface, separation=gaps, island_model="island4d", variant=near, rtol=1e-6)
-    true = contact(surface, separation=gaps, island_model="exact", variant=near)
-    assert (apart(found, true) <= found.error + true.error).all()
-    assert found.error.max() <= 1e-3
 
 
 ROUGH = Surface([[0.05], [0.8]], 0.2, 0.2 * 1e8, 1.0, 3.0)  # the first row leaves the table where it is pressed
@@ -211,8 +199,6 @@ OWN_GAPS = np.array([2.09, 1.0, -1.5, 2.5])
 
 
 class Own:
-    """The least that the library asks for."""
-
     name = "own"
 
     def __init__(self, change=lambda *answer: answer):
@@ -239,18 +225,6 @@ def test_totals_laws_islands_and_scenes():
     assert float(scene["pressure"][0]) == pytest.approx(expected, rel=1e-4, abs=0)
 
 
-def test_a_table_from_a_file_is_the_shipped_one():
-    models = open_table(shipped("universal")), "universal"
-    for derivatives in (False, True):
-        found, known = (
-            contact(FLAT, separation=OWN_GAPS, island_model=model, derivatives=derivatives) for model in models
-        )
-        np.testing.assert_array_equal(found.pressure, known.pressure)
-    np.testing.assert_array_equal(found.pressure_by["hurst"], known.pressure_by["hurst"])
-    found, known = (contact_law(FLAT, island_model=model).pressure(separation=1.0) for model in models)
-    assert found == known
-
-
 @pytest.mark.parametrize("bad", [None, 3, Own, object(), "unknown", type("Nameless", (), {"answer": 1})()])
 def test_what_is_no_island_model(bad):
     for ask, given in ((contact, {"separation": 1.0}), (contact_law, {}), (island, {"delta": 1.0})):
@@ -271,7 +245,6 @@ def test_answers_are_checked():
     assert np.isnan(found).tolist() == [False, True]
     with pytest.raises(InputError, match="derivatives come from island model 'universal', 'own' has none"):
         contact(FLAT, separation=1.0, island_model=Own(), derivatives=True)
-    # one number for all islands is enough
     one = contact(FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3)))
     assert 1e-3 <= one.error < 1.1e-3
 

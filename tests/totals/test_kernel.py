@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from catalogue import LEVEL, OWN
+from catalogue import LEVEL
 
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
@@ -13,7 +13,7 @@ from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
 from mbma_tables.totals import island_sum
-from mbma_tables.totals.island_sum import Pairs, Sums, kinks, sums_by_table
+from mbma_tables.totals.island_sum import Pairs, Sums, sums_by_table
 
 
 @pytest.mark.parametrize("variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name)
@@ -37,7 +37,6 @@ def test_islands_are_those_of_geometry(variant):
 
 
 def totals(hurst, zeta_1, compression, peak, rtol=1e-9, slopes=0):
-    """Totals, error and status straight from the core."""
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak)))
     numbers, count = [np.ascontiguousarray(array) for array in arrays], arrays[0].size
     out, error, status = np.empty((count, 2, 5 if slopes else 1)), np.empty(count), np.empty(count, np.uint8)
@@ -65,7 +64,6 @@ def test_no_number_crashes_and_none_that_is_wrong_is_answered(slopes):
 
 
 def test_what_cannot_be_resolved_is_said(monkeypatch):
-    """A tolerance below rounding ends in a status, never in a number that looks right."""
     assert totals(0.8, 216.0, 4.0, 3.0)[2][0] == OK
     out, error, status = totals(0.8, 216.0, 4.0, 3.0, rtol=1e-30)
     assert status[0] == UNRESOLVED
@@ -97,18 +95,6 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
         phi.append(np.empty((500, 7)))
         one.phi(X, mu, *universal_model().cells, 1, phi[-1], None)
         assert phi[-1].tobytes() == phi[0].tobytes()
-
-
-@pytest.mark.parametrize("variant", [REPORTED, OWN], ids=lambda variant: variant.name)
-def test_kinks_are_where_geometry_reaches_its_floors(variant):
-    rng = np.random.default_rng(6)
-    hurst, zeta_1 = rng.uniform(0.1, 1, 200), 3.51 * 10 ** rng.uniform(0, 7, 200)
-    for kink, name, floor in zip(
-        kinks(hurst, zeta_1, variant), ("zeta_d", "zeta_u"), (variant.floor_d, variant.floor_u), strict=True
-    ):
-        before, beyond = (geometry(kink * (1 + sign * 1e-9), hurst, zeta_1, variant)[name] for sign in (-1, 1))
-        assert (before > floor).all()
-        assert (beyond == floor).all()
 
 
 @pytest.mark.slow

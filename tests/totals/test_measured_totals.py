@@ -168,7 +168,7 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
         island(surface, 1.0, island_model="island4d")
     q = np.geomspace(1, 10, 30)
     blue = Surface.from_spectrum(q, q, h_max=3000.0)
-    with pytest.raises(OutOfRangeError, match="measure shorter wavelengths, or ask another theory"):
+    with pytest.raises(OutOfRangeError, match="measure shorter wavelengths, or use another theory"):
         contact(blue, separation=1.0, theory="mbma")
     assert contact(blue, mean_separation=500.0, theory="calibrated").pressure > 0
     steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
@@ -178,7 +178,6 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_area_at_a_force_of_boundary_elements(number):
-    """Two surfaces with a plateau; no constant of MBMA saw them."""
     hurst, waves, last, top = ((0.8, 8, 128, 0.041954782), (0.6, 4, 64, 0.037331897))[number]
     q = 2 * np.pi * np.geomspace(1, last, 300)
     C = np.minimum(1, (q / (2 * np.pi * waves)) ** (-2 - 2 * hurst))

@@ -8,12 +8,14 @@ import subprocess
 import numpy as np
 import pytest
 
+from generate.pages.film import spheres
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, rough_contact
 from mbma_tables.export.law_code import law_files, law_text
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import targets
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.islands.spectral import plane_basis
+from mbma_tables.law.half_space import plane_basis
+from mbma_tables.law.rough_body import CELLS
 from mbma_tables.theories import Theory, TheoryAnswer
 
 FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
@@ -21,7 +23,7 @@ FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
 @pytest.mark.parametrize("shape", ["sphere", "cylinder"])
 def test_smooth_bodies_are_hertz(shape):
-    """The distance falls with the height of the roughness, to below 1e-4."""
+    """The distance falls with the height of the roughness, to below 3e-4."""
     R, E, before = 1000.0, 110.0, np.inf
     for h_rms in (0.05, 0.005, 0.0005):
         face = Surface(0.8, 0.05, 1.5, h_rms, 3.5 * h_rms)
@@ -33,9 +35,9 @@ def test_smooth_bodies_are_hertz(shape):
             force = math.pi * E / (2 * math.log(4 * R / a) - 1)
         p0 = 2 * E * a / math.pi / R if shape == "sphere" else E * a / (2 * R)
         off = max(abs(np.log([found.force / force, found.contact_radius / a, found.pressure[0] / p0])))
-        assert off < max(before / 3, 1e-4)
+        assert off < max(before / 3, 3e-4)
         before = off
-    assert off < 2e-4
+    assert off < 3e-4
 
 
 def test_the_plane_operator_is_that_of_the_logarithm():
@@ -101,7 +103,7 @@ def test_force_laws_and_their_code(tmp_path):
     assert law.energy(1.0) == pytest.approx(np.trapezoid(law.force(x), x), rel=1e-5)
     assert law.force(-3.0) == 0
     text = law_text("c-law", law, name="ball")
-    assert "force [N], A/A0 the real area [um^2]" in text
+    assert "here pressure is the force [N], and A/A0 the real area [um^2]" in text
     assert "not valid below p = " in text
     if shutil.which("gcc"):
         (tmp_path / "ball.c").write_text(text)
@@ -144,7 +146,9 @@ def test_units_validity_and_what_is_refused(tmp_path):
     assert data["pressure"].dims == ("load", "place")
     found.plot(tmp_path / "ball.svg")
     assert found.valid.all()
-    assert 0 < found.scatter[1] < found.scatter[0] < 0.3
+    assert 0 < 5 * found.scatter[1] < found.scatter[0] < 0.7
+    unknown = Asperities(1.0, 30.0).pressed(300.0, 3.0)
+    assert np.isnan(unknown.scatter)
     wide = rough_contact(FACE, 100.0, approach=2.0, E_star="110 GPa", theory="calibrated")
     assert not wide.valid
     assert "tenth of the radius" in "".join(wide.reasons)
@@ -166,3 +170,21 @@ def test_units_validity_and_what_is_refused(tmp_path):
         rough_contact(FACE, "5 mm", force="3 N")
     with pytest.raises(InputError, match="radius"):
         rough_contact(FACE, 0.1, force=1.0)
+
+
+@pytest.mark.slow
+def test_boundary_elements_of_rough_spheres():
+    """The stated scatter covers 24 simulated spheres; wide contacts are near."""
+    pytest.importorskip("pandas")
+    seen = spheres()
+    assert seen["off"].size == 96
+    valid = seen["valid"] > 0
+    assert valid.sum() > 50
+    for sd, least in ((1, 0.6), (2, 0.9)):
+        assert np.mean(np.abs(seen["force"] / seen["scatter"])[valid] < sd) > least
+        assert np.mean(np.abs(seen["off"] / (CELLS[0] / seen["width"] ** CELLS[1])) < sd) > least
+    wide = seen["width"] > 4.5
+    assert np.abs(seen["off"][wide].mean()) < 0.1
+    assert seen["off"][wide].std() < 0.2
+    assert np.abs(seen["area"][wide].mean()) < 0.1
+    assert np.abs(seen["mean_radius"][wide].mean()) < 0.1

@@ -150,7 +150,6 @@ def by_zeta_1(hurst, zeta_1, h_max, depth):
     ],
 )
 def test_next_to_the_floor_of_zeta_u(hurst, left, h_max, depth):
-    """Down to zeta_1 = 3.0000001, where area goes with the sixth root of what is left."""
     surface = Surface(hurst, 1.0, 3.0 + left, 1.0, h_max)
     found = contact(surface, separation=h_max - depth, derivatives=True)
     true = by_zeta_1(hurst, surface.zeta_1, h_max, float(h_max - found.separation))
@@ -167,7 +166,6 @@ def test_units_shapes_and_no_contact():
     one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), separation=1.0, derivatives=True)
     for name in NAMES:
         assert found.pressure_by[name].shape == found.area_by[name].shape == (2, 3)
-        # no contact is flat
         assert (found.pressure_by[name][:, 1:] == 0).all()
         assert (found.area_by[name][:, 1:] == 0).all()
         np.testing.assert_allclose(stiff.pressure_by[name], np.array([2, 3, 4]) * found.pressure_by[name], rtol=1e-15)
