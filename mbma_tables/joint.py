@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Part = AnySurface | Mapping[str, Any]
 CONDUCTANCE = "W/(m^2 K)"
-RANGE, POINTS = (1e-5, 0.3), 41  # of pressures over the hardness, in pictures
+RANGE, POINTS = (1e-5, 0.3), 41  # pressures over the hardness, and their number, in pictures
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, one_number, positive_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import Units, resolve
+from mbma_tables.common.units import Units, factor, resolve
 
 ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
 ONE_TEMPER = 1.3  # largest ratio of tempers' hardnesses for which their geometric mean is used, within 14% of both
@@ -266,6 +266,36 @@ def hardness(given: str | None = None, *, yield_stress: str | None = None) -> st
             )
         return known
     return text
+
+
+def microhardness(surface: Any, c1: float | str, c2: float) -> str:
+    """Hardness of a face at the size of its own contacts, with its unit: what ``hardness=`` takes.
+
+    H = c1 (1.62 sigma/m)^c2, sigma/m in micrometres, m the mean absolute slope of a profile: Yovanovich's, as in
+    M. Bahrami et al., Thermal contact resistance of nonconforming rough surfaces 2, J. Thermophys. Heat Tr. 18 (2004).
+
+    Parameters
+    ----------
+    surface : Surface
+        With its unit of length.
+    c1 : float or str
+        Vickers hardness of an indent of 1 um, with its unit or in GPa.
+    c2 : float
+        Size index, in (-1, 0]: d ln hardness by d ln of the indent's size.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, materials
+    >>> face = Surface.from_roughness(Rq="1 um", longest="250 um", shortest="4 um", hurst=0.8, nominal_area="4 cm^2")
+    >>> materials.microhardness(face, "5 GPa", -0.2)
+    '2.57205 GPa'
+    """
+    if surface.unit is None:
+        raise InputError("microhardness depends on lengths: give the surface its unit")
+    one, index = positive_array("c1", Units(stress="GPa").number("pressure", c1)), finite_array("c2", c2)
+    require("c2", index, (index > -1) & (index <= 0), "in (-1, 0]")
+    indent = 1.62 * surface.h_rms / np.sqrt(2 * surface.m2 / math.pi) * factor(surface.unit, "um")
+    return f"{one_number('hardness', one * indent**index):.6g} GPa"
 
 
 def hardness_in(units: Units, value: Any) -> Any:

@@ -130,9 +130,9 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
             force, area, stiffness = E_star * sums.pressure, sums.area, -2 * E_star * sums.pressure_by["separation"]
         for name, values in {"pressure": force, "area": area, "stiffness": stiffness}.items():
             worst = max(worst, np.abs(known[name][answered] / values - 1).max())
-        assert np.allclose(
-            found[f"{theory} conductance"] * state["E_star"], found[f"{theory} stiffness"], equal_nan=True
-        )
+        conductance = 50 / 1e-3 / state["E_star"] * found[f"{theory} stiffness"]  # of 50 W/(m K), lengths in mm
+        np.testing.assert_allclose(found[f"{theory} conductance"], conductance, rtol=1e-12)
+        np.testing.assert_allclose(found[f"{theory} tangential"], found[f"{theory} stiffness"] * 1.4 / 1.7, rtol=1e-12)
     if state["against"] == "pressure":
         pressures = np.nanmax([found[f"{theory} pressure"] for theory in ("mbma", "calibrated", "persson")], axis=0)
         assert np.allclose(np.diff(np.log(pressures)), np.log(1e5) / 99, rtol=1e-6)
@@ -225,7 +225,11 @@ def test_a_slider_moves_curves_and_address_and_a_link_brings_them_back(visit):
 def test_bad_numbers_are_told_beside_their_field(visit):
     tab = visit()
     for field, text, said in (
-        ("q1", "1", "more than 3 q₀"),
+        ("hurst", "1.2", "H must be in (0, 1], got 1.2"),
+        ("q1", "1e6", "longest must be more than 3 times shortest"),
+        ("q1", "1e-12", "at most 1e8 times shortest"),
+        ("hardness", "-2", "hardness must be positive, got -2"),
+        ("nu", "0.7", "nu must be in (-1, 0.5], got 0.7"),
         ("h_rms", "-1", "h_rms must be positive, got -1"),
         ("E_star", "thirteen", "E_star must be a number"),
         ("spectrum", "1 2 3", "line 1"),
@@ -246,9 +250,30 @@ def test_bad_numbers_are_told_beside_their_field(visit):
     for state, field, said in (
         ("theory=hertz", "theory", "theory must be one of"),
         ("color=red", "theory", "nothing here"),
-        ("variant=fitted&q1=2.5&theory=mbma", "q1", "more than 5.14 q₀"),
+        ("variant=fitted&q1=2.5&theory=mbma", "q1", "more than 5.14 times shortest"),
     ):
         assert said in visit(state).inner_text(f"#error-{field}")
+
+
+@pytest.mark.parametrize("against", ["gap", "pressure"])
+@pytest.mark.parametrize("hardness", [0.05, 0.5, 5.0])
+def test_a_hardness_is_that_of_the_library(visit, against, hardness):
+    """In E* = 13.3 MPa on the road, whose rms gradient is near 1/2: plasticity indices from 100 to 1."""
+    tab, road = visit(), Surface.named("concrete")
+    tab.evaluate(GO, urllib.parse.urlencode({"theory": "calibrated", "against": against, "hardness": hardness}))
+    found = columns(tab)
+    gap = found["calibrated gap"]
+    seen = np.isfinite(gap) & np.isfinite(found["calibrated area"])
+    assert seen.sum() > 20
+    known = contact(road, mean_separation=gap[seen], E_star=13.3, theory="calibrated", hardness=hardness)
+    expected = {"pressure": known.pressure, "area": known.area, "stiffness": known.stiffness}
+    expected |= {"conductance": 50 / 1e-3 / 13.3 * known.unloading_stiffness}
+    expected |= {"tangential": known.tangential(nu=0.3).stiffness}
+    for name, values in expected.items():
+        np.testing.assert_allclose(found[f"calibrated {name}"][seen], values, rtol=1e-5, err_msg=name)
+    assert "Python library" in tab.inner_text("#concerns")
+    tab.fill("#hardness", "")
+    assert "Python library" not in tab.inner_text("#concerns")
 
 
 SAMPLES = np.geomspace(0.2, 50, 60)
@@ -369,7 +394,7 @@ def test_on_a_phone_and_in_the_dark(visit, tmp_path):
 
     tab = visit(viewport={"width": 360, "height": 740}, color_scheme="dark", has_touch=True, is_mobile=True)
     assert tab.evaluate("document.documentElement.scrollWidth") <= 360
-    assert tab.locator("canvas").count() == 4
+    assert tab.locator("canvas").count() == 5
     tab.screenshot(path=str(tmp_path / "dark.png"))
     picture = image.imread(tmp_path / "dark.png")[..., :3]
     assert np.median(picture) < 0.2

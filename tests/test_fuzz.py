@@ -1,4 +1,4 @@
-"""Odd maps and spectra; damaged scenes."""
+"""Odd maps; damaged scenes."""
 
 import contextlib
 import pathlib
@@ -74,17 +74,6 @@ def test_map_arrays():
         found = read(lambda: Surface.from_map(heights, odd_number(rng), **options(rng)))  # noqa: B023
         assert surface_is_right(found)
         assert np.asarray(heights).tobytes() == before
-
-
-def test_spectra():
-    rng = np.random.default_rng(13)
-    q = np.geomspace(1.0, 100.0, 50)
-    for _ in range(50 * SCALE):
-        given = (odd_array(q, rng), q**-3.4) if rng.integers(2) else (q, odd_array(q**-3.4, rng))
-        own = {key: value for key, value in options(rng).items() if key == "band"}
-        own["convention"] = ["paper", "isotropic", "profile", "none", None][rng.integers(5)]
-        own["model"] = ["self-affine", "measured"][rng.integers(2)]
-        assert surface_is_right(read(lambda: Surface.from_spectrum(*given, h_max=odd_number(rng), **own)))  # noqa: B023
 
 
 EXAMPLES = pathlib.Path(__file__).parents[1] / "examples"

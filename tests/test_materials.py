@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import run
+from helpers import refusals, run
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -39,19 +39,14 @@ def test_texts_give_a_text_that_contact_takes():
         contact(Surface.named("challenge"), pressure="1 MPa", E1="210 GPa")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((0.0, 0.3, 1.0, 0.3), "E1 must be positive"),
-        ((1.0, 0.3, -1.0, 0.3), "E2 must be positive"),
-        ((1.0, 0.51, 1.0, 0.3), "nu1 must be in"),
-        ((1.0, 0.3, 1.0, -1.0), "nu2 must be in"),
-    ],
+test_out_of_range = refusals(
+    effective_modulus,
+    (0.0, 0.3, 1.0, 0.3, "E1 must be positive"),
+    (1.0, 0.3, -1.0, 0.3, "E2 must be positive"),
+    (1.0, 0.51, 1.0, 0.3, "nu1 must be in"),
+    (1.0, 0.3, 1.0, -1.0, "nu2 must be in"),
+    error=OutOfRangeError,
 )
-def test_out_of_range(arguments, message):
-    with pytest.raises(OutOfRangeError, match=message) as caught:
-        effective_modulus(*arguments)
-    assert caught.value.mask.all()
 
 
 # tensile strength of the hardest temper [MPa]: data sheets of the tempers, Callister's table B.4 for gold
@@ -221,3 +216,16 @@ def test_a_hardness_in_the_shell():
         cap = {} if text is None else {"hardness": np.inf if text == "inf" else text}
         known = contact(FACE, pressure="50 MPa", E_star="115 GPa", theory="calibrated", **cap)
         assert answer["area"] == [pytest.approx(float(known.area), rel=1e-12)]
+
+
+def test_microhardness_of_the_contacts_of_a_face():
+    face = Surface.from_roughness(Rq="1 um", longest="250 um", shortest="4 um", hurst=0.8, nominal_area="4 cm^2")
+    hard = float(materials.microhardness(face, 5.0, -0.2).split()[0])
+    slope = np.sqrt(2 * face.m2 / np.pi)
+    assert hard == pytest.approx(5.0 * (1.62 / slope) ** -0.2, rel=1e-5)
+    # the same face in other units, and an index of none
+    assert materials.microhardness(face.to("mm"), "5000 MPa", -0.2) == materials.microhardness(face, "5 GPa", -0.2)
+    assert materials.microhardness(face, "5 GPa", 0.0) == "5 GPa"
+    for c1, c2, match in (("5 GPa", 0.1, "c2"), (-1.0, -0.1, "c1")):
+        with pytest.raises(OutOfRangeError, match=match):
+            materials.microhardness(face, c1, c2)

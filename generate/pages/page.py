@@ -22,7 +22,7 @@ from click.testing import CliRunner
 from generate.files import ROOT
 from mbma_tables.common.files import write_file
 
-_OWN = ("architecture", "cost", "explorer", "fidelity", "machined", "stability", "tables")
+_OWN = ("architecture", "cost", "explorer", "fidelity", "joints", "machined", "stability", "tables")
 PAGES = {
     **{name: f"{name}:measure" for name in _OWN},
     **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},

@@ -95,7 +95,7 @@ def contact_map(found: Any) -> ContactMap:
     if not 0 < force < np.inf:
         raise InputError(f"a map needs a pressure above 0, got {float(pressure):g}")
     values, sizes = continued(whole)
-    # of rms gradient one, heights of order one
+    # scaled to an rms gradient of one and heights of order one
     scale, gradient = float(np.abs(values).max()), float(surface.bearing.gradient)
     stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
     engine = Simulation(values / scale, stretched, TOLERANCE)

@@ -19,13 +19,13 @@ from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
-STEP = 0.02  # of a parameter, or of the room that it has
-RTOL = 1e-6  # of a derivative that is given out, or of the quantity over the parameter
+STEP = 0.02  # relative step of a parameter, or of its distance to a limit
+RTOL = 1e-6  # tolerance relative to the derivative, or to quantity/parameter
 GAP, MODULUS = "mean_separation", "E_star"
 KINDS = ("pressure", "area")
 
 Answers = tuple[FloatArray, FloatArray]  # force and area
-Slopes = tuple[dict[str, FloatArray], ...]  # of force and of area, by names
+Slopes = tuple[dict[str, FloatArray], ...]  # slopes of force and of area, by names
 
 
 def differentiate(
@@ -79,7 +79,7 @@ def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArr
     )
     at_force, rise = np.broadcast_to(whole.elastic_area, shape).ravel(), np.zeros(0)
     if lighter is not None:
-        # of the area at a force by the force, and by parameters
+        # slopes of the area at given force: by the force, and by parameters
         rise = np.nan_to_num(area[0, 1] / pressure[0, 1])
         tilt = area[:, 1] - pressure[:, 1] * rise
 

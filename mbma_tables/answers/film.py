@@ -234,7 +234,7 @@ def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     top = float(heights.max())
     rows += [flow(known - heights) for known in np.geomspace(top * CLEAR, max(u.max(), 2 * top), KNOTS)]
     at, phi, shear = (np.array(part) for part in zip(*rows, strict=True))
-    leak, wide = found.leakage, slice(knots.size, None)  # by their own knots, whose flow is far from blocked
+    leak, wide = found.leakage, slice(knots.size, None)  # at their own knots, whose flow is far from blocked
     curve = PchipInterpolator(np.log(at[wide]), np.log(phi[wide]))
     beyond = np.exp(curve(np.log(np.maximum(u, at[knots.size])))).T
     own = np.where(u > at[knots.size], beyond, np.stack([np.ravel(leak.x), np.ravel(leak.y)]) / u**3)

@@ -28,10 +28,10 @@ from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 
-STEP = 0.02  # of the logarithm of a parameter
+STEP = 0.02  # step of the logarithm of a parameter
 NEAR = 0.9  # share of a parameter's upper limit above which its steps go down
-MAX_ERROR = 0.05  # of a slope, over itself or 1, above which it is NaN
-POINTS = 33  # of a range, geometric
+MAX_ERROR = 0.05  # largest error of a slope, over itself or 1; else it is NaN
+POINTS = 33  # points of a range, geometric
 ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
 
 Answers = dict[str, FloatArray]

@@ -67,9 +67,9 @@ class Source:
     hardness: Any
     units: Units
     yields: bool  # whether a hardness is given, and not an infinite one
-    answer: TheoryAnswer | None = None  # where it is known already
+    answer: TheoryAnswer | None = None  # if computed already
     loaded: Loaded | None = None  # the same with a hardness
-    materials: Pair | None = None  # where they are named
+    materials: Pair | None = None  # if named
     stated: bool = False  # whether the hardness is, infinite or not
 
     def theory_at(self, E_star: Any, hardness: Any) -> Theory:
@@ -84,7 +84,7 @@ class Source:
     def map(
         self,
         function: Callable[..., tuple[Any, ...]],
-        contact: Any,  # at whose mean separations
+        contact: Any,  # which has the mean separations
         outputs: int,
         more: Mapping[str, Any] | None = None,
     ) -> tuple[Numbers, ...]:

@@ -38,7 +38,7 @@ def _describe(fault: Exception) -> str:
     return " ".join(str(fault).split())
 
 
-# of Python, in a shell
+# texts for Python, in a shell
 SAID = {
     "surface.fit()": "--model self-affine",
     "outside='exact'": "--island-model exact",
@@ -49,7 +49,7 @@ SAID = {
     "k1 must be": "--conductivity must be",
     "k2 must be": "--conductivity must be",
 }
-# where a name that is an English word too is that of an option: at a verb, and in lists of options
+# contexts in which an English word is the name of an option: after a verb, and in lists of options
 BEFORE = r"^|\b(?:leave|give|got|one of|needs) |--[\w-]+(?:,|,? and|,? or) "
 AFTER = r"[,;:]| = | (?:must|has|is|are|and|or|out|without)\b|$"
 

@@ -29,7 +29,7 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 
 MAX_BYTES = 64 * 2**20
-MAX_COLUMNS, MAX_ROWS, MAX_CELL = 100, 1_000_000, 1000  # of a file of surfaces; letters of a cell
+MAX_COLUMNS, MAX_ROWS, MAX_CELL = 100, 1_000_000, 1000  # limits of a file of surfaces; letters of a cell
 OF_MAPS = ("dx", "dy", "detrend", "short_cutoff", "long_cutoff", "s_filter", "l_filter")
 LOADS = ("separation", "mean_separation", "pressure", "area")
 

@@ -208,7 +208,10 @@ def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
 @options.specimen_options
 @click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")
 @options.variant_option
-def explore_command(out: Path, specimen: Specimen, theory: str | None, variant: str) -> None:
+@options.hardness_option
+def explore_command(
+    out: Path, specimen: Specimen, theory: str | None, variant: str, hardness: float | str | None
+) -> None:
     """Write a page with sliders for the surface, its modulus, theory and variant, or a pasted spectrum.
 
     One file that needs neither a server nor a network: force, area, stiffness and conductance against gap or pressure.
@@ -217,5 +220,7 @@ def explore_command(out: Path, specimen: Specimen, theory: str | None, variant: 
     """
     from mbma_tables.export.explorer import explorer_page
 
-    page = explorer_page(specimen.surface, specimen.E_star, specimen.stress_unit, theory, variant, specimen.title)
+    page = explorer_page(
+        specimen.surface, specimen.E_star, specimen.stress_unit, theory, variant, specimen.title, hardness
+    )
     _write({out: page.encode()})

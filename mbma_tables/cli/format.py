@@ -151,7 +151,7 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     facts["assumed"] = assumed
     notes += [record["told"] for record in surface.provenance if "told" in record]
     facts["provenance"] = [dict(record) for record in surface.provenance]
-    fit = getattr(surface, "fit", None)  # of five numbers; of a spectrum a method
+    fit = getattr(surface, "fit", None)  # a field if given by five numbers, else a method
     if dataclasses.is_dataclass(fit):
         values = {field.name: getattr(fit, field.name) for field in dataclasses.fields(fit)}
         facts["fit"] = {name: v.tolist() if hasattr(v, "tolist") else v for name, v in values.items()}

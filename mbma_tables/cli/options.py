@@ -153,7 +153,7 @@ def _option(name: str, help: str, **kind: Any) -> Decorator:
 
 
 PATH: Any = click.Path(path_type=Path)
-# of `MAP_OPTIONS`, in the words of `mbma_tables.surfaces.treatment.Treatment`
+# options of `MAP_OPTIONS`, named as in `mbma_tables.surfaces.treatment.Treatment`
 _MAP_OPTIONS = (
     _option("dx", "Sampling step [length], of a map whose file has none;"),
     _option("dy", "and along its second axis, if another."),
@@ -260,7 +260,7 @@ theory_option = _option(
     "corrected where Tamaas is installed.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
-# of islands, which MBMA alone has
+# for islands, which only MBMA has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
 hardness_option = _option(
     "hardness",

@@ -21,7 +21,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file, write_file
 
 VARIABLE = "MBMA_TABLES_CACHE"
-MAX_BYTES = 2**30  # of all files
+MAX_BYTES = 2**30  # total size of the files
 SUFFIX = ".npz"
 
 

@@ -68,7 +68,7 @@ def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool 
         return
     target = pathlib.Path(os.path.realpath(path))
     draft = target.with_name(f".{target.name}.{uuid.uuid4().hex[:12]}.draft")
-    # of runs that were killed
+    # drafts of runs that were killed
     for left in target.parent.glob(f".{glob.escape(target.name)}.*.draft"):
         with contextlib.suppress(OSError):
             if time.time() - left.stat().st_mtime > ABANDONED:

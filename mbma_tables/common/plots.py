@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KINDS = ("png", "svg", "pdf")  # of files of pictures
+KINDS = ("png", "svg", "pdf")  # formats of files of pictures
 GAP_LABEL = "mean separation  u/h_rms"
 PRESSURE_LABEL = "pressure  F/(A0 E*)"
 LEAKAGE_LABEL = "flow coefficient  k h_rms^3"

@@ -17,7 +17,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
 
 MAX_BYTES = 1 << 30
-PLAIN = "".join(chr(k) for k in range(32, 127) if chr(k) not in '%;"&<>*?\\@{}')  # what no comment changes
+PLAIN = "".join(chr(k) for k in range(32, 127) if chr(k) not in '%;"&<>*?\\@{}')  # safe in any comment
 _BREAK = re.compile(r"\n ?(?:\*\*|//|[*!#%$]) ")  # of a line in a comment
 _COMMAND = re.compile(r"written by mbma_tables (\S+): mbma export ([^;]*);")
 _INPUT = re.compile(r"input ([^;]*): sha256 ([0-9a-f]{64});")

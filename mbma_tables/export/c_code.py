@@ -28,7 +28,7 @@ from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import calibrated_table, persson
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE
 
-FORM = "standard"  # that of island model "formula"
+FORM = "standard"  # the form of island model "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
 CORE = ("phi.c", "totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
 MODEL = {

@@ -17,7 +17,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.export.text import DIGITS, number
 
 MIN_ROWS, MAX_ROWS = 3, 5000
-ROUNDS = 40  # of making the errors of chords equal
+ROUNDS = 40  # rounds of making the errors of chords equal
 LAST = 1.5  # the last chord's error counts so much more, as its last row is not moved
 
 

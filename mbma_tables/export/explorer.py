@@ -7,6 +7,7 @@ from the current tables, so that writing one needs no compiler.
 from __future__ import annotations
 
 import base64
+import dataclasses
 import html
 import json
 import re
@@ -19,10 +20,12 @@ from mbma_tables import __version__
 from mbma_tables.answers import source
 from mbma_tables.common.arguments import number_in, positive_array
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import Units
+from mbma_tables.common.units import Units, factor
 from mbma_tables.export import c_code
 from mbma_tables.export.text import page_file
+from mbma_tables.laws import hardness as hardness_law
 from mbma_tables.laws.calibrated import TESTED_AREA
+from mbma_tables.materials import hardness_in
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
@@ -32,13 +35,14 @@ from mbma_tables.theories import calibrated, calibrated_table, mbma
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
 SHOWN_READINGS = (REPORTED, PRINTED, FITTED)
-SCRIPTS = ("model.js", "state.js", "curves.js", "downloads.js", "charts.js", "main.js")
+SCRIPTS = ("model.js", "state.js", "hardness.js", "curves.js", "downloads.js", "charts.js", "main.js")
 FEW = 1000  # numbers up to which they stay doubles
-FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
-MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # of whole numbers in the page, and of numbers before they are scaled
+FRACTION_BITS, ORDER = 43, 3  # packed tables: steps of 1e-13; order of differences
+MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # limits of integers in the page, and of numbers before they are scaled
 MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
+K_S, NU = 50.0, 0.3  # first conductivity [W/(m K)] and Poisson's ratio
 MAX_SAMPLES = 500  # of a spectrum, for a step of a slider to stay short
 
 
@@ -91,6 +95,7 @@ def _limits() -> dict[str, Any]:
         "heights": calibrated.TESTED_HEIGHTS,
         "area": TESTED_AREA,
         "max_samples": MAX_SAMPLES,
+        "hardness": dataclasses.asdict(hardness_law.CONSTANTS),
     }
 
 
@@ -119,12 +124,13 @@ def explorer_page(
     theory: str | None = None,
     variant: str = "reported",
     title: str = "",
+    hardness: float | str | None = None,
 ) -> str:
     """A page of HTML that shows how a surface touches, with sliders; it needs neither a server nor a network.
 
     Of a measured surface it uses the spectrum, of at most 500 samples, and h_max; heights and maps, which the
-    calibrated law uses in Python, are not included. Without a modulus stresses are over E*. Theory and variant are
-    the initial ones; the default is MBMA, for a spectrum the calibrated law.
+    calibrated law uses in Python, are not included. Without a modulus stresses are over E*. Theory, variant and
+    `hardness` are the initial ones; the default is MBMA, for a spectrum the calibrated law.
 
     Examples
     --------
@@ -143,12 +149,19 @@ def explorer_page(
         raise InputError(f"the page has the variants {tuple(shown.name for shown in SHOWN_READINGS)}, got {variant!r}")
     modulus = 1.0 if E_star is None else number_in("E_star", float(positive_array("E_star", E_star)), 1e-300, 1e300)
     units = Units(surface.unit, "1" if E_star is None else stress_unit)
-    start = _start(surface) | {"E_star": modulus, "k_s": 1.0, "theory": theory, "variant": get_variant(variant).name}
+    start = _start(surface) | {
+        "E_star": modulus,
+        "k_s": K_S if surface.unit else 1.0,
+        "theory": theory,
+        "variant": get_variant(variant).name,
+    }
+    cap = np.inf if hardness is None else float(hardness_in(units, hardness))
+    start |= {"nu": NU, "hardness": number_in("hardness", cap, 1e-300, 1e300) if cap < np.inf else None}
     data = {
         "version": __version__,
         "title": title,
         "start": start,
-        "units": {"length": units.length, "stress": units.stress},
+        "units": {"length": units.length, "stress": units.stress, "metre": surface.unit and factor(surface.unit, "m")},
         "departures": list(surface.departures()),
         "note": MAP_NOTE if isinstance(surface, MeasuredSurface) and surface.bearing is not None else "",
         "limits": _limits(),

@@ -32,7 +32,7 @@ from mbma_tables.theories.protocol import Theory, UserTheory
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
-ROUNDS, PARTS = 4, 32  # of the search for an end of validity between two of them
+ROUNDS, PARTS = 4, 32  # rounds and parts of the search for an end of validity between two of them
 OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a surface given by a spectrum
 
 

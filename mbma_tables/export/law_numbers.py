@@ -32,8 +32,8 @@ class LawNumbers:
 
     h_max: float
     c_least: float  # the law's range: minus infinity where contact ends at c = 0,
-    c_turn: float  # where inverses end as pressure turns down, or c_most,
-    c_most: float  # and its end
+    c_turn: float  # where inverses end: at the maximum of pressure, or c_most,
+    c_most: float  # end of the range
     ends: bool  # whether contact ends at c = 0, and pressure is zero below
     side: int  # how many records count from first contact; the others count from full compression
     scale: float

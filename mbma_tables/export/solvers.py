@@ -21,9 +21,9 @@ from mbma_tables.export.text import DIGITS, checked_name, comment, number, openi
 from mbma_tables.surfaces.any_surface import AnySurface
 
 MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
-MAX_ID = 99_999_999  # of a card: eight columns
+MAX_ID = 99_999_999  # largest id in a card: eight columns
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
-DEPARTURES = (0.01, 0.1)  # of the exponential law from Persson's theory: the pressures of these are stated
+DEPARTURES = (0.01, 0.1)  # deviations of the exponential law from Persson's theory whose pressures are stated
 PAIR = "*CONTACT PAIR, INTERACTION={name}, TYPE="
 CALCULIX_TABULAR = (
     f"Use this interaction with {PAIR}NODE TO SURFACE",
@@ -88,7 +88,7 @@ def _calculix_heat(law: LawTable, name: str) -> str:
     assert rows is not None
     c = np.linspace(np.interp(max(rows.floor, law.x[1]), rows.y, rows.x), rows.x[-1], 1001)
     p = np.interp(c, rows.x, rows.y)
-    # of a concave ln p the chord has the slope of the line with the least largest distance
+    # for concave ln p, the chord has the slope of the line with the least largest distance
     u0 = (c[-1] - c[0]) / math.log(p[-1] / p[0])
     off = np.log(p) - c / u0
     middle, spread = (off.max() + off.min()) / 2, (off.max() - off.min()) / 2

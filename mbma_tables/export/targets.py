@@ -27,7 +27,7 @@ GROUPS = {
     "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
 }  # fmt: skip
 SI = ("m", "Pa")
-# by quantity: the options that are of it alone, and what its rows are against
+# by quantity: options for it alone, and the abscissa of its rows
 OPTIONS = {
     "conductance": {"conductivity", "conductivity_unit"}, "tangential_stiffness": {"kappa"}, "film": {"peklenik"},
 }  # fmt: skip
@@ -83,13 +83,13 @@ class Grammar:
 
     program: str
     mark: str  # of comments
-    body: Mapping[str, Callable[..., str]]  # by quantity: what stands below the comments, of the law and what is named
+    body: Mapping[str, Callable[..., str]]  # by quantity: text below the comments, from the law and the names
     beyond: str  # behaviour of the program outside the rows, and further notes for its user
     most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
     named: str | None = None  # default name; None if there is none
     first: str = ""  # line of the file
-    units: tuple[str, str] | None = None  # of length and of stress, where it has to be these
-    friction: str = ""  # what the user of its friction card must know; empty where there is none
+    units: tuple[str, str] | None = None  # of length and of stress, if they are prescribed
+    friction: str = ""  # notes for the user of its friction card; empty without one
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
         """The text of a file.

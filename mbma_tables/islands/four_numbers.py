@@ -10,7 +10,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS
 from mbma_tables.surfaces.variants import Variant
 
-MOST_WIDTH = 700.0  # of (4 - 2H) ln(zeta_u/zeta_d), whose exponential is a number
+MOST_WIDTH = 700.0  # largest (4 - 2H) ln(zeta_u/zeta_d), so that its exponential is finite
 SPHERE_FLOOR = 1.25  # zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5
 
 

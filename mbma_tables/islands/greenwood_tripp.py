@@ -27,7 +27,7 @@ LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), 
 MIN_SOLVER_RTOL = 1e-13
 MAX_NODES = 1024  # a few seconds for an island
 BLOCK = 1 << 22  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
-COARSE_NODES = 12  # of the first guess
+COARSE_NODES = 12  # nodes of the initial guess
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ FORCE, AREA = range(2)
 HEAD = 18
 
 INVERSE_DEGREE = 5
-INVERSE_BITS = 2  # of the mantissa: 4 buckets an octave of force or area
+INVERSE_BITS = 2  # bits of the mantissa: 4 buckets per octave of force or area
 INVERSE_RECORD = 3 + INVERSE_DEGREE + 1
 INVERSE_HEAD = 6
 Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)

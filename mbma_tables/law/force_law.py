@@ -20,8 +20,8 @@ from mbma_tables.law.make import theory_law
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
-RTOL = 1e-7  # of the force of one contact
-LIGHT = 1e-9  # of the largest force, from which on laws without a last contact begin
+RTOL = 1e-7  # tolerance of the force of one contact
+LIGHT = 1e-9  # share of the largest force at which laws without a last contact begin
 NEWTONS = {"uN": 1e-6, "mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6}
 _FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N)\s*(?:/\s*(\w+))?\s*")
 

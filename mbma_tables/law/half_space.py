@@ -32,11 +32,11 @@ from mbma_tables.islands.spectral import Basis, basis, gauss_legendre, made
 from mbma_tables.law.law import ContactLaw
 
 NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn
-STEPS, SETTLED = 100, 1e-12  # of Newton's method, and the last one over the lengths that add up
-EDGE = 1e-10  # of the largest pressure: beyond it there is no contact
-JUMPS = 0.05  # of a law's error, which its polynomials may differ by where they meet: forces need not be closer
-PLACES = 4  # times the nodes, at which the edge is looked for
-FLAT = 0.01  # of h_max, by which a layer that is pressed flat may be thinner than its law allows
+STEPS, SETTLED = 100, 1e-12  # steps of Newton's method, and size of the last one over the lengths that add up
+EDGE = 1e-10  # share of the largest pressure that defines the edge
+JUMPS = 0.05  # share of a law's error, by which its polynomials differ where they meet: sufficient accuracy of forces
+PLACES = 4  # points per node in the search for the edge
+FLAT = 0.01  # share of h_max by which a fully compressed layer may be thinner than its law allows
 
 
 @functools.lru_cache(maxsize=64)
@@ -60,7 +60,7 @@ class Solved(NamedTuple):
     basis: Basis
     u: FloatArray
     p: FloatArray  # over E*
-    jacobian: FloatArray  # of u by its load
+    jacobian: FloatArray  # derivative of u by its load
     error: float  # relative change of force with the number of nodes
 
     def raised(self, dp: FloatArray) -> FloatArray:

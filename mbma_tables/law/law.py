@@ -44,7 +44,7 @@ else:
 
 BLOCK = 1 << 16  # gaps between two checks for interrupts
 SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
-SPACED = (1e-3, 0.2)  # of the way down: geometric up to here, then even
+SPACED = (1e-3, 0.2)  # shares of the compression: geometric spacing between them, then even
 ROUNDING = 4 * float(np.finfo(float).eps)
 
 

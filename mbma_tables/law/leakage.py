@@ -20,8 +20,8 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply
 from mbma_tables.theories import OF_MAPS
 
-RTOL, SHARE = 1e-4, 0.1  # of the polynomials, or this share of the law's own error
-MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is a power
+RTOL, SHARE = 1e-4, 0.1  # tolerance of the polynomials, or this share of the law's own error
+MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow is a power
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -34,14 +34,14 @@ from mbma_tables.totals.profile import profile
 
 MIN_LAW_RTOL = 1e-9
 RESOLVED = 1e-3  # for polynomials this accurate the last coefficients estimate the error
-POWERS = (3.5, 10 / 3)  # of h_max - d, in which MBMA's force and area start
+POWERS = (3.5, 10 / 3)  # leading powers of h_max - d of MBMA's force and area
 LAYER_SHARE = 0.5  # of the boundary layer, up to which these powers dominate
 FIRST_OCTAVES = 20  # below which a theory that ends at h_max is a power of h_max - u
 MOST_OCTAVES = 60
 MAX_SPAN = 10.0  # u/h_max up to which a theory without last contact is covered
 LOWEST = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # u/h_max from which a theory may answer
 LOOKED_AT = 24  # points at which a theory's own error is evaluated
-SHARE = 0.1  # of the median of a theory's own errors: the polynomials need not be closer to it
+SHARE = 0.1  # of the median of a theory's own errors: sufficient accuracy of the polynomials
 
 
 @hinted

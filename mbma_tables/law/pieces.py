@@ -22,12 +22,12 @@ from mbma_tables.law import block as at
 
 SAMPLES = 16
 MAX_RECORDS = 4000
-TAIL_SHARE = 4.0  # of the last two coefficients, for all that follow: they fall by 2 at least
+TAIL_SHARE = 4.0  # factor on the last two coefficients for all later ones, which fall at least by 2 each
 NEAR = 1e-7  # relative width of a bucket too narrow to fit, for which its neighbour's polynomials are used
-FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # of the octaves below x = 1, where Gaussians of heights bend; 2 below
-SLOPES = 100.0  # times the tolerance of values: that of slopes, over F/x where they are smaller
+FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # initial buckets of the octaves below x = 1, with curved Gaussians; 2 below
+SLOPES = 100.0  # ratio of the tolerance of slopes (over F/x if that is larger) to that of values
 COARSE, COARSE_SLOPES = 1e-7, 10.0  # tolerance above which octaves begin with one bucket; and that of slopes there
-FOR_SLOPES = 4  # times more buckets are tried for the sake of slopes
+FOR_SLOPES = 4  # largest factor of additional buckets for slopes
 KEPT = at.DEGREE + 1
 
 Values = Callable[[FloatArray], FloatArray]

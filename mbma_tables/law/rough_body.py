@@ -33,8 +33,8 @@ JOHNSON = 2 / math.e  # reference over R: approaches are Johnson's (5.57) in Her
 LAYER_RTOL = 1e-8  # of the layer's law, as far as its theory allows
 ROUNDING = 1e-3  # of h_max, by which a law goes beyond the largest approach, so that it has the largest force
 MOMENTS = 128  # nodes of the effective radius
-POINTS = 101  # of a profile
-COUNTED = 0.1  # share of the force above which a reason against the layer's law counts
+POINTS = 101  # points of a profile
+COUNTED = 0.1  # share of the force above which a reason against the layer's law applies
 # c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the width of the contact over the
 # mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate.rough_spheres`
 CELLS, NARROWEST = (0.62, 0.8), 1.5

@@ -13,7 +13,7 @@ FRACTIONS = np.logspace(-4.5, 0, 91)  # shares of the map, from the highest poin
 MIN_TOP_POINTS = 16  # gradients are averaged over at least so many points
 QUANTILES = 1 - np.concatenate([[0], np.logspace(-5, -1, 61)[:-1], np.linspace(0.1, 1, 139)])
 BANDS = 40
-RESOLVED = 1e-14  # of the larger eigenvalue of a gradient tensor: a smaller one is rounding, as of ridges
+RESOLVED = 1e-14  # share of the larger eigenvalue of a gradient tensor: a smaller one is rounding, as for ridges
 # <|w|> and <|w|^4>/3 of Gaussian gradients w of unit variance: of ridges along one axis, else along both
 RIDGES, BOTH = (np.sqrt(2 / np.pi), 1.0), (np.sqrt(np.pi / 2), 8 / 3)
 
@@ -24,10 +24,10 @@ class RadialSpectrum:
 
     q: FloatArray  # of each band, the root of mean q^2 weighted by variance [1/length]; NaN for an empty band
     q2_mean_inverse: FloatArray  # mean q^-2 of each band, weighted by variance [length^2]
-    variance: FloatArray  # what the band adds to m0 [length^2],
+    variance: FloatArray  # contribution of the band to m0 [length^2],
     gradient: FloatArray  # to 2 m2,
     curvature: FloatArray  # and to m4 [1/length^2]
-    # of every wavevector of the real transform: -1 below the smallest wavenumber, BANDS above the largest
+    # band of every wavevector of the real transform: -1 below the smallest wavenumber, BANDS above the largest
     band: NDArray[np.intp]
 
 
@@ -43,8 +43,8 @@ class Bearing:
     # (2/sqrt(pi)) <|w|>/sqrt(2) over the same highest parts, w the gradient whitened by its own tensor: 1 if Gaussian.
     # Of ridges, where w has one component, sqrt(pi/2) <|w|>
     top_gradient: FloatArray
-    tension_force: FloatArray  # mean pressures F at which full contact would pull on shares `FRACTIONS` of the map,
-    tension: FloatArray  # and the mean pull then, <max(-p, 0)> over the whole map [E*]
+    tension_force: FloatArray  # mean pressures F at which full contact is tensile on shares `FRACTIONS` of the map,
+    tension: FloatArray  # and the mean tension then, <max(-p, 0)> over the whole map [E*]
     anisotropy: float  # root of the ratio of the gradient tensor's eigenvalues, 1 to 1e7, which stands for ridges
     slope_kurtosis: float  # (3/8) <|w|^4>, of ridges <|w|^4>: 3 if Gaussian
 

@@ -49,7 +49,7 @@ class Contact:
         try:
             residual = self._solver.solve(force)
         except (ArithmeticError, RuntimeError) as fault:
-            # of a single element in contact, for instance
+            # for example with a single element in contact
             raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}") from None
         if not residual <= self._tolerance:
             raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")

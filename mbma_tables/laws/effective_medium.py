@@ -31,12 +31,12 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, area
 
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
-BANDS = 64  # of a spectrum, graded towards both ends
+BANDS = 64  # bands of a spectrum, graded towards both ends
 NODES, LOWEST_GAP, REACH = 80, 1e-6, 8.0  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
 NO_SLOPE = 1e-12  # share of the squared gradient that the last bands hold at least
 NO_COVER = 1e-13  # share of the surface between two magnifications
-NEAREST = 1e-4  # of A/A0 to the threshold
-LOADS = 4000  # between which the load of a contact fraction is interpolated
+NEAREST = 1e-4  # least distance of A/A0 to the threshold
+LOADS = 4000  # loads for the interpolation of the load at a contact fraction
 
 
 def wide_gap(u: ArrayLike) -> FloatArray:
@@ -136,7 +136,7 @@ def _mean_gaps(
     found = np.zeros(load.shape)
     middle = (below[:-1] + below[1:]) / 2
     for first in range(variance.size):
-        # as a spectrum of its own, whose lengths are over `spread` and loads over its gradient
+        # as a separate spectrum, with lengths over `spread` and loads over its gradient
         share = 1 - below[first]
         part = Spectrum(
             wave[first:] / variance[first:],

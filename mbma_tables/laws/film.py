@@ -60,7 +60,7 @@ def anisotropic_medium(
         miss = np.sum(share * part, axis=-1) - blocked / (1 - factor)
         own = -np.sum(share * t / inside**2, axis=-1)
         by_factor = -np.sum(share * part**2, axis=-1) - blocked / (1 - factor) ** 2
-        turn = by_factor * factor[0] * factor[1] / 2  # of L by ln k
+        turn = by_factor * factor[0] * factor[1] / 2  # derivative of L by ln k
         (a, d), (b, c) = own + turn, -turn
         step = np.stack([miss[0] * d - b * miss[1], a * miss[1] - c * miss[0]]) / (a * d - b * c)
         log_k -= np.clip(step, -1, 1)

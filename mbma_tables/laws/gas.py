@@ -40,7 +40,7 @@ class Gas(NamedTuple):
 
     mass: float  # kg/mol
     gamma: float  # ratio of specific heats
-    accommodation: float  # of metals as machined
+    accommodation: float  # thermal, on metals as machined
     conductivity: tuple[float, ...]  # W/(m K) at `TEMPERATURES`
     viscosity: tuple[float, ...]  # Pa s, likewise
 

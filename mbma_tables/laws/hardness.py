@@ -34,8 +34,8 @@ from mbma_tables.laws.bearing_curve import FRACTIONS
 IMAGES, TERMS = 0.06, 10  # tau below which images converge faster than a series; its terms, and one
 SHARPEST, NARROW = 1e-200, 3e-3  # least tau; half-width over which a difference goes by powers
 SEEN = 6.0  # above which erfc is below rounding of 1
-MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
-DEPTH = 30.0  # of a map's valleys below the last node, in levels
+MOST_SHARE = 0.9  # largest share of a map's heights in one node
+DEPTH = 30.0  # deepest valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 LEVELS = -37.2, 9.0, 1500  # of Gaussian heights: nodes; above, the mean gap is the level itself
 LEAST_GAP = 1e-300  # mean gap at which all heights lie above the level

@@ -161,7 +161,7 @@ def press(
     If its approximate `area` at a load is known, heavier loads use half of the grid, and loads are added
     until contacts from `LOWEST` to `HIGHEST` are covered.
     """
-    # of rms gradient one, heights of order one
+    # scaled to an rms gradient of one and heights of order one
     scale = float(np.abs(heights).max())
     stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
     halved = area is not None and points >= HALVED * (1 - ROUNDING)

@@ -107,7 +107,7 @@ class ExactModel:
         return IslandAnswer(solved.phi_F, solved.phi_A, solved.error)
 
 
-SOLVER = ExactModel(1e-10)  # where it replaces a table
+SOLVER = ExactModel(1e-10)  # for islands outside a table
 
 
 @dataclasses.dataclass(frozen=True)

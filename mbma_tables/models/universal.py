@@ -21,7 +21,7 @@ from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, Tabl
 
 SHOWN = 65  # points along an axis of the table as a Dataset
 BLOCK = 1 << 16  # islands between two checks for Ctrl-C
-TERMS = 8  # of each polynomial along each axis
+TERMS = 8  # terms of each polynomial along each axis
 RECORD = 8 + 2 * TERMS**2  # doubles of a cell, `mbma_cell` of mbma.h
 
 

@@ -51,7 +51,7 @@ class Costs(NamedTuple):
         rows = [row for row in self.rows if row.island_model == island_model and row.what == what]
         if not rows:
             return math.nan
-        # of a call or of opening a table there is one row, without a tolerance
+        # calls and opening a table have one row, without a tolerance
         met = [row for row in rows if row.rtol is None or rtol is None or row.rtol <= rtol * (1 + 1e-9)]
         row = max(met, key=lambda row: row.rtol or 0.0) if met else min(rows, key=lambda row: row.rtol or 0.0)
         return self.seconds * row.cost
@@ -66,8 +66,8 @@ class Distance(NamedTuple):
 
     theory: str
     way: str
-    cost: float  # of a point, over that of the fixed work
-    once: float  # of preparation for a surface
+    cost: float  # cost of a point, over that of the fixed work
+    once: float  # cost of preparing a surface
     area_light: float
     area_deep: float
     force_light: float

@@ -20,7 +20,7 @@ from mbma_tables.models import AnyModel
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.problem import INVERTED, OF_LAW, OUTPUTS, REFINEMENTS, Problem
 
-ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is for its quadrature or law
+ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature or law
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
 # p(r) at a point converges later than its integrals
 AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
@@ -28,7 +28,7 @@ AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
 # islands answer a further gap in half a microsecond
 MIN_LAW_GAPS, MIN_LAW_GAPS_OF_OTHERS = 4000, 150  # of MBMA, and of other theories
 MIN_THEORY_LAW_RTOL = 1e-9
-YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # times an elastic call and an elastic answer of many (docs/yield.md)
+YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # over an elastic call, and over one of many elastic gaps (docs/yield.md)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 
 
@@ -38,7 +38,7 @@ class Step:
 
     name: str
     why: str  # effects that need it
-    what: str  # what it evaluates
+    what: str  # description of its evaluation
     island_model: str | AnyModel | None
     rtol: float | None  # relative tolerance of the totals, the law or the solver
     count: int  # gaps, islands or points evaluated
@@ -59,7 +59,7 @@ class Plan:
     steps: tuple[Step, ...]
     left_out: tuple[str, ...]  # effects that were not requested
     switched_off: tuple[str, ...]  # refinements of the model that are off
-    rtol: float  # of the whole
+    rtol: float  # tolerance of the plan
     overhead: float  # seconds that every scene takes
     first_use: float  # seconds that the first scene of a process takes besides; no choice depends on it
     theory: str = "mbma"

@@ -34,11 +34,11 @@ OUTPUTS = (
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 EFFECTS = (*OUTPUTS, *REFINEMENTS)
-OF_ISLANDS = ("island_statistics", "pressure_profile")  # of MBMA alone
+OF_ISLANDS = ("island_statistics", "pressure_profile")  # available for MBMA only
 OF_LAW = ("stiffness", "energy", "conductance")
-ELASTIC = ("energy", *OF_ISLANDS)  # of contacts in which nothing yields
+ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
 COMPARED = (*THEORIES, "persson_simplified")
-CORRELATIONS = ("cooper_mikic_yovanovich", "mikic")  # of conductance
+CORRELATIONS = ("cooper_mikic_yovanovich", "mikic")  # for conductance
 PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
 INVERTED = ("pressures", "areas")  # gaps follow from them
 MIN_RTOL, MAX_RTOL = 1e-10, 0.1

@@ -29,7 +29,7 @@ MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
 NUMBERS = tuple(dict.fromkeys(PARAMETERS + MAGNIFICATION + MOMENTS + ROUGHNESS))
 MATERIAL = ("E_star", "E1", "nu1", "E2", "nu2")
-MAP_OPTIONS = (*OPTIONS[1:], "extrapolate_to", "extrapolate_hurst")  # of a measured map; its unit has its own
+MAP_OPTIONS = (*OPTIONS[1:], "extrapolate_to", "extrapolate_hurst")  # for a measured map; its unit is separate
 MAX_TOML_BYTES, MAX_SPECTRUM_BYTES = 2**20, 16 * 2**20
 
 

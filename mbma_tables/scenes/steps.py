@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]
 TABLES = ("universal", "island4d")  # island models that are tables
-MAX_SLOPE_OF_STIFFNESS = 3.0  # of log(stiffness) by log(h_max - d); 5/2 next to first contact
+MAX_SLOPE_OF_STIFFNESS = 3.0  # largest d log(stiffness)/d log(h_max - d); 5/2 next to first contact
 
 
 @dataclasses.dataclass

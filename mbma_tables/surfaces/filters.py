@@ -9,7 +9,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 
-GAUSSIAN = math.log(2)  # of the filter's exponent: wavelengths equal to the nesting index are halved
+GAUSSIAN = math.log(2)  # factor in the filter's exponent: wavelengths equal to the nesting index are halved
 LAST_WAVES = 0.01  # amplitude below which wavelengths count as removed by an S-filter
 
 

@@ -14,7 +14,7 @@ from mbma_tables.common.errors import InputError
 
 _TAIL = np.logspace(-6, -1, 61)[:-1]
 SHARES = np.concatenate([[0.0], _TAIL, np.linspace(0.1, 0.9, 81), 1 - _TAIL[::-1], [1.0]])  # of a surface, from its top
-MIN_SHARE = 1e-300  # of a surface, as a normal number
+MIN_SHARE = 1e-300  # smallest share of a surface, above underflow
 TAIL_NODES = 400  # shares at which heights are convolved
 
 
@@ -75,7 +75,7 @@ class Heights:
         deviates = ndtri(np.clip(above / weights.sum(), MIN_SHARE, 1 - 1e-16))
 
         def height(share: Any) -> FloatArray:
-            # in the scale in which a Gaussian is straight
+            # on normal quantiles, on which a Gaussian is straight
             return np.asarray(np.interp(ndtri(share), deviates, sums[order]))
 
         # logarithms of shares weighted by variance: for two Gaussians the squares of h_max then add

@@ -30,7 +30,7 @@ WINDOW_OVERLAP = (35 / 18) ** 2  # Fourier components under that window that cou
 MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
 S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
-MAX_ANISOTROPY = 0.3  # of a cosine around the circle: four times the power one way than across it
+MAX_ANISOTROPY = 0.3  # amplitude of a cosine around the circle: four times the power one way than across it
 
 
 def radial_spectrum(
@@ -133,8 +133,8 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
 
 # grid steps in wavenumber; a window weights the few wavelengths below at random; none lies on this limit
 LONG = 4.0 * (1 - 1e-9)
-RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest wavelengths under a window may change; sums that are met
-STEEPEST = 30.0  # by which `matched` may tilt a spectrum
+RAISED, MET = 6.0, 1e-6  # largest change of ln C of the strongest wavelengths under a window; tolerance of the sums
+STEEPEST = 30.0  # largest tilt of a spectrum in `matched`
 TOLD = 0.05  # relative difference of rms gradients that is reported, and half of that of h_rms
 
 

@@ -18,9 +18,9 @@ from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 BINS_PER_DECADE = 20  # 12% wide: accuracy of a break's position; bins of a dense spectrum still average many entries
 MIN_POINTS = 6  # two define the line, four test it
 MIN_PIECE = 3  # bins in a roll-off or in what follows a cut; fewer would fit noise
-SCATTER = 0.1  # of ln C beyond counting statistics: deviation of real surfaces from a power law
+SCATTER = 0.1  # scatter of ln C of real surfaces about a power law, besides counting statistics
 HURST_TOLERANCE = 0.05  # bias of H on small windowed maps: fitted values up to this far above 1 are set to 1
-MARGIN = 6.0  # of Bayesian information: larger differences count as strong evidence
+MARGIN = 6.0  # differences of Bayesian information above this count as strong evidence
 EXACT = 1e-6  # mean misfit at which a spectrum counts as computed, not measured
 MIN_END_RATIO = 0.8  # of largest wavenumber to a profile's q1: there the drop is 30%; with less, q1 would be guessed
 TYPICAL_SLOPE = 3.5  # C q^3.5 is nearly flat for every H, so that averages within a bin do not depend on its filling

@@ -22,7 +22,7 @@ from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import MIN_POWER, Treated
 
 PER_DECADE = 10  # nodes of the spectrum
-PANELS = 8  # between two nodes
+PANELS = 8  # panels between two nodes
 STRAIGHT = 1.0  # standard deviation of the change of slope, d ln C/d ln q, from node to node
 HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
 OVERLAP = 35 / 18  # Fourier components under a Hann window that count as one independent component

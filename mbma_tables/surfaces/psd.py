@@ -30,11 +30,11 @@ from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
 CONVENTIONS = ("paper", "isotropic", "profile")
-MAX_RESIDUAL = 0.2  # of log10 C, a factor 1.6: larger ones make the fit meaningless at single wavelengths
+MAX_RESIDUAL = 0.2  # deviation of log10 C, a factor 1.6: larger ones make the fit meaningless at single wavelengths
 MAX_HURST_ERROR = 0.1  # the model's results at H and H +- 0.1 differ by tens of percent
 MAX_EXCESS = 10.0  # C over the law in a single bin; random with a probability below 1e-4
 MAX_PEAK = 100.0  # C over both its neighbourhoods; random in single samples with a probability of 2e-4
-MIN_VARIANCE_SHARE = 0.1  # of the variance; a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
+MIN_VARIANCE_SHARE = 0.1  # a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +63,7 @@ class SpectrumFit:
     roll_off: float | None  # wavenumber below which the spectrum is flat; None if it is not
     cut_off: float | None  # wavenumber above which it departs from the law, likewise
     variance_share: float  # of the measured variance of height, inside [q0, q1]
-    convention: str  # of the spectrum given; 'paper' for a map
+    convention: str  # convention of the given spectrum; 'paper' for a map
     windowed: bool = False
     detrend: str | None = None  # what was subtracted from the map; None for a spectrum
     anisotropy: float | None = None  # 0: all directions carry the same power, 1: one carries all; None for a spectrum

@@ -155,7 +155,7 @@ def _ratio(hurst: FloatArray, wanted: FloatArray, slope: FloatArray, name: str, 
     bounds = [slope * (end / wanted) ** (-0.5 if name == "Rsm" else 0.5) for end in (least, most)]
     low, high = (float(f(np.stack(bounds))) for f in (np.min, np.max))
     good = (wanted > least) & (wanted < most)
-    require(name, slope, good, f"between {low:.4g} and {high:.4g}, for 3 < q1/q0 < 1e8 with these wavelengths")
+    require(name, slope, good, f"between {low:.4g} and {high:.4g}, for a band of 3 < q1/q0 < 1e8 at these wavelengths")
     found = find_root(
         lambda x, h, goal: np.log(ratio(x, h) / goal), ends, args=(hurst, wanted), tolerances={"xrtol": 1e-15}
     )

@@ -32,7 +32,7 @@ from mbma_tables.surfaces.roughness import surface_of_roughness
 if TYPE_CHECKING:
     from mbma_tables.surfaces.psd import SpectrumFit
 
-LARGEST = 1e50  # of lengths and wavenumbers, whose powers stay finite
+LARGEST = 1e50  # limit of lengths and wavenumbers, so that their powers stay finite
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 

@@ -17,9 +17,9 @@ from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_arr
 NAYAK = 6 * math.pi * math.sqrt(3)  # summit density is m4 / (NAYAK m2), Eq. (2)
 RADIUS = 3 * math.sqrt(math.pi) / 8  # summit radius is RADIUS / sqrt(m4), Eq. (2)
 BROADENING = 0.8968  # summit variance is (1 - BROADENING/alpha) m0, Eq. (2)
-MIN_ZETA_1, MAX_ZETA_1 = 3.0, 1e8  # of a whole surface; above 3 for the floors 1.5 and 3 of (27), (30)
+MIN_ZETA_1, MAX_ZETA_1 = 3.0, 1e8  # limits for a surface; above 3 for the floors 1.5 and 3 of (27), (30)
 SHARES = {0: 2.0, 2: 1.0, 4: 0.75}  # of moments of order n, Eq. (7)
-BISECTIONS = 56  # of log(zeta_1), to rounding
+BISECTIONS = 56  # bisections of log(zeta_1), to rounding
 TINY = 1e-300  # in place of 0, where a quotient tends to 1
 
 

@@ -26,7 +26,7 @@ MIN_GRID = 32  # points along each side: 16 wavenumbers, the first of which is d
 FREE_HOLES = 0.05  # share of undefined points that is filled without being requested
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
-MIN_POWER = 1e-24  # of the strongest wavelength: below it rounding, not a measured wavelength
+MIN_POWER = 1e-24  # power over that of the strongest wavelength: lower values are rounding
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter")  # options that are lengths
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
 USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier; share of points up to which they are reported
@@ -85,7 +85,7 @@ class Treatment:
                 raise InputError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
 
 
-# of `Surface.from_map` and `Surface.from_profile`, about what is read and done to it
+# options of `Surface.from_map` and `Surface.from_profile` on reading and treatment
 OPTIONS = ("unit", "dx", "dy", "channel", "periodic", *(field.name for field in dataclasses.fields(Treatment)))
 
 

@@ -23,7 +23,7 @@ from mbma_tables.tablefiles import schema
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
-MAX_BYTES = 256 * 2**20  # of a file, and of its values
+MAX_BYTES = 256 * 2**20  # largest size of a file, and of its values
 # the HDF5 library is not thread-safe, and a process must not be forked during its calls
 HDF5_LOCK = threading.RLock()
 if hasattr(os, "register_at_fork"):
@@ -148,7 +148,7 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.
         schema.check_content(content)
     except ValueError as fault:
         raise _refuse(source, str(fault), kind or "all") from None
-    # what netCDF4 raises on bytes that are no netCDF file, or that lack a variable
+    # raised by netCDF4 for bytes that are not a netCDF file, or without a variable
     except (OSError, RuntimeError, LookupError) as fault:
         raise _refuse(source, f"is not a table file ({fault})", kind or "all") from None
     return content

@@ -89,7 +89,7 @@ def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, An
             raise ValueError(f"has variable {lost[0]}, which is not finite")
     except TableFileError as fault:
         raise TableFileError(f"{str(fault).partition('; rebuild')[0]}; {ADVICE}") from None
-    # what netCDF4 raises on bytes that are no netCDF file
+    # raised by netCDF4 for bytes that are not a netCDF file
     except (ValueError, OSError, RuntimeError, LookupError) as fault:
         raise TableFileError(f"{source}: {fault}; {ADVICE}") from None
     return values, own

@@ -24,7 +24,7 @@ ISLAND4D = "island4d"
 KINDS = (UNIVERSAL, ISLAND4D)
 FORMAT_VERSIONS = {UNIVERSAL: "2.0", ISLAND4D: "1.0"}
 COEFFICIENTS = {UNIVERSAL: "chebyshev", ISLAND4D: "spline"}
-DEGREE = 3  # of the splines of island4d
+DEGREE = 3  # degree of the splines of island4d
 AXES = {
     UNIVERSAL: (("X", "linear"), ("mu", "linear")),
     ISLAND4D: (("X", "log"), ("spread", "log"), ("sphere", "linear"), ("hurst", "linear")),
@@ -39,9 +39,9 @@ CELL_EDGES = {
     "mu_low": "least mu of a cell",
     "mu_high": "largest mu of a cell",
 }
-MAX_LOG_RATIO = 100.0  # of a ratio to the rigid sphere; those of the shipped tables are below 20
-MAX_BUCKETS, MAX_STEPS = 4096, 30_000  # of mu, eight an octave, and of X
-TERMS = 8  # of a Chebyshev series
+MAX_LOG_RATIO = 100.0  # largest logarithm of a ratio to the rigid sphere; in the shipped tables below 20
+MAX_BUCKETS, MAX_STEPS = 4096, 30_000  # largest numbers of buckets of mu, eight per octave, and of X
+TERMS = 8  # terms of a Chebyshev series
 LIMITS = {"mu": (0.0, np.inf), "spread": (0.0, np.inf), "sphere": (0.0, 1.0), "hurst": (0.0, 1.0)}
 ARGUMENTS = {UNIVERSAL: ("X", "mu"), ISLAND4D: ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")}
 REQUIRED = (

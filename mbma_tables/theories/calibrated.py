@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 # h_max/h_rms: simulated up to 5.5, beyond which separation and stiffness change by 0.1% at most from 0.1% contact on
 TESTED_HEIGHTS = (2.5, 8.0)
-NEAREST = 0.95  # of h_max: where the certificate of the table ends
+NEAREST = 0.95  # share of h_max at which the certificate of the table ends
 TAIL = 3.0, 0.8  # u/h_rms from which the error of the table grows, and its rate: exp(0.8 (u/h_rms - 3))
 # standard deviations added to that of Gaussian maps, for maps without `departures` and for others; with these, 70% of
 # docs/data/machined.nc lie within one and 93.5% within two standard deviations

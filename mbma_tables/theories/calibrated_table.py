@@ -38,7 +38,7 @@ class SurfaceSpline:
     step: FloatArray  # and their distance, shape (3,)
     covered: FloatArray  # first and last that are answered, shape (3, 2) or (2, 2)
     coefficients: FloatArray  # float32
-    law_constants: tuple[float, float, float]  # of the law beside the spline, for the core
+    law_constants: tuple[float, float, float]  # constants of the law other than the spline, for the core
 
     @functools.cached_property
     def cells(self) -> Any:

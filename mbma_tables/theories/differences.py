@@ -14,9 +14,9 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 
 ENOUGH = 2e-8  # relative, of derivatives or of their scale
-HALVINGS = 10  # of the step, at most
+HALVINGS = 10  # largest number of halvings of the step
 INTEGRAL_RTOL = 1e-9
-LEAST_LEVEL = 4  # of the rule for energies, whose error estimate may be too small by chance on coarse intervals
+LEAST_LEVEL = 4  # least level for energies: error estimates on coarse intervals may be too small by chance
 
 # places over the step, and weights of the derivative: in their middle, and at the first of them
 CENTRAL: tuple[Any, Any] = np.array([-1.0, -0.5, 0.5, 1.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 6
@@ -47,7 +47,7 @@ def differences(
             x = places[:, None] * h
             values = function(np.broadcast_to(left, x.shape).ravel(), x.ravel()).reshape(-1, *x.shape)
             slopes = np.swapaxes(weights @ values, 0, 1) / h
-            # of two steps at first, of one more later
+            # for two steps at first, then for one more
             coarse, fine = slopes if widths.size > 1 else (coarse, slopes[0])
             best = fine if apart else fine + (fine - coarse) / 15
             miss = np.abs(best - (coarse if apart else fine))

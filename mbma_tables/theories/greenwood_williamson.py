@@ -13,7 +13,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 EPSILON = 1e-13  # accuracy of the height integrals
-MAX_DEPTH = 37.0  # of d over the summits' standard deviation, where force does not underflow
+MAX_DEPTH = 37.0  # largest d over the summits' standard deviation without underflow of force
 MAX_AREA = 0.1  # A/A0 up to which asperities are nearly independent
 
 

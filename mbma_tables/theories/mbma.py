@@ -22,7 +22,7 @@ from mbma_tables.totals.island_sum import QUADRATURE_SHARE, Sums, kinks
 from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
-SECTIONS = 24  # of a scan's step, to 1e-6
+SECTIONS = 24  # golden sections of a scan's step, to 1e-6
 MOST_WORKERS = 1024
 MAX_AREA = 0.1  # above it islands begin to overlap (docs/fidelity.md)
 

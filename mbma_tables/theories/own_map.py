@@ -18,7 +18,7 @@ from mbma_tables.theories.calibrated_curves import own_law
 
 # A/A0 by the law of the map, at which it is simulated
 AREAS = (7e-4, 0.0015, 0.006, 0.012, 0.05, 0.09, 0.22, 0.3, 0.52, 0.65, 0.88, 0.95)
-MOST_POINTS = 2**20  # of a map that is simulated without change
+MOST_POINTS = 2**20  # points of the largest map that is simulated without change
 REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
 
 

@@ -27,7 +27,7 @@ LAMBDA = 4.047  # Eq. (21b)
 DECAY = 45.0  # exp(-DECAY) of an integrand's largest value counts as nothing
 MAX_RATIO = 26.0  # p0 over E* sqrt(m2) at which u is still a normal number, about exp(-676)
 MIN_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load of the inverse
-INVERSE_RTOL = 1e-10  # of a load found from its separation
+INVERSE_RTOL = 1e-10  # error of a load found from its separation
 
 # exp(-t) over [0, DECAY]: 64 nodes leave 1e-15
 _T, _T_WEIGHTS = DECAY / 2 * np.add(np.polynomial.legendre.leggauss(64), [[1], [0]])

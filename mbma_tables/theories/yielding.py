@@ -21,7 +21,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import known_at, shipped_part
 from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer, unfinished
 
-GROUP = "hardness"  # of the calibrated laws' file
+GROUP = "hardness"  # group of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "stiffness")
 TESTED_ETA = 0.025  # smallest p_m/(E* g) that was simulated
 REACHED = 1e-9  # relative, of forces at full compression
@@ -86,7 +86,7 @@ class Loaded:
     h_rms: FloatArray
     eta: FloatArray  # p_m/(E* g)
     load: FloatArray  # F/(A0 E* g)
-    answer: TheoryAnswer  # of loading
+    answer: TheoryAnswer  # result for loading
     elastic: TheoryAnswer  # of the elastic contact at u
     elastic_area: FloatArray  # A/A0 of the elastic contact at equal force
 

@@ -31,9 +31,9 @@ from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 
 NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
-GAPS = 10  # of a panel, at most: a series has 2 GAPS terms
+GAPS = 10  # largest number of gaps of a panel: a series has 2 GAPS terms
 CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])  # points where the polynomials' errors are largest
-# of delta, in which force, area, number of islands and Hertz area begin
+# leading powers of delta of force, area, number of islands and Hertz area
 POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
 KEPT = 64  # profiles in the cache
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
@@ -41,7 +41,7 @@ MAX_ROUNDS = 30
 BLOCK = 1 << 14  # gaps between two checks for interrupts
 MOST = 1000  # panels evaluated together
 
-# of approaches and which of them count: rows of `Panels.fields`, and their error
+# function of approaches and which of them are used: rows of `Panels.fields`, and their error
 Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 
 
@@ -71,7 +71,7 @@ def _rule(n: int, power: int) -> tuple[FloatArray, Any]:
     return np.concatenate([part.ravel() for part in held]), shares
 
 
-# of the panel from 0, where delta goes with the square of the place, of others, and of narrow ones
+# rules of the panel from 0, where delta is the square of the place, of others, and of narrow ones
 _RULES = [_rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)]
 RULES = np.concatenate([rule for rule, _ in _RULES])
 # positions in panels at which islands are evaluated, nodes and then CHECKS, and which of them are used
@@ -130,7 +130,7 @@ class Source(NamedTuple):
     peak: float  # h_max/h_rms
     layer: float  # where a band no longer reaches the shortest wavelength
     at_d: float  # where zeta_d reaches its floor
-    breaks: FloatArray  # where anything changes
+    breaks: FloatArray  # all breaks of the integrands
     jacobian: float  # K1 (47) below at_d
 
     def density(self, g: dict[str, FloatArray], x: FloatArray, height: Any = 0.0) -> FloatArray:

@@ -90,7 +90,7 @@ def test_where_an_answer_is_not_valid_is_said_in_one_line():
     arguments = ("contact", "--surface", "concrete", "-u", "0.8,0.01")
     lines = [line for line in run(*arguments).splitlines() if line.startswith("not valid")]
     assert lines == [
-        "not valid at 1 of 2: areas of islands are added, A/A0 is above 0.1 (1); "
+        "not valid at 1 of 2: areas of islands are added without overlap, but A/A0 is above 0.1 (1); "
         "stiffness falls with compression here, which no simulation shows (1)"
     ]
     found = json.loads(run(*arguments, "--json"))

@@ -85,7 +85,7 @@ def use():
     for form in range(8):
         more = [surfaces[2] if form > 5 else None] * 2
         core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
-    greenwood_tripp.radius(2.0, 0.5, 1e-6)
+    core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
 
     open_table("island4d").lookup(np.linspace(1.0, 2.0, 100), 3.0, 20.0, 0.8)
     universal = open_table("universal")

@@ -185,7 +185,6 @@ def test_bad_options(option, value):
 
 
 def test_nodes_are_bounded():
-    """4096 nodes took 136 s and 1.35 GB, without a word."""
     with pytest.raises(InputError, match=r"nodes must be a whole number in \[8, 1024\], got 4096"):
         greenwood_tripp.solve(10.0, 10.0, nodes=4096)
 

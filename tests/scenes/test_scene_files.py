@@ -222,7 +222,7 @@ def test_it_tells_what_the_shipped_file_states(effects, prescribed, name, quanti
 
 def test_what_else_is_advised_and_where_there_is_nothing_to_say():
     said = advice(Scene(SURFACE, effects=["conductance"], conductivities=(1.0, 1.0), pressures=[1e-4]))
-    assert "for conductance theory 'calibrated' is nearer" in said
+    assert "for conductance theory 'calibrated' is closer" in said
     assert said.count("\n") == 1
     own = dataclasses.replace(get_variant("printed"), name="own", beta=0.3)
     said = advice(Scene(SURFACE, effects=["stiffness"], areas=[1e-4], variant=own))

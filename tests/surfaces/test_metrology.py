@@ -146,17 +146,14 @@ class TestBatchOfMaps:
         assert found["columns"]["area"][1] == pytest.approx(known.area)
         assert found["columns"]["theory"] == ["calibrated", known.theory, "mbma"]
 
-    @pytest.mark.parametrize(
-        ("text", "message"),
-        [
+    def test_mistakes(self, folder):
+        for text, message in (
             ("map,surface\n1.npy,challenge\n", "a map and a named surface or numbers"),
             ("map,dx\nabsent.npy,1um\n", "there is no file"),
             ("surface,dx\nchallenge,1um\n", "for a map, which is missing"),
-        ],
-    )
-    def test_mistakes(self, folder, text, message):
-        (folder / "all.csv").write_text(text)
-        assert message in refused("batch", folder / "all.csv", "--area", "0.1")
+        ):
+            (folder / "all.csv").write_text(text)
+            assert message in refused("batch", folder / "all.csv", "--area", "0.1")
 
 
 SHARES = (np.arange(200_000) + 0.5) / 200_000

@@ -230,3 +230,22 @@ def test_beyond_the_heights_simulated_nothing_changes():
         for name, rtol in {"pressure": 1e-6, "mean_separation": 2e-4, "stiffness": 2e-3}.items():
             np.testing.assert_allclose(getattr(far, name), getattr(near, name), rtol=rtol)
         assert far.valid.all()
+
+
+def test_a_roll_off_by_name():
+    given = {"Rq": "0.5 um", "hurst": 0.7, "longest": "5 mm", "shortest": "4 um", "nominal_area": "4 cm^2"}
+    face, plain = Surface.from_roughness(**given, rolloff="250 um"), Surface.from_roughness(**given)
+    assert face.h_rms == pytest.approx(0.5, rel=1e-12)
+    q = 2 * np.pi / np.array([5000.0, 250.0, 4.0])
+    np.testing.assert_allclose(face.q, q)
+    assert face.C[0] == face.C[1]
+    assert face.C[1] / face.C[2] == pytest.approx((q[2] / q[1]) ** 3.4)
+    # the same variance over shorter wavelengths is rougher, and has a higher highest point in one area
+    assert face.rms_gradient > 3 * plain.rms_gradient
+    assert face.h_max > plain.h_max
+    assert any("flat" in text for text in face.provenance[0]["assumed"])
+    for bad, match in (({"rolloff": "5 um"}, "3 times shortest"), ({"rolloff": "6 mm"}, "longest")):
+        with pytest.raises(OutOfRangeError, match=match):
+            Surface.from_roughness(**given, **bad)
+    with pytest.raises(InputError, match="rolloff needs longest and shortest"):
+        Surface.from_roughness(**given | {"shortest": None, "Rdq": 0.1}, rolloff="250 um")

@@ -16,6 +16,7 @@ from scipy.special import erf
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.boundary_elements.evidence import cases
+from generate.boundary_elements.light import BINS, compared, recipes
 from generate.calibrated import errors
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
 from mbma_tables.common.files import shipped_file
@@ -439,7 +440,9 @@ def force_by_quadrature(surface, u):
             low, high = (middle, high) if gap(middle) > wanted else (low, middle)
         return np.exp(low - law.tail * wanted**3)
 
-    return endless(u) - endless(float(surface.h_max))
+    force = endless(u)
+    r = endless(float(surface.h_max)) / force
+    return force * (1 - r) ** 1.5 / (1 + r)
 
 
 def test_far_gaps_of_one_surface_against_quadrature():
@@ -463,3 +466,34 @@ def test_no_gap_is_beyond_its_stated_error(edge):
         seen = (pressure > 1e-290) & (u > 1e-5)
         off = found.pressure[seen] / (pressure[seen] * float(surface.rms_gradient)) - 1
         assert (np.abs(off) <= found.error[seen]).all()
+
+
+def test_light_loads_end_as_a_hertzian_contact_does():
+    """Stiffness over the cube root of pressure on a small surface, over pressure on a large one."""
+    small, large = (Surface(0.8, 1.0, 32.0, 1.0, top) for top in (3.0, 7.0))
+    for theory in (THEORY, "calibrated"):
+        depth = np.array([1e-8, 1e-7, 1e-6])
+        found = contact(small, mean_separation=3.0 - depth, theory=theory)
+        np.testing.assert_allclose(found.pressure / depth**1.5, found.pressure[0] / depth[0] ** 1.5, rtol=1e-4)
+        ratio = found.stiffness / found.pressure ** (1 / 3)
+        np.testing.assert_allclose(ratio, ratio[0], rtol=1e-4)
+    pressure = np.geomspace(1e-7, 1e-5, 9) * small.rms_gradient
+    rate = [contact(face, pressure=pressure, theory="calibrated") for face in (large, small)]
+    # of ln stiffness in ln pressure: near 1 without an end, near 1/3 close to it
+    exponents = [np.polyfit(np.log(pressure), np.log(one.stiffness), 1)[0] for one in rate]
+    assert 0.9 < exponents[0] < 1.0
+    assert 0.33 < exponents[1] < 0.6
+
+
+def test_light_loads_are_those_of_boundary_elements():
+    """Stiffness at equal pressure and 0.02% to 1% contact of docs/data/light_loads.npz, as docs/joints.md states it."""
+    with np.load(DATA / "light_loads.npz") as known:
+        rows = known["rows"].astype(float)
+    assert rows.shape[0] >= 20
+    errors = []
+    for recipe, own in zip(recipes(), rows, strict=True):
+        area, stiffness, _ = compared(recipe, own)
+        seen = (area > BINS[0]) & (area < BINS[-1]) & np.isfinite(stiffness)
+        errors.append(stiffness[seen])
+    assert abs(np.mean(np.concatenate(errors))) < 0.1
+    assert np.std(np.concatenate(errors)) < 0.3

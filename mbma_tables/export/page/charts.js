@@ -1,4 +1,4 @@
-// Four pictures by uPlot with one cursor, and the numbers under it.
+// Pictures by uPlot with one cursor, and the numbers under it.
 
 const STRESS_LABEL = OVER_E ? "E*" : (STRESS ?? "stress"),
   LENGTH_LABEL = LENGTH ?? "length";
@@ -7,14 +7,16 @@ const UNITS = {
   pressure: STRESS_LABEL,
   area: "",
   stiffness: `${STRESS_LABEL}/${LENGTH_LABEL}`,
-  conductance: `k_s/${LENGTH_LABEL}`,
+  tangential: `${STRESS_LABEL}/${LENGTH_LABEL}`,
+  conductance: METRE ? "W/(m² K)" : `k_s/${LENGTH_LABEL}`,
 };
 const TITLES = {
   gap: "mean separation u",
   pressure: "pressure F/A0",
   area: "contact area A/A0",
   stiffness: "stiffness −dF/du",
-  conductance: "conductance",
+  tangential: "tangential stiffness before slip",
+  conductance: "thermal conductance",
 };
 const withUnit = (name) => TITLES[name] + (UNITS[name] ? `  [${UNITS[name]}]` : "");
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -136,7 +138,7 @@ function tickTexts(own, splits) {
 function draw(state, found) {
   drawn = found;
   const theories = found.curves.map(({ theory }) => theory);
-  const names = [state.against === "gap" ? "pressure" : "gap", "area", "stiffness", "conductance"];
+  const names = [state.against === "gap" ? "pressure" : "gap", "conductance", "area", "stiffness", "tangential"];
   for (const [name, { chart, element }] of charts) {
     if (!names.includes(name)) {
       chart.destroy();

@@ -4,7 +4,7 @@ const GAPS = 100,
   PRESSURES = 100;
 const LIGHTEST = 1e-5,
   HEAVIEST = 1; // pressures drawn, over E* times the rms gradient
-const QUANTITIES = ["gap", "pressure", "area", "stiffness", "conductance"];
+const QUANTITIES = ["gap", "pressure", "area", "stiffness", "tangential", "conductance"];
 const NAMES = { mbma: "MBMA", calibrated: "calibrated", persson: "Persson" };
 
 function curvesOf(state) {
@@ -24,20 +24,24 @@ function curvesOf(state) {
         { length: PRESSURES },
         (_, k) => scale * LIGHTEST * (HEAVIEST / LIGHTEST) ** (k / (PRESSURES - 1)),
       );
+  const yields = Number.isFinite(state.hardness),
+    kappa = (2 - state.nu) / (2 * (1 - state.nu)); // normal over tangential stiffness
   const curves = theories.map((theory) => {
+    const at = yields && theory !== "persson" ? yielding(model, theory, state, h_rms, gradient) : model[theory],
+      refused = yields && theory === "persson";
     const curve = { theory, ...Object.fromEntries(QUANTITIES.map((name) => [name, new Array(x.length).fill(null)])) };
     curve.silence = [];
-    const gapAt = byGap ? (u) => u : separations(model, theory, state.h_max);
+    const gapAt = byGap ? (u) => u : separations(model, theory, state.h_max, at);
     x.forEach((value, k) => {
       const u = gapAt(value),
-        found = u > 0 ? model[theory](u) : null;
+        found = u > 0 && !refused ? at(u) : null;
       if (!found || !Number.isFinite(found.force)) {
-        curve.silence[k] = u > 0 ? model.why() : "it does not reach such a pressure";
+        curve.silence[k] = refused ? "with a hardness it is in the Python library" : u > 0 ? model.why() : "it does not reach such a pressure";
         return;
       }
-      const { force, area, stiffness } = found,
-        conductance = (state.k_s / state.E_star) * stiffness;
-      Object.entries({ gap: u, pressure: force, area, stiffness, conductance }).forEach(
+      const { force, area, stiffness, unloading = stiffness } = found,
+        conductance = ((state.k_s / state.E_star) * unloading) / (METRE ?? 1);
+      Object.entries({ gap: u, pressure: force, area, stiffness, tangential: unloading / kappa, conductance }).forEach(
         ([name, number]) => (curve[name][k] = number),
       );
     });
@@ -49,14 +53,14 @@ function curvesOf(state) {
 }
 
 // The mean separation at a pressure, on the branch of first contact; NaN beyond it.
-function separations(model, theory, h_max) {
+function separations(model, theory, h_max, at = model[theory]) {
   if (theory === "persson") return model.perssonSeparation;
   // ln of depth below h_max and of force: both fall by many decades towards first contact
   const nodes = [];
   for (let k = 1; k <= 60; ++k) {
     const share = k <= 20 ? 10 ** ((k - 20) / 5) * 0.05 : 0.05 + (0.95 * (k - 20)) / 40;
     const depth = h_max * (theory === "mbma" ? share : Math.min(share, 1 - 1e-6)),
-      found = model[theory](h_max - depth);
+      found = at(h_max - depth);
     if (!found || !(found.force > (nodes.at(-1)?.force ?? 0))) break;
     const { force, stiffness } = found;
     // x = ln depth against y = ln force
@@ -67,22 +71,22 @@ function separations(model, theory, h_max) {
     if (last < 0) return NaN;
     let low = last ? nodes[last - 1].x : -Infinity,
       high = nodes[last].x;
-    let at = last
+    let x = last
       ? cubic(nodes[last - 1], nodes[last], Math.log(pressure))
       : high + nodes[0].slope * Math.log(pressure / nodes[0].force);
     for (let k = 0; k < 60; ++k) {
-      if (!(at >= low && at <= high)) at = low > -Infinity ? (low + high) / 2 : high - 1;
-      const depth = Math.exp(at),
-        { force, stiffness } = model[theory](h_max - depth) ?? { force: NaN };
+      if (!(x >= low && x <= high)) x = low > -Infinity ? (low + high) / 2 : high - 1;
+      const depth = Math.exp(x),
+        { force, stiffness } = at(h_max - depth) ?? { force: NaN };
       const miss = Math.log(force / pressure),
         step = (miss * force) / (stiffness * depth);
-      if (miss > 0) high = at;
-      else low = at;
-      at -= step;
+      if (miss > 0) high = x;
+      else low = x;
+      x -= step;
       // Newton's method squares what is missing
       if (Math.abs(miss) < 1e-7) break;
     }
-    return h_max - Math.exp(at);
+    return h_max - Math.exp(x);
   };
 }
 
@@ -111,7 +115,8 @@ function scatterOf(state, curve) {
     const [[x0, y0], [x1, y1]] = [row[above - 1], row[above]];
     return Math.exp(y0 + ((y1 - y0) * (x - x0)) / (x1 - x0));
   };
-  return Object.fromEntries(["pressure", "area", "stiffness"].map((name) => [name, curve.area.map(at(name))]));
+  const known = Number.isFinite(state.hardness) ? () => () => null : at; // with a hardness the library has it
+  return Object.fromEntries(["pressure", "area", "stiffness"].map((name) => [name, curve.area.map(known(name))]));
 }
 
 // Reasons against a theory's answers, as `Contact.reasons`: each with whether it holds at a point.
@@ -122,6 +127,10 @@ function concernsOf(state, curve, h_rms, gradient) {
   reasons.push([
     "the rms gradient is above 1: are heights and wavenumbers in one unit?",
     always(gradient > LIMITS.gradient),
+  ]);
+  reasons.push([
+    "validity and scatter of a contact with a hardness are in the Python library",
+    always(Number.isFinite(state.hardness)),
   ]);
   if (state.samples && state.spectrum === FIRST.spectrum)
     DATA.departures.forEach((text) => reasons.push([text, always(true)]));

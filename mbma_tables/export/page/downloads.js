@@ -19,7 +19,7 @@ function factsOf(state) {
   return [
     `mbma_tables ${DATA.version}, page of mbma explore: ${DATA.title}`,
     ...surface,
-    `E* = ${state.E_star}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; k_s = ${state.k_s}`,
+    `E* = ${state.E_star}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; k_s = ${state.k_s}; ${Number.isFinite(state.hardness) ? `hardness ${state.hardness}` : "elastic"}; nu = ${state.nu}`,
     `lengths in ${LENGTH ?? "the unit of the surface"}, stresses ${OVER_E ? "over E*" : `in ${STRESS ?? "the unit of E*"}`}; u is the mean separation of the mean planes, first contact at h_max`,
     `theory ${state.theory}${state.theory === "mbma" ? `, variant ${state.variant}` : ""}`,
     `state ${addressOf(state)}`,
@@ -110,10 +110,11 @@ function commandOf(state) {
   const units = `${LENGTH ? ` --length-unit ${LENGTH}` : ""}${STRESS && !OVER_E ? ` --stress-unit ${STRESS}` : ""}`;
   return state.samples
     ? "mbma_tables.export.law_code.law_text of Surface.from_spectrum(q, C, h_max)"
-    : `mbma export c-law ${numbers.join(" ")}${units} --theory ${state.theory}${state.theory === "mbma" ? ` --variant ${state.variant}` : ""} --out law.c`;
+    : `mbma export c-law ${numbers.join(" ")}${Number.isFinite(state.hardness) ? ` --hardness ${state.hardness}` : ""}${units} --theory ${state.theory}${state.theory === "mbma" ? ` --variant ${state.variant}` : ""} --out law.c`;
 }
 
 function lawOf(state) {
+  if (Number.isFinite(state.hardness)) throw new Error(`with a hardness the library writes it: ${commandOf(state)}`);
   const { pieces, largest, endless } = piecesOf(state),
     count = pieces.length,
     terms = LAW_DEGREE + 1;

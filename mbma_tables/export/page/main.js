@@ -6,9 +6,10 @@ let { state, errors: addressErrors } = stateOf(location.hash);
 let writing = null; // of the address, a moment after the last change
 
 // A number by a field and a slider: linear from low to high, or logarithmic about the first value.
-for (const [name, { label, unit, group, low, high, decades }] of Object.entries(NUMBERS)) {
-  const row = document.createElement("div"),
-    centre = Math.log10(FIRST[name]);
+for (const [name, { label, unit, group, low, high, decades, wave }] of Object.entries(NUMBERS)) {
+  const own = (value) => (wave ? (2 * Math.PI) / value : value), // of the state or of the field
+    row = document.createElement("div"),
+    centre = Math.log10(own(Number.isFinite(FIRST[name]) ? FIRST[name] : FIRST.E_star / 50));
   row.className = "number";
   const field = Object.assign(document.createElement("input"), {
     id: name,
@@ -36,24 +37,25 @@ for (const [name, { label, unit, group, low, high, decades }] of Object.entries(
   const toValue = (place) =>
     decades ? 10 ** (centre + decades * (place / 500 - 1)) : low + ((high - low) * place) / 1000;
   slider.addEventListener("input", () => {
-    state[name] = Number(toValue(slider.valueAsNumber).toPrecision(6));
-    field.value = state[name];
+    const value = Number(toValue(slider.valueAsNumber).toPrecision(6));
+    state[name] = own(value);
+    field.value = value;
     update();
   });
   field.addEventListener("input", () => {
-    state[name] = field.value.trim() === "" ? NaN : Number(field.value);
+    state[name] = field.value.trim() === "" ? none(name) : own(Number(field.value));
     placeSlider();
     update();
   });
   function placeSlider() {
     const place = decades
-      ? 500 * ((Math.log10(state[name]) - centre) / decades + 1)
+      ? 500 * ((Math.log10(own(state[name])) - centre) / decades + 1)
       : (1000 * (state[name] - low)) / (high - low);
     if (Number.isFinite(place)) slider.value = Math.round(place);
-    slider.setAttribute("aria-valuetext", shown(state[name]));
+    slider.setAttribute("aria-valuetext", shown(own(state[name])));
   }
   NUMBERS[name].show = () => {
-    field.value = Number.isNaN(state[name]) ? "" : state[name];
+    field.value = Number.isFinite(state[name]) ? Number(own(state[name]).toPrecision(15)) : "";
     placeSlider();
   };
 }

@@ -1,16 +1,18 @@
 // What the page shows, as numbers and words: read from the address and the controls, checked, written to the address.
 
-const { length: LENGTH, stress: STRESS } = DATA.units;
+const { length: LENGTH, stress: STRESS, metre: METRE } = DATA.units;
 const OVER_E = STRESS === "1";
-const per = (unit) => (unit ? `1/${unit}` : "1/length");
 const NUMBERS = {
   hurst: { label: "H, Hurst exponent", unit: "", group: "numbers", low: 0.05, high: 1 },
-  q0: { label: "q₀, longest wave", unit: per(LENGTH), group: "numbers", decades: 2 },
-  q1: { label: "q₁, shortest wave", unit: per(LENGTH), group: "numbers", decades: 2 },
+  // wavenumbers, shown as wavelengths 2π/q
+  q0: { label: "longest wavelength, 2π/q₀", unit: LENGTH ?? "length", group: "numbers", decades: 2, wave: true },
+  q1: { label: "shortest wavelength, 2π/q₁", unit: LENGTH ?? "length", group: "numbers", decades: 2, wave: true },
   h_rms: { label: "h_rms, rms height", unit: LENGTH ?? "length", group: "numbers", decades: 1.5 },
   h_max: { label: "h_max, highest point", unit: LENGTH ?? "length", group: "height", decades: 1 },
   E_star: { label: "E*, effective modulus", unit: OVER_E ? "" : (STRESS ?? "stress"), group: "material", decades: 3 },
-  k_s: { label: "k_s, mean conductivity", unit: "", group: "material", decades: 3 },
+  hardness: { label: "hardness, empty: elastic", unit: OVER_E ? "E*" : (STRESS ?? "stress"), group: "material", decades: 2 },
+  k_s: { label: "k_s, mean conductivity", unit: METRE ? "W/(m K)" : "", group: "material", decades: 3 },
+  nu: { label: "ν, Poisson's ratio", unit: "", group: "material", low: 0, high: 0.5 },
 };
 const WORDS = {
   theory: ["mbma", "calibrated", "persson"],
@@ -26,7 +28,9 @@ const FIRST = {
   spectrum: "",
   convention: "paper",
   ...DATA.start,
+  hardness: DATA.start.hardness ?? Infinity,
 };
+const none = (name) => (name === "hardness" ? Infinity : NaN);
 
 // The state that an address asks for, and what is wrong with it.
 function stateOf(address) {
@@ -35,7 +39,7 @@ function stateOf(address) {
     errors = {};
   for (const [name, text] of asked) {
     if (name in NUMBERS) {
-      state[name] = text.trim() === "" ? NaN : Number(text);
+      state[name] = text.trim() === "" ? none(name) : Number(text);
     } else if (name in WORDS) {
       if (WORDS[name].includes(text)) state[name] = text;
       else errors.theory = `${name} must be one of ${WORDS[name].join(", ")}; the address has ${text}`;
@@ -91,7 +95,10 @@ function faultsOf(state) {
     floor = Math.max(3, DATA.model.variants[state.variant].numbers[4]); // of zeta_u
   for (const name of Object.keys(NUMBERS)) {
     const value = state[name];
+    if (name === "hardness" && value === Infinity) continue;
+    if (name === "nu" && value > -1 && value <= 0.5) continue;
     if (!Number.isFinite(value)) errors[name] = `${name} must be a number`;
+    else if (name === "nu") errors[name] = `nu must be in (-1, 0.5], got ${value}`;
     else if (!(value > 1e-300 && value < 1e300)) errors[name] = `${name} must be positive, got ${value}`;
   }
   if (state.spectrum !== "") {
@@ -111,8 +118,8 @@ function faultsOf(state) {
       mbma = state.theory === "mbma" || state.beside.includes("mbma"),
       least = mbma ? floor : 3;
     const which = least > 3 ? `, as variant ${state.variant} needs` : "";
-    if (!(zeta_1 > least)) errors.q1 = `q₁ must be more than ${least} q₀${which}; q₁/q₀ is ${shown(zeta_1)}`;
-    else if (!(zeta_1 <= 1e8)) errors.q1 = `q₁ must be at most 1e8 q₀; q₁/q₀ is ${shown(zeta_1)}`;
+    if (!(zeta_1 > least)) errors.q1 = `longest must be more than ${least} times shortest${which}, it is ${shown(zeta_1)} times`;
+    else if (!(zeta_1 <= 1e8)) errors.q1 = `longest must be at most 1e8 times shortest, it is ${shown(zeta_1)} times`;
   }
   return errors;
 }
