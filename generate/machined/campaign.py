@@ -23,7 +23,7 @@ from generate.provenance import source_digest, versions
 
 NUMBERS = 5  # parts of each family
 FORMS = ("calibrated", "corrected", "simulated")
-MODULES = ("generate.machined.makers", "generate.machined.solve", "mbma_tables.laws.boundary_elements")
+MODULES = ("generate.machined.makers", "generate.machined.solve", "generate.boundary_elements.tamaas_contact")
 TARGET = pathlib.Path("docs/data/machined.nc")
 MEANINGS = {
     "pressure": "F/(A0 E*)",

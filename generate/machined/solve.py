@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import Part, heights
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads

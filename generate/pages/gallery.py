@@ -22,8 +22,8 @@ from mbma_tables.common.files import write_file
 from mbma_tables.laws.boundary_elements import LOADS
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.treatment import mirrored
 from mbma_tables.theories import BoundaryElements, get_theory
-from mbma_tables.theories.own_map import continued
 from mbma_tables.theories.protocol import Theory
 from mbma_tables.theories.wrapped import answer_where_finite
 
@@ -82,7 +82,7 @@ def written(rows: dict[str, FloatArray]) -> bytes:
 def refined(path: pathlib.Path, options: dict[str, Any]) -> FloatArray:
     """Light loads of a map on twice as many points along each side, by Fourier interpolation: ten minutes."""
     treated = measured(path, options)[0]
-    values, _ = continued(treated)
+    values = mirrored(treated.heights - treated.heights.mean())
     for axis, count in enumerate(values.shape):
         values = resample(values, 2 * count, axis=axis)
     steps = [step / 2 for step in treated.steps]

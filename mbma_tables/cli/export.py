@@ -64,6 +64,7 @@ class _Export(click.Command):
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option("--leakage", is_flag=True, help="Flow coefficient of the gaps: rows of it alone, laws as code with it.")
+@click.option("--direction", metavar="x|y|DEGREES", help="Of leakage of a map; else the mean of both axes.")
 @click.option(
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )
@@ -92,6 +93,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     kind = targets().get(special) or targets()[target]
     _refuse_unused(kind, given)
     given.pop("exponential", None)
+    if "direction" in given and "leakage" not in given:
+        raise InputError("--direction is of leakage: add --leakage or leave it out")
     if target in group("CODE"):
         _export_code(target, out, values["variant"], "check" in given)
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
@@ -18,6 +19,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, in_unit, resolve
 from mbma_tables.law.law import ContactLaw
+from mbma_tables.law.leakage import LeakageLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.materials import ELASTIC_PSI, hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -46,11 +48,17 @@ class Joint:
     length: str  # unit of length,
     stress: str  # and of stress
     made_by: tuple[str, ...] = ()  # lines of a file's head that say how to write it again
+    direction: str | float | None = None  # of a simulated map's leakage
 
     @property
     def units(self) -> Units:
         """Both units."""
         return Units(self.length, self.stress)
+
+    @functools.cached_property
+    def leakage(self) -> LeakageLaw:
+        """The law's leakage, in its direction."""
+        return self.law.leakage if self.direction is None else self.law.leakage.along(self.direction)
 
     def answer(self, u: FloatArray) -> Contact:
         """The theory itself at mean separations."""
@@ -157,17 +165,18 @@ class Joint:
 
     def _of_leakage(self, scatter: Numbers, pressure: FloatArray) -> tuple[str, ...]:
         """What a reader of leakage must know."""
-        blocked, least = self.law.leakage.blocked_at, "never blocked"
+        blocked, least = self.leakage.blocked_at, "never blocked"
         if blocked > -np.inf:
             c = (self.law.h_max - blocked) / 2
             load = float(self.law.pressure(separation=blocked))
             least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
+        way = "" if self.law.pressed is None else f", direction {self.direction or 'both, their geometric mean'}"
         return (
-            f"leakage is the flow coefficient K [{self.length}^3] of the gaps: flow per length of seal is "
+            f"leakage is the flow coefficient K [{self.length}^3] of the gaps{way}: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "
             f"{1e-3 * factor('Pa', self.stress, 'stress'):.4g} {self.stress} s",
             least,
-            f"K is within {self.law.leakage.error:.1e} of that at the law's area",
+            f"K is within {self.leakage.error:.1e} of that at the law's area",
             "scatter of K from simulation to simulation, "
             + self._spread("one standard deviation of ln K", scatter, pressure),
         )
@@ -193,6 +202,7 @@ def frozen_joint(
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
     made_by: tuple[str, ...] = (),
+    direction: str | float | None = None,
 ) -> Joint:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
     surface = in_unit(surface, length_unit)
@@ -205,7 +215,7 @@ def frozen_joint(
     own = chosen_theory(surface, theory, variant=variant)
     law = contact_law(surface, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    return Joint(surface, law, own, modulus, float(cap), length, stress, made_by)
+    return Joint(surface, law, own, modulus, float(cap), length, stress, made_by, direction)
 
 
 def _known(name: str, unit: str | None) -> str:

@@ -50,7 +50,8 @@ def law_text(
     target : str
         One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`.
     surface, E_star, **asked
-        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit.
+        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit,
+        direction.
     name : str
         What functions, modules or packages are called, or begin with.
     leakage : bool
@@ -141,7 +142,7 @@ def asked_law(
         raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
     more = {"conductance": f"{k_unit}/{joint.length}"} if conducts else {}
     more |= {"leakage": f"{joint.length}^3"} if leakage else {}
-    numbers, flow = law_numbers(joint.law), flow_numbers(joint.law.leakage) if leakage else None
+    numbers, flow = law_numbers(joint.law), flow_numbers(joint.leakage) if leakage else None
     return AskedLaw(joint, numbers, flow, k_s / joint.modulus, more, _head(joint, numbers, more))
 
 
@@ -181,7 +182,7 @@ def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str
     parts = {place: number(value) for place, value in ends.items()}
     blocks = {"": law.block}
     if asked.flow:
-        blocks["FLOW_"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
+        blocks["FLOW_"], parts["FLOW_H_RMS"] = asked.joint.leakage.block, number(asked.flow.h_rms)
     if target == "javascript-law":
         held = {"WASM": page_file(LAW_MODULE)}
         held |= {f"{prefix}BLOCK": block.astype("<f8", copy=False).tobytes() for prefix, block in blocks.items()}

@@ -82,7 +82,7 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
     if quantity == "pressure":
         return c, pressure
     if quantity == "leakage":
-        flow = np.asarray(law.leakage(separation=d))
+        flow = np.asarray(joint.leakage(separation=d))
         # the first row that is blocked is the last
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
         return pressure[open_], flow[open_]
@@ -111,6 +111,7 @@ def describe_law(
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
     made_by: tuple[str, ...] = (),
+    direction: str | float | None = None,
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -147,6 +148,8 @@ def describe_law(
         Equally spaced rows instead, for comparison.
     made_by : tuple of str
         Lines for the header of a file that say how to write it again.
+    direction : str or float, optional
+        Of leakage of a simulated map: "x", "y" or degrees from x; else the geometric mean of both axes.
 
     Raises
     ------
@@ -163,7 +166,7 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
+    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by, direction)
     law, units = joint.law, joint.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
     k_s, names = 1.0, (own := ("overclosure", "pressure", joint.length, joint.stress))
@@ -196,7 +199,7 @@ def _table(
     if quantity == "leakage":
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
-            floor = float(law.leakage(separation=law.separation(area=LARGEST_AREA)))
+            floor = float(joint.leakage(separation=law.separation(area=LARGEST_AREA)))
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
@@ -208,7 +211,7 @@ def _table(
     x, y, error = choose(fine_x, fine_y, floor, jump=heat or law.highest < np.inf)
     comments = joint.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
-        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
+        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(joint, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
         *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
@@ -218,9 +221,10 @@ def _table(
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour)
 
 
-def _why_there(law: ContactLaw, end: float, quantity: str) -> str:
+def _why_there(joint: Joint, end: float, quantity: str) -> str:
     """Why rows end where they do."""
-    if quantity == "leakage" and law.leakage.blocked_at >= law.h_max - 2 * end:
+    law = joint.law
+    if quantity == "leakage" and joint.leakage.blocked_at >= law.h_max - 2 * end:
         return "where contact blocks the gaps"
     if end < _last(law) * (1 - ROUNDING):
         return "the largest asked for"

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from mbma_tables.export.law_rows import LawTable
 
 LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit"})
-ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
-CODE = LAW | {"name", "leakage"}
+ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "direction"}
+CODE = LAW | {"name", "leakage", "direction"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "GRAPHS": "onnx", "CODE": "code"}
 

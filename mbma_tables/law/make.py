@@ -117,6 +117,8 @@ def contact_law(
         raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, **yields}
+    if getattr(chosen.elastic, "pressed", None) is not None:
+        facts["pressed"] = chosen.elastic
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:

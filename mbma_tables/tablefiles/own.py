@@ -26,7 +26,7 @@ from mbma_tables.tablefiles.netcdf import (
     verified,
 )
 
-KIND, FORMAT = "simulated_map", "1.0"
+KIND, FORMAT = "simulated_map", "2.0"
 REQUIRED = ("mbma_kind", "format_version", "values_sha256")
 ADVICE = "make it anew: `mbma fit MAP --simulate --out OWN.nc`"
 

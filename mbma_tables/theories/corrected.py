@@ -10,9 +10,7 @@ change is negative. What the law, and the quarter grid carried likewise, differ 
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-import importlib.util
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from scipy.special import erf, erfinv
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.laws.energy_spline import LARGEST_AREA, LoadCurve
-from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, TOLERANCE, Pressed, coarser, press
+from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, TOLERANCE, Press, coarser
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map
 from mbma_tables.surfaces.spectral import PRESSED
@@ -35,7 +33,7 @@ from mbma_tables.theories.simulated import BoundaryElements
 LIGHT = 0.01  # contact below which the law's own area counts, too
 FINE = 4000  # loads over which the law's change is integrated
 LOWEST, HIGHEST = 3e-3, 0.8  # A/A0 that was tested
-# points along a side, and of the map with its continuation, between which it is the default
+# points along a side, and of the map, between which it is the default
 LEAST_SIDE, MOST_POINTS = 64, 2**18
 # a, b and c of the scatter, root of a^2 + (b D1)^2 + (c D2)^2: D1 is what the law differs by from the answer, D2 what
 # that by the quarter grid does; fitted to the 65 maps of `python -m generate machined` (generate/machined/coverage.py)
@@ -48,12 +46,16 @@ class Corrected(BoundaryElements):
 
     name = "corrected"
 
-    def __init__(self, surface: MeasuredSurface, half: Pressed, quarter: FloatArray) -> None:
-        pressure, area, u, energy = half.rows
+    def __init__(self, surface: MeasuredSurface, half: FloatArray, quarter: FloatArray, tolerance: float) -> None:
+        pressure, area, u, energy = half
         whole = own_map.map_of(surface)
         points, origin = own_map.steps_along(surface, whole), f"corrected by {own_map.origin_of(whole, TOLERANCE)}"
-        super().__init__(surface, pressure, area, u, energy, points, whole.heights.size, half, True, origin)
-        law, other = own_law(surface), LoadCurve(quarter)
+        # flow is that of the full grid
+        mirrored, law = not whole.periodic, own_law(surface)
+        heights = whole.heights - whole.heights.mean()
+        pressed = Press(heights, own_map.sides(whole), law.gradient, tolerance, mirrored)
+        super().__init__(surface, pressure, area, u, energy, points, whole.heights.size, pressed, True, origin)
+        other = LoadCurve(quarter)
         x = self.fit.x
         inside = np.clip(x, other.x[0], other.x[-1])
         gaps = np.array([law.separations(pressure), other.separation(inside)])
@@ -72,7 +74,7 @@ class Corrected(BoundaryElements):
         """Press half and quarter of the grid of a surface from `mbma_tables.Surface.from_map`."""
         own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        return cls(surface, _carried(surface, 1, tolerance), _carried(surface, 2, tolerance).rows)
+        return cls(surface, _carried(surface, 1, tolerance), _carried(surface, 2, tolerance), tolerance)
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons against maps unlike those tested, and contact areas that were not tested."""
@@ -100,17 +102,17 @@ class Corrected(BoundaryElements):
         return np.where(self._beyond(area), np.nan, found)
 
 
-def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Pressed:
-    """The map pressed on a coarser grid, and carried to the full one; loads end where the gap no longer falls."""
-    values, sizes = own_map.continued(own_map.map_of(surface))
-    coarse = values
+def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> FloatArray:
+    """Rows of a map pressed on a coarser grid, carried to the full one; loads end where the gap no longer falls."""
+    whole = own_map.map_of(surface)
+    coarse, sizes = whole.heights - whole.heights.mean(), own_map.sides(whole)
     for _ in range(halvings):
-        coarse = coarser(coarse, MIN_POINTS)
+        coarse = coarser(coarse, MIN_POINTS, not whole.periodic)
     steps = tuple(side / count for side, count in zip(sizes, coarse.shape, strict=True))
-    law, other = own_law(surface), OwnLaw(MeasuredSurface.of(measured_map(Treated(coarse, steps, True, None), None)))
-    loads = own_map.law_loads(surface, own_map.AREAS)
-    found = press(coarse, sizes, loads, MIN_POINTS, law.gradient, None, tolerance)
-    pressure, area, u, energy = found.rows
+    treated = Treated(coarse, steps, whole.periodic, None, window=whole.window)
+    law, other = own_law(surface), OwnLaw(MeasuredSurface.of(measured_map(treated, None)))
+    press = Press(coarse, sizes, law.gradient, tolerance, not whole.periodic)
+    pressure, (area, u, energy) = press.loads(own_map.law_loads(surface, own_map.AREAS), False)
     change = law.separations(pressure) - other.separations(pressure)
     # the coarse grid may be in full contact
     lower = u * np.exp(np.minimum(change, 0.0) / np.maximum(u, np.finfo(float).tiny))
@@ -128,21 +130,18 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
     kept = int(np.count_nonzero(np.cumprod((np.diff(gap, prepend=np.inf) < 0) & (rows[3] > 0))))
     if kept < simulated.MIN_LOADS:
         raise ConvergenceError("the law of this map changes so much with its grid that nothing is left to correct")
-    return dataclasses.replace(
-        found, heights=values, rows=rows[:, :kept], coarse_from=kept, gaps=found.gaps[:kept], cut=MIN_POINTS
-    )
+    return rows[:, :kept]
 
 
 def applies(surface: AnySurface) -> bool:
-    """Whether it is the default for a surface: Tamaas is installed, the map resolved, and pressed within seconds."""
+    """Whether it is the default for a surface: of a map that is resolved, and pressed within seconds."""
     if not isinstance(surface, MeasuredSurface) or surface.map is None or surface.bands is None:
         return False
     whole = surface.map
-    if whole.heights.ndim != 2 or not importlib.util.find_spec("tamaas"):
+    if whole.heights.ndim != 2:
         return False
-    size = whole.heights.size * (1 if whole.periodic else 4)
     resolved = own_map.steps_along(surface, whole) >= MIN_POINTS * (1 - ROUNDING)
-    if size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or not resolved:
+    if whole.heights.size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or not resolved:
         return False
     try:
         return of_map(Corrected.name, surface).ends_at_h_max

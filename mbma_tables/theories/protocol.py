@@ -133,7 +133,7 @@ class Theory(abc.ABC):
         return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficient [length^3] along both axes, shape (2, ...), of simulated gaps, if there are any."""
+        """Flow coefficients xx, yy and xy [length^3], shape (3, ...), of simulated gaps, if there are any."""
         return None
 
     def flow_trust(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import os
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws.energy_spline import Continued, LoadCurve, left_out
-from mbma_tables.laws.pressing import HIGHEST, LOWEST, ROUNDING, TOLERANCE, Pressed, Table, press
+from mbma_tables.laws.pressing import HIGHEST, LOWEST, ROUNDING, TOLERANCE, Press, Table
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -56,8 +55,8 @@ class BoundaryElements(Theory):
         Sampling steps along the shortest wave; below four areas are too large, and answers are not `valid`.
     elements : float, optional
         Of the map that do not repeat each other; 1, where the number is not known, leaves `error` to the first bound.
-    pressed : Pressed or Table, optional
-        What they are of, with the gaps at each load or the flow along both axes.
+    pressed : Press or Table, optional
+        What they are of, from which the flow is known.
     origin : str, optional
         Of which map, and by what.
     own_loads : bool, optional
@@ -92,7 +91,7 @@ class BoundaryElements(Theory):
         energy: ArrayLike,
         points: float = np.inf,
         elements: float = 1.0,
-        pressed: Pressed | Table | None = None,
+        pressed: Press | Table | None = None,
         own_loads: bool = False,
         origin: str = "",
     ) -> None:
@@ -107,14 +106,10 @@ class BoundaryElements(Theory):
         require("area", rows[1], np.diff(rows[1], prepend=0) >= 0, "rising")
         require("mean_separation", rows[2], np.diff(rows[2], prepend=np.inf) < 0, "falling")
         self.rows = rows
-        split = rows.shape[1] if pressed is None else pressed.coarse_from
-        self._apart = split - 1 if split < rows.shape[1] else -1
         # an h_max that was stated may lie below the gap of the first load
         self.ends_at_h_max = own_loads and bool(rows[2, 0] < float(np.asarray(surface.h_max)))
-        self.fit = LoadCurve(rows, self._apart)
-        if self.ends_at_h_max:
-            self.fit = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
-        self._left_out = left_out(rows, self._apart)
+        self.fit = Continued(rows, float(np.asarray(surface.h_max))) if self.ends_at_h_max else LoadCurve(rows)
+        self._left_out = left_out(rows)
 
     @classmethod
     def of(
@@ -133,20 +128,19 @@ class BoundaryElements(Theory):
             return cls(surface, F, A, u, U, table.points, table.elements, table, True, table.origin)
         whole = own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        values, sizes = own_map.continued(whole)
-        values, points, cut = own_map.reduced(values, own_map.steps_along(surface, whole))
+        steps, mirrored = own_map.steps_along(surface, whole), not whole.periodic
+        values, points, cut = own_map.reduced(whole.heights - whole.heights.mean(), steps, mirrored)
         gradient = own_law(surface).gradient
         if loads is None:
-            wanted, law_area = own_map.law_loads(surface, own_map.AREAS), own_law(surface).area
+            wanted = own_map.law_loads(surface, own_map.AREAS)
         else:
             given = finite_array("loads", loads)
             require("loads", given, (given > 0) & (np.diff(given, prepend=0) > 0), "positive and rising")
-            wanted, law_area = gradient * given, None
-        found = press(values, sizes, wanted, points, gradient, law_area, tolerance)
-        found = dataclasses.replace(found, left_out=cut * max(whole.steps))
-        pressure, area, u, energy = found.rows
+            wanted = gradient * given
+        press = Press(values, own_map.sides(whole), gradient, tolerance, mirrored, left_out=cut * max(whole.steps))
+        pressure, (area, u, energy) = press.loads(wanted, loads is None)
         size, origin = whole.heights.size, own_map.origin_of(whole, tolerance)
-        return cls(surface, pressure, area, u, energy, points, size, found, loads is None, origin)
+        return cls(surface, pressure, area, u, energy, points, size, press, loads is None, origin)
 
     @classmethod
     def from_map(
@@ -265,34 +259,48 @@ class BoundaryElements(Theory):
         return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
 
     @functools.cached_property
-    def _flows(self) -> FloatArray:
-        """Flow along both axes at each load, found when it is first read."""
+    def _flows(self) -> tuple[FloatArray, FloatArray]:
+        """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
         assert self.pressed is not None
-        return self.pressed.flow()
+        return self.pressed.flows(self.fit.x, self.fit.separation)
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficient [length^3] along both axes, by the gaps; 0 from the load at which an axis is blocked."""
+        """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked.
+
+        Along an axis that closes at u1, ln K over ln(u - u1) is a monotone cubic, straight below the last open load;
+        xy is sqrt(xx yy) times what is linear in u.
+        """
         if self.pressed is None:
             return None
-        u = self._within(surface, mean_separation)
-        found = np.zeros((2, *u.shape))
-        for axis, (known, (last, end)) in enumerate(zip(self._flows.T, self._closing, strict=True)):
-            if last <= self.rows[2, 1]:
-                passing = self.rows[2] >= last
-                curve = PchipInterpolator(np.log(self.rows[2, passing][::-1]), np.log(known[passing][::-1]))
-                # beyond the last open load as steep as before it, wider gaps by their cube
+        # bodies apart are farther apart than the theory needs
+        u = np.maximum(self._within(surface, mean_separation), mean_separation)
+        gaps, known = self._flows
+        found = np.zeros((3, *u.shape))
+        for axis, (last, end) in enumerate(self.closing):
+            passing = (gaps >= last) & (known[:, axis] > 0)
+            if passing.any():
+                x, y = np.log(gaps[passing][::-1] - end), np.log(known[passing, axis][::-1])
+                if x.size == 1:
+                    x, y = np.append(x - 1, x), np.append(y - 3, y)
+                curve = PchipInterpolator(x, y)
                 with np.errstate(divide="ignore"):
-                    below = np.minimum(np.log(u / last), 0.0) * curve(np.log(last), 1)
-                wider = np.maximum(u / self.rows[2, 0], 1.0) ** 3
-                inside = np.log(np.clip(u, last, self.rows[2, 0]))
-                found[axis] = np.where(u > end, np.exp(curve(inside) + below) * wider, 0.0)
+                    own = np.log(np.maximum(np.minimum(u, gaps[0]) - end, 0.0))
+                below = max(float(curve(x[0], 1)), 1.0) * np.minimum(own - x[0], 0.0)
+                found[axis] = np.exp(curve(np.maximum(own, x[0])) + below)
+                # towards parallel planes, which pass the cube of their distance
+                wide = u**3 - (gaps[0] ** 3 - known[0, axis]) * u / gaps[0]
+                found[axis] = np.where(u > gaps[0], wide, found[axis])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = np.nan_to_num(known[:, 2] / np.sqrt(known[:, 0] * known[:, 1]))
+        found[2] = np.sqrt(found[0] * found[1]) * np.interp(-u, -gaps, turn)
         return found
 
-    @property
-    def _closing(self) -> list[tuple[float, float]]:
-        """Of both axes, u of the last load at which it is open and of the first at which it is blocked."""
-        u = np.append(self.rows[2], 0.0)
-        return [(float(u[max(k - 1, 0)]), float(u[k])) for k in np.cumprod(self._flows > 0, axis=0).sum(axis=0)]
+    @functools.cached_property
+    def closing(self) -> list[tuple[float, float]]:
+        """Of both axes, u of the last load at which it is open and of the first at which it is blocked [length]."""
+        gaps, known = self._flows
+        u = np.append(gaps, 0.0)
+        return [(float(u[max(k - 1, 0)]), float(u[k])) for k in np.cumprod(known[:, :2] > 0, axis=0).sum(axis=0)]
 
     def flow_trust(
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
@@ -300,7 +308,7 @@ class BoundaryElements(Theory):
         """Standard deviation of ln of that flow on maps that were tested, and where an axis may be blocked."""
         if self.pressed is None:
             return None
-        near = [(mean_separation < last) & (mean_separation > end) for last, end in self._closing]
+        near = [(mean_separation < last) & (mean_separation > end) for last, end in self.closing]
         reasons = {
             "leakage: the map may be blocked, which it is at the next simulated load": np.logical_or(*near),
             f"leakage: A/A0 is above {AREA_OF_FLOW:g}": area > AREA_OF_FLOW,
