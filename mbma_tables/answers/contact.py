@@ -218,9 +218,9 @@ def _contact(
     theory: Any = source.theory
     if source.yields:
         # what it needs of scipy takes long to import
-        from mbma_tables.theories.yielding import Yielding
+        from mbma_tables.theories.saturated import with_hardness
 
-        theory = Yielding(theory, cap / modulus)
+        theory = with_hardness(theory, cap / modulus)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
     held = by if by in QUANTITIES else None
     by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}

@@ -129,7 +129,7 @@ class Leakage(Displayed):
         """
 
         def stated(by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> FloatArray:
-            own = by.elastic.flow_trust(surface, u, area)
+            own = _simulated(by).flow_trust(surface, u, area)
             if own is not None:
                 return own[0]
             stated = shipped_flow().standard_deviation(by.elastic.name, area)
@@ -264,7 +264,7 @@ def leakage_of(contact: Any) -> Leakage:
     """The leakage of a contact."""
 
     def answer(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
-        own, volume = theory.elastic.flow(surface, u), np.asarray(surface.h_rms) ** 3
+        own, volume = _simulated(theory).flow(surface, u), np.asarray(surface.h_rms) ** 3
         if own is not None:
             return np.sqrt(own[0]) * np.sqrt(own[1]), *own
         K = flow(surface, u, share) * volume
@@ -272,6 +272,11 @@ def leakage_of(contact: Any) -> Leakage:
 
     K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact._touching})
     return Leakage(K, x, y, xy, contact)
+
+
+def _simulated(theory: Theory) -> Theory:
+    """What the flow is of: of yielded gaps where these are simulated, else of the elastic contact's."""
+    return theory if type(theory).flow_trust is not Theory.flow_trust else theory.elastic
 
 
 def degrees(direction: ArrayLike | str) -> FloatArray:
@@ -311,12 +316,12 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
 
 def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
     """Reasons against the flow, beside those against the contact."""
-    own = theory.elastic.flow_trust(surface, u, area)
+    own = _simulated(theory).flow_trust(surface, u, area)
     large = np.broadcast_to(np.asarray(surface.zeta_1) > SIMULATED, np.shape(area))
     many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
     far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
     found = {many: area > LARGEST_AREA, far: large} if own is None else dict(own[1])
-    if theory.elastic is not theory:
+    if _simulated(theory) is not theory:
         found["leakage: yielded contacts leak more, by factors"] = np.ones(np.shape(area), bool)
     if isinstance(theory.elastic, Mbma):
         found["leakage: the mean separation of 'mbma' is off by factors"] = np.ones(np.shape(area), bool)

@@ -170,7 +170,7 @@ class Joint:
             c = (self.law.h_max - blocked) / 2
             load = float(self.law.pressure(separation=blocked))
             least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
-        way = "" if self.law.pressed is None else f", direction {self.direction or 'both, their geometric mean'}"
+        way = "" if self.law.gaps is None else f", direction {self.direction or 'both, their geometric mean'}"
         return (
             f"leakage is the flow coefficient K [{self.length}^3] of the gaps{way}: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "

@@ -84,7 +84,7 @@ class ContactLaw(Law, Derived, Displayed):
         With a hardness, what makes the law of the elastic contact.
     materials : Pair or None
         Where they are named.
-    pressed : theory or None
+    gaps : theory or None
         Of a simulated map, what knows the flow through its gaps.
 
     Examples
@@ -116,7 +116,7 @@ class ContactLaw(Law, Derived, Displayed):
     hardness: float = math.inf
     elastic: Callable[[], ContactLaw] | None = None
     materials: Pair | None = None
-    pressed: Any = None
+    gaps: Any = None
 
     @property
     def rows(self) -> Any:

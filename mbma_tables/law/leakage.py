@@ -43,7 +43,7 @@ class LeakageLaw:
     def along(self, direction: str | float) -> LeakageLaw:
         """Of a simulated map, the same along an axis, "x" or "y", or in a direction in degrees from x; else itself."""
         found = number_in("direction", degrees(direction), -360.0, 360.0)
-        return self if self.law.pressed is None else leakage_law(self.law, self.law.surface, found)
+        return self if self.law.gaps is None else leakage_law(self.law, self.law.surface, found)
 
     def __call__(
         self,
@@ -84,7 +84,7 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
     h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
     top = min(law.h_max, law.highest) if law.block.view(np.int64)[at.ENDS] else law.highest
     turns: tuple[float, ...] = ()
-    if law.pressed is None:
+    if law.gaps is None:
         threshold = shipped_flow().constants.threshold
         deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
         blocked = bool(law.area(separation=deepest) >= threshold)
@@ -99,9 +99,9 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
 
     def coefficient(d: FloatArray) -> FloatArray:
         u = (law.h_max + d) / 2
-        if law.pressed is None:
+        if law.gaps is None:
             return h_rms**3 * flow(surface, u, np.asarray(law.area(separation=d)))
-        x, y, xy = law.pressed.flow(surface, u)
+        x, y, xy = law.gaps.flow(surface, u)
         return np.asarray(np.sqrt(x * y) if direction is None else along(direction, x, y, xy))
 
     def values(x: FloatArray) -> FloatArray:
@@ -126,7 +126,7 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
     block.view(np.int64)[at.ENDS] = blocked
     block.flags.writeable = False
     error = float(errors[:, 0].max()) + _between_nodes(pieces, values)
-    if law.pressed is not None:
+    if law.gaps is not None:
         # bodies apart: the h_rms of the wide gap that continues it
         missed = 1 - float(values(np.array(1.0))[0]) / ((law.h_max + top) / 2) ** 3
         h_rms = law.h_max / np.sqrt(max(1.5 / max(missed, 1e-6) - 4, 1e-3))
@@ -135,13 +135,13 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
 
 def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
     """Separation of a simulated map from which on it is open, and separations of kinks."""
-    ends = [2 * end - law.h_max for _, end in law.pressed.closing]
+    ends = [2 * end - law.h_max for _, end in law.gaps.closing]
     shares = np.abs(np.sin(np.deg2rad([90.0, 0.0] if direction is None else [90.0 + direction, direction])))
     if direction is None:
         bottom = max(ends)
     else:
         bottom = min(end for end, share in zip(ends, shares, strict=True) if share > 1e-9)
-    first = 2 * float(law.pressed.rows[2, 0]) - law.h_max
+    first = 2 * float(law.gaps.rows[2, 0]) - law.h_max
     if not bottom < first:
         raise InputError("the map is blocked in this direction at its lightest simulated load: there is no leakage law")
     return bottom, tuple(turn for turn in {max(ends), first} if turn > bottom)

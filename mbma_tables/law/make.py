@@ -105,20 +105,18 @@ def contact_law(
         if cap.ndim:
             raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
         if cap < math.inf:
-            from mbma_tables.theories.yielding import Yielding
+            from mbma_tables.theories.saturated import with_hardness
 
             elastic = functools.partial(contact_law, surface, chosen, rtol=rtol, E_star=modulus)
             yields = {"hardness": float(cap), "elastic": elastic}
-            chosen = Yielding(chosen, float(cap) / modulus)
+            chosen = with_hardness(chosen, float(cap) / modulus)
     one = surface
     if one.labelled:
         one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))
     if one.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
-    facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, **yields}
-    if getattr(chosen.elastic, "pressed", None) is not None:
-        facts["pressed"] = chosen.elastic
+    facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, "gaps": chosen.gaps(), **yields}
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:
@@ -194,7 +192,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
     # where it has far larger errors at some gaps, as at the lightest contact of a small map, these do not count
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
-    bends = np.asarray(theory.elastic.bends(surface), dtype=float)
+    bends = np.asarray(theory.bends(surface), dtype=float)
 
     width = highest if not ends else h_max / 2 if lowest else h_max
     above = fit.Side(1, lowest / width, lambda x: answer(width * x), tuple(bends / width))

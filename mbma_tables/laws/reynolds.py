@@ -185,7 +185,7 @@ def _between_mirrors(gap: FloatArray, sizes: tuple[float, float], axis: int) -> 
     cubes = gap**3
     faces = [_faces(number, cubes, way, steps, True)[1:] for way in (0, 1)]
     count = int(np.count_nonzero(open_))
-    ends: list[FloatArray] = []
+    ends: list[Any] = []
     for side in (0, -1):
         # half a step from a mirror, where pressure is that of the end
         there = number.take(side, axis) >= 0

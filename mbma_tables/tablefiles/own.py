@@ -41,6 +41,11 @@ def is_own(path: os.PathLike[str] | str) -> bool:
         return False
 
 
+def holds_own(path: os.PathLike[str] | str) -> bool:
+    """Whether a file is such a table, damaged or not, and no other."""
+    return is_own(path) and KIND.encode() in pathlib.Path(path).read_bytes()
+
+
 def write_own(
     path: os.PathLike[str] | str,
     variables: Mapping[str, tuple[tuple[str, ...], Any, str, str]],

@@ -258,6 +258,10 @@ class BoundaryElements(Theory):
         """Elastic energy over A0 E* [length]."""
         return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
 
+    def gaps(self) -> Any:
+        """Itself, if the flow is known."""
+        return None if self.pressed is None else self
+
     @functools.cached_property
     def _flows(self) -> tuple[FloatArray, FloatArray]:
         """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""

@@ -12,6 +12,7 @@ from mbma_tables import Surface, contact, contact_law
 from mbma_tables.answers.leakage import flow
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.laws.boundary_elements import LOADS as SHIPPED_LOADS
+from mbma_tables.laws.boundary_elements import Contact as OwnContact
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.theories import BoundaryElements
@@ -255,3 +256,36 @@ def test_loads_far_apart_keep_the_curves_monotone():
     assert (np.diff(curve.separation(x)) < 0).all()
     assert (np.diff(curve.area(x)) > 0).all()
     assert (curve.stiffness(x) > 0).all()
+
+
+@pytest.mark.parametrize("eta", [0.1, 0.4])
+def test_a_hardness_is_simulated(eta):
+    values, cap = makers.heights(Part("honed", 1, 128)), eta * makers.GRADIENT
+    surface = Surface.from_map(values, 1.0, periodic=True)
+    pressure = cap * np.array([0.03, 0.2, 0.5])
+    engine, rows = OwnContact(values, (128.0, 128.0), hardness=cap), []
+    for force in pressure.tolist():
+        row = engine.press(force)
+        rows.append((row["area"], row["mean_separation"], row["area_yielded"] / row["area"], engine.frozen_stiffness()))
+    area, u, yielded, frozen = np.array(rows).T
+    found = contact(surface, pressure=[*pressure, pressure[1]], hardness=[cap, cap, cap, np.inf], theory="simulated")
+    np.testing.assert_allclose(found.area[:3], area, rtol=0.03)
+    np.testing.assert_allclose(found.mean_separation[:3], u, rtol=0.03)
+    np.testing.assert_allclose(found.yielded[:3], yielded, atol=0.03)
+    np.testing.assert_allclose(found.unloading_stiffness[:3], frozen, rtol=0.1)
+    elastic = contact(surface, pressure=pressure[1], theory="simulated")
+    assert (found.area[3], found.yielded[3]) == (pytest.approx(elastic.area), 0.0)
+    assert (found.leakage.K[0] < elastic.leakage.K) == (found.mean_separation[0] < elastic.mean_separation)
+    # towards the hardness everywhere
+    heavy = contact(surface, pressure=cap * np.array([0.95, 0.999]), hardness=cap, theory="simulated")
+    assert (np.diff(heavy.area) > 0).all()
+    assert heavy.area[1] == pytest.approx(1, abs=2e-3)
+    law = contact_law(surface, theory="simulated", hardness=cap)
+    assert law.at_pressure(pressure[1]).area == pytest.approx(found.area[1], rel=1e-3)
+    steps = contact(surface, pressure=pressure[1] * np.array([0.99, 1.01]), hardness=cap, theory="simulated")
+    derived = contact(surface, mean_separation=float(found.mean_separation[1]), hardness=cap, theory="simulated",
+                      derivatives=True)  # fmt: skip
+    slope = np.diff(steps.pressure)[0] / np.diff(steps.separation)[0]
+    assert derived.pressure_by["separation"] == pytest.approx(slope, rel=0.02)
+    with pytest.raises(OutOfRangeError, match="at most the hardness"):
+        contact(surface, pressure=1.1 * cap, hardness=cap, theory="simulated")
