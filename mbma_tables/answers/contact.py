@@ -80,8 +80,8 @@ def contact(
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
         `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or
-        where an option of MBMA is given; "corrected" for one given by a map, where Tamaas is installed (the extra
-        `maps`), and "calibrated" otherwise.
+        where an option of MBMA is given; "corrected" for one given by a map of at most
+        2^18 points whose wavelengths are resolved, and "calibrated" otherwise.
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1), or a
         text that `mbma_tables.materials.hardness` reads: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The

@@ -255,7 +255,7 @@ _MODEL_OPTIONS = (
 theory_option = _option(
     "theory",
     "Theory; only mbma has an island model, variant and rtol. Default: mbma for numbers, else calibrated, of maps "
-    "corrected where Tamaas is installed.",
+    "corrected.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
 # of islands, which MBMA alone has

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -27,15 +28,8 @@ from mbma_tables.theories.protocol import Theory, TheoryAnswer
 MIN_LOADS = 4
 MATCHED = 1e-6  # relative, of the surface that is asked about
 STRAYS = 2.7  # roots of the elements that join between two loads: beyond strays one path in 10^6 (Kolmogorov)
-# standard deviations against contact on the full grid at tolerance 1e-6, at contact areas between the loads above, of
-# the 65 maps of `python -m generate machined`: the larger of the 68% quantile and half of the 95% quantile
+# A/A0 of the 65 maps of `python -m generate machined` at which scatter was measured
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
-SCATTER = {
-    "area": (0.042, 0.022, 0.0071, 0.0097, 0.011, 0.0041, 0.0060),
-    "pressure": (0.0037, 0.0026, 0.0016, 0.0023, 0.0010, 0.0010, 0.0025),
-    "stiffness": (0.026, 0.016, 0.0080, 0.0073, 0.010, 0.010, 0.0094),
-    "flow": (0.0043, 0.031, 0.032, 0.55, 2.2, 2.2, 2.2),
-}
 AREA_OF_FLOW = 0.4
 EVALUATED = 1e-5  # of the curves through the default loads; laws need not be closer to them
 
@@ -77,6 +71,18 @@ class BoundaryElements(Theory):
     """
 
     name = "simulated"
+    areas: tuple[float, ...] = own_map.AREAS  # by the law of the map, at its loads
+    tolerance, tested = TOLERANCE, (LOWEST, HIGHEST)  # of boundary elements; A/A0
+    # standard deviations against contact on the full grid at tolerance 1e-6, at `TESTED_AREAS`, which lie between the
+    # loads: the larger of the 68% quantile and half of the 95% quantile of the errors
+    scatters: Mapping[str, tuple[float, ...]] = MappingProxyType(
+        {
+            "area": (0.042, 0.022, 0.0071, 0.0097, 0.011, 0.0041, 0.0060),
+            "pressure": (0.0037, 0.0026, 0.0016, 0.0023, 0.0010, 0.0010, 0.0025),
+            "stiffness": (0.026, 0.016, 0.0080, 0.0073, 0.010, 0.010, 0.0094),
+            "flow": (0.0043, 0.031, 0.032, 0.55, 2.2, 2.2, 2.2),
+        }
+    )
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """None: it is of this very map."""
@@ -113,7 +119,7 @@ class BoundaryElements(Theory):
 
     @classmethod
     def of(
-        cls, surface: AnySurface, loads: Sequence[float] | None = None, tolerance: float = TOLERANCE
+        cls, surface: AnySurface, loads: Sequence[float] | None = None, tolerance: float | None = None
     ) -> BoundaryElements:
         """Press the map of a surface from `Surface.from_map`; loads in `common.cache`, or in its `table`, are read.
 
@@ -132,15 +138,19 @@ class BoundaryElements(Theory):
         values, points, cut = own_map.reduced(whole.heights - whole.heights.mean(), steps, mirrored)
         gradient = own_law(surface).gradient
         if loads is None:
-            wanted = own_map.law_loads(surface, own_map.AREAS)
+            wanted = own_map.law_loads(surface, cls.areas)
         else:
             given = finite_array("loads", loads)
             require("loads", given, (given > 0) & (np.diff(given, prepend=0) > 0), "positive and rising")
             wanted = gradient * given
-        press = Press(values, own_map.sides(whole), gradient, tolerance, mirrored, left_out=cut * max(whole.steps))
+        accuracy = cls.tolerance if tolerance is None else tolerance
+        settings: Any = {"mirrored": mirrored, "left_out": cut * max(whole.steps)}
+        press = Press(values, own_map.sides(whole), gradient, accuracy, **settings)
         pressure, (area, u, energy) = press.loads(wanted, loads is None)
-        size, origin = whole.heights.size, own_map.origin_of(whole, tolerance)
-        return cls(surface, pressure, area, u, energy, points, size, press, loads is None, origin)
+        # flow by the accurate gaps
+        gaps = press if accuracy <= TOLERANCE else Press(values, own_map.sides(whole), gradient, **settings)
+        size, origin = whole.heights.size, own_map.origin_of(whole, accuracy)
+        return cls(surface, pressure, area, u, energy, points, size, gaps, loads is None, origin)
 
     @classmethod
     def from_map(
@@ -152,7 +162,7 @@ class BoundaryElements(Theory):
         periodic: bool | None = None,
         detrend: str | None = None,
         loads: Sequence[float] | None = None,
-        tolerance: float = TOLERANCE,
+        tolerance: float | None = None,
         **treatment: Any,
     ) -> BoundaryElements:
         """Press a map flat by Tamaas (the extra `simulate`): four seconds for 256 x 256 points, one core.
@@ -167,7 +177,7 @@ class BoundaryElements(Theory):
             to 95%, and more where these do not reach from 0.1% to 90% contact. With eight or more sampling steps along
             the shortest wavelength, those above 6% contact are then pressed on every second step.
         tolerance : float, optional
-            Of the boundary elements.
+            Of the boundary elements, 1e-5 by default.
 
         Raises
         ------
@@ -330,14 +340,14 @@ class BoundaryElements(Theory):
         return {
             **own_map.unresolved(self.points, answer.area),
             cut: np.full(answer.area.shape, left_out > 0),
-            f"A/A0 is below {LOWEST:g}": (answer.area < LOWEST) & (answer.area > 0),
-            f"A/A0 is above {HIGHEST:g}": answer.area > HIGHEST,
+            f"A/A0 is below {self.tested[0]:g}": (answer.area < self.tested[0]) & (answer.area > 0),
+            f"A/A0 is above {self.tested[1]:g}": answer.area > self.tested[1],
         }
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid at tolerance 1e-6; NaN with loads of one's own, and beyond them."""
         with np.errstate(divide="ignore"):
-            found = np.interp(np.log(area), np.log(TESTED_AREAS), SCATTER[quantity])
+            found = np.interp(np.log(area), np.log(TESTED_AREAS), self.scatters[quantity])
         return np.where(self.own_loads & ~self._beyond(area), found, np.nan)
 
     def _beyond(self, area: FloatArray) -> NDArray[np.bool_]:
