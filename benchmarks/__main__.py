@@ -33,6 +33,7 @@ from benchmarks.exports import exported
 from benchmarks.kernels import BEFORE, held_out, measured
 from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
+from generate.files import ROOT
 from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.common.files import shipped_file
@@ -338,7 +339,7 @@ def main(write: bool) -> None:
         rows = [[x.name.strip(), f"{x.value:.3g} {x.unit}".strip(), x.wanted, marks[x.met]] for x in LINES]
         measured = page.table("what | measured | wanted | ", rows)
         machine = f"{os.cpu_count()} cores, load average {load[0]:.1f}."
-        page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, page.ROOT)
+        page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, ROOT)
 
 
 if __name__ == "__main__":

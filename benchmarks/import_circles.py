@@ -22,12 +22,18 @@ def imports_of(name: str, path: pathlib.Path, known: set[str]) -> set[str]:
     return {other for other in found & known if other != name}
 
 
-def circles(package: pathlib.Path) -> list[list[str]]:
-    """Groups of modules that reach one another."""
-    files = {".".join(p.with_suffix("").parts).removesuffix(".__init__"): p for p in sorted(package.rglob("*.py"))}
+def import_graph(package: pathlib.Path) -> tuple[dict[str, set[str]], dict[str, pathlib.Path]]:
+    """What each module imports of the others, and their files; the package itself is left out."""
+    names = ((path, path.relative_to(package.parent).with_suffix("").parts) for path in sorted(package.rglob("*.py")))
+    files = {".".join(parts).removesuffix(".__init__"): path for path, parts in names}
     # the package itself, which names all that is public, is asked for its version alone
     del files[package.name]
-    graph = {name: imports_of(name, path, set(files)) for name, path in files.items()}
+    return {name: imports_of(name, path, set(files)) for name, path in files.items()}, files
+
+
+def circles(package: pathlib.Path) -> list[list[str]]:
+    """Groups of modules that reach one another."""
+    graph, _ = import_graph(package)
     reached = {name: set(others) for name, others in graph.items()}
     for middle in graph:
         for others in reached.values():

@@ -9,13 +9,18 @@ from typing import Any
 
 import click
 
-from generate.pages.page import PAGES, ROOT, measured, write
+from generate.files import ROOT
+from generate.pages.page import PAGES, measured, write
 from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 GROUPS = {
-    **{name: f"generate.{name}" for name in ("calibrated", "coverage", "explorer", "leakage_law", "wheels")},
+    **{
+        name: f"generate.{name}"
+        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
+    },
     **dict.fromkeys(("gaps", "grids", "measured_maps"), "generate.boundary_elements.studies"),
+    "light": "generate.boundary_elements.light",
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas.fit",
     "machined": "generate.machined.campaign",

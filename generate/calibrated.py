@@ -73,11 +73,12 @@ class Parts:
         u = self.plain + a * self.first + b * self.cubic
         curve = CubicSpline(np.log(u), GRID - law.tail * u**3)
         found, end = curve(np.log(one.u)), float(curve(np.log(one.h_max)))
-        return np.asarray(found + np.log(np.maximum(-np.expm1(end - found), LEAST)) - np.log(one.force))
+        left = np.maximum(-np.expm1(end - found), LEAST)
+        return np.asarray(found + 1.5 * np.log(left) - np.log(2 - left) - np.log(one.force))
 
 
-def fit(training: Sequence[Case]) -> Constants:
-    """The spectrum's law: area at equal force, then force at equal u."""
+def fit(training: Sequence[Case], tail: bool = False) -> Constants:
+    """The spectrum's law: area at equal force, then force at equal u; or the tail alone."""
     seen = [one for one in training if one.gaussian]
     pairs = [(one, Parts(one.spectrum)) for one in seen]
 
@@ -87,8 +88,11 @@ def fit(training: Sequence[Case]) -> Constants:
     def forces(trial: Constants) -> list[FloatArray]:
         return [part.errors(one, trial) / noise(one, "force") for one, part in pairs]
 
-    constants = fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas, **OPTIONS)
-    return fitted(constants, ("weight", "weight_slope", "cubic", "tail"), forces, **OPTIONS)
+    constants = CONSTANTS
+    if not tail:
+        constants = fitted(constants, ("area_s0", "area_slope", "area_t0"), areas, **OPTIONS)
+    names = ("tail",) if tail else ("weight", "weight_slope", "cubic", "tail")
+    return fitted(constants, names, forces, **OPTIONS)
 
 
 def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
@@ -181,8 +185,9 @@ def others(found: Sequence[Case]) -> dict[str, FloatArray]:
 @click.command()
 @click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True))
 @click.option("--table", type=click.Path(path_type=pathlib.Path), help="The library's file: table and errors.")
+@click.option("--tail", is_flag=True, help="Fit the tail of light loads alone: other constants are the library's.")
 @click.option("--hardness", is_flag=True, help="EVIDENCE has capped pressures: fit what a hardness adds.")
-def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, hardness: bool) -> None:
+def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, tail: bool, hardness: bool) -> None:
     """Fit the calibrated law to the training set of EVIDENCE; its errors there and elsewhere go into the table."""
     data, said = xr.load_dataset(evidence), "held-out errors within one and two standard deviations:"
     if hardness:
@@ -191,8 +196,8 @@ def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, hardness: boo
         return
     found = cases(data)
     training = [one for one in found if one.split == TRAINING]
-    constants = _rounded(fit(training))
-    map_constants = _rounded(fit_map(training, constants))
+    constants = _rounded(fit(training, tail))
+    map_constants = MAP_CONSTANTS if tail else _rounded(fit_map(training, constants))
     forms = {
         "spectrum": told(found, lambda one: one.law(constants)),
         "map": told(found, lambda one: one.map_law(constants, map_constants)),

@@ -109,17 +109,7 @@ def read_parts(path: os.PathLike[str] | str) -> dict[str, xr.Dataset]:
 
 
 def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "") -> None:
-    """Write the root or one group of a file, compressed and sealed; what else the file holds stays as it is.
-
-    Parameters
-    ----------
-    path : path
-        The file; made where there is none.
-    data : xarray.Dataset
-        The part's variables and attributes; an encoding of its variables is kept.
-    group : str, optional
-        Name of the group, such as "hardness"; the root without it.
-    """
+    """Write the root, or one group, of a file, compressed and sealed; what else the file holds stays as it is."""
     parts = read_parts(path) | {group: data}
     packed = {"zlib": True, "complevel": 9, "shuffle": True, "_FillValue": None}
 

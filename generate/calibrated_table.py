@@ -45,9 +45,9 @@ LONG_NAMES = {
     "log_separation": "natural logarithm of the mean separation over h_rms",
 }
 COMMENT = (
-    "F(u) = F_G(u) - F_G(h_max); lengths in h_rms. quantity: area at equal force, force at equal mean separation, "
-    "stiffness at equal force. calibrated_map: where a map is at hand. stated_scatter: of calibrated from "
-    "cross-validation, of calibrated_map on the training set, of other theories on self-affine surfaces"
+    "F = F_G (1 - r)^(3/2)/(1 + r), r = F_G(h_max)/F_G(u); lengths in h_rms. quantity: area at equal force, force at "
+    "equal mean separation, stiffness at equal force. calibrated_map: where a map is at hand. stated_scatter: of "
+    "calibrated from cross-validation, of calibrated_map on the training set, of other theories on self-affine surfaces"
 )
 
 

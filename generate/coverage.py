@@ -13,7 +13,7 @@ import tempfile
 
 import click
 
-from generate.pages.page import ROOT
+from generate.files import ROOT
 
 
 @click.command(context_settings={"ignore_unknown_options": True})

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from generate.pages.page import ROOT
+from generate.files import ROOT
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
 from mbma_tables.export.code import web_assembly

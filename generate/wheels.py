@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from generate.pages.page import ROOT
+from generate.files import ROOT
 
 if TYPE_CHECKING:
     import lief

@@ -1,6 +1,6 @@
 """Contact of rough surfaces by the magnification-based multi-asperity (MBMA) model.
 
-The public names load what they need when first used, so that importing the package stays cheap.
+The public names load what they need when first used, so that importing the package is fast.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from mbma_tables.joint import Joint as Joint
     from mbma_tables.law.law import ContactLaw as ContactLaw
     from mbma_tables.law.make import contact_law as contact_law
+    from mbma_tables.law.rough_body import RoughContact as RoughContact
+    from mbma_tables.law.rough_body import rough_contact as rough_contact
     from mbma_tables.models.tables import open_table as open_table
     from mbma_tables.scenes.scene import Scene as Scene
     from mbma_tables.surfaces.surface import Surface as Surface
@@ -42,6 +44,7 @@ _HOMES = {
     "FlowFactors": "mbma_tables.answers.film",
     "Island": "mbma_tables.totals.island",
     "Joint": "mbma_tables.joint",
+    "RoughContact": "mbma_tables.law.rough_body",
     "Variant": "mbma_tables.surfaces.variants",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.law.law",
@@ -52,6 +55,7 @@ _HOMES = {
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.totals.island",
     "open_table": "mbma_tables.models.tables",
+    "rough_contact": "mbma_tables.law.rough_body",
     "sensitivity": "mbma_tables.answers.sensitivity",
 }
 _MODULES = {"greenwood_tripp": "mbma_tables.islands.greenwood_tripp", "theories": "mbma_tables.theories"}

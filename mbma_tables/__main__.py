@@ -8,7 +8,7 @@ INTERRUPTED = 130  # as shells report Ctrl-C
 
 
 def main() -> None:
-    """Run it; Ctrl-C ends it from the start, its own imports included."""
+    """Run the command line; Ctrl-C is handled from the start, also during imports."""
     try:
         from mbma_tables.cli import main
 

@@ -1,4 +1,4 @@
-"""`Joint`: two rough metal parts in contact, and the interface laws that follow from one pressure range."""
+"""`Joint`: two rough metal parts and all their interface laws."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.answers.contact import contact
+from mbma_tables.answers.interface import ratio_of
 from mbma_tables.answers.result import Contact
 from mbma_tables.answers.sensitivity import Sensitivity, sensitivity
 from mbma_tables.common.arguments import hinted, nearest, needed
@@ -39,7 +40,7 @@ RANGE, POINTS = (1e-5, 0.3), 41  # of pressures over the hardness, in pictures
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Joint(Displayed):
-    """Two rough metal parts pressed together: stiffness, real area, gap and conductance by one description.
+    """Two rough metal parts pressed together: stiffness, real area, gap and conductance from one description.
 
     Parameters
     ----------
@@ -48,14 +49,16 @@ class Joint(Displayed):
         `Surface.from_roughness` without a highest point; or those of `Surface.from_map`, with the file under "map".
         Without `part_b` the other face is smooth.
     materials : str, Metal, or pair of them
-        Metals of the parts, of `mbma_tables.materials.METALS`; of one that is in contact with itself, one.
+        Metals of the parts, from `mbma_tables.materials.METALS`; one if both are the same.
     nominal_area : float or str, optional
         A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`); needed for parts that are
-        mappings. Surfaces have their own highest point, and keep it without.
+        mappings. Without it, surfaces keep their own highest point.
     hardness : float or str, optional
         Of the softer metal, as for `contact`; by default that of `materials`, whose temper must then be named.
     friction : float, optional
         Coefficient of friction, for friction cards of solvers.
+    direction : {"along", "across"}, optional
+        Of the shear relative to the lay, for parts that have one.
     gas : {"air", "helium", "vacuum"}
     temperature : float
         Of the gas [K].
@@ -67,7 +70,7 @@ class Joint(Displayed):
     Attributes
     ----------
     surface : AnySurface
-        The one rough surface that stands for both.
+        The equivalent surface of both parts.
     pair : Pair
         The metals.
 
@@ -97,6 +100,7 @@ class Joint(Displayed):
     nominal_area: float | str | None = None
     hardness: float | str | None = None
     friction: float | None = None
+    direction: str | None = None
     gas: str = "air"
     temperature: float = 300.0
     gas_pressure: float | str = "1 atm"
@@ -123,7 +127,8 @@ class Joint(Displayed):
             return Surface.from_map(part["map"], **{name: value for name, value in part.items() if name != "map"})
         if self.nominal_area is None:
             raise InputError("parts by their roughness need nominal_area, from which their highest points follow")
-        return Surface.from_roughness(**part, nominal_area=self.nominal_area)
+        made: AnySurface = Surface.from_roughness(**part, nominal_area=self.nominal_area)
+        return made
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Joint:
@@ -134,7 +139,7 @@ class Joint(Displayed):
         Raises
         ------
         InputError
-            For a file that is no TOML, and for arguments that are unknown or missing.
+            For a file that is not valid TOML, and for unknown or missing arguments.
 
         Examples
         --------
@@ -172,24 +177,42 @@ class Joint(Displayed):
         return contact_law(self.surface, **self._asked)
 
     def sensitivity(self, pressure: float | str, ranges: Mapping[str, tuple[Any, Any]] | None = None) -> Sensitivity:
-        """How much each number of the joint matters at a pressure, as of `sensitivity`."""
+        """Sensitivity to each parameter of the joint at a pressure, from `sensitivity`."""
         return sensitivity(self.surface, pressure=pressure, ranges=ranges, **self._asked)
 
     def export(
-        self, target: str, pressures: tuple[float | str, float | str], name: str | None = None, heat: bool = True
-    ) -> str:
-        """The joint for a solver: pressure against overclosure, and its conductance with `heat`, in N, mm, MPa, mW.
+        self,
+        target: str,
+        pressures: tuple[float | str, float | str] | None = None,
+        name: str | None = None,
+        heat: bool = True,
+        friction_pressure: float | str | None = None,
+    ) -> str | bytes:
+        """The joint for a solver: pressure, friction, and with `heat` conductance, in N, mm, MPa, mW.
 
         Parameters
         ----------
         target : str
-            One that takes rows: "calculix", "abaqus", "csv", ... (`mbma export --help`).
+            One of `mbma export --help` that takes a law: rows such as "calculix", "abaqus" and "csv", functions such as
+            "c-law", "modelica-law" and "fmu".
         pressures : pair of float or str
-            Smallest and largest pressure; plain numbers in MPa.
+            Smallest and largest pressure of rows; plain numbers in MPa.
         name : str, optional
-            Of the surface interaction.
+            Of the surface interaction, or what functions begin with.
         heat : bool
+        <<<<<<< HEAD
             Whether conductance of the solid spots is written, too.
+        friction_pressure : float or str, optional
+            Where the one tangential stiffness of a friction card holds; else at the geometric mean of `pressures`.
+
+        Returns
+        -------
+        str or bytes
+            The first file of the target, bytes of an FMU. Solvers have a friction card where the joint has a
+            coefficient of friction, functions the tangential stiffness.
+        =======
+            Whether the conductance of the solid spots is also written.
+        >>>>>>> refs/heads/prose
 
         Examples
         --------
@@ -203,19 +226,32 @@ class Joint(Displayed):
         from mbma_tables.export.law_rows import describe_law
         from mbma_tables.export.targets import targets
 
-        known = {key: each for key, each in targets().items() if each.rows}
+        known = {key: each for key, each in targets().items() if each.rows or "kappa" in each.takes}
         if target not in known:
-            raise InputError(f"no target of rows is called {target!r}: {nearest(target, known)}")
+            raise InputError(f"no target of laws is called {target!r}: {nearest(target, known)}")
+        takes, (length, stress) = known[target].takes, known[target].units or ("mm", "MPa")
         options: dict[str, Any] = {"theory": self.theory, "hardness": self.hardness or self.pair.hardness or np.inf}
-        if heat:
+        options |= {"length_unit": length, "stress_unit": stress}
+        if heat := heat and "conductivity" in takes:
             k1, k2 = (float(text.split()[0]) for text in self.pair.conductivities)  # W/(m K) is mW/(mm K)
-            options |= {"quantity": "conductance", "conductivity": 2 * k1 * k2 / (k1 + k2)}
-            options["conductivity_unit"] = "mW/(mm K)"
-        law = describe_law(
-            self.surface, self.pair.E_star, length_unit="mm", stress_unit="MPa", pressures=pressures, **options
-        )
+            options |= {"conductivity": 2 * k1 * k2 / (k1 + k2)}
+            options["conductivity_unit"] = "mW/(mm K)" if length == "mm" else "W/(m K)"
         named = {} if name is None else {"name": name}
+        if not known[target].rows:
+            options["kappa"] = self._kappa(None)
+            file = known[target].files(self.surface, self.pair.E_star, **options, **named)[""]
+            return file if target.startswith("fmu") else file.decode()
+        if pressures is None:
+            raise InputError(f"{target} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')")
+        if self.friction is not None and "friction" in takes:
+            options |= {"friction": self.friction, "kappa": self._kappa, "friction_pressure": friction_pressure}
+        quantity = "conductance" if heat else known[target].quantity
+        law = describe_law(self.surface, self.pair.E_star, quantity=quantity, pressures=pressures, **options)
         return known[target].files(law, **named)[""].decode()
+
+    def _kappa(self, area: Any) -> Any:
+        """Normal over tangential stiffness at a contact area, which only matters to surfaces with a lay."""
+        return ratio_of(None, None, self.pair, self.direction, self.surface, area)
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""
@@ -233,7 +269,7 @@ class Joint(Displayed):
         """Values, units, meanings and model uncertainties of a contact of this joint, by name."""
         units = found.units
         stiff, gap = units["stiffness"], units["mean_separation"]
-        sheared, solid = found.tangential(self.friction), found.conductance()
+        sheared, solid = found.tangential(self.friction, direction=self.direction), found.conductance()
         gas = found.gap_conductance(self.gas, self.temperature, self.gas_pressure)
         sd = "model uncertainty (1 sd) of ln"
         return {
@@ -261,7 +297,7 @@ class Joint(Displayed):
         return self.at_pressure(np.geomspace(*RANGE, POINTS) * float(hardness_in(Units(stress="GPa"), hardness)))
 
     def facts(self) -> dict[str, str]:
-        """What the joint was made of, by name."""
+        """The arguments of the joint, by name."""
         a, b = self.pair.metals
         hardness = self.hardness or self.pair.hardness or f"not known: name the temper of {self.pair.softer.name}"
         theory = self.theory if isinstance(self.theory, str) else self.theory.name

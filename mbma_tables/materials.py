@@ -1,8 +1,10 @@
-"""Elastic constants of the two bodies, joined into the one modulus that contact needs, and ranges for common metals.
+"""Elastic constants, hardness and conductivity of metals.
+
+The constants of two bodies are joined into the one modulus that contact needs.
 
 Hardnesses are converted from Brinell, Vickers or Rockwell number to the mean pressure over the projected area, which is
-the pressure that counts here. A ground or polished face is harder than its bulk at depths of micrometres: measure where
-it matters. Where the numbers were read is in tables/metals.csv.
+the pressure that counts here. A ground or polished face is harder than its bulk at depths of micrometres: measure it if
+it matters. The sources of the numbers are in tables/metals.csv.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, resolve
 
 ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
-ONE_TEMPER = 1.3  # hardest over softest temper up to which their geometric mean stands for both, within 14%
+ONE_TEMPER = 1.3  # largest ratio of tempers' hardnesses for which their geometric mean is used, within 14% of both
 TABOR = 3.0  # hardness over yield stress
 TEMPERS = ("soft", "hard")
 # Vickers number of non-austenitic steels at Rockwell C numbers: ASTM E140 table 1, as printed at
@@ -117,7 +119,7 @@ def _mean_pressure(scale: str, number: float) -> float:
 
 
 def _metals() -> dict[str, Metal]:
-    """Those of tables/metals.csv, by name."""
+    """The metals of tables/metals.csv, by name."""
     found = {}
     lines = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
     for row in csv.DictReader(line for line in lines if not line.startswith("#")):
@@ -175,24 +177,24 @@ class Pair:
 
     @property
     def softer(self) -> Metal:
-        """The metal that yields."""
+        """The softer metal, which yields."""
         return min(self.metals, key=lambda metal: metal.hardness)
 
     @property
     def hardness(self) -> str | None:
-        """Hardness of the softer one with its unit; None where its tempers differ by more than a factor of 1.3."""
+        """Hardness of the softer one with its unit; None if its tempers differ by more than a factor of 1.3."""
         soft, hard = self.softer.hardness
         return f"{math.sqrt(soft * hard):.6g} GPa" if hard <= ONE_TEMPER * soft else None
 
     @property
     def conductivities(self) -> tuple[str, str]:
-        """Thermal conductivities with their unit, the geometric means of what was found."""
+        """Thermal conductivities with their unit, geometric means of the ranges."""
         a, b = (f"{math.sqrt(low * high):.6g} W/(m K)" for low, high in (metal.conductivity for metal in self.metals))
         return a, b
 
 
 def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
-    """Two metals in contact: names or `Metal` objects, or one that is in contact with itself.
+    """Two metals in contact: names or `Metal` objects, or one metal for both bodies.
 
     Examples
     --------
@@ -211,7 +213,7 @@ def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
 
 
 def hardness(given: str | None = None, *, yield_stress: str | None = None) -> str:
-    """Hardness as a mean pressure, with its unit: what ``hardness=`` takes.
+    """Hardness as a mean pressure with its unit, for the argument ``hardness=``.
 
     Parameters
     ----------
@@ -267,14 +269,14 @@ def hardness(given: str | None = None, *, yield_stress: str | None = None) -> st
 
 
 def hardness_in(units: Units, value: Any) -> Any:
-    """A hardness in the given units, of all that `hardness` reads; numbers as they are."""
+    """A hardness in the given units, from any text that `hardness` accepts; numbers are unchanged."""
     if isinstance(value, list | tuple):
         return [hardness_in(units, each) for each in value]
     return units.number("hardness", hardness(value) if isinstance(value, str) else value)
 
 
 def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair | None]:
-    """Modulus and hardness of a contact as given, or of the materials that are named, and these."""
+    """Modulus and hardness of a contact, as given or from the named materials, and these materials."""
     if materials is None:
         return E_star, hardness, None
     known = pair(materials)

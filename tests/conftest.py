@@ -1,7 +1,6 @@
 """Fixtures of several files; what they need is imported when they are first asked for."""
 
 import os
-import signal
 
 import pytest
 from hypothesis import settings
@@ -14,23 +13,6 @@ settings.load_profile("untimed")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # simulations are not kept between tests
 os.environ["MBMA_TABLES_CACHE"] = "off"
-
-
-@pytest.fixture
-def tally(record_property):
-    """Reads inputs one by one, each under a watch, and counts what it tried."""
-    from fuzzing import Endless, Tally
-
-    def ring(*_):
-        raise Endless
-
-    before = signal.signal(signal.SIGALRM, ring)
-    count = Tally()
-    yield count
-    signal.signal(signal.SIGALRM, before)
-    record_property("inputs fuzzed", count.tried)
-    record_property("refused", count.refused)
-    assert count.tried
 
 
 @pytest.fixture(scope="session")
@@ -46,7 +28,6 @@ def generations():
 
 @pytest.fixture(scope="session")
 def table_files(tmp_path_factory):
-    """One small table file of each kind."""
     from small_tables import KINDS, small_table
 
     from generate.tables.writing import write_table
@@ -57,5 +38,4 @@ def table_files(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def sources(table_files):
-    """The bytes of one good table file of each kind."""
     return {kind: path.read_bytes() for kind, path in table_files.items()}

@@ -4,9 +4,13 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
+
+from mbma_tables import InputError
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))  # multiplies the counts of random tests
 
@@ -32,6 +36,13 @@ def random_map(points, low, high, power=1.8, seed=1, phases=False):
     return np.fft.irfft2(np.where((q > low) & (q < high), noise * np.maximum(q, 1e-3) ** -power, 0))
 
 
+def topographies():
+    """The package SurfaceTopography, whose import warns of its own missing optional parts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return pytest.importorskip("SurfaceTopography")
+
+
 def fresh(code, *arguments):
     """What `code` prints as JSON in a new interpreter."""
     command = [sys.executable, "-W", "error", "-c", code, *arguments]
@@ -39,7 +50,6 @@ def fresh(code, *arguments):
 
 
 def run(*arguments):
-    """What `mbma` prints."""
     from mbma_tables.cli import main
 
     result = CliRunner().invoke(main, [str(argument) for argument in arguments])
@@ -60,6 +70,31 @@ def refused(*arguments):
     return result.stderr
 
 
+def refusals(ask, *rows, error=InputError):
+    """A test of rows: arguments of `ask`, the type of the error if it is another, and what its message says."""
+
+    @pytest.mark.parametrize("row", rows, ids=lambda row: row[-1])
+    def test(row):
+        *given, said = row
+        kind = given.pop() if isinstance(given[-1], type) else error
+        with pytest.raises(kind, match=said) as caught:
+            ask(*given)
+        assert "\n" not in str(caught.value)
+
+    return test
+
+
+def told(ask, *rows):
+    """A test of rows, each of arguments of `ask` and of what is in the text that it answers."""
+
+    @pytest.mark.parametrize("row", rows, ids=lambda row: row[-1])
+    def test(row):
+        *given, said = row
+        assert said in ask(*given)
+
+    return test
+
+
 class Springs:
     """A user's theory: an exponential force, its area proportional to it."""
 
@@ -68,3 +103,30 @@ class Springs:
     def answer(self, surface, mean_separation):
         force = np.exp(-3 * mean_separation / surface.h_rms)
         return force, 0.1 * force
+
+
+WORDS = [*b' nan inf -1 1e400 [ ] { } = , # \n \x00 \xff \' " """ 1979-05-27T07:32:00Z \xef\xbb\xbf'.split(b" ")]
+WORDS += [b"0" * 400, b"9" * 5000, b"0x" + b"f" * 9000, "\u202e\u00b2\u0663".encode()]
+WORDS += [3000 * word for word in (b"[", b'{"a":', b"a=", b"a.")]
+
+
+def spoilt(content, rng):
+    """Bytes with a few cut, doubled, swapped or replaced places."""
+    data = bytearray(content)
+    for _ in range(rng.integers(1, 5)):
+        at, to = sorted(int(place) for place in rng.integers(0, len(data) + 1, 2))
+        kind = rng.integers(6)
+        if kind == 0:
+            del data[at : min(to, at + 40)]
+        elif kind == 1:
+            data[at:at] = data[at : min(to, at + 200)]
+        elif kind == 2:
+            data[at:at] = WORDS[rng.integers(len(WORDS))]
+        elif kind == 3 and data:
+            data[min(at, len(data) - 1)] = rng.integers(256)
+        elif kind == 4:
+            length = min(40, (to - at) // 2)
+            data[at : at + length], data[to - length : to] = data[to - length : to], data[at : at + length]
+        else:
+            data = data[: max(at, 1)]
+    return bytes(data)

@@ -101,16 +101,9 @@ class Reader:
             block = np.tensordot(weights(p - i), block[i : i + 4], axes=1)
         return float(block)
 
-    def error(self, function, point):
-        """Bound on the relative error at coordinates of the axes."""
-        field = self.variables[f"error_{function}"]
-        if field.ndim == 1:
-            return float(field[self.cell(*point)])
-        cell = []
-        for name, x, cells in zip(self.axes, point, field.shape, strict=True):
-            nodes = self.variables[name].size
-            cell.append(min(math.floor(self.position(name, x) * cells / (nodes - 1)), cells - 1))
-        return float(field[tuple(cell)])
+    def error(self, function, X, mu):
+        """Bound on the relative error of an island of two numbers."""
+        return float(self.variables[f"error_{function}"][self.cell(X, mu)])
 
     def answer(self, **arguments):
         """What conformance points hold: Phi or hat values, by F and A."""

@@ -50,24 +50,20 @@ def small(folder, kind, extra=""):
 
 @functools.cache
 def small_build(kind):
-    """The kind with a small table's configuration, and that table as the generator makes it."""
     with tempfile.TemporaryDirectory() as folder:
         configuration = load(kind, small(pathlib.Path(folder), kind))
     return KINDS[kind](configuration), built(configuration, ChunkedSolver())
 
 
 def small_table(kind):
-    """A table of few nodes or cells."""
     return small_build(kind)[1]
 
 
 def unseal(content):
-    """The netCDF bytes of a table file."""
     return content[:-SEAL_LENGTH]
 
 
 def seal(body):
-    """A table file with a right checksum over any bytes."""
     return body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n"
 
 

@@ -1,5 +1,6 @@
 """Public names, typed errors, and the messages of the argument checks."""
 
+import contextlib
 import functools
 import math
 
@@ -7,24 +8,21 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import fresh
+from helpers import fresh, refusals
 
 import mbma_tables
 from mbma_tables import (
-    ConvergenceError,
-    InputError,
-    MbmaError,
-    NotSelfAffineError,
-    OutOfRangeError,
     Surface,
     contact,
     contact_law,
+    flow_factors,
     greenwood_tripp,
     height_integral,
     island,
     open_table,
 )
 from mbma_tables.common.arguments import SHOWN, finite_array, require
+from mbma_tables.common.errors import ConvergenceError, InputError, MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.materials import effective_modulus
 
 
@@ -47,27 +45,22 @@ def test_numbers_become_float64(value, shape):
     assert array.shape == shape
 
 
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        (math.nan, "x must be finite, got nan"),
-        ([1.0, math.inf, -math.inf], r"x must be finite, got inf at \(1,\), -inf at \(2,\)$"),
-        ([[1.0, math.nan]], r"x must be finite, got nan at \(0, 1\)$"),
-        ([math.nan] * 5, r"nan at \(2,\) and 2 more$"),
-        ([], "x is empty: at least one number is needed"),
-        (np.ones((0, 3)), "x is empty"),
-        ("deep", "x must be real numbers: entries of type"),
-        (1j, "x must be real numbers: entries of type complex128"),
-        (True, "x must be real numbers: entries of type bool"),
-        (None, "x must be real numbers"),
-        ([1.0, [2.0, 3.0]], "x must be real numbers"),
-        (10**400, "x must be real numbers"),
-        (np.datetime64("2020-01-01"), "x must be real numbers"),
-    ],
+test_what_is_no_number_is_named = refusals(
+    lambda value: finite_array("x", value),
+    (math.nan, "x must be finite, got nan"),
+    ([1.0, math.inf, -math.inf], r"x must be finite, got inf at \(1,\), -inf at \(2,\)$"),
+    ([[1.0, math.nan]], r"x must be finite, got nan at \(0, 1\)$"),
+    ([math.nan] * 5, r"nan at \(2,\) and 2 more$"),
+    ([], "x is empty: at least one number is needed"),
+    (np.ones((0, 3)), "x is empty"),
+    ("deep", "x must be real numbers: entries of type"),
+    (1j, "x must be real numbers: entries of type complex128"),
+    (True, "x must be real numbers: entries of type bool"),
+    (None, "x must be real numbers"),
+    ([1.0, [2.0, 3.0]], "x must be real numbers"),
+    (10**400, "x must be real numbers"),
+    (np.datetime64("2020-01-01"), "x must be real numbers"),
 )
-def test_what_is_no_number_is_named(value, message):
-    with pytest.raises(InputError, match=message):
-        finite_array("x", value)
 
 
 @pytest.mark.parametrize(
@@ -84,6 +77,23 @@ def test_masked_entries_are_refused_not_uncovered(take):
     with pytest.raises(InputError, match=r"has 1 masked entries among 3: leave them out with \.compressed\(\), or put"):
         take(np.ma.masked_array([0.1, 0.2, 0.3], [False, True, False]))
     take(np.ma.masked_array([0.1, 0.2, 0.3], False))
+
+
+def test_quantities_of_other_libraries_are_refused():
+    class Quantity:
+        magnitude = 5.0
+
+        def __array__(self, dtype=None, copy=None):
+            return np.asarray(self.magnitude)
+
+    given = [Quantity()]
+    with contextlib.suppress(ImportError):
+        import pint
+
+        given += [5 * pint.UnitRegistry().MPa, np.ones(2) * pint.UnitRegistry().MPa]
+    for quantity in given:
+        with pytest.raises(InputError, match="pressure is a Quantity with a unit of its own: convert it"):
+            contact(ROAD, pressure=quantity, E_star="1 GPa")
 
 
 def test_other_containers_of_xarray_and_hdf5_are_refused(tmp_path):
@@ -105,12 +115,13 @@ CALLS = {
     "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
     "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
     **{
-        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1})
-        for theory in ("greenwood_williamson", "persson", "calibrated")
+        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1, "E_star": 1.0})
+        for theory in ("mbma", "greenwood_williamson", "persson", "calibrated")
         for known in ("separation", "mean_separation", "pressure", "area")
     },
     "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),
     "island4d": (open_table("island4d").lookup, {"delta_over_h_rms": 1.5, "zeta_d": 2.0, "zeta_u": 20.0, "hurst": 0.7}),
+    "law by separation": (contact_law(ROUGH, rtol=1e-3).pressure, {"separation": 0.3}),
     "effective_modulus": (effective_modulus, {"E1": 1.0, "nu1": 0.3, "E2": 2.0, "nu2": 0.3}),
 }
 
@@ -153,26 +164,27 @@ ROAD = Surface(0.8, 0.2, 40.0, 1.0, 3.0, unit="um")
 BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
 
 
-@pytest.mark.parametrize(
-    ("asked", "message"),
-    [
-        (lambda: contact("concrete", separation=1.0), "surface must be a Surface, got 'concrete'; a named"),
-        (lambda: contact_law(None), "surface must be a Surface, got None"),
-        (lambda: Surface.named([]), r"no surface is named \[\]; there are"),
-        (lambda: contact(ROAD, separation=1.0, quantities=None), r"quantities must be some of .* got None"),
-        (lambda: contact(ROAD, separation=1.0, derivatives="no"), "derivatives must be True or False, got 'no'"),
-        (lambda: contact(ROAD, separation=1.0, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
-        (lambda: contact_law(ROAD, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
-        (lambda: contact(ROAD, separation="50 MPa"), "'MPa' is no known unit of length but one of stress"),
-        (lambda: contact(ROAD, pressure=["5 MPa", 50], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
-        (lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
-        (lambda: contact(ROAD, separation=["1 um", "2"]), "separation: '2' has no unit beside others that have"),
-        (lambda: Surface.from_roughness(Rq=["1.6 um", 2.0], **BAND), "Rq: 2.0 has no unit beside others"),
-    ],
+test_natural_mistakes_have_a_message_with_the_remedy = refusals(
+    lambda ask: ask(),
+    (lambda: contact("concrete", separation=1.0), "surface must be a Surface, got 'concrete'; a named"),
+    (lambda: contact_law(None), "surface must be a Surface, got None"),
+    (lambda: Surface.named([]), r"no surface is named \[\]; there are"),
+    (lambda: contact(ROAD, separation=1.0, derivatives="no"), "derivatives must be True or False, got 'no'"),
+    (lambda: contact(ROAD, separation=1.0, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
+    (lambda: contact_law(ROAD, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
+    (lambda: flow_factors("concrete", 1.0), "surface must be a Surface, got 'concrete'; a named"),
+    (lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))), "rtol, outside, workers take one value each"),
+    (lambda: contact(ROAD, separation=1.0, hardness=10**400), "hardness must be real numbers: entries of type obj"),
+    (lambda: contact(ROAD, separation=1.0, hardness=b"1"), "hardness must be real numbers"),
+    (lambda: island(ROAD, 5e-324), "delta must be at least 1e-250, got 5e-324"),
+    (lambda: Surface(0.8, 5e-324, 1.0, 1.0, 3.0), "q0 must be from 1e-50 to 1e\\+50: take another unit"),
+    (lambda: Surface(5e-324, 1.0, 10.0, 1.0, 3.0), r"hurst must be in \(0, 1\], got 5e-324"),
+    (lambda: contact(ROAD, separation="50 MPa"), "'MPa' is no known unit of length but one of stress"),
+    (lambda: contact(ROAD, pressure=["5 MPa", 50], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
+    (lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
+    (lambda: contact(ROAD, separation=["1 um", "2"]), "separation: '2' has no unit beside others that have"),
+    (lambda: Surface.from_roughness(Rq=["1.6 um", 2.0], **BAND), "Rq: 2.0 has no unit beside others"),
 )
-def test_natural_mistakes_have_a_message_with_the_remedy(asked, message):
-    with pytest.raises(InputError, match=message):
-        asked()
 
 
 def test_what_is_given_by_place_but_has_a_name_is_refused_with_the_names():

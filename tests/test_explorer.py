@@ -58,7 +58,6 @@ def opened():
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    """A page about the concrete road in MPa."""
     path = tmp_path_factory.mktemp("explorer") / "page with blanks.html"
     run("explore", "--surface", "concrete", "--E-star", "13.3MPa", "--out", str(path))
     return path.as_uri()
@@ -91,7 +90,6 @@ def download(tab, button: str) -> str:
 
 
 def columns(tab) -> dict[str, np.ndarray]:
-    """The page's CSV file, without units."""
     rows = [line for line in tab.evaluate(CSV).splitlines() if not line.startswith("#")]
     head, *body = csv.reader(rows)
     numbers = np.array([[float(cell) if cell else np.nan for cell in row] for row in body])
@@ -99,7 +97,6 @@ def columns(tab) -> dict[str, np.ndarray]:
 
 
 def random_state(rng: np.random.Generator) -> dict:
-    """Any surface, modulus, theory and axis."""
     q0, h_rms = np.exp(rng.uniform(-8, 8, 2))
     hurst = rng.choice([1.0, rng.uniform(0.1, 1.0)], p=[0.1, 0.9])
     numbers = (hurst, q0, q0 * np.exp(rng.uniform(np.log(5.2), np.log(5e4))), h_rms, h_rms * rng.uniform(2.0, 6.0))
@@ -137,7 +134,6 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
             found[f"{theory} conductance"] * state["E_star"], found[f"{theory} stiffness"], equal_nan=True
         )
     if state["against"] == "pressure":
-        # one column of pressures for all theories, which each meets
         pressures = np.nanmax([found[f"{theory} pressure"] for theory in ("mbma", "calibrated", "persson")], axis=0)
         assert np.allclose(np.diff(np.log(pressures)), np.log(1e5) / 99, rtol=1e-6)
     return worst
@@ -229,16 +225,11 @@ def test_a_slider_moves_curves_and_address_and_a_link_brings_them_back(visit):
 def test_bad_numbers_are_told_beside_their_field(visit):
     tab = visit()
     for field, text, said in (
-        ("hurst", "1.2", "H must be in (0, 1], got 1.2"),
         ("q1", "1", "more than 3 q₀"),
-        ("q1", "1e12", "at most 1e8 q₀"),
         ("h_rms", "-1", "h_rms must be positive, got -1"),
-        ("h_max", "", "h_max must be a number"),
         ("E_star", "thirteen", "E_star must be a number"),
         ("spectrum", "1 2 3", "line 1"),
-        ("spectrum", "1 2\nq C", "line 2"),
         ("spectrum", "1 1\n0.5 1", "q must rise"),
-        ("spectrum", "1 -1", "C must not be negative"),
         ("spectrum", "1 1\n2 1", "a factor 3"),
     ):
         if field == "spectrum":
@@ -304,43 +295,7 @@ def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
         explorer_page(surface, theory="mbma")
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_any_address_is_drawn_or_refused(seed, visit):
-    rng, tab, drawn = np.random.default_rng(seed), visit(), 0
-    odd = ("", "NaN", "Infinity", "-0", "1e400", "0x10", "1e-320", "-1")
-    count = 20 if seed == 0 else 400
-    for _ in range(count):
-        state = random_state(rng)
-        q0 = 10 ** rng.uniform(-150, 150)
-        state |= {"q0": q0, "q1": q0 * 10 ** rng.uniform(0.3, 8.5), "hurst": rng.choice([1.0, 1e-3, rng.uniform()])}
-        for name in rng.choice([*NAMES, "E_star", "k_s"], rng.integers(3), replace=False):
-            state[str(name)] = rng.choice([*odd, *(10 ** rng.uniform(-310, 308, 3)).astype(str)])
-        if rng.uniform() < 0.3:
-            q = np.sort(10 ** rng.uniform(-3, 5, rng.integers(1, 40)))
-            C = q**-3.5 * rng.choice([0.0, 1.0, 1.0, 1e200], q.size)
-            state["spectrum"] = rows(q, C).replace("\n", ";")
-        tab.evaluate(GO, urllib.parse.urlencode(state))
-        faults = [text for text in tab.locator(".error").all_inner_texts() if text]
-        assert bool(faults) == tab.is_disabled("#csv")
-        drawn += not faults
-    # and the fixture sees that nothing was thrown
-    assert 0.1 * count < drawn < count
-
-
-def test_a_page_of_a_spectrum_begins_with_it(opened, tmp_path):
-    from generate.pages.explorer import visit
-
-    path = tmp_path / "own.html"
-    surface = Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1, unit="um")
-    path.write_text(explorer_page(surface, 5.0, "GPa", theory="calibrated"), encoding="utf-8")
-    tab = visit(opened, path.as_uri())
-    assert "60 samples of a spectrum" in tab.inner_text("#subtitle")
-    assert "[GPa/um]" in tab.inner_text("#readout")
-    tab.context.close()
-
-
 def compiled_law(path):
-    """The functions of a law in C at many overclosures."""
     strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-shared", "-fPIC")
     library = path.with_suffix(".so")
     subprocess.run(["gcc", *strict, str(path), "-lm", "-o", str(library)], check=True)
@@ -409,14 +364,6 @@ def test_where_a_theory_has_no_answer_the_page_says_why(visit):
     assert "MBMA: has no answer here: it does not reach such a pressure." in tab.inner_text("#concerns")
 
 
-def test_an_old_browser_is_told(opened, address):
-    tab = opened.new_page()
-    tab.add_init_script("delete window.DecompressionStream")
-    tab.goto(address)
-    tab.wait_for_selector("#subtitle:not(:empty) >> text=cannot run the page")
-    tab.close()
-
-
 def test_on_a_phone_and_in_the_dark(visit, tmp_path):
     from matplotlib import image
 
@@ -426,5 +373,4 @@ def test_on_a_phone_and_in_the_dark(visit, tmp_path):
     tab.screenshot(path=str(tmp_path / "dark.png"))
     picture = image.imread(tmp_path / "dark.png")[..., :3]
     assert np.median(picture) < 0.2
-    # and curves in it that can be seen
     assert (picture.max(axis=-1) > 0.6).mean() > 0.005

@@ -7,14 +7,12 @@ import json
 import mpmath
 import numpy as np
 import pytest
-import xarray as xr
 from scipy.differentiate import derivative
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.boundary_elements.tamaas_contact import Contact as Elastic
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import shipped_file
 from mbma_tables.laws import hardness
 from mbma_tables.laws.bearing_curve import bearing
 from mbma_tables.laws.boundary_elements import Contact, project
@@ -171,14 +169,3 @@ def test_stated_scatter_is_what_held_out_errors_have():
         assert 0.55 < one < 0.8, name
         # MBMA's stiffness is off by a bias more than by chance
         assert 0.88 < two < (1.01 if name == "mbma stiffness" else 0.99), name
-
-
-def test_refined_grids_agree_on_corrected_areas():
-    with xr.open_dataset(shipped_file("calibrated.nc").parents[1] / "docs" / "data" / "hardness.nc") as data:
-        data = data.load()
-    refined = data.sel(surface=data.split == data.split.attrs["flag_meanings"].split().index("refine"))
-    for seed in np.unique(refined.seed):
-        grids = refined.sel(surface=refined.seed == seed).sortby("points")
-        area = grids.area.values[:, :-1]
-        kept = (area[-1] > 0.03) & (area[-1] < 0.95)
-        assert np.abs(np.log(area[1] / area[-1]))[kept].max() < 0.05  # 8 and 32 points a shortest wave

@@ -2,19 +2,15 @@
 
 import math
 
-import dask
 import numpy as np
-import pytest
-import scipy.integrate
-import xarray as xr
 from catalogue import LEVEL, OWN
 from helpers import SCALE
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import OutOfRangeError, Scene, Surface, contact, contact_law, island
+from mbma_tables import Surface, contact, contact_law, island
 from mbma_tables.models import ISLAND_MODELS
-from mbma_tables.surfaces.variants import PRINTED, VARIANTS
+from mbma_tables.surfaces.variants import VARIANTS
 
 EPS = np.finfo(float).eps
 
@@ -32,8 +28,6 @@ def surface_of(hurst, zeta_1, top):
 
 
 surfaces = st.builds(surface_of, hursts, zetas, tops)
-# some of these have islands that the smaller table and the closed forms do not cover
-rough_surfaces = st.builds(surface_of, st.floats(0.1, 1), zetas, tops)
 # where the formulas as printed do not divide 0 by 0
 plain_surfaces = surfaces.filter(lambda surface: surface.hurst < 0.99)
 
@@ -106,38 +100,8 @@ def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, pow
             assert found.area_by[name] == one.area_by[name] * unit**degree, name
 
 
-@invariant(8, surface=surfaces, share=depths, power=st.floats(-12, 12), stress=st.floats(-12, 12))
-def test_laws_in_any_unit(surface, share, power, stress):
-    unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
-    law, other = contact_law(surface, rtol=1e-9), contact_law(in_unit(surface, unit), rtol=1e-9, E_star=modulus)
-    room = law.error + other.error + lost_digits(surface, gap)
-    for name, factor in {"pressure": modulus, "area": 1, "energy": modulus * unit}.items():
-        one, moved = getattr(law, name)(separation=gap), getattr(other, name)(separation=gap * unit)
-        assert abs(moved / (one * factor) - 1) <= room, name
-    assert (law.turning_point is None) == (other.turning_point is None)
-    if law.turning_point is not None:
-        # where force is flat, its error moves the end of the branch by a root
-        assert abs(other.turning_point / unit - law.turning_point) <= 2 * math.sqrt(room) * law.h_max
-
-
-@pytest.mark.slow
-@invariant(4, surface=surfaces, share=st.floats(0.05, 0.9), power=st.floats(-12, 12), stress=st.floats(-12, 12))
-def test_scenes_in_any_unit(surface, share, power, stress):
-    unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
-    effects = ("pressure", "area", "stiffness", "energy", "conductance", "island_statistics")
-    parts = {"effects": effects, "rtol": 1e-6, "conductivities": (1.0, 3.0)}
-    one = Scene(surface, separations=[gap], **parts).run()
-    other = Scene(in_unit(surface, unit), separations=[gap * unit], E_star=modulus, **parts).run()
-    degrees = {"pressure": (1, 0), "area": (0, 0), "stiffness": (1, -1), "energy": (1, 1), "conductance": (0, -1)}
-    degrees |= {"island_number": (0, -2), "island_delta": (0, 1), "island_force": (1, 2)}
-    for name, (of_stress, of_length) in degrees.items():
-        expected = one[name] * modulus**of_stress * unit**of_length
-        np.testing.assert_allclose(other[name], expected, rtol=2e-6, err_msg=name)
-
-
 @invariant(12, surface=surfaces, variant=variants)
 def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(surface, variant):
-    """Down to the model's own turning point, which is never above d = 0; beyond it they rise."""
     law = contact_law(surface, rtol=1e-6, variant=variant)
     gaps = gaps_of(surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:]))
     found = contact(surface, separation=gaps, variant=variant, derivatives=True)
@@ -164,101 +128,23 @@ def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(sur
             assert abs(gaps[np.flatnonzero(slopes >= 0)[0]] - turn) <= cell
 
 
-def moment(order, hurst, zeta):
-    """Moments of the band [1, zeta] as (7) prints them, in units of s and 1/q0."""
-    shape = {0: 2.0, 2: 1.0, 4: 0.75}[order]
-    return shape * hurst * (zeta ** (order - 2 * hurst) - 1) / (order - 2 * hurst)
-
-
-def summits(hurst, zeta, rule):
-    """Density and standard deviation of height of the summits of the band [1, zeta] (2), in units of s and 1/q0."""
-    m0, m2, m4 = (moment(order, hurst, zeta) for order in (0, 2, 4))
-    lost = 0.8968 * m2**2 / (m0 * m4) if rule.summit_sigma else 0
-    return m4 / (rule.density_divisor * m2), np.sqrt((1 - lost) * m0)
-
-
-def first_contact(surface, rule):
-    """C and G of F -> C l^(7/2) and A -> G l^(10/3), from the limits of (26) to (49) as delta goes to 0.
-
-    There sigma and mu go with delta and X, radii and densities stay, and the sphere is rigid: F^i ~ sigma^(3/2) mu,
-    A^i ~ delta^(1/3) sigma^2.
-    """
-    H, zeta_1, s, q0 = surface.hurst, surface.zeta_1, surface.s, surface.q0
-    share_d, share_u = 4 / 3 * rule.beta / (surface.h_rms / s), rule.phi / (1 + rule.phi)
-    sigma = np.sqrt((1 - (0.8968 / 1.5 if rule.summit_sigma else 0)) * (share_d**2 - share_u**2))
-    X = (1 - (share_d if rule.offset else 0)) / sigma
-    D = 0.75 * zeta_1**2 / rule.density_divisor
-    R = 3 * math.sqrt(math.pi) / 8 / math.sqrt(moment(4, H, zeta_1))
-    mu = 8 / 3 * D * sigma * math.sqrt(2) * R
-
-    def integral(z, n):
-        return (z + X) ** n * math.exp(-z * z / 2) / math.sqrt(2 * math.pi)
-
-    F, A = (scipy.integrate.quad(integral, -X, 40, args=(n,), epsabs=0)[0] for n in (2.5, 2.0))
-    D_top, sigma_top = summits(H, zeta_1, rule)
-    eta = 0.75 * (math.pi * D_top) ** (1 / 3) * (1.5 * R) ** (2 / 3) * (share_u / (rule.phi * R)) ** (1 / 3)
-    K1 = 1 - 4 / 3 * rule.beta if rule.jacobian == "printed" else 1 - (share_d if rule.offset else 0)
-    top = surface.h_max / s
-    weight = K1 * D_top * math.exp(-0.5 * (top / sigma_top) ** 2) / (math.sqrt(2 * math.pi) * sigma_top)
-    force = sigma**1.5 * math.sqrt(2 * R) * math.pi / 5 * mu * F * weight
-    area = eta * math.pi * D * R * sigma**2 * 2 * R * math.pi / 2 * A * weight
-    return force * q0 * s / s**3.5 * 2 / 7, area / s ** (10 / 3) * 3 / 10
-
-
 @invariant(20, surface=plain_surfaces, variant=variants)
 def test_first_contact_is_a_power_law(surface, variant):
-    """F ~ l^(7/2) and A ~ l^(10/3), with the factors of the limit; what is missing goes with l."""
-    layer = surface.h_rms * surface.zeta_1**-surface.hurst
-    depth = layer * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
-    gaps = surface.h_max - depth
+    """F ~ l^(7/2) and A ~ l^(10/3); what is missing goes with l."""
+    gaps = surface.h_max - surface.h_rms * surface.zeta_1**-surface.hurst * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
     depth = surface.h_max - gaps
     found = contact(surface, separation=gaps, variant=variant, rtol=1e-11)
-    for values, exponent, factor in zip(
-        (found.pressure, found.area), (3.5, 10 / 3), first_contact(surface, variant), strict=True
-    ):
-        off = np.log(values / (factor * depth**exponent))
+    for values, exponent in ((found.pressure, 3.5), (found.area, 10 / 3)):
         slope = np.diff(np.log(values))[::2] / np.diff(np.log(depth))[::2]
-        rounding = 1e-8 + lost_digits(surface, gaps[-1])
+        assert abs(slope[0] - exponent) < 1e-2
         # a thousandth of the depth, a thousandth of the difference but for the second order
-        for far, near in ((off[0], off[2]), (slope[0] - exponent, slope[1] - exponent)):
-            assert abs(near) <= abs(far) / 100 + rounding
-        assert abs(off[2]) < 1e-2
-
-
-@invariant(10, surface=plain_surfaces, share=st.floats(0.02, 1.5), variant=variants, seed=seeds)
-def test_random_islands_add_up(surface, share, variant, seed):
-    """The sum over islands by chance: two in each of many layers of approach, so that their scatter is known."""
-    gap = float(gaps_of(surface, share))
-    reach = surface.h_max - gap
-    # K1 steps where zeta_d reaches its floor: no layer holds both sides of that
-    floor = variant.floor_d ** (-2 * surface.hurst) - surface.zeta_1 ** (-2 * surface.hurst)
-    step = math.sqrt(floor) / (4 / 3 * variant.beta) * surface.h_rms
-    edges = np.unique(np.append(np.linspace(0, 1, 3000), math.sqrt(min(step / reach, 1))))
-    # near first contact islands are as many and carry less
-    places = edges[:-1] + np.diff(edges) * np.random.default_rng(seed).uniform(size=(2, edges.size - 1))
-    delta, measure = reach * places**2, 2 * reach * places * np.diff(edges)
-    found = island(surface, delta, variant=variant)
-    D, sigma = summits(surface.hurst, found.zeta_d, variant)
-    D, sigma = D * surface.q0**2, sigma * surface.s
-    slope = 4 / 3 * variant.beta
-    if variant.jacobian == "exact":
-        slope = slope * surface.s / surface.h_rms if variant.offset else 0
-    K1 = np.where(found.zeta_d > variant.floor_d, 1 - slope, 1)
-    height = gap + delta - (found.h_d if variant.offset else 0)
-    weight = measure * K1 * D * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
-    total = contact(surface, separation=gap, variant=variant)
-    for carried, whole in ((found.force, total.pressure), (found.area, total.area)):
-        terms = carried * weight
-        scatter = math.sqrt(np.sum((terms[0] - terms[1]) ** 2)) / 2
-        assert scatter <= 1e-3 * whole
-        assert abs(terms.mean(axis=0).sum() - whole) <= 6 * scatter
+        assert abs(slope[1] - exponent) <= abs(slope[0] - exponent) / 100 + 1e-8 + lost_digits(surface, gaps[-1])
 
 
 @invariant(
     12, surface=surfaces, shares=st.lists(depths, min_size=1, max_size=30), variant=variants, digits=st.integers(2, 9)
 )
 def test_a_law_and_its_inverse(surface, shares, variant, digits):
-    """Both ways, on the branch of first contact."""
     law = contact_law(surface, rtol=10.0**-digits, variant=variant)
     for name, value, slope, turn in (
         ("pressure", law.pressure, lambda separation: law.stiffness(separation=separation) / 2, law.turning_point),
@@ -276,29 +162,6 @@ def test_a_law_and_its_inverse(surface, shares, variant, digits):
         ].all()
 
 
-@invariant(12, surface=rough_surfaces, share=depths, variant=st.sampled_from(list(VARIANTS.values())))
-def test_tiers_are_within_their_bounds_of_each_other(surface, share, variant):
-    gap = float(gaps_of(surface, share))
-    exact = contact(surface, separation=gap, island_model="exact", variant=variant, rtol=1e-9)
-    refused = 0
-    for island_model, rtol in (("universal", 1e-9), ("island4d", 1e-5), ("formula", 1e-4)):
-        if island_model == "island4d" and variant is PRINTED:
-            continue
-        try:
-            found = contact(surface, separation=gap, island_model=island_model, variant=variant, rtol=rtol)
-        except OutOfRangeError:
-            # closed forms and the four-parameter table end earlier
-            assert island_model != "universal"
-            refused += 1
-            continue
-        assert abs(found.pressure / exact.pressure - 1) <= found.error + exact.error, island_model
-        assert abs(found.area / exact.area - 1) <= found.error + exact.error, island_model
-    rigid = contact(surface, separation=gap, island_model="rigid", variant=variant)
-    # a sphere that gives way carries less
-    assert exact.pressure <= rigid.pressure * (1 + rigid.error + exact.error)
-    return refused
-
-
 def batch_of(rng, count):
     hurst, zeta_1 = rng.uniform(0.4, 1, count), 10 ** rng.uniform(0.6, 3, count)
     top = rng.uniform(2.5, 4, count)
@@ -312,7 +175,6 @@ def some_of(numbers, chosen):
 
 @invariant(8, island_model=st.sampled_from(ISLAND_MODELS), seed=seeds)
 def test_no_entry_knows_the_others(island_model, seed):
-    """Order, shape and company change no bit; totals of few surfaces are summed in another way, within the errors."""
     rng = np.random.default_rng(seed)
     numbers, gaps = batch_of(rng, 30)
     order = rng.permutation(30)
@@ -343,28 +205,3 @@ def test_no_entry_knows_the_others(island_model, seed):
                 continue
             for name in names:
                 np.testing.assert_array_equal(getattr(alone, name), getattr(whole, name)[k])
-
-
-@invariant(
-    6, island_model=st.sampled_from(ISLAND_MODELS), seed=seeds, chunks=st.tuples(st.integers(1, 9), st.integers(1, 5))
-)
-def test_chunks_change_no_answer(island_model, seed, chunks):
-    rng = np.random.default_rng(seed)
-    numbers, gaps = batch_of(rng, 9)
-    named = [xr.DataArray(n, dims="surface") for n in some_of(numbers, slice(None))]
-    shares = xr.DataArray([0.0, 0.1, 0.5, 0.9, 1.0], dims="gap")
-    d = xr.DataArray(gaps, dims="surface") * (1 - shares) + named[4] * shares
-    asked = {"island_model": island_model, "rtol": 1e-4}
-    eager = contact(Surface(*named), separation=d, **asked)
-    chunked = Surface(*(n.chunk(surface=chunks[0]) for n in named))
-    lazy = contact(chunked, separation=d.chunk(surface=chunks[0], gap=chunks[1]), **asked)
-    plain = contact(Surface(*(n.values[:, None] for n in named)), separation=d.values, **asked)
-    for name in ("pressure", "area", "error"):
-        with dask.config.set(scheduler="synchronous"):
-            computed = getattr(lazy, name).transpose("surface", "gap").compute()
-        whole = getattr(eager, name).transpose("surface", "gap")
-        np.testing.assert_array_equal(whole, getattr(plain, name))
-        if island_model != "universal":
-            np.testing.assert_array_equal(computed, whole)
-        elif name != "error":
-            assert (np.abs(computed - whole) <= (lazy.error + eager.error).transpose("surface", "gap") * whole).all()

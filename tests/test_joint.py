@@ -1,12 +1,19 @@
 """`Joint`: one description of two parts, the same numbers as the single calls, and no more work than they."""
 
+import ctypes
 import pathlib
+import runpy
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
+from helpers import random_map
 
 from mbma_tables import InputError, Joint, Surface, contact
 from mbma_tables.cli import main
+from mbma_tables.export import targets
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.theories.calibrated import Calibrated
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
@@ -29,7 +36,6 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
     np.testing.assert_array_equal(table["tangential_stiffness"], known.tangential().stiffness)
     assert table["pressure"].attrs["units"] == "GPa"
     assert table["conductance"].attrs["units"] == "W/(m^2 K)"
-    # variances of independent heights add
     assert joint.surface.h_rms == pytest.approx(np.hypot(0.4, 0.7), rel=1e-6)
 
 
@@ -81,11 +87,7 @@ def test_untempered_metals_are_not_valid():
 
 
 def test_parts_may_be_maps(tmp_path):
-    rng = np.random.default_rng(0)
-    q = np.hypot(*np.meshgrid(np.fft.fftfreq(64), np.fft.fftfreq(64)))
-    phase = np.fft.fft2(rng.normal(size=(64, 64)))
-    heights = np.fft.ifft2(np.where((q > 0.03) & (q < 0.2), phase * np.maximum(q, 0.01) ** -1.8, 0)).real
-    np.save(tmp_path / "face.npy", heights / heights.std())
+    np.save(tmp_path / "face.npy", random_map(64, 0.03, 0.2) / random_map(64, 0.03, 0.2).std())
     part = '{map = "face.npy", dx = 1.0, periodic = true, unit = "um"}'
     (tmp_path / "joint.toml").write_text(f'materials = "steel 1020"\nhardness = "1.5 GPa"\npart_a = {part}\n')
     mapped = Joint.from_toml(tmp_path / "joint.toml")
@@ -118,3 +120,75 @@ def test_cards_hold_the_joint(joint):
     assert "GAP CONDUCTANCE" not in closure
     with pytest.raises(InputError, match="calculix"):
         joint.export("calculux", (1, 50))
+
+
+def test_friction_cards_have_the_stiffness_before_slip(joint):
+    found = joint.at_pressure(["1 MPa", "7 MPa"])
+    stick = 1e6 * found.tangential().stiffness  # MPa/mm of GPa/um
+    card = joint.export("calculix", ("1 MPa", "49 MPa"))  # the geometric mean is 7 MPa
+    mu, slope = map(float, card.split("*FRICTION\n")[1].splitlines()[0].split(","))
+    assert (mu, slope) == (0.2, pytest.approx(stick[1], rel=1e-6))
+    assert f"{stick[0]:.4g} at 1," in " ".join(card.replace("\n**", "").split())
+    own = joint.export("abaqus", ("1 MPa", "49 MPa"), heat=False, friction_pressure="1 MPa")
+    slip, mu = own.split("*FRICTION, ELASTIC SLIP=")[1].splitlines()[:2]
+    assert float(mu) * 1.0 / float(slip) == pytest.approx(stick[0], rel=1e-6)
+    # rows of the tangential stiffness, for programs of data
+    rows = describe_law(
+        joint.surface, joint.pair.E_star, length_unit="mm", stress_unit="MPa", quantity="tangential_stiffness",
+        pressures=("1 MPa", "49 MPa"), kappa=float(found.tangential().ratio), theory="calibrated", hardness="0.95 GPa",
+    )  # fmt: skip
+    assert np.interp(7.0, rows.x, rows.y) == pytest.approx(stick[1], rel=1e-2)
+    with pytest.raises(InputError, match="takes no friction"):
+        targets.group("SOLVERS")["lsdyna"].files(
+            describe_law(joint.surface, "57 GPa", stress_unit="MPa", friction=0.2, kappa=1.2, friction_pressure=1.0)
+        )
+    with pytest.raises(InputError, match="friction needs kappa"):
+        describe_law(joint.surface, "57 GPa", stress_unit="MPa", friction=0.2)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="not installed: cc")
+def test_functions_of_yielded_joints(joint, tmp_path):
+    (tmp_path / "bolt.c").write_text(joint.export("c-law", name="bolt"))
+    subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-w", "bolt.c", "-lm", "-o", "bolt.so"], cwd=tmp_path, check=True)
+    bolt = ctypes.CDLL(str(tmp_path / "bolt.so"))
+    found = joint.at_pressure("10 MPa")
+    c = 1e-3 * float(joint.surface.h_max - found.mean_separation)  # mm of um
+    for what, value in {
+        "pressure": 10.0,
+        "tangent": 1e6 * found.stiffness,
+        "tangential_stiffness": 1e6 * found.tangential().stiffness,
+        "conductance": 1e-3 * found.conductance(),
+    }.items():
+        function = bolt[f"bolt_{what}"]
+        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
+        assert function(c) == pytest.approx(float(value), rel=1e-4), what
+    package = joint.export("modelica-law", name="bolt")
+    assert "function tangential_stiffness" in package
+    assert "function unloading" in package
+    assert joint.export("fmu", name="bolt")[:2] == b"PK"
+    with pytest.raises(InputError, match="leave the hardness out"):
+        joint.export("matlab-law", name="bolt")
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="not installed: ccx")
+def test_two_heated_and_sheared_blocks_in_calculix():
+    for name, simulated, law in runpy.run_path(str(EXAMPLE.with_name("two_blocks.py")))["compared"]():
+        assert simulated == pytest.approx(law, rel=0.01), name
+
+
+def test_parts_with_a_lay_have_a_direction():
+    rng = np.random.default_rng(2)
+    q = np.hypot(4 * np.fft.fftfreq(64)[:, None], np.fft.fftfreq(64)[None])
+    heights = np.fft.ifft2(np.where((q > 0.03) & (q < 0.3), np.fft.fft2(rng.normal(size=(64, 64))), 0)).real
+    ground = Surface.from_map(heights / heights.std(), 1.0, periodic=True, unit="um")
+    given = {"materials": "steel 1020", "hardness": "1.5 GPa", "friction": 0.2}
+    with pytest.raises(InputError, match="give direction"):
+        Joint(ground, **given).table("60 MPa")
+    along, across = (Joint(ground, **given, direction=way) for way in ("along", "across"))
+    stiff = [float(one.table("60 MPa")["tangential_stiffness"][0]) for one in (along, across)]
+    assert stiff[0] < stiff[1]
+    cards = [
+        one.export("calculix", ("10 MPa", "100 MPa"), heat=False, friction_pressure="60 MPa") for one in (along, across)
+    ]
+    slopes = [float(card.split("*FRICTION\n")[1].splitlines()[0].split(",")[1]) for card in cards]
+    np.testing.assert_allclose(slopes, 1e6 * np.array(stiff), rtol=1e-3)

@@ -21,14 +21,6 @@ def test_profiles_along_and_across():
     assert across == pytest.approx((1 - a**2) ** 2.5 / (1 + a**2 / 2), rel=1e-10)
 
 
-def test_small_isotropic_waves():
-    # second order in s/u for an isotropic field: k = u^3 (1 - 3/2 s^2/u^2)
-    a = 0.02
-    gap = 1 + a * (np.cos(2 * np.pi * 2 * X)[:, None] + np.cos(2 * np.pi * 2 * X)[None, :])
-    found = flow_conductance(gap)
-    np.testing.assert_allclose(found, 1 - 1.5 * a**2, atol=1e-6)
-
-
 def test_scale_of_gaps_and_sides():
     gap = np.exp(0.3 * np.random.default_rng(1).standard_normal((20, 40)))
     first = flow_conductance(gap, (1.0, 2.0))

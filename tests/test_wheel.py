@@ -73,7 +73,6 @@ def test_source_distribution_holds_what_the_checkout_holds(source, tmp_path):
         held = {name.partition("/")[2] for name in packed.getnames()}
     tracked = run("git", "ls-files", cwd=source).stdout.splitlines()
     assert [name for name in tracked if not name.startswith(".") and name not in held] == []
-    # and it is enough for a wheel
     with zipfile.ZipFile(wheel_of(archive, tmp_path)) as packed:
         assert any(re.search(r"core/_plain\.\S+$", name) for name in packed.namelist())
 

@@ -19,6 +19,7 @@ from generate.boundary_elements.capped import load_at
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
 from generate.boundary_elements.solve import LOADS, Contact, prepared, pressed
 from generate.boundary_elements.surfaces import Recipe, heights
+from generate.calibrated_file import rms
 from generate.timing import fixed_work
 from mbma_tables import Surface, contact
 from mbma_tables.common.files import write_file
@@ -139,31 +140,29 @@ def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
         click.echo(f"{target}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
 
 
-def gap_errors(kind: str, surfaces: slice = slice(None)) -> dict[str, np.ndarray]:
-    """ln(law/simulation) by contacts and `JUMPS`: with the simulated contact, with one gap for all, of the whole chain.
+def gap_errors(kind: str) -> pd.DataFrame:
+    """ln(law/simulation) at `JUMPS`, a row a contact: with the simulated contact, with one gap for all, of the chain.
 
     The chain, from pressure and hardness by the calibrated law, is that of self-affine surfaces, else NaN.
     """
-    found: dict[str, list[Any]] = {"law": [], "one gap": [], "chain": [], "area": [], "waves": []}
-    for recipe in (Recipe(*numbers, 256) for numbers in SURFACES[kind][surfaces]):
+    found = []
+    for recipe, eta in itertools.product((Recipe(*numbers, 256) for numbers in SURFACES[kind]), HARDNESSES[kind]):
         surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
         h_rms = float(surface.std())
         like = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, h_rms, known["h_max"] * h_rms)
-        for eta in HARDNESSES[kind]:
-            solved = boundary_elements.Contact(surface, recipe.sizes, hardness=eta)
-            for load in (load_at(area, eta) for area in AREAS):
-                found["area"].append(solved.press(load)["area"])
-                found["waves"].append(recipe.waves)
-                assert solved.pressure is not None
-                open_, gap = solved.pressure <= 0, solved.gap / h_rms
-                simulated = np.array([(open_ / (gap + jump)).mean() for jump in JUMPS])
-                chain, law = np.full(JUMPS.size, np.nan), mean_inverse(gap.mean(), 1 - open_.mean(), JUMPS, 1.0, eta)
-                if recipe.kind == PLAIN:
-                    own = contact(like, pressure=load, theory="calibrated", hardness=eta)
-                    chain = mean_inverse(float(own.mean_separation) / h_rms, float(own.area), JUMPS, 1.0, eta)
-                for name, value in {"law": law, "one gap": 1 / (gap.mean() + JUMPS), "chain": chain}.items():
-                    found[name].append(np.log(value / simulated))
-    return {name: np.array(rows) for name, rows in found.items()}
+        solved = boundary_elements.Contact(surface, recipe.sizes, hardness=eta)
+        for load in (load_at(area, eta) for area in AREAS):
+            row: dict[str, Any] = {"area": solved.press(load)["area"], "waves": recipe.waves}
+            assert solved.pressure is not None
+            open_, gap = solved.pressure <= 0, solved.gap / h_rms
+            simulated = np.array([(open_ / (gap + jump)).mean() for jump in JUMPS])
+            laws = {"law": mean_inverse(gap.mean(), 1 - open_.mean(), JUMPS, 1.0, eta)}
+            laws |= {"one gap": 1 / (gap.mean() + JUMPS), "chain": np.full(JUMPS.size, np.nan)}
+            if recipe.kind == PLAIN:
+                own = contact(like, pressure=load, theory="calibrated", hardness=eta)
+                laws["chain"] = mean_inverse(float(own.mean_separation) / h_rms, float(own.area), JUMPS, 1.0, eta)
+            found.append(row | {name: np.log(value / simulated) for name, value in laws.items()})
+    return pd.DataFrame(found)
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -172,10 +171,10 @@ def gaps() -> None:
     for kind in SURFACES:
         known = gap_errors(kind)
         light, many = known["area"] < LIGHT, (known["waves"] >= MANY) & (known["area"] < HEAVY)
+        law, one, chain = (100 * np.stack(known[name]) for name in ("law", "one gap", "chain"))
         click.echo(f"{kind}: M/h_rms; root mean square and largest error; largest of k/(u + M) below 5% contact;")
         click.echo("mean and standard deviation of the chain, from three long waves a side on, below 30% contact [%]")
-        columns = [np.sqrt(np.mean(known["law"] ** 2, axis=0)), np.abs(known["law"]).max(axis=0)]
-        columns += [np.abs(known["one gap"][light]).max(axis=0)]
-        columns += [np.nanmean(known["chain"][many], axis=0), np.nanstd(known["chain"][many], axis=0)]
-        for jump, row in zip(JUMPS, 100 * np.array(columns).T, strict=True):
-            click.echo(" ".join([f"{jump:5g}", *(f"{value:6.1f}" for value in row)]))
+        for k, jump in enumerate(JUMPS):
+            told = rms(law[:, k]), np.abs(law[:, k]).max(), np.abs(one[light, k]).max()
+            of_chain = np.nanmean(chain[many, k]), np.nanstd(chain[many, k])
+            click.echo(" ".join([f"{jump:5g}", *(f"{value:6.1f}" for value in (*told, *of_chain))]))

@@ -21,32 +21,19 @@ WORN_SLOPE = 0.2
 class Recipe:
     """What a surface is made of.
 
-    Attributes
-    ----------
-    kind : str
-        "self_affine"; "plateau": flat spectrum below q0 down to one wave a side; "filtered": Gaussian filters (ISO
-        16610-21) of half transmission at q0 and q1, cut at twice q1; "stretched" along x, `shape` times; heights z in
-        h_rms transformed: "peaks" (exp(shape z) - 1)/shape, "valleys" the same upside down, "worn" above the level
-        `shape`, "patchy": times exp(shape y), y a smooth Gaussian field. "yielded": "self_affine", to be pressed with
-        a hardness of `shape` E* g.
-    hurst, zeta_1 : float
-        Hurst exponent and q1/q0.
-    waves : int
-        Waves of wavenumber q0 along a side.
-    seed : int
-        Of numpy's default_rng, which draws the phases.
-    points : int
-        Grid points along each side.
-    shape : float
-        What the kind says.
+    Its kind is "self_affine"; "plateau": flat spectrum below q0 down to one wave a side; "filtered": Gaussian filters
+    (ISO 16610-21) of half transmission at q0 and q1, cut at twice q1; "stretched" along x, `shape` times; heights z in
+    h_rms transformed: "peaks" (exp(shape z) - 1)/shape, "valleys" the same upside down, "worn" above the level `shape`,
+    "patchy": times exp(shape y), y a smooth Gaussian field; or "yielded": "self_affine", to be pressed with a hardness
+    of `shape` E* g.
     """
 
     kind: str
     hurst: float
-    zeta_1: float
-    waves: int
-    seed: int
-    points: int
+    zeta_1: float  # q1/q0
+    waves: int  # of wavenumber q0 along a side
+    seed: int  # of the phases
+    points: int  # along each side
     shape: float = 0.0
 
     @property

@@ -12,14 +12,14 @@ from scipy.special import erf
 
 from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import MIN_WAVES
+from generate.files import evidence
 from generate.formulas.printing import HEADER, latex_steps, read_functions
-from generate.pages.page import Measured, duration, evidence, table, unmarked
+from generate.pages.page import Measured, duration, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.plots import Curve, draw_compression, theory_label
+from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.scenes.costs import shipped_costs, shipped_distances
-from mbma_tables.scenes.steps import other_theory
 from mbma_tables.theories import THEORIES
 
 POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are compared with simulations
@@ -61,12 +61,6 @@ def pocket_errors() -> list[list[Any]]:
     return [[what, *np.quantile(np.concatenate(e), (0.5, 0.9, 1.0)), len(seen)] for what, e in found.items()]
 
 
-def pocket_laws() -> str:
-    """The same as a table."""
-    header = "pocket law | median error | 90% of errors below | largest | surfaces"
-    return table(header, pocket_errors(), "{} | {:.2g}% | {:.2g}% | {:.2g}% | {}")
-
-
 def formula() -> Measured:
     """Certificates, ranges and equations of the closed forms."""
     rows = []
@@ -75,7 +69,9 @@ def formula() -> Measured:
             worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
             rows.append([form, result, found.coefficients, found.largest, found.median, worst])
     header = "form | function | coefficients | largest error | median | worst at"
-    parts = {"laws": pocket_laws(), "certificates": table(header, rows, "{} | {} | {} | {:g} | {:.2g}")}
+    parts = {"certificates": table(header, rows, "{} | {} | {} | {:g} | {:.2g}")}
+    header = "pocket law | median error | 90% of errors below | largest | surfaces"
+    parts["laws"] = table(header, pocket_errors(), "{} | {:.2g}% | {:.2g}% | {:.2g}% | {}")
     parts["ranges"] = "\n".join(
         f"- {form}: {', '.join(f'`{low:g} <= {name} <= {high:g}`' for name, (low, high) in limits.items())}"
         for form, limits in RANGES.items()
@@ -93,15 +89,16 @@ def picture() -> Any:
     seen = [one for one in evidence() if one.node == SHOWN]
     _, hurst, zeta_1, *_ = SHOWN
     surface = Surface(float(hurst), 1.0, float(zeta_1), 1.0, float(np.mean([one.h_max for one in seen])))
-    u = contact(surface, pressure=LOADS * surface.rms_gradient, theory="calibrated").mean_separation
-    curves = []
+    u, curves = contact(surface, pressure=LOADS * surface.rms_gradient, theory="calibrated").mean_separation, []
     for theory in ("calibrated", "mbma", "persson"):
-        curve = contact(surface, mean_separation=u, theory=theory).curve()
         # three bands would hide one another
         bands: dict[str, Any] = {} if theory == "calibrated" else {"scatter": None, "area_scatter": None}
+        curve = contact(surface, mean_separation=u, theory=theory).curve()
         curves.append(dataclasses.replace(curve, label=theory_label(theory), **bands))
     figure = draw_compression(curves, f"H = {hurst:g}, q1/q0 = {zeta_1:g}: a spectrum that no constant was fitted to")
-    by_gap, by_force = unmarked(figure)
+    by_gap, by_force = figure.axes
+    for line in (*by_gap.lines, *by_force.lines):
+        line.set_marker("")
     for number, one in enumerate(seen):
         force = one.force * float(surface.rms_gradient)
         by_gap.plot(one.u, force, "k.", label="_" if number else "boundary elements")
@@ -130,8 +127,8 @@ def readme() -> Measured:
 
 
 def theories() -> Measured:
-    """Separation, area and stiffness at a few pressures, and curves of force and area, by every theory."""
-    road, rows, curves = Surface.named("concrete"), [], []
+    """Separation, area and stiffness at a few pressures by every theory."""
+    road, rows = Surface.named("concrete"), []
     for pressure, name in itertools.product(PRESSURES, THEORIES):
         found = contact(road, pressure=pressure, theory=name)
         numbers = found.mean_separation / road.h_rms, 100 * found.area, found.stiffness * road.h_rms / pressure
@@ -139,14 +136,4 @@ def theories() -> Measured:
         rows.append([pressure, f"`{name}`", *numbers, "yes" if found.valid else "no", spread])
     header = "F/(A0 E*) | theory | u/h_rms | A/A0 [%] | stiffness h_rms/F | valid | scatter of ln F"
     text = table(header, rows, "{:g} | {} | {:.3g} | {:.3g} | {:.3g} | {} | {:.2g}")
-    gap = float(road.h_max) * (1 - 2 * np.linspace(0.002, 1.0, 121))
-    for name in THEORIES:
-        line = other_theory(name, road, gap, 1.0)
-        known, u = np.isfinite(line.pressure), (road.h_max + gap) / (2 * road.h_rms)
-        curves.append(Curve(theory_label(name), u[known], *(field[known] for field in line)))
-    figure = draw_compression(curves, "concrete road of Lorenz, by every theory")
-    by_gap, by_force = unmarked(figure)
-    by_gap.legend()
-    by_gap.set_ylim(1e-8, 20)
-    by_force.set(xlim=(1e-6, 10), ylim=(1e-6, 5))
-    return {"answers": text}, {"docs/figures/theories.svg": figure}
+    return {"answers": text}, {}

@@ -12,14 +12,14 @@ import numpy as np
 
 from generate.boundary_elements.design import REFINEMENT, SPLITS, TRAINING
 from generate.calibrated_file import binned
+from generate.files import dataset
 from generate.leakage_flow import Flow, cases
 from generate.leakage_law import EDGES, EVIDENCE, LARGE, errors, noise_floor, summary
-from generate.pages.page import DATA, Measured, dataset, panels, read_csv, spans, table
+from generate.pages.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact
 from mbma_tables.answers.leakage_table import GROUP, shipped_flow
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.calibrated import CONSTANTS
-from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.calibrated_table import shipped, shipped_part
 
 # rows of the accuracy of the calibrated law, as its file names them
@@ -30,10 +30,7 @@ SETS = (
     *(f"self-affine, {name}" for name in ("mbma", "mbma_printed", "mbma_fitted", "persson", "greenwood_williamson")),
 )
 WORDS = {"held_out_": "new ", "4 wave": "4-8 wave", "wave": "wavelength", "stretched": "stretched 1:3 to 1:12"}
-QUANTITIES = ("force", "area", "stiffness")
 GRIDS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9)  # contacts at which grids are compared
-COLOURS = {"calibrated": "k", "calibrated_map": "0.5", "mbma": "C0", "mbma_printed": "C9", "mbma_fitted": "C1"}
-COLOURS |= {"persson": "C3", "persson_simplified": "C6", "greenwood_williamson": "C2"}
 
 BINS, HEADER = (0.004, 0.05, 0.15, 0.3, 0.4), "A {:.3g}-{:.3g}%"  # of leakage
 LEAKAGE_SETS = ("training", "plateaus", "stretched", "yielded", "zeta_1 32, two waves", "zeta_1 64 and 128")
@@ -42,29 +39,25 @@ DRAWN = (0.4, 0.8)  # Hurst exponents
 
 
 def calibrated() -> Measured:
-    """Accuracy and constants that `python -m generate calibrated` stored, and a figure."""
+    """Accuracy and constants that `python -m generate calibrated` stored."""
     data = dataset(shipped_file("calibrated.nc"))
     edges, sets = (*data.contact_low.values, data.contact_high.values[-1]), data.attrs["sets"].split("; ")
-    parts, quantities = {}, data.attrs["quantities"].split()
-    for quantity in QUANTITIES:
-        rows = []
-        for name in SETS:
-            cells = data.accuracy.values[sets.index(name), quantities.index(quantity)]
-            words = functools.reduce(lambda text, pair: text.replace(*pair), WORDS.items(), name)
-            rows.append([words, *((100 * bias, 100 * spread) for bias, spread, *_ in cells)])
-        parts[quantity] = table(f"surfaces, and what is known of them | {spans(edges)}", rows, "{} | {:+.0f} ± {:.0f}")
-    parts |= {"numbers": numbers(data.attrs), "bars": bars(data), "refinement": refinement()}
-    return parts, {"docs/figures/calibrated.svg": draw_calibrated(data)}
+    words = [functools.reduce(lambda text, pair: text.replace(*pair), WORDS.items(), name) for name in SETS]
+    parts, header = {}, f"surfaces, and what is known of them | {spans(edges)}"
+    for number, quantity in enumerate(data.attrs["quantities"].split()):
+        own = 100 * data.accuracy.values[[sets.index(name) for name in SETS], number]
+        rows = ([name, *map(tuple, row[:, :2])] for name, row in zip(words, own, strict=True))
+        parts[quantity] = table(header, rows, "{} | {:+.0f} ± {:.0f}")
+    return parts | {"numbers": numbers(data.attrs), "bars": bars(data.attrs["bars"]), "refinement": refinement()}, {}
 
 
 def numbers(facts: dict[str, Any]) -> str:
     """Constants, the table's certificate, and the coverage of the stated scatter."""
     rows = [(f"`{name}`", f"{facts[f'law_{name}']:.4g}") for name in vars(CONSTANTS)]
-    maps = {name.removeprefix("map_"): value for name, value in facts.items() if name.startswith("map_")}
-    rows += [(f"`{name}` (map)", f"{value:.4g}") for name, value in maps.items()]
+    rows += [(f"`{name[4:]}` (map)", f"{value:.4g}") for name, value in facts.items() if name.startswith("map_")]
     evidence = json.loads(facts["evidence"])
     rows += [("surfaces simulated, of which in the training set", f"{evidence['surfaces']}, {evidence['training']}")]
-    for what in QUANTITIES:
+    for what in ("force", "area", "stiffness"):
         largest, most = facts[f"largest_error_{what}"], facts[f"p99_error_{what}"]
         rows.append((f"largest (99%) error of {what} by the table", f"{largest:.1e} ({most:.1e})"))
     for what, (one, two) in json.loads(facts["coverage"]).items():
@@ -72,13 +65,12 @@ def numbers(facts: dict[str, Any]) -> str:
     return table("quantity | value", rows)
 
 
-def bars(data: Any) -> str:
+def bars(stored: str) -> str:
     """Limits to nine errors in ten, what is reached, and the floor by surfaces of one spectrum."""
     rows = []
-    for bar in json.loads(data.attrs["bars"]):
-        over, large = bar["found"] - bar["limit"], f"({bar['surfaces_large']})"
-        judged = "met" if over <= 0 else f"missed by {100 * over:.1f}" if over > 0 else "no load there"
-        found = f"{100 * bar['found']:.1f}%: {judged}" if np.isfinite(bar["found"]) else f"—: {judged}"
+    for bar in json.loads(stored):
+        over, large = 100 * (bar["found"] - bar["limit"]), f"({bar['surfaces_large']})"
+        found = f"{100 * bar['found']:.1f}%: {'met' if over <= 0 else f'missed by {over:.1f}'}"
         large = f"{100 * bar['large']:.1f}% {large}" if np.isfinite(bar["large"]) else f"— {large}"
         what = bar["what"].replace("wave", "wavelength") + " a side"
         rows.append([what, 100 * bar["limit"], found, 100 * bar["mean"], bar["surfaces"], large, 100 * bar["noise"]])
@@ -88,7 +80,7 @@ def bars(data: Any) -> str:
 
 def refinement() -> str:
     """Errors of raw and corrected areas on coarse grids against the finest, by points a shortest wave and contact."""
-    data = dataset(DATA / "boundary_elements.nc")
+    data = dataset("boundary_elements.nc")
     one = data.isel(surface=data.split.values == SPLITS.index(REFINEMENT))
     finest, spacings = one.points.values == one.points.values.max(), one.points / (one.zeta_1 * one.waves)
     rows = []
@@ -103,29 +95,6 @@ def refinement() -> str:
         pairs = zip(*cells, strict=True)
         rows.append([spacing, *((a.mean(), b.mean()) if a.size and b.size else "—" for a, b in pairs)])
     return table(f"grid points per shortest wavelength | {spans(GRIDS)}", rows, "{:g} | {:+.1f}, {:+.1f}")
-
-
-def draw_calibrated(data: Any) -> Any:
-    """One surface's curves with the stated scatter as a band, and every theory's scatter of force."""
-    figure, (left, right) = panels(1, 2, (10, 3.6))
-    simulated, surface = read_csv("bem_hurst0.8_zeta64.csv"), Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
-    gap, g = np.linspace(0.01, 3.38, 200), float(surface.rms_gradient)
-    for name in THEORIES:
-        found = get_theory(name).answer(surface, gap)
-        force = found.pressure / g
-        left.semilogy(gap, force, color=COLOURS[name], label=name)
-        if name == "calibrated":
-            spread = np.exp(get_theory(name).scatter(surface, "pressure", found.area))
-            left.fill_between(gap, force / spread, force * spread, color="0.8", label="its scatter")
-    left.semilogy(simulated.iloc[:, 3], simulated.iloc[:, 0], "ko", mfc="none", label="boundary elements")
-    left.set(xlabel="u/h_rms", ylabel="F/(A0 E* g)", ylim=(1e-5, 3), title="H 0.8, zeta_1 64, h_max 3.4 h_rms")
-    left.legend(fontsize="small")
-    number = data.attrs["quantities"].split().index("force")
-    for k, name in enumerate(data.attrs["theories"].split()):
-        right.loglog(data.contact, data.stated_scatter.values[k, number], "o-", color=COLOURS[name], label=name)
-    right.set(xlabel="A/A0", ylabel="rms of ln(F/simulated) at equal u", title="Stated scatter of force")
-    figure.legend(*right.get_legend_handles_labels(), fontsize="small", loc="outside right center")
-    return figure
 
 
 def leakage() -> Measured:
@@ -174,11 +143,10 @@ def floor() -> str:
 
 def of_cells(seen: Sequence[Any]) -> str:
     """Held-out errors, and the spread of cells of one spectrum, with many and with few longest wavelengths a side."""
-    isotropic = [one for one in seen if one.isotropic and one.zeta_1 < LARGE]
-    contact_constants, constants, lines = shipped().constants, shipped_flow().constants, list[list[Any]]()
+    constants, lines = shipped_flow().constants, list[list[Any]]()
     for name, many in (("eight", True), ("four or five", False)):
-        own = [one for one in isotropic if (one.waves >= MANY_WAVES) == many]
-        flows = [Flow(one, contact_constants) for one in own if one.split != TRAINING]
+        own = [one for one in seen if one.isotropic and one.zeta_1 < LARGE and (one.waves >= MANY_WAVES) == many]
+        flows = [Flow(one, shipped().constants) for one in own if one.split != TRAINING]
         laws = {
             "calibrated": [errors(f, f.medium(constants)) for f in flows],
             "medium, simulated area and gap": [errors(f, f.medium(constants, f.one.area, f.one.u)) for f in flows],
@@ -198,16 +166,16 @@ def draw_leakage(seen: Sequence[Any]) -> Any:
             if one.kind == "self_affine" and one.node[1] == hurst and (one.isotropic or one.zeta_1 >= 64):
                 colour, label = ("k", "simulated, zeta_1 < 64") if one.zeta_1 < 64 else ("r", "simulated, zeta_1 >= 64")
                 axes.plot(one.area, np.exp(one.log_k), ".", color=colour, ms=4, alpha=0.6, label=label)
-        for zeta, style in ((16.0, "-"), (64.0, "--"), (1024.0, ":")):
+        for zeta, style in ((64.0, "--"), (1024.0, ":"), (16.0, "-")):
             answer = contact(Surface(hurst, 1.0, zeta, 1.0, 4.0), area=area, theory="calibrated")
             k = np.where(answer.leakage.blocked, np.nan, answer.leakage.K)
             axes.plot(area, k, f"C0{style}", label=f"calibrated, zeta_1 {zeta:g}")
-            if zeta == 16:
-                spread, u = np.exp(answer.leakage.scatter), answer.mean_separation
-                axes.fill_between(area, k / spread, k * spread, color="C0", alpha=0.2, lw=0, label="its scatter")
-                closed = flow.closed_form(u, area)
-                axes.plot(area, np.where(closed > 0, closed, np.nan), "C1-", lw=1, label="closed form, zeta_1 16")
-                axes.plot(area, u**3, "C2-", lw=1, label="u^3, zeta_1 16")
+        # the last of these also by other laws
+        spread, u = np.exp(answer.leakage.scatter), answer.mean_separation
+        axes.fill_between(area, k / spread, k * spread, color="C0", alpha=0.2, lw=0, label="its scatter")
+        closed = flow.closed_form(u, area)
+        axes.plot(area, np.where(closed > 0, closed, np.nan), "C1-", lw=1, label="closed form, zeta_1 16")
+        axes.plot(area, u**3, "C2-", lw=1, label="u^3, zeta_1 16")
         axes.set(xlabel="real contact area  A/A0", yscale="log", ylim=(1e-7, 20), title=f"H = {hurst:g}")
         axes.grid(alpha=0.3)
     axes_of[0].set_ylabel("flow coefficient over h_rms^3,  k")

@@ -1,35 +1,133 @@
-"""docs/maps.md: theories on anisotropic and non-Gaussian surfaces, relative to boundary elements."""
+"""docs/gallery.md, measured maps from file to contact, and docs/maps.md, theories on maps beside boundary elements."""
 
 from __future__ import annotations
 
+import dataclasses
+import os
+import pathlib
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from scipy.signal import resample
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.pages.gallery import BARS, EXAMPLES, ratios, read_rows
-from generate.pages.page import DATA, Measured, dataset, table
+from generate.files import ROOT, dataset, read_csv, to_csv
+from generate.pages.page import Measured, printed, table
 from mbma_tables import Surface, contact
+from mbma_tables.answers.measurement import curves, draw
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.files import write_file
+from mbma_tables.laws.boundary_elements import LOADS
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories import get_theory
+from mbma_tables.surfaces.treatment import Treated, mirrored
+from mbma_tables.theories import BoundaryElements, get_theory
+from mbma_tables.theories.protocol import Theory
+from mbma_tables.theories.wrapped import answer_where_finite
 
+FOLDER = "docs/data/maps"
+ROWS = f"{FOLDER}/boundary_elements.csv"
+VARIABLE = "MBMA_REFERENCE_MAPS"
+COLUMNS = ["force", "area", "mean_separation", "energy"]
+HEAD = """\
+# boundary elements on measured maps (Tamaas), plane removed, continued by mirror images, waves below
+# four sampling steps removed; force over A0 E*, lengths in the map's unit
+"""
+GAPS = np.append(np.geomspace(1e-6, 0.1, 90)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
 KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")
 GRADIENT = 0.1  # that surfaces are given: theories are for small ones
 # contacts that are summed up: as far as islands do not lie on one another, and all
 RANGES = {"mbma": (0.01, 0.1), "calibrated": (0.01, 0.97)}
-EXTRAPOLATED = {"extrapolate_to": "2nm", "extrapolate_hurst": 0.8}
-PRESSURES = (1e-4, 1e-3, 1e-2)
+EXTRAPOLATION = (
+    f"mbma contact --map {FOLDER}/top-1.top --short-cutoff 9.4nm --extrapolate-to 2nm --extrapolate-hurst 0.8 "
+    "--theory persson --pressure 0.0001,0.001,0.01"
+)
 Seen = tuple[str, MeasuredSurface, FloatArray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Example:
+    """A measurement and its options on the command line."""
+
+    name: str
+    options: dict[str, Any]
+
+    def path(self) -> pathlib.Path | None:
+        """The file, in the repository or in the folder that MBMA_REFERENCE_MAPS names; None if in neither."""
+        places = [ROOT / FOLDER, *([pathlib.Path(os.environ[VARIABLE])] if VARIABLE in os.environ else [])]
+        return next((place / self.name for place in places if (place / self.name).is_file()), None)
+
+
+EXAMPLES = (
+    Example("top-1.top", {"short_cutoff": "9.4nm"}),
+    Example("frt-2.frt", {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"}),
+    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}),
+)
+# too large to be shipped; their boundary elements are
+BARS = (
+    Example("al3d-1.al3d", {"short_cutoff": f"{4 * 4.38027e-07 * (1 - 1e-9)}m"}),
+    # whose light contacts are solved on a finer grid too
+    Example("di-1.di", {"short_cutoff": f"{4 * 500 / 512 * (1 - 1e-9)}nm"}),
+)
+
+
+def read_rows() -> dict[str, FloatArray]:
+    """Boundary elements by map: `COLUMNS`, shape (4, n), lengths in the file's unit."""
+    return {str(name): own[COLUMNS].to_numpy().T for name, own in read_csv(ROOT / ROWS).groupby("map")}
+
+
+def refined(treated: Treated) -> FloatArray:
+    """Light loads of a map on twice as many points along each side, by Fourier interpolation: ten minutes."""
+    values = mirrored(treated.heights - treated.heights.mean())
+    for axis, count in enumerate(values.shape):
+        values = resample(values, 2 * count, axis=axis)
+    steps = [step / 2 for step in treated.steps]
+    return BoundaryElements.from_map(values, *steps, periodic=True, loads=LOADS[:4]).rows
+
+
+def gallery() -> Measured:
+    """What `mbma fit` prints of each example, and its picture with boundary elements, solved where none are known."""
+    rows, parts, files = read_rows(), {}, dict[str, Any]()
+    for example, fine in (*((one, False) for one in (*EXAMPLES, *BARS)), (BARS[1], True)):
+        name, path = f"{example.name} refined" if fine else example.name, example.path()
+        if path is None:
+            continue
+        treated, surface = measured(path, example.options)
+        if name not in rows and treated.heights.ndim == 2:
+            rows[name] = refined(treated) if fine else BoundaryElements.from_map(path, **example.options).rows
+            frames = [pd.DataFrame(own.T, columns=COLUMNS).assign(map=of) for of, own in sorted(rows.items())]
+            # at once: what comes after may be stopped
+            write_file(ROOT / ROWS, to_csv(HEAD, pd.concat(frames)[["map", *COLUMNS]], "%.9g"))
+        if example in EXAMPLES:
+            found = dict(zip(["pressure", *COLUMNS[1:]], rows[name], strict=True)) if name in rows else None
+            picture = draw(treated, surface, curves(surface), name, "pressure  F/(A0 E*)", found)
+            files[f"docs/figures/gallery_{path.stem}.svg"] = picture
+            options = " ".join(f"--{key.replace('_', '-')} {value}" for key, value in example.options.items())
+            parts[path.stem.replace("-", "_")] = printed(f"mbma fit {FOLDER}/{name} {options}")
+    return parts, files
+
+
+def ratios(
+    theory: Theory, surface: MeasuredSurface, force: FloatArray, area: FloatArray, u: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """A theory's area at a force and force at a separation over simulated ones; NaN where it does not reach them."""
+    fine = answer_where_finite(theory, surface, np.append(u, GAPS * float(surface.h_max)))
+    loads, areas = fine.pressure[u.size :], fine.area[u.size :]
+    order = np.argsort(np.where(np.isfinite(loads), loads, np.inf))[: np.isfinite(loads).sum()]
+    loads, areas = loads[order], np.maximum.accumulate(areas[order])
+    # between gaps, a force that vanishes cannot be interpolated
+    held = loads > 0
+    own = np.interp(np.log(force), np.log(loads[held]), np.log(areas[held]), np.nan, np.nan)
+    return np.exp(own) / area, fine.pressure[: u.size] / force
 
 
 def simulated() -> Iterator[Seen]:
     """Held-out surfaces by name, as maps, with F/(A0 E*), A/A0 and u of boundary elements."""
-    data = dataset(DATA / "boundary_elements.nc")
+    data = dataset("boundary_elements.nc")
     kinds = data.kind.attrs["flag_meanings"].split()
     order = [KINDS.index(kinds[k]) if kinds[k] in KINDS else -1 for k in data.kind.values]
     for one in (data.isel(surface=number) for number in np.lexsort((data["shape"].values, np.array(order)))):
@@ -45,14 +143,6 @@ def simulated() -> Iterator[Seen]:
         rows = np.stack([one.force * GRADIENT, one.area, one.mean_separation * scale])
         name = f"stretched 1:{shape:g}" if kind == "stretched" else f"{kind} {shape:g}"
         yield name, surface, rows[:, np.isfinite(rows).all(axis=0) & (one.area.values > 0)]
-
-
-def from_files() -> Iterator[Seen]:
-    """Measured maps with boundary elements, those of the gallery and what else is at hand."""
-    for example in (*EXAMPLES, *BARS):
-        path, rows = example.path(), read_rows().get(example.name)
-        if path is not None and rows is not None:
-            yield f"measured: {example.name}", measured(path, example.options)[1], rows[:3]
 
 
 def summary(seen: list[Seen]) -> list[Any]:
@@ -79,28 +169,12 @@ def summary(seen: list[Seen]) -> list[Any]:
     return cells
 
 
-def extrapolation() -> str:
-    """A measured spectrum as it is and extrapolated, by a theory that needs the spectrum only."""
-    path, options = EXAMPLES[0].path(), EXAMPLES[0].options
-    assert path is not None
-    known, longer = (measured(path, options | more)[1] for more in ({}, EXTRAPOLATED))
-    rows = []
-    for pressure in PRESSURES:
-        one, other = (contact(s, pressure=pressure, theory="persson") for s in (known, longer))
-        # conductance over conductivity is stiffness over E*
-        pairs = ((one.area, other.area), (one.stiffness, other.stiffness))
-        rows.append([pressure, *(number for x, y in pairs for number in (x, y, y / x))])
-    names = ("area", "stiffness/E* and conductance/k [1/nm]")
-    header = " | ".join(["pressure/E*", *(f"{name} | extrapolated | ratio" for name in names)])
-    note = next(entry["told"] for entry in longer.provenance if entry["step"] == "extrapolated")
-    text = table(header, rows, "{:g} | {:.3g} | {:.3g} | {:.2f} | {:.3g} | {:.3g} | {:.2f}")
-    return f"{text}\n\nReported with it: {note}."
-
-
 def measure() -> Measured:
     """Blocks of the page; no other files."""
-    groups: dict[str, list[Seen]] = {}
-    for one in (*simulated(), *from_files()):
+    groups, known = dict[str, list[Seen]](), read_rows()
+    maps = [(one.name, one.path(), one.options) for one in (*EXAMPLES, *BARS) if one.name in known]
+    files = [(f"measured: {n}", measured(path, own)[1], known[n][:3]) for n, path, own in maps if path is not None]
+    for one in (*simulated(), *files):
         groups.setdefault(one[0], []).append(one)
     rows = []
     for name, seen in groups.items():
@@ -112,4 +186,4 @@ def measure() -> Measured:
     columns = (f"{name}: {what}" for name in ("MBMA", "calibrated") for what in ("area", "force", "valid"))
     header = f"surfaces (number) | anisotropy | kurtosis of slopes | skewness | {' | '.join(columns)}"
     shapes = table(header, rows, "{} | {:.1f} | {:.1f} | {:.1f} | {:.2f} ({:.2f} to {:.2f})")
-    return {"shapes": shapes, "extrapolation": extrapolation()}, {}
+    return {"shapes": shapes, "extrapolation": printed(EXTRAPOLATION)}, {}

@@ -7,29 +7,28 @@
 
 from __future__ import annotations
 
-import functools
+import contextlib
 import importlib
 import itertools
 import math
 import pathlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+from click.testing import CliRunner
 
+from generate.files import ROOT
 from mbma_tables.common.files import write_file
 
-if TYPE_CHECKING:
-    from generate.boundary_elements.evidence import Case
-
-ROOT = pathlib.Path(__file__).parents[2]
-DATA = ROOT / "docs" / "data"
-_OWN = ("cost", "explorer", "export", "fidelity", "gallery", "machined", "maps", "stability", "tables")
+_OWN = ("architecture", "cost", "explorer", "fidelity", "machined", "stability", "tables")
 PAGES = {
     **{name: f"{name}:measure" for name in _OWN},
     **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
+    **{name: f"film:{name}" for name in ("lubrication", "rough_bodies")},
     **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
+    **{"gallery": "maps:gallery", "maps": "maps:measure"},
 }
 Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -59,18 +58,20 @@ def write(name: str, parts: Mapping[str, str], files: Mapping[str, Any], out: pa
     return [out / place for place in contents]
 
 
-def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> str:
-    """A Markdown table.
+def printed(command: str) -> str:
+    """A command `mbma ...` with what it prints."""
+    from mbma_tables.cli import main
 
-    Parameters
-    ----------
-    header : str
-        Names of the columns, with bars between them.
-    rows : iterable of iterables
-        Cells. Strings are copied, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple
-        fills a format of several fields.
-    formats : str
-        Formats of the columns, likewise; the last one holds for all that follow.
+    with contextlib.chdir(ROOT):
+        done = CliRunner().invoke(main, command.split()[1:], catch_exceptions=False)
+    return f"```\n$ {command}\n{done.stdout.strip()}\n```"
+
+
+def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> str:
+    """A Markdown table, of names and formats of columns with bars between them; the last format holds for the rest.
+
+    Strings are copied, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple fills a format
+    of several fields.
     """
     known = formats.split(" | ")
 
@@ -86,9 +87,9 @@ def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> st
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def percent(value: float, sign: str = "") -> str:
+def percent(value: float) -> str:
     """A fraction in percent to two digits; a dash where it is not finite."""
-    return f"{float(f'{100 * value:.2g}'):g}{sign}" if math.isfinite(value) else "—"
+    return f"{float(f'{100 * value:.2g}'):g}" if math.isfinite(value) else "—"
 
 
 def duration(seconds: float) -> str:
@@ -100,35 +101,6 @@ def duration(seconds: float) -> str:
 def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
     """Headers of bins of contact in percent, from their edges as fractions."""
     return " | ".join(form.format(100 * a, 100 * b) for a, b in itertools.pairwise(edges))
-
-
-def to_csv(head: str, frame: Any, form: str | None = None) -> bytes:
-    """A data frame as a CSV file with a head of comments."""
-    text: str = head + frame.to_csv(index=False, float_format=form, lineterminator="\n")
-    return text.encode()
-
-
-def read_csv(name: str | pathlib.Path) -> Any:
-    """A CSV file of docs/data with comments and a line of names, as a data frame."""
-    import pandas as pd
-
-    return pd.read_csv(DATA / name, comment="#")
-
-
-@functools.cache
-def dataset(path: str | pathlib.Path) -> Any:
-    """A netCDF file in memory."""
-    import xarray as xr
-
-    return xr.load_dataset(path)
-
-
-@functools.cache
-def evidence() -> tuple[Case, ...]:
-    """The simulated surfaces of docs/data/boundary_elements.nc."""
-    from generate.boundary_elements.evidence import cases
-
-    return tuple(cases(dataset(DATA / "boundary_elements.nc")))
 
 
 def panels(rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any) -> tuple[Any, Any]:
@@ -144,11 +116,3 @@ def svg(figure: Any) -> bytes:
     from mbma_tables.common.plots import to_picture
 
     return to_picture(figure, "svg", dpi=100, outlines=True)
-
-
-def unmarked(figure: Any) -> Any:
-    """The axes of a figure of theories, their lines without markers."""
-    for axes in figure.axes:
-        for line in axes.lines:
-            line.set_marker("")
-    return figure.axes

@@ -1,25 +1,20 @@
-"""docs/stability.md: corners of parameter space, counted and drawn, and the island solver beside another program's.
+"""docs/stability.md: corners of parameter space, counted and drawn.
 
-The reference at corners is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter
-tolerance. The other program is `GreenwoodTripp` of ContactMechanics, which solves (34), (36) and (37) too; it takes the
-gap in the middle, d(0), instead of X, and scales pressure by E* sqrt(sigma/8B), which is half of E* sigma/L.
+The reference is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter tolerance.
 """
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import mpmath as mp
 import numpy as np
-from scipy.integrate import simpson
-from scipy.interpolate import BarycentricInterpolator
 
 from generate.pages.page import Measured, panels, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
@@ -28,7 +23,6 @@ from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.greenwood_tripp import IslandSolution
 from mbma_tables.models import answer_islands
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import get_variant
@@ -58,13 +52,8 @@ TOTAL_BANDS = (3.0000001, 3.1, 10.0, 216.0, 1e4, 1e6, 1e8)
 TOTAL_HURSTS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
 TOP, TOTAL_TRUTH = 3.0, 1e-10
 
-# islands of the comparison: X and mu
-CASES = ((2.0, 0.1), (0.0, 1.0), (5.0, 1.0), (8.0, 0.3), (5.0, 4.0))
-POINTS = (26, 51, 101, 201)  # each with half the step of the one before
-BEYOND = 1.02  # of our outer radius, beyond which both pressures vanish
-TOLERANCE, MAX_ITERATIONS = 1e-9, 10_000
-
 Answer = tuple[Sequence[Any], float]  # values, and a bound on their relative error
+Counted = tuple[list["Tally"], dict[str, FloatArray]]  # and the error at each corner by way
 
 
 @dataclasses.dataclass
@@ -110,6 +99,22 @@ def relative_error(found: float, truth: Any) -> float:
     return abs(float(found / truth - 1))
 
 
+def counted(
+    ways: Mapping[str, Callable[..., Answer]], corners: Iterable[tuple[Any, ...]], truth: Callable[..., Sequence[Any]]
+) -> Counted:
+    """Every way at every corner; rigid spheres do not claim to be elastic ones, and have no truth."""
+    tallies, errors = {name: Tally(name) for name in ways}, dict[str, list[float]]({name: [] for name in ways})
+    for corner in corners:
+        try:
+            exact: Sequence[Any] | None = truth(*corner)
+        except MbmaError:
+            exact = None
+        for name, way in ways.items():
+            known = None if name.endswith("rigid") else exact
+            errors[name].append(tallies[name].add(functools.partial(way, *corner), known))
+    return list(tallies.values()), {name: np.array(own) for name, own in errors.items()}
+
+
 def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
     """(pi/5) F_{5/2}(-X) and (pi/2) F_2(-X) by mpmath: parabolic cylinder functions."""
     with mp.workdps(DIGITS):
@@ -117,152 +122,101 @@ def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
         return mp.pi / 5 * force, mp.pi / 2 * area
 
 
-def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
-    """Every island model at every corner of (X, mu); maps of the larger error of both functions, NaN where refused."""
-    tallies = {name: Tally(f"islands by {name}") for name in ISLAND_MODELS}
-    models = {name: get_model(name, 10 * SOLVED, get_variant("reported")) for name in ISLAND_MODELS}
-    maps = {name: np.full((X_CORNERS.size, MU_CORNERS.size), np.nan) for name in ISLAND_MODELS}
+def islands() -> Counted:
+    """Every island model at every corner of (X, mu)."""
 
-    def ask(model: Any, X: float, mu: float) -> Answer:
-        found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
-        return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
+    def ask(name: str) -> Callable[..., Answer]:
+        model = get_model(name, 10 * SOLVED, get_variant("reported"))
 
-    for (i, X), (j, mu) in itertools.product(enumerate(X_CORNERS), enumerate(MU_CORNERS)):
-        truth: Sequence[Any] | None = None
+        def answer(X: float, mu: float) -> Answer:
+            found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
+            return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
+
+        return answer
+
+    def truth(X: float, mu: float) -> Sequence[Any]:
         if mu <= RIGID_MU:
             force, area = rigid_truth(X)
-            truth = force * mp.mpf(float(mu)), area
-        else:
-            with contextlib.suppress(MbmaError):
-                solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
-                truth = solved.phi_F, solved.phi_A
-        for name, model in models.items():
-            # rigid spheres do not claim to be elastic ones
-            known = None if name == "rigid" else truth
-            maps[name][i, j] = tallies[name].add(functools.partial(ask, model, X, mu), known)
-    return list(tallies.values()), maps
+            return force * mp.mpf(float(mu)), area
+        solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
+        return solved.phi_F, solved.phi_A
+
+    ways = {f"islands by {name}": ask(name) for name in ISLAND_MODELS}
+    return counted(ways, itertools.product(X_CORNERS, MU_CORNERS), truth)
 
 
-def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
-    """Geometry by the library and by the paper's formulas as printed, against 60 digits."""
+def island_geometry() -> Counted:
+    """Geometry by the library and by the paper's formulas as printed, against 60 digits; corners of the maps first."""
 
     def library(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
         found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), get_variant(variant))
         return [float(found[name][0]) for name in FIELDS], math.inf
 
-    def direct(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
+    def printed(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
         found = exact_island(approach, hurst, zeta_1, float(divisor(variant)), DOUBLES)
         return [found[name] for name in FIELDS], math.inf
 
-    ways = {library: Tally("geometry, library"), direct: Tally("geometry, the paper's formulas as printed")}
-    maps = {way.__name__: np.full((APPROACHES.size, BANDS.size), np.nan) for way in ways}
-    for hurst, variant, (j, zeta_1) in itertools.product(HURSTS, VARIANTS, enumerate(map(float, BANDS))):
-        # approaches of the map, then one ulp around the floors of zeta_d and zeta_u
+    def truth(approach: float, hurst: float, zeta_1: float, variant: str) -> Sequence[Any]:
+        found = exact_island(approach, hurst, zeta_1, divisor(variant))
+        return [found[name] for name in FIELDS]
+
+    corners = list(itertools.product(APPROACHES, (MAP_HURST,), BANDS, ("reported",)))
+    for hurst, variant, zeta_1 in itertools.product(HURSTS, VARIANTS, map(float, BANDS)):
+        if (hurst, variant) != (MAP_HURST, "reported"):
+            corners += [(approach, hurst, zeta_1, variant) for approach in APPROACHES]
+        # one ulp around the floors of zeta_d and zeta_u
         floors = [float(kink) for kink in kinks(hurst, zeta_1, get_variant(variant))]
-        near = [kink * (1 + side * ULP) for kink in floors for side in (-1, 0, 1)]
-        for i, approach in enumerate([*map(float, APPROACHES), *near]):
-            exact = exact_island(approach, hurst, zeta_1, divisor(variant))
-            for way, tally in ways.items():
-                answer = functools.partial(way, approach, hurst, zeta_1, variant)
-                error = tally.add(answer, [exact[field] for field in FIELDS])
-                if hurst == MAP_HURST and variant == "reported" and i < APPROACHES.size:
-                    maps[way.__name__][i, j] = error
-    return list(ways.values()), maps
+        corners += [(kink * (1 + side * ULP), hurst, zeta_1, variant) for kink in floors for side in (-1, 0, 1)]
+    ways = {"geometry, library": library, "geometry, the paper's formulas as printed": printed}
+    return counted(ways, corners, truth)
 
 
 def totals() -> list[Tally]:
     """Totals of every island model at corners of surfaces and gaps, both variants, against the exact one at 1e-10."""
-    tallies = {name: Tally(f"totals by {name}") for name in (*ISLAND_MODELS, "island4d")}
 
-    def ask(surface: Surface, depth: float, variant: str, island_model: str, rtol: float) -> Answer:
-        found = contact(surface, separation=TOP - depth, island_model=island_model, variant=variant, rtol=rtol)
+    def ask(name: str, variant: str, hurst: float, zeta_1: float, depth: float, rtol: float = 1e-8) -> Answer:
+        surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
+        found = contact(surface, separation=TOP - depth, island_model=name, variant=variant, rtol=rtol)
         return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
 
-    for variant, hurst, zeta_1, depth in itertools.product(VARIANTS, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
-        at = functools.partial(ask, Surface(hurst, 1.0, zeta_1, 1.0, TOP), depth, variant)
-        truth = None
-        with contextlib.suppress(MbmaError):
-            truth = at("exact", TOTAL_TRUTH)[0]
-        for name, tally in tallies.items():
-            # the four-number table is of one variant
-            if name != "island4d" or variant == "reported":
-                tally.add(functools.partial(at, name, 1e-8), None if name == "rigid" else truth)
-    return list(tallies.values())
+    exact = functools.partial(ask, "exact", rtol=TOTAL_TRUTH)
+
+    def of(names: Sequence[str], variants: Sequence[str]) -> list[Tally]:
+        ways = {f"totals by {name}": functools.partial(ask, name) for name in names}
+        corners = itertools.product(variants, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS)
+        return counted(ways, corners, lambda *corner: exact(*corner)[0])[0]
+
+    # the four-number table is of one variant
+    return of(ISLAND_MODELS, VARIANTS) + of(["island4d"], VARIANTS[:1])
 
 
-def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray]) -> Any:
+def draw(geometry_errors: dict[str, FloatArray], island_errors: dict[str, FloatArray]) -> Any:
     """Maps of error: geometry by the paper's formulas as printed and by the library, and islands."""
     from matplotlib import colormaps, colors
 
     figure, axes = panels(2, 2, (10, 8))
     colormap = colormaps["viridis"].with_extremes(bad="white")
     style = {"norm": colors.LogNorm(MIN_ERROR, MAX_ERROR), "cmap": colormap, "shading": "nearest", "rasterized": True}
+    geometries = {name: own[: APPROACHES.size * BANDS.size] for name, own in reversed(geometry_errors.items())}
+    for panel, (name, errors) in zip(axes[0], geometries.items(), strict=True):
+        own = errors.reshape(APPROACHES.size, BANDS.size)
+        panel.pcolormesh(BANDS, APPROACHES, np.maximum(own, MIN_ERROR), **style)
+        panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=name)
     places = np.arange(MU_CORNERS.size), np.arange(X_CORNERS.size)
-    titles = {"direct": "the paper's formulas as printed", "library": "the library"}
-    for panel, (name, title) in zip(axes[0], titles.items(), strict=True):
-        panel.pcolormesh(BANDS, APPROACHES, np.maximum(geometry_maps[name], MIN_ERROR), **style)
-        panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=f"geometry: {title}")
-    for panel, island_model in zip(axes[1], ("exact", "universal"), strict=True):
-        mesh = panel.pcolormesh(*places, np.maximum(island_maps[island_model], MIN_ERROR), **style)
-        panel.set(xlabel="mu", ylabel="X", title=f"islands: island model {island_model} (white: refused)")
+    for panel, name in zip(axes[1], ("islands by exact", "islands by universal"), strict=True):
+        errors = island_errors[name].reshape(X_CORNERS.size, MU_CORNERS.size)
+        mesh = panel.pcolormesh(*places, np.maximum(errors, MIN_ERROR), **style)
+        panel.set(xlabel="mu", ylabel="X", title=f"{name} (white: refused)")
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in X_CORNERS[::4]])
     figure.colorbar(mesh, ax=axes, label="largest relative error")
     return figure
 
 
-def corners(tallies: Sequence[Tally]) -> str:
-    """The table of all corners."""
-    header = "corners | tried | refused | not finite | warnings | largest error of answers | beyond their bound"
-    rows = (vars(tally).values() for tally in tallies)
-    return table(header, rows, "{} | {} | {} | {} | {} | {:.1e} | {}").replace("—", "-")
-
-
-def theirs(solution: IslandSolution, points: int) -> tuple[FloatArray, FloatArray, float]:
-    """Radii over L, pressure over E* sigma/L and Phi_F by ContactMechanics on so many points."""
-    with warnings.catch_warnings():
-        # of its own optional parts
-        warnings.simplefilter("ignore")
-        from ContactMechanics.ReferenceSolutions.GreenwoodTripp import GreenwoodTripp
-
-    # profiles are polynomials of rho^2 through the Gauss nodes
-    middle = float(BarycentricInterpolator(solution.rho**2, solution.gap)(0.0))
-    mix = 0.1 if solution.mu < 2 else 0.02  # its iteration diverges with more
-    end = BEYOND * solution.rho[-1]
-    _, pressure, rho = GreenwoodTripp(middle, solution.mu, end, points, tol=TOLERANCE, mix=mix, maxiter=MAX_ITERATIONS)
-    return rho, pressure / 2, math.pi * float(simpson(rho * pressure, x=rho))
-
-
-def comparison() -> tuple[str, Any]:
-    """Forces and pressures of both solvers, and their differences against the other's number of points."""
-    figure, (left, right) = panels(1, 2, (10, 4))
-    rows, differences = [], []
-    for X, mu in CASES:
-        solution = greenwood_tripp.solve(X, mu)
-        found = [theirs(solution, points) for points in POINTS]
-        forces = np.array([force for _, _, force in found])
-        differences.append(forces / solution.phi_F - 1)
-        # what is left of an error of third order
-        extrapolated = abs((8 * forces[-1] - forces[-2]) / 7 / solution.phi_F - 1)
-        rows.append([X, mu, float(solution.phi_F), float(solution.error), *differences[-1], extrapolated])
-        rho, pressure, _ = found[1]
-        (line,) = left.plot(solution.rho, solution.pressure / pressure[0], label=f"X = {X:g}, mu = {mu:g}")
-        left.plot(rho[::3], pressure[::3] / pressure[0], ".", color=line.get_color())
-        right.loglog(POINTS, np.abs(differences[-1]), ".-", color=line.get_color())
-    right.loglog(POINTS, np.abs(differences).max() * (POINTS[0] / np.array(POINTS)) ** 3, "k:", label="third order")
-    left.set(xlabel="radius  rho/L", ylabel="pressure  p/p(0)", title="lines: this library; dots: ContactMechanics")
-    right.set(xlabel="points of ContactMechanics", ylabel="relative difference of force")
-    right.set_xticks(POINTS, [f"{points}" for points in POINTS], minor=False)
-    right.minorticks_off()
-    left.legend()
-    right.legend()
-    header = f"X | mu | Phi_F | its error | {' points | '.join(map(str, POINTS))} points | extrapolated"
-    return table(header, rows, "{:g} | {:g} | {:.10f} | {:.1e}"), figure
-
-
 def measure() -> Measured:
-    """The measured blocks of the page, and its figures."""
-    (island_tallies, island_maps), (geometry_tallies, geometry_maps) = islands(), island_geometry()
-    compared, beside = comparison()
-    parts = {"corners": corners([*island_tallies, *geometry_tallies, *totals()]), "comparison": compared}
-    return parts, {"docs/figures/stability.svg": draw(geometry_maps, island_maps), "docs/figures/islands.svg": beside}
+    """The measured block of the page, and its figure."""
+    (island_tallies, island_errors), (geometry_tallies, geometry_errors) = islands(), island_geometry()
+    header = "corners | tried | refused | not finite | warnings | largest error of answers | beyond their bound"
+    rows = (vars(tally).values() for tally in (*island_tallies, *geometry_tallies, *totals()))
+    text = table(header, rows, "{} | {} | {} | {} | {} | {:.1e} | {}").replace("—", "-")
+    return {"corners": text}, {"docs/figures/stability.svg": draw(geometry_errors, island_errors)}

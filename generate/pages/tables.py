@@ -1,145 +1,26 @@
-"""docs/tables.md: content of the shipped files, and one lookup in each, step by step."""
+"""docs/tables.md: sizes, errors and axes of the shipped files, and a figure of the universal table's error bound."""
 
 from __future__ import annotations
 
 import itertools
-import math
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from generate.pages.page import Measured, panels, table
-from generate.tables.island4d import evaluate
-from mbma_tables.common.arguments import FloatArray
-from mbma_tables.islands.four_numbers import to_axes
-from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.tables import shipped
-from mbma_tables.models.universal import fractions_of_mu
-from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent, error_cell
+from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent
 
-EXAMPLE = 40  # the conformance point that is worked through
 LEAST_DRAWN = 1e-3  # mu
 
 
-def sizes() -> str:
-    """Nodes, bytes and certified errors of the shipped files."""
-    rows = []
-    for kind, f in itertools.product(KINDS, "FA"):
-        content, size = read_table(shipped(kind), kind), shipped(kind).stat().st_size / 1e6
-        names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
-        rows.append([kind, content.size, size, f, *(content.attributes[name] for name in names)])
-    header = "table | cells or nodes | file | of | largest error | 99% below | half below | largest at islands"
-    return table(header, rows, "{} | {} | {:.2f} MB | {} | {:.1e}")
-
-
-def axes() -> str:
-    """The axes of the four-parameter table."""
-    rows = []
-    for axis in read_table(shipped(ISLAND4D), ISLAND4D).axes:
-        shifted = f"{axis.name} + {axis.offset:g}" if axis.offset else axis.name
-        t = f"log({shifted})" if axis.transform == "log" else shifted
-        rows.append([axis.name, axis.long_name, t, axis.low, axis.high, axis.nodes])
-    return table("axis | what it is | equally spaced in | first | last | nodes", rows, "{} | {} | {} | {:g}")
-
-
-def _universal() -> tuple[TableContent, FloatArray]:
-    """The universal table, and X_low, X_high, mu_low and mu_high of its cells."""
-    content = read_table(shipped(UNIVERSAL), UNIVERSAL)
-    return content, np.stack([content.auxiliary[name][1] for name in CELL_EDGES])
-
-
-def cells() -> str:
-    """The cells of the universal table."""
-    content, (X_low, X_high, mu_low, mu_high) = _universal()
-    first, (X, mu) = mu_low == 0, content.axes
-    widths, octaves = X_high - X_low, np.log2(mu_high[~first] / mu_low[~first])
-    most = np.diff(np.flatnonzero(np.append(first, True))).max()
-    rows = [
-        ["X", f"{X.low:g} to {X.high:g}", f"{first.sum()} strips, {widths.min():g} to {widths.max():g} wide"],
-        ["mu", f"{mu.low:g} to {mu.high:g}", f"1 to {most} cells a strip"],
-        ["first cell of a strip", "from 0", f"to {mu_high[first].min():g} at least"],
-        ["other cells", "", f"{np.median(octaves):.2g} octaves of mu, half of them longer"],
-    ]
-    return table(" | range | cells", rows)
-
-
-def numbers(*values: float, form: str = ".12e") -> str:
-    """Numbers with commas."""
-    return ", ".join(f"{value:{form}}" for value in values)
-
-
-def _with_stored(content: TableContent, rows: dict[str, str]) -> str:
-    points = content.conformance
-    for what in ("table", "exact"):
-        rows[f"stored {what}_F, {what}_A"] = numbers(*(points[f"{what}_{f}"][EXAMPLE] for f in "FA"))
-    rows["tolerance"] = numbers(points["tolerance"][EXAMPLE], form=".2e")
-    return f"Conformance point {EXAMPLE} (counted from 0):\n\n" + table("step | number", rows.items())
-
-
-def example_universal() -> str:
-    """One conformance point of the universal table, step by step."""
-    content, ends = _universal()
-    X, mu = (float(content.conformance[name][EXAMPLE]) for name in ("X", "mu"))
-    cell = int(np.flatnonzero((ends[0] <= X) & (ends[1] >= X) & (ends[2] <= mu) & (ends[3] >= mu))[0])
-    X_low, X_high, mu_low, mu_high = ends[:, cell]
-    x = (2 * X - X_low - X_high) / (X_high - X_low)
-    a, b, c, d = fractions_of_mu(mu_low, mu_high)
-    y = (a * mu + b) / (c * mu + d)
-    sums = chebyshev.chebval2d(x, y, content.coefficients[cell])
-    rows = {
-        "X, mu": f"{X!r}, {mu!r}",
-        "cell": str(cell),
-        "X_low, X_high, mu_low, mu_high": numbers(*ends[:, cell], form=".10g"),
-        "x, y": numbers(x, y, form=".12f"),
-        "first row of chebyshev_F": numbers(*content.coefficients[cell, 0, :, 0], form=".6e"),
-        "Phi_F = mu times the sum of chebyshev_F": numbers(mu * sums[0]),
-        "Phi_A = the sum of chebyshev_A": numbers(sums[1]),
-        "error_F, error_A": numbers(*content.local_error[cell], form=".2e"),
-    }
-    return _with_stored(content, rows)
-
-
-def example_island4d() -> str:
-    """One conformance point of the four-parameter table, step by step."""
-    content = read_table(shipped(ISLAND4D), ISLAND4D)
-    raw = {name: content.conformance[name][[EXAMPLE]] for name in ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")}
-    place = to_axes(**raw, variant=get_variant(content.attributes["variant"]))
-    X, mu, spread, sphere, sigma = (float(a[0]) for a in (place.X, place.mu, place.spread, place.sphere, place.sigma))
-    coordinates = zip(content.axes, (X, spread, sphere, float(raw["hurst"][0])), strict=True)
-    positions = [float(axis.position(x)) for axis, x in coordinates]
-    g = evaluate(content.coefficients, [np.array([p]) for p in positions])[0]
-    F_52, F_2 = (float(height_integral(n, -X)) for n in (2.5, 2.0))
-    along = list(zip(content.axes, positions, content.local_error.shape, strict=False))
-    where = tuple(int(error_cell(axis, count, p)) for axis, p, count in along)
-    rows = {name: repr(float(value[0])) for name, value in raw.items()} | {
-        "spread, sphere": numbers(spread, sphere),
-        "sigma, mu, X": f"{numbers(sigma, mu)}, {X:.12f}",
-        "F_hat/Phi_F = S sqrt(2 R_d S)": numbers(float(place.force[0])),
-        "A_hat/Phi_A = 2 pi D R_u R_d S^2": numbers(float(place.area[0])),
-    }
-    for axis, p, _ in along:
-        node = min(int(p), axis.nodes - 2)
-        rows[f"position, cell and u on {axis.name}"] = f"{p:.12f}, {node}, {p - node:.12f}"
-    bounds = numbers(*content.local_error[where], form=".2e")
-    rows |= {
-        "g_F, g_A": numbers(*g),
-        "F_5/2(-X), F_2(-X)": numbers(F_52, F_2),
-        "Phi_F = exp(g_F) pi mu F_5/2(-X)/5": numbers(math.exp(g[0]) * math.pi * mu * F_52 / 5),
-        "Phi_A = exp(g_A) pi F_2(-X)/2": numbers(math.exp(g[1]) * math.pi * F_2 / 2),
-        "cell of the error field, error_F, error_A there": f"{where}, {bounds}",
-    }
-    return _with_stored(content, rows)
-
-
-def draw() -> Any:
+def draw(content: TableContent) -> Any:
     """Bound on the relative error of the universal table over X and mu."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
 
-    content, (X_low, X_high, mu_low, mu_high) = _universal()
+    X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
     bottom = np.maximum(mu_low, LEAST_DRAWN)
     corners = np.stack([X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high], axis=-1).reshape(-1, 4, 2)
     figure, plots = panels(1, 2, (9, 3.6), sharey=True)
@@ -157,6 +38,17 @@ def draw() -> Any:
 
 def measure() -> Measured:
     """The measured blocks of the page, and its figure."""
-    parts = {"sizes": sizes(), "cells": cells(), "axes": axes()}
-    parts |= {"universal": example_universal(), "island4d": example_island4d()}
-    return parts, {"docs/figures/tables_universal_error.svg": draw()}
+    contents, sizes, axes = {kind: read_table(shipped(kind), kind) for kind in KINDS}, [], []
+    for (kind, content), f in itertools.product(contents.items(), "FA"):
+        names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
+        size = shipped(kind).stat().st_size / 1e6
+        sizes.append([kind, content.size, size, f, *(content.attributes[name] for name in names)])
+    for axis in contents[ISLAND4D].axes:
+        shifted = f"{axis.name} + {axis.offset:g}" if axis.offset else axis.name
+        t = f"log({shifted})" if axis.transform == "log" else shifted
+        axes.append([axis.name, axis.long_name, t, axis.low, axis.high, axis.nodes])
+    header = "table | cells or nodes | file | of | largest error | 99% below | half below | largest at islands"
+    parts = {"sizes": table(header, sizes, "{} | {} | {:.2f} MB | {} | {:.1e}")}
+    header = "axis | what it is | equally spaced in | first | last | nodes"
+    parts["axes"] = table(header, axes, "{} | {} | {} | {:g}")
+    return parts, {"docs/figures/tables_universal_error.svg": draw(contents[UNIVERSAL])}

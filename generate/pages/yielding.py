@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import json
 from typing import Any
 
 import numpy as np
 
-from generate import timing
 from generate.boundary_elements.evidence import Capped, capped
 from generate.calibrated_file import binned
 from generate.calibrated_hardness import BARS, blind
-from generate.pages.page import DATA, Measured, dataset, panels, spans, table
+from generate.files import dataset
+from generate.pages.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact, materials
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories.calibrated_table import shipped_part
-from mbma_tables.totals.conductance import conductance
 
 BINS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # A/A0 by which stiffness is compared, at these hardnesses
 HARDNESSES = (0.05, 0.2, 0.8)
@@ -38,37 +36,36 @@ RATIOS = ("elastic area over true", "elastic force over true")
 
 def measure() -> Measured:
     """When a contact is elastic, how accurate the law with a hardness is, metals."""
-    ratios = simulated()
+    seen, (_, attributes) = capped(dataset("hardness.nc")), shipped_part("hardness")
+    ratios = simulated(seen)
     rows = [[psi, *((v.mean(), v.std()) for v in ratios[1:, ratios[0] == psi])] for psi in np.unique(ratios[0])]
     header = f"psi | {RATIOS[0]}, equal force | {RATIOS[1]}, equal u | yielded share"
-    stored = {name: json.loads(shipped_part("hardness")[1][name]) for name in ("drift", "coverage")}
-    drift = [[zeta_1, *(100 * error for error in row)] for zeta_1, row in stored["drift"].items()]
+    drift = [[z, *(100 * error for error in row)] for z, row in json.loads(attributes["drift"]).items()]
     of_drift = "zeta_1 | area [%] | yielded share [%] | force [%] | frozen stiffness [%]"
     shares: dict[str, list[Any]] = {}
-    for name, share in stored["coverage"].items():
+    for name, share in json.loads(attributes["coverage"]).items():
         shares.setdefault(name.split()[0], [f"`{name.split()[0]}`"]).append(tuple(share))
     covered = "theory | area at equal force | force at equal u | frozen stiffness"
-    parts = {"when": table(header, rows, "{:.3g} | {:.2f} ± {:.2f}"), "held_out": held_out(), "frozen": frozen()}
+    parts = {"when": table(header, rows, "{:.3g} | {:.2f} ± {:.2f}"), "held_out": held_out(), "frozen": frozen(seen)}
     parts |= {"coverage": table(covered, shares.values(), "{} | {:.0%} / {:.0%}")}
-    parts |= {"drift": table(of_drift, drift, "{} | {:+.1f}"), "metals": metals(), "cost": cost()}
+    parts |= {"drift": table(of_drift, drift, "{} | {:+.1f}"), "metals": metals()}
     return parts, {"docs/figures/yield.svg": draw(ratios)}
 
 
-def simulated() -> FloatArray:
+def simulated(seen: list[Capped]) -> FloatArray:
     """psi of every simulation, and means over contacts of A_el/A at equal force, F_el/F at equal gap, yielded share."""
-    data, rows = dataset(DATA / "hardness.nc"), []
-    stretched = data.kind.attrs["flag_meanings"].split().index("stretched")
-    for one in (data.isel(surface=k) for k in np.flatnonzero(data.kind.values != stretched)):
-        every = (one[name].values.astype(float) for name in ("force", "area", "mean_separation", "area_yielded"))
-        *capped_rows, (bare_force, bare_area, bare_u, _) = np.stack(list(every), axis=1)
-        for eta, (force, area, u, yielded) in zip(data.eta.values, capped_rows, strict=False):
-            # where the elastic contact was pressed as lightly
-            kept = (area > CONTACT[0]) & (area < CONTACT[1]) & (u < bare_u[0]) & (force > bare_force[0])
-            if kept.any():
-                elastic = np.exp(np.interp(np.log(force), np.log(bare_force), np.log(bare_area)))
-                load = np.exp(np.interp(-u, -bare_u, np.log(bare_force)))
-                ratios = (elastic / area, load / force, yielded / area)
-                rows.append((1 / eta, *(float(ratio[kept].mean()) for ratio in ratios)))
+    rows = []
+    for one in seen:
+        bare = one.bare
+        # where the elastic contact was pressed as lightly
+        kept = (
+            (one.area > CONTACT[0]) & (one.area < CONTACT[1]) & (one.u < bare["u"][0]) & (one.force > bare["force"][0])
+        )
+        if one.kind != "stretched" and kept.any():
+            elastic = np.exp(np.interp(np.log(one.force), np.log(bare["force"]), np.log(bare["area"])))
+            load = np.exp(np.interp(-one.u, -bare["u"], np.log(bare["force"])))
+            ratios = (elastic / one.area, load / one.force, one.yielded / one.area)
+            rows.append((1 / one.eta, *(float(ratio[kept].mean()) for ratio in ratios)))
     return np.array(rows).T
 
 
@@ -76,34 +73,33 @@ def held_out() -> str:
     """Errors of the law with a hardness on held-out surfaces."""
     variables, attributes = shipped_part("hardness")
     sets, rows = attributes["sets"].split(), list[list[Any]]()
-    for (name, words), (form, known) in itertools.product(
-        HELD_OUT.items(), enumerate(("`h_max`", "the map's heights"))
-    ):
+    forms = enumerate(("`h_max`", "the map's heights"))
+    for (name, words), (form, known) in itertools.product(HELD_OUT.items(), forms):
         found = variables["accuracy"][sets.index(name), form]
         rows.append([words, known, *(tuple(100 * row[:4]) for row in found)])
-    errors = {name: blind()[name] for name in attributes["quantities"].split()}
-    cells = ((e.mean(), e.std(), np.mean(np.abs(e) < BARS[name]), np.abs(e).max()) for name, e in errors.items())
+    errors = ((blind()[name], BARS[name]) for name in attributes["quantities"].split())
+    cells = ((e.mean(), e.std(), np.mean(np.abs(e) < bar), np.abs(e).max()) for e, bar in errors)
     rows.append(["another code's (`docs/data/hardness.csv`)", "`h_max`", *(tuple(100 * np.array(c)) for c in cells)])
     names = "area at equal force [%] | yielded share [%] | force at equal u [%] | frozen stiffness at equal force [%]"
     return table(f"surfaces | law with | {names}", rows, "{} | {} | {:+.1f} ± {:.1f}; {:.1f}; {:.0f}")
 
 
-def frozen() -> str:
+def frozen(seen: list[Capped]) -> str:
     """Frozen stiffness at equal force of theories against every self-affine simulation, by hardness and contact."""
-
-    def deviations(theory: str, one: Capped) -> FloatArray:
-        """Area, deviation and stated scatter at each load."""
-        g, kept = float(one.surface.rms_gradient), one.area > BINS[0]
-        try:
-            by = contact(one.surface, pressure=one.force[kept] * g, theory=theory, hardness=one.eta * g)
-        except OutOfRangeError as fault:  # MBMA ends before
-            kept[kept] = ~np.asarray(fault.mask)
-            by = contact(one.surface, pressure=one.force[kept] * g, theory=theory, hardness=one.eta * g)
-        return np.stack([one.area[kept], np.log(by.unloading_stiffness / (one.frozen[kept] * g)), by.stiffness_scatter])
-
-    seen, rows = [one for one in capped(dataset(DATA / "hardness.nc")) if one.kind == "self_affine"], []
+    rows = []
     for theory, eta in itertools.product(("mbma", "calibrated"), HARDNESSES):
-        area, error, stated = np.concatenate([deviations(theory, one) for one in seen if one.eta == eta], axis=1)
+        parts = []  # area, deviation and stated scatter at each load
+        for one in (one for one in seen if one.kind == "self_affine" and one.eta == eta):
+            g, kept = float(one.surface.rms_gradient), one.area > BINS[0]
+            options: dict[str, Any] = {"theory": theory, "hardness": eta * g}
+            try:
+                by = contact(one.surface, pressure=one.force[kept] * g, **options)
+            except OutOfRangeError as fault:  # MBMA ends before
+                kept[kept] = ~np.asarray(fault.mask)
+                by = contact(one.surface, pressure=one.force[kept] * g, **options)
+            error = np.log(by.unloading_stiffness / (one.frozen[kept] * g))
+            parts.append(np.stack([one.area[kept], error, by.stiffness_scatter]))
+        area, error, stated = np.concatenate(parts, axis=1)
         sizes = (np.abs(error) / stated)[np.isfinite(stated)]
         within = f"{np.mean(sizes < 1):.0%} / {np.mean(sizes < 2):.0%}"
         cells = ((own.mean(), own.std()) for own in binned(area, 100 * error, BINS))
@@ -131,21 +127,6 @@ def metals() -> str:
     return table(f"{header} | elastic up to gradient", rows)
 
 
-def cost() -> str:
-    """Times of pressure to gap, area and conductance, with a hardness over without."""
-    rng, g, rows = np.random.default_rng(5), float(SURFACE.rms_gradient), []
-
-    def run(pressure: FloatArray, hardness: float) -> Any:
-        found = contact(SURFACE, pressure=pressure, theory="calibrated", hardness=hardness)
-        return found.area, conductance(found.unloading_stiffness, 1.0, 1.0)
-
-    for count in (1, 100, 10_000):
-        pressure = g * 0.3 * 10 ** rng.uniform(-3, -0.1, count)
-        elastic, plastic = (timing.measure(functools.partial(run, pressure, h))[0] for h in (np.inf, 0.3 * g))
-        rows.append([count, plastic / elastic])
-    return table("pressures in a call | time with a hardness over elastic", rows, "{} | {:.1f}")
-
-
 def draw(ratios: FloatArray) -> Any:
     """Area and force of elastic answers over the simulated ones against psi, with metals below."""
     found = contact(SURFACE, area=0.03, theory="calibrated", hardness=float(SURFACE.rms_gradient) / INDICES)
@@ -159,14 +140,14 @@ def draw(ratios: FloatArray) -> Any:
         axis.axhspan(0.95, 1.05, color="tab:green", alpha=0.2, label="within 5%")
         axis.semilogx(psi, dots, ".", color="grey", alpha=0.6, label="boundary elements, 1% to 10% contact")
         axis.semilogx(INDICES, line, label="law at 3% contact")
-        axis.axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
         axis.set_ylabel(label)
         axis.grid(True, alpha=0.3)
     axes[1].set_yscale("log")
     axes[0].legend(fontsize=8, loc="lower left")
     for place, metal in enumerate(map(materials.get, METALS)):
         axes[2].plot(psi_of(metal), [place, place], linewidth=6)
-    axes[2].axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
+    for axis in axes:
+        axis.axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
     axes[2].set_yticks(range(len(METALS)), [f"{name} on itself" for name in METALS], fontsize=8)
     axes[2].set_xlabel(f"psi = E* g/p_m; metals at rms gradient {GRADIENT:g}, hard to soft")
     return figure

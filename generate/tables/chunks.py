@@ -47,28 +47,14 @@ def chunk_key(work: Work, job: Job) -> str:
 
 
 class ChunkedSolver:
-    """Solves islands on an executor and keeps what is finished.
-
-    Parameters
-    ----------
-    executor : concurrent.futures.Executor or None
-        Where chunks run, dask's `Client.get_executor()` included; None runs them here.
-    folder : path, optional
-        Folder of the finished chunks; without it nothing is kept.
-    """
+    """Solves islands on an executor, None: here, and keeps finished chunks in a folder, None: nowhere."""
 
     def __init__(self, executor: Pool = None, folder: pathlib.Path | None = None) -> None:
         self.executor = executor
         self.folder = folder
 
     def map(self, label: str, work: Work, jobs: Sequence[Job]) -> list[FloatArray]:
-        """``work(*job)`` of each job, in order; `label` names the progress bar.
-
-        Raises
-        ------
-        WorkerError
-            Where a worker died; finished chunks are kept.
-        """
+        """``work(*job)`` of each job, in order; WorkerError where a worker died. `label` names the progress bar."""
         results, missing, paths = {}, {}, {}
         for number, job in enumerate(jobs):
             missing[number] = job

@@ -23,6 +23,8 @@ MIN_NODES = 8  # of an axis: a quintic spline without knots at its second nodes 
 MAX_NODES = 2_000_000  # of a table: four arrays of these fit a file
 MIN_POINTS, MAX_POINTS = 100, 1_000_000  # of the certificate: the 99th percentile still is a point
 MIN_SHIPPED_POINTS = 5000  # of a table in the shipped folder
+# looser, the force of a universal table no longer increases in mu
+TARGETS = {UNIVERSAL: (1e-11, 3e-4), ISLAND4D: (1e-11, 0.1)}
 MIN_EXTENT = 1e-6  # of an axis, in its own transform: nodes must differ
 # where the solver reaches its tightest tolerance, whatever the other axes
 LIMITS = {
@@ -47,31 +49,14 @@ class AxisRange:
 
 @dataclasses.dataclass(frozen=True)
 class Configuration:
-    """What a table is to cover, and how well.
+    """What a table is to cover, and how well."""
 
-    Attributes
-    ----------
-    kind : str
-        "universal" or "island4d".
-    target : float
-        Largest relative error allowed on held-out points.
-    max_nodes : int
-        Size limit: nodes of the whole table.
-    variant : str
-        Variant of an island4d table; a universal one serves all.
-    certificate_points : int
-        Held-out points, at least 100; 5,000 for a table that goes into the shipped folder.
-    seed : int
-        Of the low-discrepancy sequences.
-    axes : dict of AxisRange
-    """
-
-    kind: str
-    target: float
-    max_nodes: int
-    variant: str
-    certificate_points: int
-    seed: int
+    kind: str  # universal or island4d
+    target: float  # largest relative error allowed on held-out points
+    max_nodes: int  # of the whole table
+    variant: str  # of an island4d table; a universal one serves all
+    certificate_points: int  # held-out ones
+    seed: int  # of the low-discrepancy sequences
     axes: dict[str, AxisRange]
 
     def digest(self) -> str:
@@ -121,7 +106,7 @@ def _configuration(kind: str, path: pathlib.Path | None, target: float | None) -
             raise InputError(f"it is not a TOML file: {fault}") from None
     _checked(own, list(given), "the file")
     changed, shipped, axes = _checked(own.get("axes", {}), list(given["axes"]), "[axes]"), given["target"], {}
-    wanted = number_in("target", own.get("target", shipped) if target is None else target, 1e-11, 0.1)
+    wanted = number_in("target", own.get("target", shipped) if target is None else target, *TARGETS[kind])
     for name, entry in given["axes"].items():
         # cells are as small as they must be, where nodes are counted
         known = [*entry] if kind == UNIVERSAL else ["low", "high", "offset", "start", "nodes"]
@@ -142,13 +127,7 @@ def _configuration(kind: str, path: pathlib.Path | None, target: float | None) -
 
 
 def load(kind: str, path: pathlib.Path | None = None, target: float | None = None) -> Configuration:
-    """The configuration of a kind of table: the shipped one, changed by a TOML file and by `target`.
-
-    Raises
-    ------
-    InputError
-        For an unreadable file, unknown keys, or values that make no table.
-    """
+    """The configuration of a kind of table: the shipped one, changed by a TOML file and by `target`."""
     try:
         return _configuration(kind, path, target)
     except ValueError as fault:

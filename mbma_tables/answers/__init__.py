@@ -1,1 +1,1 @@
-"""`contact` and what it returns: units, shapes and checks enter and leave here."""
+"""`contact`, its result, leakage, sensitivity; units, shapes, checks."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from mbma_tables.common.arguments import (
     describe_entries,
     finite_array,
     hinted,
-    is_labelled,
     positive_array,
     require,
     require_flag,
@@ -58,15 +57,14 @@ def contact(
     rtol: float = 1e-8,
     outside: str = "raise",
     derivatives: bool = False,
-    quantities: Iterable[str] = QUANTITIES,
     workers: int = 1,
 ) -> Contact:
-    """Pressure, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
+    """Pressure, real contact area and stiffness of a surface at given separation, pressure or area.
 
     Parameters
     ----------
     surface : Surface
-        One surface or a batch; it broadcasts against what is known.
+        One surface or a batch; it broadcasts against the given quantity.
     separation : array_like
         d between the rigid plane and the mid-plane, in the surface's unit or, as text, with its own ("0.8 um"); at
         least -h_max (full compression). Above h_max the bodies are apart: pressure and area are zero, and u is d.
@@ -74,7 +72,7 @@ def contact(
     mean_separation : array_like
         u = (h_max + d)/2 (50) [length].
     pressure : array_like
-        F/A0 in the unit of `E_star`, or with its own; the answer is on the branch of first contact.
+        F/A0 in the unit of `E_star`, or with its own; the solution is on the branch of first contact.
     area : array_like
         A/A0, likewise.
     theory : str or theory, optional
@@ -85,16 +83,16 @@ def contact(
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1), or a
         text that `mbma_tables.materials.hardness` reads: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
-        theory's elastic answer goes through `mbma_tables.laws.hardness`; u is then the mean gap with yielded points
+        theory's elastic result is corrected by `mbma_tables.laws.hardness`; u is then the mean gap with yielded points
         flattened. By default that of the softer of `materials`; infinite, or without either: nothing yields, and the
-        answer is not `valid` where the metals named, or any, would.
+        result is not `valid` where the metals named, or any, would.
     materials : str, pair of str, optional
         Metals in contact, one of `mbma_tables.materials.METALS` each, or `Metal` objects; in place of `E_star`.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
         table from `open_table`, or a user-defined model with a `name` and ``answer(X, mu)``.
     variant : {"reported", "printed", "fitted"} or Variant
-        Which variant of the paper's equations MBMA takes.
+        Variant of the paper's equations in MBMA.
     E_star : array_like or str
         Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit, which "100 GPa" names.
     rtol : float
@@ -104,10 +102,8 @@ def contact(
     derivatives : bool
         Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
         theories by numerical differentiation, to 1e-6.
-    quantities : iterable of {"pressure", "area"}
-        What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
     workers : int
-        Threads that share MBMA's batches of surfaces, and of gaps; the bits are those of one.
+        Number of threads for MBMA's batches of surfaces and gaps; results are identical for any number.
 
     Returns
     -------
@@ -165,17 +161,23 @@ def contact(
     chosen = chosen_theory(
         surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside, workers=workers
     )
-    # an empty hardness is refused where it is checked
-    yields = stated and (is_labelled(hardness) or not np.size(hardness) or not np.equal(hardness, np.inf).all())
+    yields = stated and not (isinstance(hardness, float | np.ndarray) and _infinite(np.asarray(hardness)))
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
-    wanted = quantities if quantities is QUANTITIES else wanted_quantities(quantities)
     make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
-    return make(surface, value, E_star, hardness, by, source, derivatives, wanted)
+    return make(surface, value, E_star, hardness, by, source, derivatives)
+
+
+def _infinite(hardness: Any) -> bool:
+    """Whether every hardness is infinite; values that are no numbers are rejected elsewhere."""
+    return bool(hardness.dtype.kind == "f" and hardness.size and np.isposinf(hardness).all())
 
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
-    """The requested theory, with MBMA's `options`, which other theories refuse."""
-    given = [] if options == OPTIONS else [name for name, value in options.items() if value != OPTIONS[name]]
+    """The requested theory, with MBMA's `options`; other theories reject these."""
+    try:
+        given = [] if options == OPTIONS else [name for name, value in options.items() if value != OPTIONS[name]]
+    except ValueError:
+        raise InputError(f"{', '.join(options)} take one value each, not an array") from None
     named = theory_name(surface, theory, **options) if theory is None else theory
     if isinstance(named, str) and named in THEORIES:
         if not given and options.get("workers") is not True:
@@ -187,16 +189,8 @@ def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None,
     return get_theory(named, surface)
 
 
-def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
-    """The requested quantities, each once, in the order of `QUANTITIES`."""
-    asked = {quantities} if isinstance(quantities, str) or not isinstance(quantities, Iterable) else set(quantities)
-    if not asked or not asked <= set(QUANTITIES):
-        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
-    return tuple(filter(asked.__contains__, QUANTITIES))
-
-
 def one_known(**given: Any) -> tuple[str, Any]:
-    """The one of `KNOWN` that is given."""
+    """Name of the one quantity of `KNOWN` that is given."""
     known = []
     for name, value in given.items():
         if value is not None:
@@ -207,9 +201,8 @@ def one_known(**given: Any) -> tuple[str, Any]:
 
 
 def _contact(
-    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
-    quantities: tuple[str, ...],
-) -> Contact:  # fmt: skip
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool
+) -> Contact:
     """`contact` of plain arrays."""
     asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
     cap = checked_hardness(hardness) if source.yields else np.asarray(np.inf)
@@ -227,8 +220,7 @@ def _contact(
     if derivatives and held:
         require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
-        wanted = QUANTITIES if derivatives else quantities
-        totals = theory.totals(surface, places["separation"], E_star, derivatives, wanted)
+        totals = theory.totals(surface, places["separation"], E_star, derivatives)
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])
@@ -247,9 +239,6 @@ def _contact(
         by_modulus = {"pressure": fields["pressure"] / E_star + by_log_modulus["pressure"]}
         by_modulus["area"] = by_log_modulus["area"] / E_star
         fields |= at_fixed(held, by, slopes, by_modulus)
-    for name in QUANTITIES:
-        if name not in quantities:
-            fields |= {name: None, f"{name}_by": None}
     return _made(source, fields)
 
 
@@ -262,7 +251,7 @@ def _made(source: Source, fields: dict[str, Any]) -> Contact:
 def _places(
     surface: AnySurface, asked: FloatArray, modulus: FloatArray, cap: FloatArray, by: str, theory: Any, source: Source
 ) -> tuple[dict[str, Any], Any]:
-    """Both separations of what is known, and with a hardness `lighter` of `Yielding.loaded`."""
+    """Both separations for the given quantity; with a hardness also `lighter` of `Yielding.loaded`."""
     h_max, lighter = np.asarray(surface.h_max), None
     if by != "separation":
         require(by, asked, asked >= 0, "at least 0")
@@ -284,7 +273,7 @@ def _places(
             raise
     gap = asked if by == "separation" else 2 * average - h_max
     if theory.ends_at_h_max:
-        # apart, both are the distance of the mean planes
+        # without contact, both are the distance of the mean planes
         average, gap = np.maximum(average, gap) if by == "separation" else average, np.minimum(gap, average)
     return {"separation": gap[()], "mean_separation": average[()]}, lighter
 
@@ -292,7 +281,7 @@ def _places(
 def _refuse_pressures(
     surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: FloatArray, theory: Theory, unit: str | None
 ) -> None:
-    """Refuse pressures beyond the hardness or the theory's end, in the unit in which they were given."""
+    """Reject pressures above the hardness or the theory's largest; the message has their own unit."""
     name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
     limits = [(hardness, "the hardness")]
     with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
@@ -305,21 +294,20 @@ def _refuse_pressures(
 
 
 def _of_labelled(
-    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool,
-    wanted: tuple[str, ...],
-) -> Contact:  # fmt: skip
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool
+) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
     units, held = source.units, by if by in QUANTITIES else None
-    names = (*(("separation", "mean_separation") if held else ()), *wanted, "error")
-    fields: dict[str, Any] = {"pressure": None, "area": None, "islands": None}
+    names = (*(("separation", "mean_separation") if held else ()), *QUANTITIES, "error")
+    fields: dict[str, Any] = {"islands": None}
     slopes: list[tuple[str, str]] = []
     if derivatives:
-        kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
+        kinds = [f"{kind}_by" for kind in QUANTITIES if kind != held] + (["separation_by"] if held else [])
         free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, cap, by, source, derivatives, wanted)
+        found = _contact(block, asked, modulus, cap, by, source, derivatives)
         return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
 
     arrays = {by: value, "E_star": E_star, "hardness": hardness}
@@ -328,7 +316,7 @@ def _of_labelled(
         fields[name] = named(found, name, units)
     for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
         fields.setdefault(kind, {})[name] = found
-    # what was given is kept, with its name and attributes
+    # the given quantity keeps its name and attributes
     if by == "separation":
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
     elif by == "mean_separation":

@@ -1,4 +1,4 @@
-"""Where a map touches: pressures and gaps at every point at one load, simulated by boundary elements."""
+"""Pressures and gaps at every point of a map at one load, simulated by boundary elements."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ContactMap(Displayed):
-    """One map at one load, as `Contact.map` finds it; `to_dataset` is its xarray Dataset, `plot` its picture.
+    """Contact of one map at one load, from `Contact.map`; `to_dataset` gives an xarray Dataset, `plot` a picture.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ContactMap(Displayed):
 
     @property
     def contact(self) -> Any:
-        """Where the map touches, shape (nx, ny)."""
+        """True where the map is in contact, shape (nx, ny)."""
         return self.pressure > 0
 
     def _facts(self) -> dict[str, str]:
@@ -85,7 +85,7 @@ class ContactMap(Displayed):
 
 
 def contact_map(found: Any) -> ContactMap:
-    """The map of a contact's surface pressed with its pressure; see `Contact.map`."""
+    """Simulation of a contact's map at the contact's pressure; see `Contact.map`."""
     source, pressure = found._source, np.asarray(found.pressure, float)
     if pressure.ndim or np.ndim(source.E_star) or np.ndim(source.hardness):
         raise InputError("a map is of one contact: give one pressure, one modulus and one hardness")

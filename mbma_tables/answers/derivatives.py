@@ -1,7 +1,7 @@
-"""Derivatives of a theory's force and area by the gap and by the surface's parameters.
+"""Derivatives of a theory's force and area with respect to the gap and the surface's parameters.
 
-Where a theory has none in closed form they are finite differences, with steps inside the range of contact, refused
-where their estimated error is too large. With a hardness the derivatives of the elastic contact go through its law.
+Where a theory has none in closed form they are finite differences with steps inside the range of contact; an error is
+raised if their estimated error is too large. With a hardness, the elastic derivatives enter its law by the chain rule.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def differentiate(
 
     With a hardness, which is held, also by the logarithm of "E_star"; `lighter` is that of `Yielding.loaded`.
 
-    Where differences do not settle, at corners of a theory or where force has no bound, it is a ConvergenceError.
+    Raises ConvergenceError where differences do not converge: at kinks of a theory, or where force is unbounded.
     """
     u = np.asarray(mean_separation, dtype=float)
     known = theory.slopes(surface, u)
@@ -66,7 +66,7 @@ def _elastic(theory: Theory, surface: AnySurface, u: FloatArray) -> Slopes:
 
 @np.errstate(all="ignore")
 def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArray | None) -> Slopes:
-    # what needs scipy is imported for a hardness alone
+    # imports scipy: needed for a hardness only
     from mbma_tables.laws import hardness as law
 
     elastic, names = capped.elastic, (GAP, *surface.parameters, MODULUS)
@@ -111,7 +111,7 @@ def _numerical(
     whole: TheoryAnswer,
     answer: Callable[..., Answers],
 ) -> Slopes:
-    """By differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, and what was moved by x."""
+    """Differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, the parameter changed by x."""
     shape = np.shape(whole.pressure)
     at = {name: getattr(surface, name) for name in (*PARAMETERS[1:], *surface.parameters)} | {GAP: u, MODULUS: 1.0}
     at = {name: np.broadcast_to(np.asarray(value, dtype=float), shape).ravel() for name, value in at.items()}
@@ -138,7 +138,7 @@ def _numerical(
 
 
 def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[FloatArray, FloatArray]:
-    """First steps, and on which side of a parameter to step: 0 for both."""
+    """Initial steps, and the side of a parameter on which to step: 0 for both."""
     centre = at[name]
     room = np.abs(centre)
     side: FloatArray = np.zeros(centre.shape)
@@ -148,7 +148,7 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
     if name in (GAP, "h_max") and theory.ends_at_h_max:
         beyond = np.abs(at["h_max"] - at[GAP])
         room = np.where(beyond > 0, np.minimum(room, beyond), room)
-        # at first contact only what lies below it has a derivative
+        # at first contact only one-sided derivatives exist, from smaller gaps
         side = np.where(beyond == 0, -1.0 if name == GAP else 1.0, side)
     step = STEP * room
     if name == "hurst":
@@ -161,7 +161,7 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
 
 
 def at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
-    """Derivatives where pressure or area is held: of the separation, and of the quantity that is not held."""
+    """Derivatives at fixed pressure or area: of the separation, and of the other quantity."""
     other = "area" if held == "pressure" else "pressure"
     steep, follows = slopes[held]["separation"], slopes[other]["separation"]
     names = [name for name in slopes[held] if name != "separation"]

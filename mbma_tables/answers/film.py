@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.answers.contact import contact
 from mbma_tables.answers.leakage_table import shipped_flow
@@ -18,14 +19,20 @@ from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import unit_of
 from mbma_tables.laws.calibrated import TESTED_AREA
 from mbma_tables.laws.film import LAY, OPEN, SHEAR, WIDEST_LAY, factors
+from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.materials import Metal, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.treatment import mirrored
+from mbma_tables.theories.own_map import map_of
 from mbma_tables.theories.protocol import Theory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RANGE = (0.2, 50.0)  # u/h_rms
+# simulated: A/A0 of the lightest contact, knots of curves in contact and before it, the first gap before it over the
+# highest point, and standard deviations of ln phi before contact and of ln phi_s, of the grid and between the knots
+LIGHTEST, KNOTS, CLEAR, OWN, OWN_SHEAR = 0.002, 7, 1.001, 0.01, 0.02
 USEFUL = 0.5  # standard deviation of ln phi above which a flow factor is not valid
 
 
@@ -49,7 +56,7 @@ class FlowFactors(Displayed):
     valid : ndarray
         Whether flow through such gaps was simulated.
     reasons : dict
-        Why not, each with a mask.
+        Reasons why not `valid`, each with a mask.
     peklenik : float
         Length of the roughness along x over that along y.
     """
@@ -135,6 +142,9 @@ def flow_factors(
     Before contact the factors are those of an effective medium of Gaussian gaps, in contact of that of the leakage law
     (`mbma_tables.laws.film`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
 
+    With ``theory="simulated"`` they are those of the surface's own map: Reynolds' equation on its gaps, which boundary
+    elements deform in contact, at knots of u (half a minute for 256 x 256 points).
+
     Parameters
     ----------
     surface : Surface
@@ -143,7 +153,7 @@ def flow_factors(
         u [length], from 0.2 to 50 h_rms; above h_max there is no contact.
     peklenik : float, optional
         Length of the roughness along x over that along y, from 1/8.5 to 8.5. By default that of the map, x its first
-        axis; of a spectrum with an anisotropy that, x along the lay; else 1, isotropic.
+        axis; of a spectrum with an anisotropy that, x along the lay; else 1, isotropic. Not of a simulated map.
     theory, E_star, hardness, materials : optional
         As for `contact`; the theory is "calibrated" by default.
 
@@ -161,39 +171,74 @@ def flow_factors(
     >>> bearing = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
     >>> film = flow_factors(bearing, ["1 um", "1.5 um", "3 um"], peklenik=3, E_star="110 GPa")
     >>> print(film.phi_x.round(2), film.phi_y.round(2), film.shear_y.round(2))
-    [1.03 1.04 1.02] [0.51 0.72 0.9 ] [0.8  0.61 0.37]
+    [1.03 1.07 1.02] [0.51 0.69 0.9 ] [0.8  0.7  0.37]
     """
     one: Any = surface
-    if getattr(surface, "labelled", False) or surface.shape != ():
-        raise InputError("flow factors are of one surface, not of a batch")
     theory = "calibrated" if theory is None else theory
     found = contact(
         surface, mean_separation=mean_separation, theory=theory, E_star=E_star, hardness=hardness, materials=materials
     )
+    if surface.labelled or surface.shape != ():
+        raise InputError("flow factors need one surface, not a batch")
     u = np.ravel(found.mean_separation)
     low, high = (end * float(surface.h_rms) for end in RANGE)
     require("mean_separation", u, (u >= low) & (u <= high), f"from {RANGE[0]:g} to {RANGE[1]:g} h_rms")
     gamma = _peklenik(one) if peklenik is None else number_in("peklenik", peklenik, 1 / WIDEST_LAY, WIDEST_LAY)
     area, leak = np.ravel(found.area), found.leakage
-    ratio, shear = factors(u / float(surface.h_rms), area, gamma, shipped_flow().constants)
-    power, steep = LAY
-    phi_x, phi_y = np.ravel(leak.K) / u**3 * ratio
-    touching = area > 0
-    of_contact = np.where(touching, np.nan_to_num(np.ravel(leak.scatter), nan=np.inf), 0.0)
-    scatter = np.sqrt(OPEN**2 + of_contact**2 + (power * area**steep * np.log(gamma)) ** 2)
-    # the lightest contacts were not pressed, but flow is nearly that before contact
+    own = found.theory == "simulated"
+    if own:
+        if peklenik is not None:
+            raise InputError("peklenik is not of a map that is simulated: leave it out")
+        (phi_x, phi_y), shear = _simulated(found, u)
+        of_lay, far = 0.0, False
+    else:
+        ratio, shear = factors(u / float(surface.h_rms), area, gamma, shipped_flow().constants)
+        phi_x, phi_y = np.ravel(leak.K) / u**3 * ratio
+        of_lay = LAY[0] * area ** LAY[1] * np.log(gamma)
+        far = bool(gamma > WIDEST_LAY or gamma < 1 / WIDEST_LAY)
+    of_contact = np.where(area > 0, np.nan_to_num(np.ravel(leak.scatter), nan=np.inf), 0.0)
+    scatter = np.sqrt((OWN if own else OPEN) ** 2 + of_contact**2 + of_lay**2)
+    # the lightest contacts were not simulated, but their flow is nearly that before contact
     light = f"A/A0 is below {TESTED_AREA[0]:g}"
     reasons = {text: np.ravel(mask) for text, mask in leak.reasons.items() if text != light}
-    far = bool(gamma > WIDEST_LAY or gamma < 1 / WIDEST_LAY)
     reasons |= {f"the lay is longer than {WIDEST_LAY:g} to 1, beyond simulated flow": np.full(u.shape, far)}
     reasons |= {f"the model uncertainty of ln phi is above {USEFUL:g}": scatter > USEFUL}
     reasons = {text: mask for text, mask in reasons.items() if np.any(mask)}
     units = {name: found.units[name] for name in ("mean_separation", "pressure")}
     units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units))
+    shear_scatter = np.full(u.shape, OWN_SHEAR if own else SHEAR)
     return FlowFactors(
-        u, phi_x, phi_y, shear[0], shear[1], np.ravel(found.pressure), area, scatter, np.full(u.shape, SHEAR),
+        u, phi_x, phi_y, shear[0], shear[1], np.ravel(found.pressure), area, scatter, shear_scatter,
         ~np.logical_or.reduce([np.zeros(u.shape, bool), *reasons.values()]), reasons, float(gamma), surface, units,
     )  # fmt: skip
+
+
+def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """phi and phi_s along both axes, shape (2, n), of the gaps of a map: simulated ones, and wider ones undeformed."""
+    source = found._source
+    surface, whole = source.surface, map_of(source.surface)
+    h_rms, heights = float(surface.h_rms), whole.heights - whole.heights.mean()
+
+    def flow(gap: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        cell = gap if whole.periodic else mirrored(gap)
+        sides = cell.shape[0] * whole.steps[0], cell.shape[1] * whole.steps[1]
+        K, carried = flow_and_couette(cell, sides)
+        return float(cell.mean()), K / cell.mean() ** 3, (cell.mean() - carried) / h_rms
+
+    def pressed(known: float) -> Any:
+        return contact(surface, mean_separation=known, theory=source.theory)
+
+    lightest = float(contact(surface, area=LIGHTEST, theory=source.theory).mean_separation)
+    knots = np.geomspace(u.min(), lightest, KNOTS)[:-1] if u.min() < lightest else np.empty(0)
+    rows = [flow(pressed(known).map().gap) for known in (*knots.tolist(), lightest)]
+    top = float(heights.max())
+    rows += [flow(known - heights) for known in np.geomspace(top * CLEAR, max(u.max(), 2 * top), KNOTS)]
+    at, phi, shear = (np.array(part) for part in zip(*rows, strict=True))
+    leak, wide = found.leakage, slice(knots.size, None)  # by their own knots, whose flow is far from blocked
+    curve = PchipInterpolator(np.log(at[wide]), np.log(phi[wide]))
+    beyond = np.exp(curve(np.log(np.maximum(u, at[knots.size])))).T
+    own = np.where(u > at[knots.size], beyond, np.stack([np.ravel(leak.x), np.ravel(leak.y)]) / u**3)
+    return own, PchipInterpolator(np.log(at), shear)(np.log(np.maximum(u, at[0]))).T
 
 
 def _peklenik(surface: Any) -> float:

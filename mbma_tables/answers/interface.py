@@ -1,4 +1,4 @@
-"""What a contact conducts and how it shears: quantities that need numbers of the bodies or of a gas.
+"""Conductance and tangential stiffness of a contact: quantities that depend on constants of the bodies or of a gas.
 
 Shear is that under constant normal pressure, from the normal law. With kappa the normal over the tangential stiffness
 (`materials.tangential_ratio`), Coulomb friction f at each point::
@@ -31,7 +31,7 @@ from mbma_tables.materials import Pair, tangential_ratio
 from mbma_tables.surfaces.any_surface import AnySurface
 
 OF_YIELDING = (
-    "slip of a contact that yields is not known: its normal law is of loading alone; `stiffness` of full stick is"
+    "slip of a contact that yields is not known: its normal law is for loading only; `stiffness` of full stick is known"
 )
 OF_LAY = "slip of a surface with a lay was not compared with simulations; `stiffness` of full stick is known"
 DIRECTIONS = ("along", "across")
@@ -40,7 +40,7 @@ ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tangential:
-    """A contact that is sheared, made by `tangential` of contacts and laws; lengths and stresses as theirs."""
+    """A contact under shear, made by `tangential` of contacts and laws, in the units of these."""
 
     ratio: Any  # kappa
     friction: float | None
@@ -58,7 +58,7 @@ class Tangential:
 
     @property
     def gross_slip(self) -> Numbers:
-        """Displacement from which all of the contact slips [length], f kappa (h_max - u)."""
+        """Tangential displacement at which the whole contact slips [length], f kappa (h_max - u)."""
         found: Numbers = self._known()[3] * (self.last - self.mean_separation)
         return found
 
@@ -95,7 +95,7 @@ class Tangential:
         return found
 
     def _moved(self, approach: Any) -> Any:
-        """Mean separation of the contact that is taken off."""
+        """Mean separation of the contact whose pressure is subtracted."""
         return np.minimum(self.mean_separation + approach, self.last)
 
     def _checked(self, name: str, value: Any) -> Any:
@@ -116,7 +116,7 @@ class Tangential:
 
 
 def ratio_of(nu: Any, E: Any, pair: Pair | None, direction: str | None, surface: Any, area: Any) -> Any:
-    """kappa of Poisson's ratios and moduli as given, or of the materials that are named."""
+    """kappa for given Poisson's ratios and moduli, or for the named materials."""
     if nu is None and pair is None:
         raise InputError("tangential stiffness needs nu, Poisson's ratio of the bodies, where no materials are named")
     if nu is None:
@@ -155,7 +155,7 @@ class Interface:
         -------
         ndarray or DataArray
             [unit of k/length of the surface], such as W/(m K um); in W/(m^2 K) for "45 W/(m K)", in S/m^2 for
-            "6e6 S/m", where the surface knows its unit. Its scatter is `stiffness_scatter`.
+            "6e6 S/m", if the surface has a unit. Its scatter is `stiffness_scatter`.
 
         Examples
         --------
@@ -221,13 +221,13 @@ class Interface:
             eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
             return (k * metre * mean_inverse(u, area, jump * metre, surface.h_rms, eta),)
 
-        found: Numbers = source.map(mean, self, 1, {"area": self._touching})[0]
+        found: Numbers = source.map(mean, self, 1, {"area": self.area})[0]
         return found
 
     def tangential(
         self: Any, friction: float | None = None, nu: Any = None, E: Any = None, direction: str | None = None
     ) -> Tangential:
-        """Tangential stiffness of full stick, partial and gross slip; computed when called for.
+        """Tangential stiffness of full stick, partial and gross slip.
 
         Parameters
         ----------
@@ -248,7 +248,7 @@ class Interface:
         '0.0222 GPa/um, 0.000882 GPa; slip from 0.22 um'
         """
         source = self._source
-        ratio = ratio_of(nu, E, source.materials, direction, source.surface, self._touching)
+        ratio = ratio_of(nu, E, source.materials, direction, source.surface, self.area)
         last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
 
         def at(function: Any) -> Any:
@@ -261,7 +261,7 @@ class Interface:
         normal = at(lambda theory, s, u, E: (E * theory.answer(s, u).pressure,))
         energy = at(lambda theory, s, u, E: (E * theory.energy(s, u),))
         return Tangential(
-            ratio, friction, self.mean_pressure * self._touching if self.pressure is None else self.pressure,
+            ratio, friction, self.pressure,
             self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
             OF_YIELDING if source.yields else OF_LAY if direction else (normal, energy, inverse),
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Leakage of a contact: its flow coefficient, how far that is to be trusted, and rates of liquids and gases."""
+"""Leakage of a contact: its flow coefficient with uncertainty, and leakage rates of liquids and gases."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from mbma_tables.theories.protocol import Theory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
-SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
+LARGEST_KNUDSEN = 0.1  # largest ratio of mean free path to channel for which first-order slip holds
+SLIP = 6.0  # in a plane channel slip multiplies the flow by 1 + 6 Kn
 # standard deviations of ln k of maps by their isotropic spectrum, which come on top, of maps that are valid for the
 # calibrated law and of others; at these contacts of docs/data/machined.nc
 MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
@@ -93,7 +93,7 @@ class Leakage(Displayed):
 
     @property
     def blocked(self) -> Any:
-        """Whether contact percolates, A/A0 at or above about 0.41; what passes then is not in this model."""
+        """Whether the contact percolates, A/A0 at or above about 0.41; any remaining flow is not modelled."""
         return self.K == 0
 
     def along(self, direction: ArrayLike | str) -> Any:
@@ -113,7 +113,7 @@ class Leakage(Displayed):
 
     @property
     def hydraulic_aperture(self) -> Numbers:
-        """K^(1/3) [length], the gap of parallel plates that pass as much."""
+        """K^(1/3) [length], the gap of parallel plates with the same flow."""
         return np.cbrt(self.K)
 
     @property
@@ -144,29 +144,29 @@ class Leakage(Displayed):
 
     @functools.cached_property
     def closed_form(self) -> Any:
-        """K/h_rms^3 by a closed form of gap and area alone, good to zeta_1 of 32: a second opinion."""
+        """K/h_rms^3 by a closed form of gap and area alone, accurate up to zeta_1 = 32, for comparison."""
         constants = shipped_flow().constants
         return self._map(lambda theory, s, u, E, area: constants.closed_form(u / np.asarray(s.h_rms), area))
 
     @functools.cached_property
     def valid(self) -> Any:
-        """Whether flow through contacts such as these was simulated; `reasons` has why not."""
+        """Whether flow through such contacts was simulated; if not, `reasons` explains why."""
         contact = self._contact
-        return contact.valid & contact._source.valid(contact, reasons_against, {"area": contact._touching})
+        return contact.valid & contact._source.valid(contact, reasons_against, {"area": contact.area})
 
     @functools.cached_property
     def reasons(self) -> Any:
-        """What is against entries, each with its mask; of plain arrays."""
+        """Reasons why entries are not valid, each with its mask; for plain arrays."""
         contact = self._contact
-        return contact.reasons | contact._source.reasons(contact, reasons_against, {"area": contact._touching})
+        return contact.reasons | contact._source.reasons(contact, reasons_against, {"area": contact.area})
 
     def _map(self, function: Callable[..., FloatArray]) -> Any:
-        area = {"area": self._contact._touching}
+        area = {"area": self._contact.area}
         return self._contact._source.map(lambda *given: (function(*given),), self._contact, 1, area)[0]
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of the quantities that have one."""
+        """Units of the quantities that are not dimensionless."""
         units = self._contact._source.units
         return {"K": unit_of("leakage", units), "hydraulic_aperture": unit_of("separation", units)}
 
@@ -211,7 +211,7 @@ class Leakage(Displayed):
         """Volume of an ideal gas at the outlet's pressure that leaks per time and length of seal [length^2/time].
 
         Isothermal: mass flow goes as p1^2 - p2^2. Slip of the first order adds the share 6 Kn, with Kn the mean free
-        path over k^(1/3) h_rms, the gap of parallel plates that pass as much.
+        path over k^(1/3) h_rms, the gap of parallel plates with the same flow.
 
         Parameters
         ----------
@@ -231,14 +231,14 @@ class Leakage(Displayed):
         eta, high, low, length = self._positive(
             viscosity=viscosity, pressure_in=pressure_in, pressure_out=pressure_out, width=width
         )
-        larger = "at least pressure_out: it is the larger, absolute pressure"
+        larger = "at least pressure_out: both are absolute pressures"
         require("pressure_in", np.asarray(high + 0 * low), np.asarray(high >= low), larger)
         path = self._number("mean_free_path", mean_free_path)
         require("mean_free_path", np.asarray(path), np.asarray(path >= 0), "at least 0")
         channel = self.hydraulic_aperture
         agree(K=self.K, viscosity=eta, pressure_in=high, pressure_out=low, width=length, mean_free_path=path)
         knudsen = path / np.maximum(channel, np.finfo(float).tiny) * (channel > 0)
-        limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, flow is not that of slip"
+        limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, first-order slip does not apply"
         require("mean_free_path", np.asarray(path + 0 * knudsen), np.asarray(knudsen <= LARGEST_KNUDSEN), limit)
         return self.K * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
 
@@ -270,7 +270,7 @@ def leakage_of(contact: Any) -> Leakage:
         K = flow(surface, u, share) * volume
         return K, K, K, np.zeros_like(K)
 
-    K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact._touching})
+    K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact.area})
     return Leakage(K, x, y, xy, contact)
 
 
@@ -315,14 +315,14 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
 
 
 def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
-    """Reasons against the flow, beside those against the contact."""
+    """Reasons why the flow is not valid, in addition to those for the contact."""
     own = _simulated(theory).flow_trust(surface, u, area)
     large = np.broadcast_to(np.asarray(surface.zeta_1) > SIMULATED, np.shape(area))
     many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
     far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
     found = {many: area > LARGEST_AREA, far: large} if own is None else dict(own[1])
     if _simulated(theory) is not theory:
-        found["leakage: yielded contacts leak more, by factors"] = np.ones(np.shape(area), bool)
+        found["leakage: yielded contacts leak several times more"] = np.ones(np.shape(area), bool)
     if isinstance(theory.elastic, Mbma):
-        found["leakage: the mean separation of 'mbma' is off by factors"] = np.ones(np.shape(area), bool)
+        found["leakage: the mean separation of 'mbma' is wrong by factors"] = np.ones(np.shape(area), bool)
     return found

@@ -1,8 +1,8 @@
 """Flow coefficient of contacts: the contact factor's table of self-affine surfaces, and its scatter.
 
 The table holds ln R of `mbma_tables.laws.effective_medium` over Hurst exponent, ln zeta_1 and ln A/(Ac - A).
-Below its least contact ln R goes as A^m, as what obstructs; above its largest it is linear in the odds: R is a power
-of Ac - A.
+Below the smallest tabulated contact ln R is proportional to A^m, as the obstruction is; above the largest it is linear
+in ln A/(Ac - A), so that R is a power of Ac - A.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, known_a
 GROUP = "leakage"
 AXES = ("hurst", "log_zeta_1", "log_odds")
 COVERED = np.array([[0.1, 1.0], [math.log(3.0), math.log(1e5)]])  # H and ln zeta_1, where the error was measured
-FEW = 8192  # entries whose numbers stay in the processor's cache
-LEAST = 1e-300  # contact fraction that counts as none
+FEW = 8192  # entries per block, so that a block fits into the processor's cache
+LEAST = 1e-300  # smaller contact fractions count as zero
 OWN_NODES = 64  # contact fractions at which a spectrum's own factor is found
 KEPT = 64  # spectra whose factors are kept
 

@@ -1,4 +1,4 @@
-"""What a measured map or line scan says: in lines, in a table of loads, and in one picture."""
+"""Report on a measured map or line scan: text lines, a table of loads and one picture."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ GAPS = np.append(np.geomspace(2e-3, 0.1, 20)[:-1], np.linspace(0.1, 0.98, 60))  
 
 
 def described(surface: MeasuredSurface) -> list[str]:
-    """Lines on what was found in a measurement, what was done to it, and what follows for theories."""
+    """Text lines on a measurement: its properties, its treatment, and consequences for theories."""
     unit = surface.unit or "length"
     h_rms, shortest, longest = float(surface.h_rms), 2 * np.pi / float(surface.q1), 2 * np.pi / float(surface.q0)
     lines = [
         f"h_rms {h_rms:.4g} {unit}, highest point {float(surface.h_max):.4g} {unit} "
         f"({float(surface.h_max) / h_rms:.3g} h_rms), rms gradient {float(surface.rms_gradient):.4g}",
-        f"waves from {shortest:.4g} to {longest:.4g} {unit}",
+        f"wavelengths from {shortest:.4g} to {longest:.4g} {unit}",
     ]
     if (found := areal(surface)) is not None:
         shown = {name: f"{name} {number:.4g}" for name, number in found.items()}
@@ -78,7 +78,7 @@ def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str,
         try:
             answer = answer_where_finite(theory, surface, u)
         except MbmaError:
-            # a theory that has no answer is left out of a picture
+            # theories that fail are left out of the picture
             continue
         scatter, area_scatter = (theory.scatter(surface, what, answer.area) for what in ("pressure", "area"))
         lines = {"pressure": E_star * answer.pressure, "area": answer.area, "mean_separation": u}
@@ -180,7 +180,7 @@ def _by_pressure(
 ) -> None:
     for name, found in answers.items():
         pressure, value, width = found["pressure"], found[what], found[scatter]
-        # areas of MBMA's islands, which are added, may pass 1
+        # MBMA's sum of island areas may exceed 1
         held = np.isfinite(pressure) & (found["area"] > 1e-4) & (found["area"] <= 1) & (pressure > 0)
         (line,) = axes.plot(pressure[held], value[held], label=theory_label(name))
         band = held & np.isfinite(width)
@@ -188,9 +188,7 @@ def _by_pressure(
         low, high = (value / times, value * times) if what == "area" else (value - width, value + width)
         axes.fill_between(pressure[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
     if simulated is not None:
-        axes.plot(
-            simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this very map"
-        )
+        axes.plot(simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this map")
     axes.set_xscale("log")
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
@@ -200,7 +198,7 @@ def _by_pressure(
 def table_of_loads(
     surface: MeasuredSurface, E_star: float = 1.0, theory: str = "calibrated"
 ) -> tuple[dict[str, Any], list[str]]:
-    """Columns by a theory at a few contacts, and lines on what is left out of them or not valid."""
+    """Columns of a theory's results at a few contact areas, and text lines on those omitted or not valid."""
     from mbma_tables.answers.contact import contact
 
     areas, told = AREAS, []
@@ -211,10 +209,10 @@ def table_of_loads(
             raise
         areas, told = AREAS[~fault.mask], [f"{_contacts(AREAS[fault.mask])} left out: {fault}"]
         found = contact(surface, area=areas, theory=theory, E_star=E_star)
-    # curves of odd maps jump over some contacts
+    # curves of unusual maps skip some contact areas
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
     if not reached.all():
-        told.append(f"{_contacts(areas[~reached])} left out: the map's curve jumps over it")
+        told.append(f"{_contacts(areas[~reached])} omitted: the map's curve does not reach it")
     names = ("area", "pressure", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
     reasons, everywhere = found.reasons, get_theory(theory, surface).departures(surface)

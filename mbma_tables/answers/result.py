@@ -1,4 +1,4 @@
-"""The result of `contact`: pressure, area and what follows from them when it is read."""
+"""The result of `contact`: pressure, area and quantities derived from them on access."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_SHOWN = 10_000  # entries up to which the text includes errors, scatter and
 
 
 def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers]:
-    """A quantity of a contact that is kept when it was read."""
+    """A quantity of a contact that is computed on first access and then kept."""
 
     @functools.wraps(method)
     def found(contact: Contact) -> Numbers:
@@ -42,7 +42,7 @@ def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Contact(Interface, Displayed):
-    """A contact: pressure, area and what follows from them; arrays of the broadcast shape, or DataArrays.
+    """Result of a contact: pressure, area and derived quantities; arrays of the broadcast shape, or DataArrays.
 
     Attributes
     ----------
@@ -50,21 +50,28 @@ class Contact(Interface, Displayed):
         d, between the rigid plane and the mid-plane [length].
     mean_separation : ndarray
         u = (h_max + d)/2 (50) [length].
+    <<<<<<< HEAD
+    pressure : ndarray
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
+    area : ndarray
+        A/A0. MBMA does not end at 1 under full compression, and this is not clamped.
+    =======
     pressure : ndarray or None
         F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not requested.
     area : ndarray or None
-        A/A0, None where not requested. MBMA does not end at 1 under full compression, and this is not clamped.
+        A/A0, None where not requested. In MBMA it differs from 1 at full compression; it is not clamped.
+    >>>>>>> refs/heads/prose
     error : ndarray
         Bound on the relative numerical error of both against the theory (for "mbma" against its island model),
-        NaN where not known. The theory's own distance from simulation is another number, `scatter`.
+        NaN where not known. The deviation of the theory from simulation is given separately, as `scatter`.
     theory, variant, island_model : str
-        What made them; variant and island model are empty where the theory is not MBMA.
+        Names of what computed them; variant and island model are empty unless the theory is MBMA.
     islands : int or None
-        Islands evaluated; None where that is left to dask, or where there are none.
+        Number of islands evaluated; None if computed by dask or if the theory has none.
     pressure_by, area_by, separation_by : dict of ndarray, or None
-        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held. Asked by
-        pressure or area, that is held in place of the separation, whose own derivatives are `separation_by`, and
-        "pressure" or "area" stands for "separation".
+        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held. If
+        pressure or area was given, that is held in place of the separation, whose own derivatives are `separation_by`,
+        and "pressure" or "area" stands for "separation".
     """
 
     separation: Numbers
@@ -94,11 +101,10 @@ class Contact(Interface, Displayed):
         if source.surface.resolution:
             facts["resolution"] = source.surface.resolution
         for name in ("mean_separation", "pressure", "area"):
-            if getattr(self, name) is not None:
-                facts[name] = shown(getattr(self, name), units[name])
+            facts[name] = shown(getattr(self, name), units[name])
         if any_labelled(source.surface, self.mean_separation) or np.size(self.error) > MOST_SHOWN:
             return facts
-        if np.all(self._touching == 0):
+        if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
@@ -106,9 +112,9 @@ class Contact(Interface, Displayed):
             more |= {"psi": self.psi, "yielded": self.yielded}
         elif units["pressure"] != "1":
             facts["elastic_hardness"] = shown(self.elastic_hardness, units["pressure"])
-            # a pressure in another unit than meant shows itself so
+            # reveals a pressure in an unintended unit
             light = self.elastic_hardness * ELASTIC_PSI / 2
-            if self.pressure is not None and np.any(self.pressure > light):
+            if np.any(self.pressure > light):
                 limit = shown(light, units["pressure"])
                 facts["pressure"] += f" (above E* g/2 = {limit}, the mean pressure in light contact)"
         if source.theory.advice:
@@ -132,7 +138,7 @@ class Contact(Interface, Displayed):
     def curve(self, leakage: bool = False) -> Curve:
         """A line of pictures, of one surface at several separations; optionally with its leakage."""
         surface = self._source.surface
-        if self.pressure is None or self.area is None or np.size(self.pressure) < 2 or surface.shape != ():
+        if np.size(self.pressure) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
         fields = [self.mean_separation / surface.h_rms, self.pressure, self.area, self.scatter, self.area_scatter]
@@ -144,7 +150,7 @@ class Contact(Interface, Displayed):
     def map(self) -> ContactMap:
         """Pressure, gap and contact at every point of the surface's map at this pressure, simulated by Tamaas.
 
-        The map is pressed on its full grid, with the contact's pressure, whatever the theory that answered.
+        The map is simulated on its full grid at the contact's pressure, whichever theory computed the contact.
 
         Raises
         ------
@@ -170,17 +176,12 @@ class Contact(Interface, Displayed):
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
-        """The theory's answer at these separations, computed once."""
+        """The theory's result at these separations, computed once."""
         source = self._source
         if source.answer is not None:
             return source.answer
         found: Any = source.map(lambda theory, s, u, E: theory.answer(s, u), self, 4)
         return TheoryAnswer(*found)
-
-    @property
-    def _touching(self) -> Numbers:
-        """A/A0, whether requested or not."""
-        return self._answer.area if self.area is None else self.area
 
     @described
     def stiffness(self) -> Any:
@@ -192,14 +193,14 @@ class Contact(Interface, Displayed):
         """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
         if self._source.yields:
             raise InputError(
-                "energy: what a contact that yields gives back is not known, since the shape that stays is not; "
-                "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness what a small "
-                "unloading starts with"
+                "energy: the energy that a yielded contact gives back is not known, since its residual shape is not; "
+                "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness the "
+                "initial stiffness of unloading"
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
 
     def _of_loading(self, name: str) -> Any:
-        """A number of `Loaded`, over E*."""
+        """A field of `Loaded`, divided by E*."""
         known = self._source.loaded
         if known is not None:
             return getattr(known, name)[()]
@@ -219,7 +220,7 @@ class Contact(Interface, Displayed):
 
     @described
     def plane_separation(self) -> Any:
-        """Gap between the mean planes [length]: u less what yielded points are flattened."""
+        """Gap between the mean planes [length]: u less the flattening of yielded points."""
         return self._of_loading("plane_separation") if self._source.yields else self.mean_separation
 
     @property
@@ -230,15 +231,14 @@ class Contact(Interface, Displayed):
 
     @property
     def elastic_hardness(self) -> Any:
-        """Hardness from which the elastic area is within 5%, E* g/1.1 [stress]."""
+        """Hardness above which the elastic area is within 5%, E* g/1.1 [stress]."""
         return (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
 
     @described
     def mean_pressure(self) -> Any:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
-        pressure = self._source.E_star * self._answer.pressure if self.pressure is None else self.pressure
         with np.errstate(invalid="ignore"):
-            return pressure / self._touching
+            return self.pressure / self.area
 
     @described
     def scatter(self) -> Any:
@@ -262,7 +262,7 @@ class Contact(Interface, Displayed):
             return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 
     def _scatter(self, of: str) -> Numbers:
-        return self._source.map(lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self._touching})[0]
+        return self._source.map(lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self.area})[0]
 
     @functools.cached_property
     def leakage(self) -> Leakage:
@@ -273,12 +273,12 @@ class Contact(Interface, Displayed):
 
     @property
     def _against(self) -> tuple[Any, ...]:
-        """What `Source.valid` and `Source.reasons` need."""
+        """Arguments for `Source.valid` and `Source.reasons`."""
         return self, functools.partial(reasons_against, self._source), self._answer._asdict()
 
     @described
     def valid(self) -> Any:
-        """Whether the theory was tested for contacts such as these; `reasons` has where and why not."""
+        """Whether the theory was tested for such contacts; if not, `reasons` gives where and why."""
         return self._source.valid(*self._against)
 
     @functools.cached_property

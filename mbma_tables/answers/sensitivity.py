@@ -1,4 +1,4 @@
-"""How much each unknown of a surface matters: logarithmic derivatives of answers, and answers over stated ranges."""
+"""Sensitivity of results to each parameter of a surface: logarithmic derivatives, and results over stated ranges."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # of the logarithm of a parameter
-NEAR = 0.9  # of a number's end, from which on its steps go down
+NEAR = 0.9  # share of a parameter's upper limit above which its steps go down
 MAX_ERROR = 0.05  # of a slope, over itself or 1, above which it is NaN
 POINTS = 33  # of a range, geometric
 ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
@@ -39,25 +39,25 @@ Answers = dict[str, FloatArray]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """What `sensitivity` answers; its text is a table.
+    """Result of `sensitivity`; its text is a table.
 
     Attributes
     ----------
     by : str
-        What is held: "separation", "mean_separation", "pressure" or "area".
+        Quantity held fixed: "separation", "mean_separation", "pressure" or "area".
     parameters : dict of float
-        The surface's numbers, the modulus where there is one, and what is held.
+        The surface's parameters, the modulus if given, and the quantity held fixed.
     answers : dict of float
-        The answers at these numbers; stiffness that of loading, conductance over the mean conductivity of the
+        The results for these parameters; stiffness is that of loading, conductance over the mean conductivity of the
         bodies [1/length].
     slopes, errors : dict of dict of float
-        d ln(answer)/d ln(parameter) by parameter and answer, the other parameters held, NaN where the answer jumps,
+        d ln(result)/d ln(parameter) by parameter and result, the other parameters held, NaN where the result jumps,
         and estimates of their errors.
     ranges : dict of dict of tuple of float
-        Smallest and largest answer while a parameter runs over its range, and, under "all", over the ends and the
+        Smallest and largest result while a parameter runs over its range, and, under "all", over the ends and the
         present values of all ranges together.
     units : Units
-        Of parameters and answers.
+        Of parameters and results.
     """
 
     by: str
@@ -99,26 +99,26 @@ def sensitivity(
     hardness: float | str | None = None,
     materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> Sensitivity:
-    """How much each number of a surface matters to pressure, area, stiffness and conductance, by any theory.
+    """Sensitivity of pressure, area, stiffness and conductance to each parameter of a surface, for any theory.
 
     Parameters
     ----------
     surface : Surface
         One surface. Its parameters are its five numbers, or those of the drawing that it was made from
-        (`Surface.from_roughness`). Those of one that is its own spectrum are "heights" and "lengths", factors of all
-        heights and of all lengths along the plane, which calibrations of an instrument are about; h_max alone; the
+        (`Surface.from_roughness`). Those of one given by a spectrum are "heights" and "lengths", factors of all
+        heights and of all lengths along the plane, as calibrations of an instrument are; h_max alone; the
         "shortest" and "longest" wavelengths, cut-offs that only remove wavelengths, and with an extrapolated spectrum
-        its exponent "extrapolate_hurst". Where the calibrated law takes a map's own heights, tops and valleys, h_max
-        and cut-offs are left out: they are the map's.
+        its exponent "extrapolate_hurst". Where the calibrated law uses a map's own heights and curves, h_max and
+        cut-offs are left out: they follow from the map.
     separation, mean_separation, pressure, area : float or str, one of them
-        What is held, as for `contact`.
+        The quantity held fixed, as for `contact`.
     E_star : float or str
         Effective modulus, as for `contact`.
     ranges : mapping of pairs, optional
-        Between what a parameter may lie: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
+        Lower and upper limit of parameters: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
     theory, island_model, variant, rtol, hardness, materials : optional
-        As for `contact`, but for maps "calibrated" by default, as simulations know one surface; a hardness is one of
-        the parameters.
+        As for `contact`, but for maps "calibrated" by default, as a simulation is of one surface only; a hardness is
+        one of the parameters.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def sensitivity(
     'conductance goes like hardness^-0.69'
     """
     named = theory_name(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
-    # a simulation knows no surface but its own
+    # a simulation is of one surface only
     named = "calibrated" if theory is None and named in OF_MAPS else named
     chosen = chosen_theory(surface, named, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
@@ -174,7 +174,7 @@ def sensitivity(
 
     here = {name: float(number[()]) for name, number in answers({}).items() if name in wanted}
     if not all(number > 0 for number in here.values()):
-        raise InputError(f"there is no contact at this {by}, or full contact: nothing to take a logarithm of")
+        raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
     varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
     slopes, errors = _slopes(answers, numbers, varied, wanted, 3 if batches else 1)
     ends = _ranges(answers, numbers, ranges or {}, units, wanted)
@@ -182,7 +182,7 @@ def sensitivity(
 
 
 def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
-    """How the surface is made, and from which numbers."""
+    """The function that makes the surface, and the parameters it is made from."""
     if surface.labelled or surface.shape != ():
         raise InputError("sensitivities are of one surface, not of a batch")
     own = {name: getattr(surface, name) for name in PARAMETERS}
@@ -196,11 +196,11 @@ def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any
 
 
 def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurface], dict[str, Any]]:
-    """The same of a surface that is its own spectrum."""
+    """The same for a surface given by a spectrum."""
     steps = {record["step"]: record for record in surface.provenance}
     own: dict[str, Any] = {"heights": 1.0, "lengths": 1.0}
     known: MeasuredSurface = surface
-    # the calibrated law takes measured heights and tops, which have their own highest point and shortest wavelengths
+    # the calibrated law uses measured heights, which have their own highest point and shortest wavelengths
     takes_map = getattr(theory, "name", theory) == Calibrated.name
     if surface.heights.is_gaussian or not takes_map:
         own["h_max"] = float(surface.h_max)
@@ -233,20 +233,20 @@ def _slopes(
     wanted: list[str],
     halvings: int,
 ) -> list[dict[str, dict[str, float]]]:
-    """Logarithmic derivatives by parameter and answer, and their errors."""
+    """Logarithmic derivatives by parameter and result, and their errors."""
 
     def logarithms(k: Any, x: FloatArray) -> FloatArray:
         found = answers({name: numbers[name] * np.exp(np.where(k == j, x, 0.0)) for j, name in enumerate(varied)})
         return np.log([found[name] for name in wanted])
 
-    # cut-offs only remove wavelengths; other numbers may be near their end
+    # cut-offs only remove wavelengths; other parameters may be near a limit
     cap = numbers.get("hardness", np.inf)
     ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": cap}
     ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
     ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
     sides, shape = np.array([ways.get(name, 0.0) for name in varied]), (len(wanted), len(varied))
     slopes, errors = differences(logarithms, np.full(len(varied), STEP), sides, np.ones(shape), halvings)
-    # an answer that jumps has no slope
+    # a discontinuous result has no slope
     slopes = np.where(errors <= MAX_ERROR * np.maximum(1, np.abs(slopes)), slopes, np.nan)
     return [
         {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.T.tolist(), strict=True)}
@@ -261,7 +261,7 @@ def _ranges(
     units: Units,
     wanted: list[str],
 ) -> dict[str, dict[str, tuple[float, float]]]:
-    """Smallest and largest answers over each range, and over the ends of all."""
+    """Smallest and largest results over each range, and over the ends of all ranges."""
     ends = {}
     for name, pair in ranges.items():
         if name not in numbers:

@@ -1,4 +1,4 @@
-"""What contacts and laws have in common: meanings of quantities; the source of a contact and reasons against it."""
+"""Common parts of contacts and laws: meanings of quantities, the source of a contact, reasons against validity."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ MEANINGS = {
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
     "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, between simulations",
     "separation_scatter": "standard deviation of the mean separation at this force from simulation to simulation",
-    "valid": "whether the theory was tested for contacts such as these",
+    "valid": "whether the theory was tested for such contacts",
 }
-MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
+MAX_GRADIENT = 1.0  # larger rms gradients suggest that heights and wavenumbers are in different units
 
 
 def named(value: Any, name: str, units: Units) -> Any:
@@ -59,7 +59,7 @@ Against = Callable[..., dict[str, Any]]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Source:
-    """What a `Contact` is of, for quantities that are computed when they are read."""
+    """Inputs of a `Contact`, for quantities that are computed on access."""
 
     theory: Theory
     surface: AnySurface
@@ -101,7 +101,7 @@ class Source:
         return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
 
     def valid(self, contact: Any, against: Against, more: Mapping[str, Any]) -> Numbers:
-        """Where no reason of ``against(theory, surface, u, E_star, *more)``, masks by their texts, holds."""
+        """True where none of the reasons (masks by text) of ``against(theory, surface, u, E_star, *more)`` applies."""
 
         def none(*given: Any) -> tuple[FloatArray]:
             return (np.asarray(~np.logical_or.reduce(list(against(*given).values())), dtype=float),)
@@ -126,7 +126,7 @@ class Source:
 def reasons_against(
     source: Source, theory: Theory, surface: AnySurface, u: FloatArray, E_star: FloatArray, *known: FloatArray
 ) -> dict[str, Any]:
-    """Every reason against answers of a source's theory, perhaps with a hardness, with its mask."""
+    """Every reason why results of a source's theory, perhaps with a hardness, are not valid, with its mask."""
     answer = TheoryAnswer(*known)
     steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
@@ -138,7 +138,7 @@ def reasons_against(
 def _beyond_metals(
     source: Source, theory: Theory, surface: AnySurface, E_star: FloatArray, answer: TheoryAnswer
 ) -> dict[str, Any]:
-    """Elastic contacts whose pressure the metals named would not bear; without names, no metal."""
+    """Elastic contacts with pressures that the named metals (without names: any metal) do not support."""
     stress, pair = source.units.stress, source.materials
     if stress in (None, "1") or (pair is None and source.stated):
         return {}
@@ -167,9 +167,9 @@ class _Point(NamedTuple):
 
 
 class LawPoint(_Point):
-    """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
+    """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape.
 
-    `units` are the law's. What yields no law holds: `contact` answers that.
+    `units` are the law's. Laws do not contain the yielded share; `contact` computes it.
     """
 
     units = Units()
@@ -186,7 +186,7 @@ class LawPoint(_Point):
 
 
 class LawValues(NamedTuple):
-    """What a law answers at separations: F/A0, A/A0, -dF/du and the energy, of their shape."""
+    """Results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape."""
 
     pressure: Any
     area: Any

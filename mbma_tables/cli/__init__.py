@@ -1,11 +1,12 @@
-"""The command line `mbma`: contact, curves and islands of a surface, as a table, JSON, CSV or a picture.
+"""The command line `mbma`: results as tables, JSON, CSV or pictures.
 
-Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Whatever needs
-scipy is imported where a command runs, so that ``--help`` answers at once.
+Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Modules that
+need scipy are imported by the commands that use them, so that ``--help`` is fast.
 """
 
 from __future__ import annotations
 
+import functools
 import re
 import sys
 import warnings
@@ -16,15 +17,17 @@ import click
 
 from mbma_tables import __version__
 from mbma_tables.cli import batch, cache, commands, export, joint, scene, tables
+from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.core import core
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # as shells report Ctrl-C
 
 
 def _describe(fault: Exception) -> str:
-    """One line for what went wrong, and for misuse of the command line a second with a hint."""
+    """One line that describes the error, and for misuse of the command line a second one with a hint."""
     if isinstance(fault, click.ClickException):
         line = " ".join(fault.format_message().split())
         if isinstance(fault, click.UsageError) and fault.ctx is not None:
@@ -52,8 +55,8 @@ AFTER = r"[,;:]| = | (?:must|has|is|are|and|or|out|without)\b|$"
 
 
 def _in_options(text: str, command: click.Command, words: list[str]) -> str:
-    """A message of the library, which names arguments, with the options of a command for them."""
-    # what the command line says by itself, and what is of a file that was given, in whose words it is
+    """A message of the library with its argument names replaced by the options of a command."""
+    # messages of the command line itself, and messages on a file, which keep the file's own names
     if "--" in text or text.startswith(tuple(word + end for word in words for end in ":,")):
         return text
     for python, shell in SAID.items():
@@ -78,7 +81,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 class Program(click.Group):
-    """A group of commands whose every known fault ends in a short message."""
+    """A group of commands whose expected errors end in a short message."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run, and exit with 0, with 2 for bad input, or with 130 where it was interrupted."""
@@ -101,7 +104,9 @@ class Program(click.Group):
 
 
 @click.group("mbma", cls=Program, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="mbma")
+@click.version_option(
+    __version__, prog_name="mbma", message=f"%(prog)s %(version)s, core {core.__name__.rpartition('.')[2].lstrip('_')}"
+)
 @click.pass_context
 def main(context: click.Context) -> None:
     """Contact of rough surfaces: pressure, real contact area and stiffness against gap or pressure.
@@ -134,4 +139,5 @@ for command in (
     export.export_command,
     export.explore_command,
 ):
+    command.format_options = functools.partial(format_options, command)  # type: ignore[method-assign]
     main.add_command(command)

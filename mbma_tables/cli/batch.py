@@ -53,7 +53,7 @@ def batch_command(
     model: options.Model,
     output: options.Output,
 ) -> None:
-    """A row of the answer for each line of SURFACES.csv.
+    """Contact for each line of SURFACES.csv, one row each.
 
     Its header names a surface's numbers as the options of `mbma contact` do, "surface" for named ones, "map" for files
     of maps with their dx, dy, detrend, cut-offs and filters, moduli (E_star, or E1, nu1, E2, nu2), and separation,
@@ -87,7 +87,7 @@ def batch_command(
         names.append(row.get("name", row.get("surface", row.get("map", f"line {number}"))))
         specimens.append(specimen)
     if len({specimen.units for specimen in specimens}) > 1:
-        raise InputError(f"{file}: some lines know their units and some do not: give --length-unit and --stress-unit")
+        raise InputError(f"{file}: some lines have units and some do not: give --length-unit and --stress-unit")
     first = specimens[0]
     moduli = [1.0 if specimen.E_star is None else specimen.E_star for specimen in specimens]
     doing(f"batch of {len(lines)} lines")
@@ -154,7 +154,7 @@ def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: s
     if "map" in row and ("surface" in row or numbers):
         raise InputError("a map and a named surface or numbers: one of them")
     if treatment and "map" not in row:
-        raise InputError(f"{', '.join(treatment)}: about a map, which is missing")
+        raise InputError(f"{', '.join(treatment)}: for a map, which is missing")
     if "map" in row:
         specimen = from_map(folder / row["map"], treatment | {"unit": length})
     else:
@@ -172,22 +172,20 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
     return name.strip().lstrip("-").replace("-", "_"), (low, high)
 
 
-@click.command("sensitivity", short_help="How much each unknown matters.")
+@click.command("sensitivity", short_help="Sensitivity of results to each parameter.")
 @options.load_options(options.quantity_option)
-@click.option(
-    "--range", "ranges", multiple=True, metavar="NAME=X:X", help="Where a parameter may lie; may be repeated."
-)
+@click.option("--range", "ranges", multiple=True, metavar="NAME=X:X", help="Range of a parameter; may be repeated.")
 @options.specimen_options
 @options.theory_options
 @options.output_options
 def sensitivity_command(
     loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: options.Model, output: options.Output
 ) -> None:
-    """d ln(answer)/d ln(parameter) of force, area, stiffness and conductance, what is given being held.
+    """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
-    and lengths, h_max, cut-offs and the exponent of what is extrapolated. With --range also the smallest and largest
-    answer while one runs over its range, and over the ends of all ranges together.
+    and lengths, h_max, cut-offs and the exponent of an extrapolation. With --range also the smallest and largest
+    result while one runs over its range, and over the ends of all ranges together.
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa --range h_max=1:1.5 --range hurst=0.6:0.8
     """

@@ -1,4 +1,4 @@
-"""The command `mbma cache`: simulations of maps that are kept, so that none is done twice."""
+"""The command `mbma cache`: stored simulations of maps, which are not repeated."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from mbma_tables.common.progress import echo
 @click.option("--clear", is_flag=True, help="Remove them all.")
 @options.json_option("a line")
 def cache_command(clear: bool, as_json: bool) -> None:
-    """Where loads and flows of simulated maps are kept, how many files, and their size.
+    """Folder in which loads and flows of simulated maps are stored, number of files, and their size.
 
-    The environment variable MBMA_TABLES_CACHE names another folder; "off" turns it off. Those used longest ago are
-    removed where all have more than 1 GiB.
+    The environment variable MBMA_TABLES_CACHE names another folder; "off" disables the cache. When it
+    exceeds 1 GiB, the files used longest ago are removed.
 
     Example: mbma cache --clear
     """

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
 MIN_POINTS = 5
-DRAWN = ("calibrated", "persson")  # theories beside the chosen one in a picture, where they are there
+DRAWN = ("calibrated", "persson")  # theories shown beside the chosen one in a picture, where available
 COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
 MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotropy")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
@@ -136,8 +136,8 @@ def curve_command(
 ) -> None:
     """Pressure and area from first contact (d = h_max) to full compression (d = -h_max).
 
-    Half of the points are geometric in (h_max - d)/h_max, from 0.001 to 0.2, since the force falls like its
-    power 7/2 at light contact; the rest are even, up to 2. Gaps where a theory has no finite force are left out.
+    Half of the points are geometric in (h_max - d)/h_max, from 0.001 to 0.2, since the force is proportional to
+    its power 7/2 at light contact; the rest are even, up to 2. Gaps where a theory has no finite force are omitted.
 
     The picture has Persson's theory beside the chosen one, and the calibrated law with its scatter as a band.
 
@@ -223,11 +223,11 @@ def surfaces_command(output: options.Output) -> None:
     Report("surfaces", "the paper's cases", [], {}, to_columns(values, {})).write(output)
 
 
-@click.command("fit", short_help="What a measured map or line scan says, and how it touches.")
+@click.command("fit", short_help="Evaluate a measured map or line scan, and its contact.")
 @click.argument("measurements", metavar="MAP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
 @options.plot_option
-@click.option("--simulate", is_flag=True, help="Press the map by boundary elements; --out OWN.nc keeps them.")
+@click.option("--simulate", is_flag=True, help="Simulate the map by boundary elements; --out OWN.nc stores results.")
 @options.map_options
 @options.output_options
 def fit_command(
@@ -238,7 +238,7 @@ def fit_command(
     treatment: dict[str, Any],
     output: options.Output,
 ) -> None:
-    """Read a map or line scan, say what was found in it and done to it, and how it touches a flat.
+    """Read a map or line scan; report its properties and treatment, and its contact with a flat.
 
     The table is by the calibrated law, with its distance from boundary elements (scatter: standard deviation of ln A at
     a pressure and of ln F at a separation). The picture has the map, its spectrum, its heights, and area and
@@ -282,15 +282,15 @@ def fit_command(
     report.write(output, plot, picture)
 
 
-@click.command("cost", short_help="What accuracy costs, in time.")
-@click.option("--island-model", help="Rows of this island model alone.")
-@click.option("--distance", is_flag=True, help="Theories' distance from brute force in place of numerical error.")
+@click.command("cost", short_help="Computing time against accuracy.")
+@click.option("--island-model", help="Rows of this island model only.")
+@click.option("--distance", is_flag=True, help="Theories' deviation from simulation instead of numerical error.")
 @options.json_option("a table")
 def cost_command(island_model: str | None, distance: bool, as_json: bool) -> None:
-    """Error and time of everything that answers, as measured on held-out surfaces.
+    """Error and time of every method, as measured on held-out surfaces.
 
-    Costs are times over that of a fixed piece of work; seconds are those of the machine that measured. docs/cost.md
-    says what each row is. With --distance: root mean squares of ln(theory/boundary elements), of area at equal force
+    Costs are times relative to that of a fixed piece of work; seconds are those of the machine of the measurement.
+    See docs/cost.md. With --distance: root mean squares of ln(theory/boundary elements), of area at equal force
     and force at equal separation, light at 1-10% contact and deep at 10-97%.
 
     Example: mbma cost --island-model universal
@@ -300,7 +300,7 @@ def cost_command(island_model: str | None, distance: bool, as_json: bool) -> Non
     costs = shipped_costs()
     if distance:
         if island_model is not None:
-            raise InputError("--island-model is about numerical error: leave it or --distance out")
+            raise InputError("--island-model is for numerical error: leave it or --distance out")
         _show("distance", shipped_distances(), costs.seconds, as_json)
         return
     rows = [row for row in costs.rows if row.island_model != UNIT]

@@ -15,17 +15,18 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.export.again import again, made_by
-from mbma_tables.export.targets import Target, group, names, targets
+from mbma_tables.export.targets import AGAINST, Target, group, names, targets
+from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
-    from mbma_tables.export.law_rows import LawTable
+    from mbma_tables.export.law_table import LawTable
 
 DEFAULTS = {"variant": "reported", "exponential": False, "leakage": False, "check": False}
 
 
 class _Target(click.ParamType[str]):
-    """One of the targets; of a mistaken one the nearest is told."""
+    """One of the targets; for an unknown name the error suggests the nearest."""
 
     name = "target"
 
@@ -36,7 +37,7 @@ class _Target(click.ParamType[str]):
 
 
 class _Export(click.Command):
-    """The command, whose help lists the targets, and which knows its words."""
+    """The command, whose help lists the targets."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if "--again" in args:
@@ -58,13 +59,24 @@ class _Export(click.Command):
 @click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @options.optional_specimen_options
-@click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")
+@click.option("--rows", type=int, help="Number of rows of a table; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
 @options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
+@click.option(
+    "--nu",
+    "kappa",
+    type=float,
+    callback=lambda _, __, nu: None if nu is None else float(tangential_ratio(nu)),
+    help="Poisson's ratio of both bodies: tangential stiffness against pressure, or as well.",
+)
+@click.option("--friction", type=float, help="Coefficient for friction cards, whose stiffness before slip needs --nu.")
+@options.quantity_option("--friction-pressure", help="At which that stiffness holds; else amid --pressures.")
 @click.option("--leakage", is_flag=True, help="Flow coefficient of the gaps: rows of it alone, laws as code with it.")
 @click.option("--direction", metavar="x|y|DEGREES", help="Of leakage of a map; else the mean of both axes.")
+@click.option("--quantity", type=click.Choice([*AGAINST]), help="Of the rows; by default that which TARGET takes.")
+@click.option("--peklenik", type=float, help="Of a film: length of the roughness along x over that along y.")
 @click.option(
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )
@@ -83,7 +95,7 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law), subroutines of solvers
-    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), an FMU of FMI 2 (fmu) or 3 (fmu3), and onnx; c, fortran and
+    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of FMI 2 (fmu) or 3 (fmu3); c, fortran and
     javascript are the whole model as code, of the paper's variants reported and printed.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
@@ -103,7 +115,9 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         raise InputError("one surface is needed: see the options --surface, --file, --map, --hurst")
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
-    joint = {"surface": specimen.surface, "E_star": specimen.E_star, "stress_unit": specimen.stress_unit}
+    if kind.units is not None:
+        specimen = specimen.in_units(*kind.units)
+    joint: dict[str, Any] = {name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")}
     ctx = click.get_current_context()
     joint["made_by"] = made_by(ctx.meta["words"], out, [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
     _write(_law_files(kind, out, joint, given))
@@ -117,17 +131,19 @@ def _write(files: Mapping[Path, bytes]) -> None:
 
 
 def _refuse_unused(target: Target, given: Mapping[str, Any]) -> None:
-    """Refuse options that would be without effect."""
+    """Reject options that have no effect."""
     taken = target.takes if target.name in group("CODE") else target.takes | {"specimen"}
     unused = [
-        "the surface" if name == "specimen" else f"--{name.replace('_', '-')}" for name in given if name not in taken
+        {"specimen": "the surface", "kappa": "--nu"}.get(name, f"--{name.replace('_', '-')}")
+        for name in given
+        if name not in taken
     ]
     if unused:
         raise InputError(f"without effect on {target.name}: leave {' and '.join(unused)} out")
 
 
 def _law_files(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
-    """What is written of one surface's law, by its files."""
+    """Contents of the files of one surface's law."""
     if target.end and out.suffix != target.end:
         raise InputError(f"--out of {target.name} must be NAME{target.end}, got {out.name!r}")
     if str(out) == "-" and not target.alone:
@@ -135,30 +151,33 @@ def _law_files(target: Target, out: Path, joint: dict[str, Any], given: dict[str
     files = target.files(*_rows(target, out, joint, given), **given) if target.rows else target.files(**joint, **given)
     if str(out) == "-":
         return {out: files[""]}
-    # what the first file needs is written before it
+    # files that the first one needs are written before it
     return {out.with_name(f"{out.stem}{end}") if end else out: files[end] for end in sorted(files, reverse=True)}
 
 
 def _rows(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> tuple[Any, ...]:
-    """Rows of a law, and what is named in their file; taken out of `given`."""
+    """Rows of a law, and the names in their file; removed from `given`."""
     from mbma_tables.export.law_rows import describe_law
 
     name = (out.stem,) if target.end else (given.pop("name"),) if "name" in given else ()
     asked = {option: given.pop(option) for option in (*given,)}
     if "pressures" in asked:
         asked["pressures"] = _pressures(asked["pressures"])
-    heat = "conductance" if asked.keys() & {"conductivity", "conductivity_unit"} else "pressure"
-    law = describe_law(**joint, quantity="leakage" if asked.pop("leakage", False) else heat, **asked)
+    heat = "conductance" if asked.keys() & {"conductivity", "conductivity_unit"} else target.quantity
+    asked.setdefault("quantity", "leakage" if asked.pop("leakage", False) else heat)
+    if target.quantity == "conductance":  # its numbers do not depend on the conductivity
+        asked = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} | asked
+    law = describe_law(**joint, **asked)
     if "pressures" in asked:
         _warn(law)
     return law, *name
 
 
 def _warn(law: LawTable) -> None:
-    """Tell of pressures asked for at which the law is not valid."""
+    """Report requested pressures at which the law is not valid."""
     rows = law.behaviour or law
     for line in rows.comments:
-        # a limit below the smallest pressure asked for does not matter
+        # a limit below the smallest requested pressure does not matter
         below = line.startswith("not valid below") and rows.y_name == "pressure"
         if line.startswith("not valid") and not (below and float(line.split("p = ")[1].split()[0]) <= rows.floor):
             echo(line, err=True)

@@ -1,4 +1,4 @@
-"""What a command found, with its units and what it rests on, as a table, as JSON or as CSV."""
+"""The result of a command, with units and provenance, as a table, JSON or CSV."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
-# options that say where the answer goes, or that the report names by themselves
+# options on the output, and those that the report names separately
 NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "theory", "variant", "island_model", "rtol")
 
 
@@ -43,9 +43,9 @@ class Column:
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """Columns of one length, and the facts that they rest on.
+    """Columns of one length, and their provenance.
 
-    `notes` are lines for a reader; `facts` are the same and more, for a program.
+    `notes` are lines of text; `facts` contain the same and more in machine-readable form.
     """
 
     command: str
@@ -104,7 +104,7 @@ class Report:
 
 
 def to_json(content: Any) -> str:
-    """JSON, in which null says that there is no number."""
+    """JSON, with null in place of missing numbers."""
     return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=2)
 
 
@@ -126,7 +126,7 @@ def shown_unit(name: str, units: Units) -> str:
 
 
 def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Column]:
-    """One column for each array, scalars being arrays of one entry; NaN says that there is no number."""
+    """One column for each array, scalars being arrays of one entry; NaN stands for missing numbers."""
     columns = []
     for name, array in values.items():
         entries = np.atleast_1d(array).ravel().tolist()
@@ -135,7 +135,7 @@ def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Colu
 
 
 def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
-    """The surface's numbers for a program, and lines of them for a reader."""
+    """The surface's parameters in machine-readable form, and as lines of text."""
     surface = specimen.surface
     known = {name: getattr(surface, name) for name in SURFACE_NUMBERS}
     # a spectrum that is no power law has no Hurst exponent
@@ -160,7 +160,7 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
 
 
 def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
-    """Where a contact's theory is tested, and its scatter: lines for a reader, and facts for a program."""
+    """Range in which a contact's theory was tested, and its scatter: lines of text, and machine-readable facts."""
     valid = np.atleast_1d(answer.valid)
     reasons = {reason: np.atleast_1d(mask) for reason, mask in answer.reasons.items()}
     notes = []
@@ -196,7 +196,7 @@ def report_answer(
 ) -> Report:
     """The report of a command that evaluated the model; `units` are those that do not follow from names."""
     surface, notes = _surface_facts(specimen)
-    scale = "forces are over E*, none was given"
+    scale = "forces are over E*, since no modulus was given"
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
     made = (

@@ -24,12 +24,13 @@ from mbma_tables.theories import OF_MAPS, THEORIES
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
+MANY = 20  # options of a command whose help has sections
 PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """What `contact` and `island` are asked for besides the surface and the gap."""
+    """Arguments of `contact` and `island` other than the surface and the gap."""
 
     island_model: str
     variant: str
@@ -43,7 +44,7 @@ class Model:
         return self.hardness not in (None, math.inf)
 
     def of(self, surface: AnySurface) -> Model:
-        """The same with a theory by name."""
+        """The same options, with a theory by name."""
         from mbma_tables.theories import theory_name
 
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
@@ -52,7 +53,7 @@ class Model:
 
 @dataclasses.dataclass(frozen=True)
 class Output:
-    """Where a report goes, and in which form."""
+    """Destination and format of a report."""
 
     as_json: bool
     as_csv: bool
@@ -64,7 +65,7 @@ class Output:
 
 
 def _parse_number(ctx: click.Context, param: click.Parameter, given: str | None) -> float | str | None:
-    """A number, or the text of one with its unit, which is read where the name is known."""
+    """A number, or a number with its unit as text, which is converted later."""
     if given is None:
         return None
     try:
@@ -146,7 +147,7 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
 
 
 def _option(name: str, help: str, **kind: Any) -> Decorator:
-    """The option of one argument of the library, by its name; of a quantity where no other kind is said."""
+    """The option for one argument of the library, by its name; a quantity unless another kind is given."""
     flag, kind = f"--{name.replace('_', '-')}", kind or {"callback": _parse_number, "metavar": "X[UNIT]"}
     return click.option(flag, name.partition("/")[0], help=help, **kind)
 
@@ -159,14 +160,14 @@ _MAP_OPTIONS = (
     _option("channel", "Number of the map's channel in its file.", type=int),
     _option("periodic/--not-periodic", "Whether the map continues periodically.", default=None),
     _option("detrend", "What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", metavar="MODE"),
-    _option("outliers", "Take out points N standard deviations off; try 10.", type=float, metavar="N"),
+    _option("outliers", "Remove points beyond N standard deviations; try 10.", type=float, metavar="N"),
     _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
     _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
     _option("long_cutoff", "Longest wavelength to keep [length]."),
     _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
     _option("l_filter", "and of an L-filter [length]."),
-    _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
-    _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
+    _option("tip_radius", "Of the probe or stylus [length]: keep wavelengths that it can follow."),
+    _option("reliable/--all-waves", "Whether to use the resolution stated in the file.", default=None),
     _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
     _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
     _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
@@ -206,10 +207,11 @@ _SPECIMEN_OPTIONS = (
     _option("Rsm", "or mean spacing of a profile's elements [length];"),
     _option("longest", "longest wavelength [length],"),
     _option("shortest", "or shortest wavelength [length],"),
+    _option("rolloff", "wavelength from which on a power law follows a flat spectrum [length],"),
     _option("Sds", "or summits per area [1/length^2],"),
     _option("Spd", "the same by its newer name;"),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),
-    _option("nominal_area", "or the nominal area [length^2], of which the highest point follows."),
+    _option("nominal_area", "or the nominal area [length^2], which determines the highest point."),
     _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
     _option("E1", "Instead of --E-star: Young's modulus,"),
     _option("nu1", "and Poisson's ratio of one body,", type=float),
@@ -227,7 +229,7 @@ optional_specimen_options = _group(
 
 
 def load_options(option: Callable[..., Decorator]) -> Decorator:
-    """What a contact is known by, each an `option` of numbers; those given reach a command as `loads`."""
+    """Quantities of which one is given, each an `option` of numbers; the command receives those given as `loads`."""
     return _group(
         "loads",
         _given,
@@ -250,7 +252,7 @@ variant_option = _option(
 _MODEL_OPTIONS = (
     variant_option,
     _option("island_model", "Island model.", default="universal", type=click.Choice(ISLAND_MODELS), **SHOWN),
-    _option("rtol", "Numerical relative error asked for.", type=float, default=DEFAULT_RTOL, **SHOWN),
+    _option("rtol", "Requested numerical relative error.", type=float, default=DEFAULT_RTOL, **SHOWN),
 )
 theory_option = _option(
     "theory",
@@ -278,6 +280,33 @@ output_options = _group(
 )
 leakage_option = _option("leakage", "Add the flow coefficient of the gaps [length^3].", is_flag=True)
 plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE")
+
+
+# headings of help, and the options below them; others are below "Options"
+_SECTIONS = {
+    "What is known": "separation mean_separation pressure area over_h_rms",
+    "Surface": "surface file map",
+    "Measured map": f"{' '.join(specimens.MAP_OPTIONS)} model",
+    "Surface in numbers": "hurst q0 q1 zeta_1 h_rms h_max nominal_area m0 m2 m4",
+    "Surface by roughness parameters": "Rq Ra Sq Sa Rdq Sdq Rsm longest shortest Sds Spd Sp",
+    "Bodies": "E_star E1 nu1 E2 nu2 materials hardness conductivity length_unit stress_unit",
+    "Theory": "theory variant island_model rtol",
+}
+_SECTION_OF = {name: title for title, names in _SECTIONS.items() for name in names.split()}
+
+
+def format_options(command: click.Command, context: click.Context, formatter: click.HelpFormatter) -> None:
+    """The options of a command for its help, in sections where there are many."""
+    sections: dict[str, list[tuple[str, str]]] = {}
+    parameters = [each for each in command.get_params(context) if isinstance(each, click.Option)]
+    for parameter in parameters:
+        record = parameter.get_help_record(context)
+        if record is not None:
+            title = _SECTION_OF.get(parameter.name or "", "Options") if len(parameters) > MANY else "Options"
+            sections.setdefault(title, []).append(record)
+    for title in sorted(sections, key=[*_SECTIONS, "Options"].index):
+        with formatter.section(title):
+            formatter.write_dl(sections[title])
 
 
 def check_plot(plot: Path | None, out: Path | None) -> None:

@@ -22,11 +22,11 @@ SUFFIXES = (".nc", ".csv")
 scene_file = click.argument("file", type=click.Path(path_type=Path))
 
 
-@click.command("plan", short_help="How a scene would be computed, at what error and price.")
+@click.command("plan", short_help="Plan of a scene: steps, errors and computing times.")
 @scene_file
 @json_option("text")
 def plan_command(file: Path, as_json: bool) -> None:
-    """How the scene in FILE would be computed: steps, why each is there, certified error and measured cost.
+    """Plan of the scene in FILE: steps with the effects that need them, certified errors and measured costs.
 
     Example: mbma plan examples/scene_joint.toml
     """
@@ -96,7 +96,7 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
 
 
 def _report(found: xarray.Dataset) -> Report:
-    """What is known at gaps, or at islands where nothing is."""
+    """The quantities at gaps, or at islands if there are none at gaps."""
     lines = next((d for d in (("gap",), ("island", "node")) if any(v.dims == d for v in found.variables.values())), ())
     fields = {str(name): field for name, field in found.variables.items() if field.dims == lines}
     columns = to_columns(

@@ -1,4 +1,4 @@
-"""The command group `mbma tables`: which tables there are, what their files hold, whether they are sound."""
+"""The command group `mbma tables`: list tables, show their contents, verify their files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL, TableCont
 
 
 def _place(name: str) -> tuple[Path, str | None]:
-    """Path and kind of a table by its kind, or of a file, whose kind is not known."""
+    """Path and kind of a table; for a file, whose kind is unknown, None."""
     from mbma_tables.models.tables import shipped
 
     if name in KINDS:

@@ -1,1 +1,1 @@
-"""What every room uses: arguments, units, errors, files, display, plots."""
+"""Checks of arguments, units, errors, files, text and HTML, figures."""

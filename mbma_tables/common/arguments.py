@@ -1,4 +1,4 @@
-"""Checks of what a caller passes in: one message per fault, with the offending entries."""
+"""Checks of arguments: one message per error, with the offending entries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mbma_tables.common.errors import InputError, MbmaError, OutOfRangeError
 from mbma_tables.core import in_blocks
 
 SHOWN = 3  # offending entries quoted in a message
-BLOCK = 1 << 16  # entries between two looks for Ctrl-C
+BLOCK = 1 << 16  # entries between two checks for Ctrl-C
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +28,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 SYMBOLS = {"H": "hurst", "d": "separation", "u": "mean_separation", "p": "pressure", "E": "E_star", "A": "area"}
 FloatArray = NDArray[np.float64]
-Numbers: TypeAlias = "np.float64 | FloatArray | xr.DataArray"  # what answers hold: a number, an array, or by names
+Numbers: TypeAlias = "np.float64 | FloatArray | xr.DataArray"  # types of results: a number, an array, or these by name
 
 
 def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
@@ -46,7 +46,7 @@ def _shortest(number: Any) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Words that point from an unknown name to the nearest known one."""
+    """Text that suggests the nearest known name for an unknown one."""
     names = list(known)
     alike = [other for other in names if other.lower() == name.lower()]
     near = alike or difflib.get_close_matches(name, names, 1)
@@ -54,7 +54,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def hinted(function: Callable[P, R]) -> Callable[P, R]:
-    """A function whose complaint about an unknown argument names the nearest known one, or what a symbol stands for."""
+    """Decorator: the error for an unknown argument names the nearest known one, or the meaning of a symbol."""
     parameters = inspect.signature(function).parameters
     names = [name for name in parameters if name not in ("self", "cls")]
     called = function.__qualname__.removesuffix(".__init__")
@@ -87,13 +87,13 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def require_flag(name: str, value: Any) -> None:
-    """Refuse what is neither True nor False."""
+    """Reject values other than True and False."""
     if not isinstance(value, bool | np.bool_):
         raise InputError(f"{name} must be True or False, got {value!r}")
 
 
 def needed(module: str, extra: str) -> Any:
-    """A module of an extra; where it is not installed, the error says what installs it."""
+    """A module of an extra; if it is missing, the error has the command that installs it."""
     try:
         return importlib.import_module(module)
     except ImportError:
@@ -101,7 +101,7 @@ def needed(module: str, extra: str) -> Any:
 
 
 def is_labelled(value: Any) -> bool:
-    """Whether `value` is an xarray DataArray, without importing xarray for the question."""
+    """Whether `value` is an xarray DataArray, without importing xarray."""
     xarray = sys.modules.get("xarray")
     return xarray is not None and isinstance(value, xarray.DataArray)
 
@@ -115,15 +115,21 @@ def any_labelled(surface: Any, *values: Any) -> bool:
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
     """`value` as a float64 array; empty, masked, complex, non-numeric, NaN or infinite input is refused.
 
-    An array without hidden entries is taken though it is a masked one.
+    A masked array without masked entries is accepted.
     """
     if isinstance(value, float) and math.isfinite(value):
-        # numpy takes long over single numbers
+        # numpy is slow for single numbers
         return np.asarray(value, dtype=np.float64)
     # xarray's other containers, and HDF5's: an array with names that would be lost here
     if hasattr(value, "dims") and not is_labelled(value):
         raise InputError(
             f"{name} must be numbers, an array or a DataArray: pass the array inside that {type(value).__name__}"
+        )
+    # pint's and astropy's, whose units numpy would drop
+    if hasattr(value, "magnitude") or hasattr(value, "to_value"):
+        raise InputError(
+            f"{name} is a {type(value).__name__} with a unit of its own: convert it and pass its numbers, or a "
+            "text such as '10 MPa'"
         )
     if np.ma.is_masked(value):
         masked = np.ma.getmaskarray(np.ma.asanyarray(value))
@@ -147,12 +153,12 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
 
 
 def spread(array: Any, shape: tuple[int, ...]) -> Any:
-    """An array broadcast to a shape; itself where it has that, which numpy takes long to find out."""
+    """An array broadcast to a shape; itself if it has that shape, since numpy's check is slow."""
     return array if np.shape(array) == shape else np.broadcast_to(array, shape)
 
 
 def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
-    """What is given, broadcast and flat, and the shape."""
+    """The arguments, broadcast and flat, and their shape."""
     shape = np.broadcast(*given).shape
     table = np.empty((len(given), *shape))
     for k, value in enumerate(given):
@@ -172,7 +178,7 @@ def filled(fill: Callable[..., Any], columns: Sequence[Any], outputs: int, *more
 
 
 def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> list[FloatArray]:
-    """Rows that a loop of the core makes of what is given, of its broadcast shape."""
+    """Rows computed by a loop of the core from the arguments, in their broadcast shape."""
     shape = np.broadcast(*given).shape
     known, out = np.empty((len(given), *shape)), np.empty((outputs, *shape))
     for k, value in enumerate(given):
@@ -186,14 +192,14 @@ def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: in
 
 
 def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:
-    """The numbers that occur among owners, each with its places."""
+    """The distinct numbers among owners, each with its indices."""
     order = np.argsort(owner, kind="stable")
     known, first = np.unique(owner[order], return_index=True)
     return list(zip(known.tolist(), np.split(order, first[1:]), strict=False))
 
 
 def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "") -> None:
-    """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right, `unit` theirs."""
+    """Raise an error for entries of `value` where `good` is false; `allowed` describes valid ones, `unit` is theirs."""
     if isinstance(good, np.bool_) and good:
         return
     bad = ~np.asarray(good, dtype=bool)

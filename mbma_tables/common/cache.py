@@ -1,7 +1,7 @@
 """A folder of results that take long to compute, kept between processes: whole files, the oldest removed first.
 
 The folder is that of the platform's caches; the environment variable `MBMA_TABLES_CACHE` names another, and "off"
-turns it off. What cannot be read or written is computed anew, without a word.
+turns it off. Results that cannot be read or written are computed again, without a warning.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SUFFIX = ".npz"
 
 
 def folder() -> pathlib.Path | None:
-    """Where results are kept; None where they are not."""
+    """The folder of stored results; None if the cache is off."""
     named = os.environ.get(VARIABLE, "").strip()
     if named.lower() == "off":
         return None
@@ -38,7 +38,7 @@ def folder() -> pathlib.Path | None:
 
 
 def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
-    """The arrays kept under a name, of these shapes; None where there are none."""
+    """The arrays stored under a name, of these shapes; None if there are none."""
     place = folder()
     if place is None:
         return None
@@ -46,7 +46,7 @@ def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
         content = read_file(place / f"{name}{SUFFIX}", MAX_BYTES)
         with np.load(io.BytesIO(content), allow_pickle=False) as kept:
             found: dict[str, Any] = {key: kept[key] for key in shapes}
-    # damaged by whatever wrote to the disk
+    # damaged file
     except (InputError, OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
     if any(found[key].shape != shape or not np.isfinite(found[key]).all() for key, shape in shapes.items()):
@@ -57,7 +57,7 @@ def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
 
 
 def keep(name: str, **arrays: FloatArray) -> None:
-    """Keep arrays under a name."""
+    """Store arrays under a name."""
     place = folder()
     if place is None:
         return
@@ -68,7 +68,7 @@ def keep(name: str, **arrays: FloatArray) -> None:
 
 
 def files() -> list[tuple[pathlib.Path, os.stat_result]]:
-    """What is kept, that used longest ago first."""
+    """The stored files, least recently used first."""
     place, found = folder(), []
     for path in place.glob(f"*{SUFFIX}") if place is not None else ():
         # another process may remove it
@@ -78,7 +78,7 @@ def files() -> list[tuple[pathlib.Path, os.stat_result]]:
 
 
 def trim(most: int = MAX_BYTES) -> int:
-    """Remove files until the rest has at most so many bytes, those used longest ago first; how many were removed."""
+    """Remove files, least recently used first, until the rest has at most so many bytes; returns how many."""
     kept, removed = files(), 0
     size = sum(stat.st_size for _, stat in kept)
     for path, stat in kept:

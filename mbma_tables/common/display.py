@@ -1,7 +1,7 @@
-"""How answers show themselves: a line in a terminal, a small table with its picture in a notebook, an xarray Dataset.
+"""Display of results: a line in a terminal, a small table with its picture in a notebook, an xarray Dataset.
 
-A class that derives from `Displayed` says what it is (`_facts`), what it holds (`_variables`) and how it is drawn
-(`_figure`).
+A class that derives from `Displayed` defines its description (`_facts`), its quantities (`_variables`) and its
+picture (`_figure`).
 """
 
 from __future__ import annotations
@@ -50,18 +50,18 @@ def shown(value: Any, unit: str = "1") -> str:
 
 
 class Displayed:
-    """What shows itself in a line, as a table with a picture, as a figure, and as a Dataset."""
+    """Base class with display as a line, as a table with a picture, as a figure and as a Dataset."""
 
     def _facts(self) -> Mapping[str, str]:
-        """What it is, by name."""
+        """Its description, by name."""
         raise NotImplementedError
 
     def _variables(self) -> Mapping[str, Variable]:
-        """What it holds, by name."""
+        """Its quantities, by name."""
         raise NotImplementedError
 
     def _origin(self) -> Mapping[str, str]:
-        """What else a Dataset says in its attributes."""
+        """Further attributes of the Dataset."""
         return {}
 
     def _figure(self) -> Figure:
@@ -103,7 +103,7 @@ class Displayed:
         return figure
 
     def to_dataset(self) -> xr.Dataset:
-        """What it holds as an xarray Dataset, each variable with its unit and what it is."""
+        """Its quantities as an xarray Dataset, each with unit and description."""
         needed("xarray", "xarray")
         import xarray as xr
 

@@ -44,7 +44,7 @@ class ConvergenceError(MbmaError, ArithmeticError):
     mask : numpy.ndarray of bool
         True where it failed, in the shape of the broadcast arguments.
     result : object
-        What was reached all the same, for inspection; entries under `mask` are not answers.
+        The unconverged result, for inspection; entries under `mask` are not valid.
     """
 
     def __init__(self, message: str, mask: Any = None, result: Any = None) -> None:
@@ -54,7 +54,7 @@ class ConvergenceError(MbmaError, ArithmeticError):
 
 
 class NotSelfAffineError(MbmaError, ValueError):
-    """A measured map or spectrum that is no self-affine surface; the message says why."""
+    """A measured map or spectrum that is not a self-affine surface; the message has the reason."""
 
 
 class TableFileError(MbmaError, OSError):

@@ -71,7 +71,7 @@ class Curve:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure [inches] that is none of pyplot's, and that notebooks show."""
+    """A figure [inches] that is independent of pyplot and that notebooks show."""
     figure: Any = needed("matplotlib.figure", "plot").Figure(figsize=(width, height), layout="constrained")
     figure._repr_png_ = lambda: to_picture(figure, dpi=72)
     made: Figure = figure
@@ -163,13 +163,13 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
 def to_picture(figure: Figure, kind: str = "png", dpi: float = 120, outlines: bool = False) -> bytes:
     """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure.
 
-    Text stays text in SVG; with `outlines` its letters are drawn and look the same without their font, and numbers have
-    two decimals, so that others' last digits do not change the file.
+    Text stays text in SVG; with `outlines` its letters are drawn as paths, which need no font, and coordinates have
+    two decimals, so that rounding differences between machines do not change the file.
     """
     import matplotlib as mpl
 
     content = io.BytesIO()
-    # nothing of the time or of chance goes into a file
+    # files contain no time stamps and no random numbers
     stable: Any = {"svg.fonttype": "path" if outlines else "none", "svg.hashsalt": "mbma_tables"}
     undated: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}}
     with mpl.rc_context(stable):

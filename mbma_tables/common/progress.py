@@ -1,4 +1,4 @@
-"""Signs of life on a terminal: what takes longer than two seconds says so, in one line that is wiped at the end."""
+"""Progress on a terminal: one line for tasks of more than two seconds, erased at the end."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import click
 
-PATIENCE = 2.0  # seconds before the first sign
+PATIENCE = 2.0  # seconds before the first display
 WIPE = "\r\x1b[K"
 
 _ended = threading.Event()
@@ -18,21 +18,21 @@ _state = {"doing": "working"}
 
 
 def doing(what: str) -> None:
-    """Say what is being done; shown where it takes long."""
+    """Set the text of the progress line, which is shown if the task takes long."""
     _state["doing"] = what
 
 
 def echo(text: object, nl: bool = True, err: bool = False) -> None:
-    """Print to standard output, or with `err` to standard error, with the line of progress gone before."""
+    """Print to standard output, or with `err` to standard error, after erasing the progress line."""
     _end()
     click.echo(text, nl=nl, err=err)
 
 
 @contextlib.contextmanager
 def shown(what: str) -> Iterator[None]:
-    """Show on standard error, if that is a terminal, what is being done and for how long.
+    """Show the current task and its duration on standard error, if that is a terminal.
 
-    Within another such call, only what is being done changes until its end.
+    Within another such call, only the text changes until its end.
     """
     before, thread = _state["doing"], None
     doing(what)

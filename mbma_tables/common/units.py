@@ -1,8 +1,8 @@
-"""Units of length and stress: which there are, how "0.8 um" is read and converted, and what unit a result has.
+"""Units of length and stress: known units, parsing and conversion of texts such as "0.8 um", units of results.
 
-One rule holds everywhere. A number is in the unit that is known: the surface's, or the modulus's. A number that names
-its unit is converted to that. A unit asked for converts what has another one, and says in which unit plain numbers are
-where none is known yet. What cannot be converted is refused.
+The same rule applies everywhere. Plain numbers are in the known unit, the surface's or the modulus's; texts with a unit
+are converted to it. A requested unit converts values that have another one, and is that of plain numbers if none is
+known yet. An error is raised for values that cannot be converted.
 """
 
 from __future__ import annotations
@@ -48,15 +48,15 @@ SIZES: dict[str, dict[str, Fraction]] = {
     },
 }
 ALIASES = {"micron": "um", "Å": "angstrom", "inch": "in", "N/mm^2": "MPa", "N/mm2": "MPa", "N/m^2": "Pa", "N/m2": "Pa"}
-# powers of length and of stress of whatever has a name and a unit
+# powers of length and of stress of named quantities
 DIMENSIONS = {
-    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest"), (1, 0)),
+    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest", "rolloff"), (1, 0)),
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
     **dict.fromkeys(
         ("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter", "extrapolate_to"), (1, 0)
     ),
-    **dict.fromkeys(("width", "mean_free_path", "displacement"), (1, 0)),
+    **dict.fromkeys(("width", "mean_free_path", "displacement", "radius", "approach", "reference"), (1, 0)),
     **dict.fromkeys(("viscosity", "pressure_drop", "pressure_in", "pressure_out"), (0, 1)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
     **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),
@@ -78,7 +78,7 @@ _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.D
 
 
 def known(unit: Any, kind: str = "length") -> str:
-    """A unit's name as this package writes it; what is no unit of that kind is refused with the nearest ones."""
+    """A unit's name as this package writes it; the error for an unknown one suggests the nearest."""
     if not isinstance(unit, str):
         raise InputError(f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}")
     plain = ALIASES.get(unit.strip(), unit.strip().translate(_ASCII))
@@ -93,7 +93,7 @@ def known(unit: Any, kind: str = "length") -> str:
 
 @functools.lru_cache(1024)
 def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
-    """By what a number in one unit is multiplied to be in another, rounded once."""
+    """Factor from one unit to another, rounded once."""
     return float((SIZES[kind][known(have, kind)] / SIZES[kind][known(want, kind)]) ** power)
 
 
@@ -207,7 +207,7 @@ def resolve(
 
 
 def _entries(value: Any) -> Iterator[Any]:
-    """What a list holds, and the lists in it."""
+    """The entries of a list and of the lists in it."""
     for entry in value:
         yield from _entries(entry) if isinstance(entry, list | tuple) else (entry,)
 

@@ -1,4 +1,4 @@
-"""The compiled core: C that runs every loop of the library, and that exports write out unchanged.
+"""The compiled core: all loops of the library, in C; exports contain the same files.
 
 `core` is the module of the newest generation of processor that this machine supports; the environment variable
 MBMA_TABLES_CORE names another one, such as "x86_64_v3". `mbma.h` describes the functions; arguments of the wrappers are
@@ -37,14 +37,14 @@ def _load() -> Any:
 
 
 core: Any = _load()
-# builds of one arithmetic give the same bits
+# builds with the same arithmetic give identical results
 ARITHMETIC: str = core.arithmetic
 
 
 def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, workers: int = 1) -> list[Answer]:
-    """``fill(slice)`` of each `size` of `count` entries, in order: Ctrl-C is honoured between two, not inside one.
+    """``fill(slice)`` of each `size` of `count` entries, in order; Ctrl-C takes effect between two of them.
 
-    Blocks are the same whatever the number of threads, `workers`, and so are the bits of what they fill.
+    Blocks, and with them all bits of the results, are independent of the number of threads, `workers`.
     """
     if 0 < count <= size:
         return [fill(slice(0, count))]
@@ -59,7 +59,7 @@ def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, workers: i
             for number, block in left:
                 answers[number] = fill(block)
         finally:
-            # after Ctrl-C, the blocks at work alone are waited for
+            # after Ctrl-C, only the running blocks are completed
             for _ in left:
                 pass
 

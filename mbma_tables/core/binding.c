@@ -13,7 +13,7 @@
 
 static void release(Py_buffer *views, Py_ssize_t count) {
     for (Py_ssize_t k = 0; k < count; k++)
-        PyBuffer_Release(&views[k]); /* nothing where no buffer was taken */
+        PyBuffer_Release(&views[k]); /* no effect without a buffer */
 }
 
 /* One argument by its kind: d a double, i a whole number; arrays of D doubles, L int64, J int32, F floats to be read,
@@ -46,7 +46,7 @@ static bool take(PyObject *given, char kind, argument *a, Py_buffer *view) {
     return true;
 }
 
-/* Whether an array has the size that is said from *kinds on, if there is any: a product of a number and of the letters
+/* Whether an array has the size given from *kinds on, if there is any: a product of a number and of the letters
  * k, m and n, each the size of the first array that has it; ? allows None. */
 static bool has_size(const argument *a, const char **kinds, size_t letters[4]) {
     bool any = **kinds == ' ' || **kinds == '\0';
@@ -64,8 +64,8 @@ static bool has_size(const argument *a, const char **kinds, size_t letters[4]) {
     return any || a->n == (number ? number : 1) * product;
 }
 
-/* A call of a function by the kinds of its arguments: "Dn w3n w?n" are numbers, three answers for each, and if wanted
- * one more. */
+/* A call of a function by the kinds of its arguments: "Dn w3n w?n" are numbers, three results for each, and
+ * optionally one more. */
 static PyObject *called(const char *name, const char *kinds, bool (*call)(const argument *, long long *),
                         PyObject *const *given, Py_ssize_t count) {
     size_t letters[4] = {SIZE_MAX, SIZE_MAX, SIZE_MAX, SIZE_MAX};
@@ -104,12 +104,12 @@ static PyMethodDef METHODS[] = {FUNCTIONS(ENTRY){NULL, NULL, 0, NULL}};
 
 enum { FEW = 1000 }; /* gaps, for which the interpreter lock is kept */
 
-/* Base class of laws in Python: quantities at one float, or at an array of few, are answered here, all else by the
+/* Base class of laws in Python: quantities at one float or a small array are computed here, all others by the
  * method `_ask_one`. */
 typedef struct {
     PyObject_HEAD
     Py_buffer view; /* of the attribute `block` */
-    mbma_law law;   /* its head is NULL before the first question */
+    mbma_law law;   /* its head is NULL before the first use */
 } law_object;
 
 static const mbma_law *law_of(PyObject *self) {
@@ -125,7 +125,7 @@ static const mbma_law *law_of(PyObject *self) {
         const mbma_law found = mbma_law_open(words.data, words.n);
         if (found.head == NULL)
             PyErr_Format(PyExc_ValueError, "core: the block is not that of a law");
-        /* another thread may have been faster */
+        /* another thread may have set it */
         if (found.head != NULL && own->law.head == NULL) {
             own->view = view;
             own->law = found;
@@ -142,7 +142,7 @@ static void law_dealloc(PyObject *self) {
     Py_DECREF(type);
 }
 
-/* A quantity of a small array of doubles, numpy's own as the block is; NULL where Python is to answer. */
+/* A quantity of a small array of doubles, numpy's own as the block is; NULL if Python must compute it. */
 static PyObject *ask_law_array(law_object *self, PyObject *gaps, bool by_mean, int what) {
     double *out[5] = {NULL}, separations[FEW];
     argument a = {0};
@@ -187,7 +187,7 @@ static PyObject *ask_law(PyObject *self, PyObject *const *given, Py_ssize_t coun
                 return NULL;
             const double gap = PyFloat_AsDouble(by[by_d]);
             const double value = mbma_law_at(law, (mbma_quantity)what, by_d ? gap : 2.0 * gap - law->head->h_max);
-            /* NaN: refused below, with a reason */
+            /* NaN: rejected below, with a reason */
             if (value == value)
                 return PyFloat_FromDouble(value);
         } else
@@ -211,7 +211,7 @@ static PyObject *ask_law(PyObject *self, PyObject *const *given, Py_ssize_t coun
     static double call_##name(double d, void *law) { return mbma_law_at((const mbma_law *)law, what, d); }
 QUANTITIES(ASK)
 
-/* Addresses of the functions of (d, data) that answer one quantity each, and data, which lives as long as the law. */
+/* Addresses of the functions of (d, data), one for each quantity, and data, which is valid as long as the law. */
 static PyObject *law_addresses(PyObject *self, PyObject *nothing) {
     const mbma_law *const law = law_of(self);
     (void)nothing;

@@ -1,18 +1,19 @@
 /* The law calibrated on boundary elements, by quintic splines over the numbers of a surface and a third axis.
  *
  * Sums over the first two axes are made in the same order for one entry and for all cells of the third axis, so that
- * answers do not depend on what is asked beside them.
+ * results do not depend on the other entries of a call.
  */
 #include <float.h>
 
 #include "elementary.h"
+#include "ends.h"
 #include "mbma.h"
 
 enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
 
-#define LEAST 1e-300                /* u that counts as none */
+#define LEAST 1e-300                /* smaller u count as zero */
 #define LEAST_LOG_SEPARATION -690.0 /* ln u at which full contact counts as reached */
-#define CLOSE 1e-9                  /* of ln F: the next miss would be about the square of this one */
+#define CLOSE 1e-9                  /* of ln F: the next error would be about the square of this one */
 
 /* 120 times the six cardinal quintic B-splines that reach a cell: rows by powers of the place in [0, 1] of it. */
 static const double QUINTIC[6][COLUMNS] = {{1.0, 26.0, 66.0, 26.0, 1.0},    {-5.0, -50.0, 0.0, 50.0, 5.0},
@@ -31,7 +32,7 @@ MBMA_INLINE size_t cell_of(const mbma_spline *s, int axis, double x, double *z) 
     return (size_t)cell;
 }
 
-/* What a surface's polynomials are: made before, or sums over the first two axes by weights w from a corner on. */
+/* A surface's polynomials: made before, or sums over the first two axes by weights w from a corner on. */
 typedef struct {
     const double *pieces;
     const float *corner;
@@ -104,7 +105,7 @@ size_t mbma_spline_pieces(const mbma_spline *s, const mbma_surfaces *surfaces, d
     return bad;
 }
 
-/* The number of an entry's surface; the first for one that there is not, whose answer is NaN. */
+/* The number of an entry's surface; the first if there is none, with NaN as the result. */
 MBMA_INLINE size_t held_owner(const mbma_surfaces *surfaces, int64_t owner) {
     return (uint64_t)owner < surfaces->count ? (size_t)owner : 0;
 }
@@ -127,8 +128,8 @@ size_t mbma_spline_values(const mbma_spline *s, const mbma_surfaces *surfaces, s
 
 /* ---- the calibrated law ------------------------------------------------------------------------------------------ */
 
-/* ln F of a surface without end, and its slope. Beyond the ends of the third axis: below, full contact rules, F^2 linear
- * in ln u; above, ln F is linear in u. */
+/* ln F of a surface without end, and its slope. Beyond the ends of the third axis: below, as near full contact, F^2
+ * linear in ln u; above, ln F is linear in u. */
 MBMA_INLINE double log_force(const mbma_spline *s, const own_spline *own, double log_u, double *slope) {
     const double first = s->first[2], last = first + (double)s->cells[2] / s->rate[2];
     const double value = value_at(s, own, log_u, slope);
@@ -202,15 +203,15 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfac
         }
         for (size_t k = 0; k < count; k++) {
             const double endless = log_F[k] < -700.0 ? 0.0 : mbma_exp(log_F[k]);
-            /* without cancellation */
-            const double load = -endless * mbma_expm1(end[k] - log_F[k]), over = load / t->area_t0;
+            double steep;
+            const double load = endless * mbma_ended(end[k] - log_F[k], &steep), over = load / t->area_t0;
             const double share = mbma_erf(load * sqrt(2.0 * (1.0 + over) / (s0[k] + over)));
             const double known = gap[k] == gap[k] && end[k] == end[k] ? 0.0 : NAN;
             const double touching = gap[k] >= h_max[k] ? 0.0 : 1.0;
             const bool full = gap[k] <= 0.0;
             force[begin + k] = (full ? INFINITY : touching * load) + known;
             area[begin + k] = (full ? 1.0 : touching * share) + known;
-            stiffness[begin + k] = (full ? INFINITY : touching * (-slope[k] * endless / held[k])) + known;
+            stiffness[begin + k] = (full ? INFINITY : touching * (-slope[k] * endless * steep / held[k])) + known;
         }
     }
     for (size_t k = 0; k < n; k++)
@@ -218,7 +219,7 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfac
     return bad;
 }
 
-/* Newton's method in ln(F + F at h_max), which is smooth to the end, over ln u in a bracket; NaN beyond that. */
+/* Newton's method in ln F of a surface without end, which is smooth to the end, over ln u in a bracket; NaN beyond that. */
 size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u) {
     size_t bad = 0;
@@ -230,16 +231,15 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
         for (size_t k = 0; k < count; k++) {
             const size_t mine = held_owner(surfaces, owner[begin + k]);
             const double F = force[begin + k], end = surfaces->ends[2 * mine + 1];
-            const double over = mbma_log(mbma_max(F, DBL_MIN)) - end;
-            goal[k] = end + (mbma_max(over, 0.0) + mbma_log1p(mbma_exp(-fabs(over))));
+            goal[k] = mbma_endless(mbma_log(mbma_max(F, DBL_MIN)), end);
             low[k] = LEAST_LOG_SEPARATION;
             high[k] = mbma_log(surfaces->h_max[mine]);
             /* ln F is about -3 u at light loads */
             x[k] = mbma_min(mbma_log(mbma_max(-0.3 * goal[k], 1e-3)), high[k] - 0.01);
             u[begin + k] = NAN;
-            done[k] = !(F > 0.0 && fabs(goal[k]) < INFINITY && (uint64_t)owner[begin + k] < surfaces->count);
+            done[k] = !(F > 0.0 && end == end && fabs(goal[k]) < INFINITY && (uint64_t)owner[begin + k] < surfaces->count);
         }
-        /* steps of all together, which do not wait for each other */
+        /* steps of all entries together, which are independent */
         for (int step = 0; step < MOST_STEPS && left > 0; step++) {
             left = 0;
             for (size_t k = 0; k < count; k++) {

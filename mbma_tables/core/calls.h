@@ -1,4 +1,4 @@
-/* The core's functions as a table of what they take, for `binding.c` and for tests without Python: sizes of arrays are
+/* The core's functions as a table of their arguments, for `binding.c` and for tests without Python: sizes of arrays are
  * checked here, values in the core. */
 #ifndef MBMA_CALLS_H
 #define MBMA_CALLS_H
@@ -43,27 +43,12 @@ static size_t closed_form(size_t which, size_t n, const double *x, const double 
     return 0;
 }
 
-/* The table from three arrays: cells, places, and X_low, X_high, X_rate, mu_high, first_bucket, buckets. */
+/* The table from three arrays, which `models/universal.py` checks: cells, places, and X_low, X_high, X_rate, mu_high, first_bucket, buckets. */
 static mbma_cells cells_of(const argument *a) {
     const double *const n = P(2);
     return (mbma_cells){P(0), P(1), n[0], n[1], n[2], n[3], (int64_t)n[4], (int64_t)n[5]};
 }
 #define CELLS(k) ((const mbma_cells[]){cells_of(a + (k))})
-
-/* Whether places and cells lie inside their arrays; checked once for a table, by the function `table_fits`. */
-static bool is_table(const argument *a) {
-    const mbma_cells t = cells_of(a);
-    const double steps = (t.X_high - t.X_low) * t.X_rate;
-    if (N(0) % WORDS(mbma_cell) != 0 || !(steps >= 0.0 && steps < (double)N(1) && t.buckets > 0))
-        return false;
-    const size_t strips = (size_t)steps + 1, cells = N(0) / WORDS(mbma_cell);
-    for (size_t k = 0; k < N(1); k++) {
-        const int64_t place = t.places[k];
-        if (place < 0 || (k < strips ? (size_t)(place + t.buckets) > N(1) : (size_t)place >= cells))
-            return false;
-    }
-    return true;
-}
 
 /* From density_divisor, beta, phi, floor_d, floor_u, offset, summit_sigma, printed. */
 static mbma_variant variant_of(const argument *a) {
@@ -86,7 +71,7 @@ static bool are_panels(const argument *a) {
 }
 #define NODES(k) ((const mbma_nodes[]){{(int64_t)N((k) + 1), P(k), P((k) + 1), P((k) + 2)}})
 
-/* How many coefficients a table of so many nodes has; 0 of one that cannot be. */
+/* How many coefficients a table of so many nodes has; 0 for an impossible one. */
 static size_t coefficients_of(const argument *nodes) {
     const int64_t *const count = (const int64_t *)nodes->data;
     size_t product = 2;
@@ -99,7 +84,7 @@ static size_t coefficients_of(const argument *nodes) {
 #define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
 #define INVERSE(k) ((const mbma_inverse[]){mbma_inverse_open(P(k), N(k))})
 
-/* First in all calls: coefficients; first nodes, rates, ends of what is covered, three constants; cells; of surfaces
+/* First in all calls: coefficients; first nodes, rates, ends of the range, three constants; cells; of surfaces
  * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
 #define SPLINE "F D13 L3 Dn Dn "
 static bool fits_spline(const argument *a) {
@@ -135,7 +120,6 @@ static mbma_spline spline_of(const argument *a) {
     FN(closed_form, "i Dn Dn D?n D?n wn", (uint64_t)I(0) < 8 && (I(0) < 6 || (P(3) && P(4))), \
        closed_form((size_t)I(0), N(1), P(1), P(2), P(3), P(4), P(5))) \
     /* phi.c */ \
-    FN(table_fits, "D J D", true, N(2) == 6 && is_table(a)) \
     FN(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3), \
        mbma_phi(N(0), P(0), P(1), CELLS(2), (int)I(5), P(6), P(7))) \
     /* totals.c */ \
@@ -143,8 +127,6 @@ static mbma_spline spline_of(const argument *a) {
        mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), (int)I(9), P(10), P(11), P(12), P(13))) \
     FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
        mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4))) \
-    FN(kronrod, "i wn wn wn", I(0) > 0 && I(0) < 32 && N(1) == (size_t)I(0), \
-       mbma_kronrod((int)I(0), P(1), P(2), P(3))) \
     /* profile.c */ \
     FN(profile_islands, "Dn d d d D8 D J D6 w4n w1", true, \
        mbma_profile_islands(N(0), P(0), X(1), X(2), X(3), VARIANT(4), CELLS(5), P(8), P(9))) \
@@ -196,12 +178,9 @@ static mbma_spline spline_of(const argument *a) {
     FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4))) \
     FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4))) \
-    /* hardness.c */ \
-    FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
-       mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9)))
+       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4)))
 
-/* A function of arguments: whether their sizes fit, and what was found. */
+/* A function of arguments: whether their sizes fit, and the result. */
 #define DEFINE_CALL(name, kinds, fits, call) \
     static bool do_##name(const argument *a, long long *found) { \
         (void)a; \

@@ -1,5 +1,5 @@
-/* Eight doubles at once, and their halves: fma8(a, y, b) is a y + b, and so on. All ways of writing it round alike
- * where the processor has an fma. */
+/* Eight doubles at once, and their halves: fma8(a, y, b) is a y + b, and so on. All implementations round identically
+ * on processors with an fma. */
 #ifndef MBMA_EIGHT_H
 #define MBMA_EIGHT_H
 
@@ -38,7 +38,7 @@ MBMA_INLINE four four_of(const double *row) {
 
 #if defined(__AVX512F__)
 typedef __m512d eight;
-/* masks of all: without them GCC warns of what its own headers leave unset */
+/* masks of all lanes: without them GCC warns of unset values in its own headers */
 #define LOW_FOUR(a) _mm512_maskz_extractf64x4_pd(0xFF, a, 0)
 #define HIGH_FOUR(a) _mm512_maskz_extractf64x4_pd(0xFF, a, 1)
 MBMA_INLINE eight eight_of(const double *row) { return _mm512_loadu_pd(row); }

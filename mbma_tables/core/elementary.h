@@ -44,7 +44,7 @@ MBMA_INLINE double mbma_float(int64_t bits) {
 
 MBMA_INLINE double mbma_min(double a, double b) { return a < b ? a : b; }
 MBMA_INLINE double mbma_max(double a, double b) { return a > b ? a : b; }
-/* x held in [low, high]; NaN becomes low, so that what is indexed by it stays inside */
+/* x held in [low, high]; NaN becomes low, so that indices from it stay inside */
 MBMA_INLINE double mbma_held(double x, double low, double high) { return mbma_min(mbma_max(x, low), high); }
 
 /* p x^4 + a x^3 + b x^2 + c x + d by Horner's rule */
@@ -74,7 +74,7 @@ MBMA_INLINE mbma_reduced mbma_reduce(double x) {
     return found;
 }
 
-/* exp(x), of x beyond [-700, 700] that of its end. */
+/* exp(x); beyond [-700, 700] the value at its end. */
 MBMA_INLINE double mbma_exp(double x) {
     const mbma_reduced e = mbma_reduce(x);
     return mbma_fma(e.power, e.rest, e.power);
@@ -97,14 +97,14 @@ MBMA_INLINE double mbma_log(double x) {
     const double s = f / (2.0 + f), z = s * s;
     const double high = mbma_horner(2.0 / 21.0, z, 2.0 / 19.0, 2.0 / 17.0, 2.0 / 15.0, 2.0 / 13.0);
     const double p = mbma_fma(mbma_horner(high, z, 2.0 / 11.0, 2.0 / 9.0, 2.0 / 7.0, 2.0 / 5.0), z, 2.0 / 3.0);
-    /* 2 s = f - s f, whose rounding does not count */
+    /* 2 s = f - s f, whose rounding is negligible */
     return mbma_fma(k, MBMA_LN2_HIGH, f - mbma_fma(s, mbma_fma(-z, p, f), -k * MBMA_LN2_LOW));
 }
 
 /* ln(1 + x) of x > -1. */
 MBMA_INLINE double mbma_log1p(double x) {
     const double u = 1.0 + x;
-    /* what rounding took from 1 + x */
+    /* rounding error of 1 + x */
     return mbma_log(u) + (x - (u - 1.0)) / u;
 }
 

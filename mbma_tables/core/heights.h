@@ -5,7 +5,7 @@
 #include "elementary.h"
 #include "height_coefficients.h"
 
-/* F_n = height_polynomial(t) base^n weight fade, of which the last product alone can underflow. */
+/* F_n = height_polynomial(t) base^n weight fade; only the last product can underflow. */
 typedef struct {
     size_t piece;
     double t, base, weight, fade;
@@ -22,7 +22,7 @@ MBMA_INLINE spot spot_of(double x) {
     const double light = mbma_held(x, 0.0, 41.0), head = (double)(float)light, tail = light - head;
     const double inverse = 1.0 / (deep ? x * x : light + 1.0), v = deep ? 1.0 : inverse;
     const double square = light * light;
-    /* what rounding took from the square, for exp is steep */
+    /* rounding error of the square, since exp is steep */
     const double lost = ((head * head - square) + 2.0 * head * tail) + tail * tail;
     spot at;
     at.piece = (size_t)(x < 0.0 ? below : above);

@@ -16,7 +16,7 @@
 #define NO_POWER 1e-100             /* for p = 0 */
 #define STRETCH 8.0                 /* scale of the approach's map, in boundary layers zeta_1^(-H) */
 
-/* What islands need of their surface. */
+/* Constants of a surface for its islands. */
 typedef struct {
     double hurst, log_zeta_1, e;
     double rms_over_s;           /* h_rms/s = sqrt(1 - e) */
@@ -78,7 +78,7 @@ MBMA_INLINE surface surface_of(double hurst, double zeta_1, const mbma_variant *
     return s;
 }
 
-/* The island at delta = x h_rms; `floor_d` and `floor_u` tell whether zeta_d (27) and zeta_u (30) are at their floors,
+/* The island at delta = x h_rms; `floor_d` and `floor_u` are true if zeta_d (27) and zeta_u (30) are at their floors,
  * and are constants wherever this is inlined, so that it has no branch. */
 MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface *s) {
     island n;

@@ -4,7 +4,7 @@
 
 enum { CHUNK = 256, STEPS = 200, INVERSE_BITS = 2 };
 enum { RECORD = sizeof(mbma_law_record) / sizeof(double), GUESS = sizeof(mbma_inverse_record) / sizeof(double) };
-static const double SURE = 3e-6;     /* steps, in halves of a record, after which another would change nothing */
+static const double SURE = 3e-6;     /* step, in half records, below which another would change nothing */
 static const double EPSILON = 4e-16; /* steps that another would not shorten */
 
 mbma_law mbma_law_open(const void *block, size_t words) {
@@ -39,7 +39,7 @@ mbma_inverse mbma_inverse_open(const void *block, size_t words) {
     return inverse;
 }
 
-/* Where a gap is in a law: its record, t, q = -s scale rate, and t/q. */
+/* Position of a gap in a law: its record, t, q = -s scale rate, and t/q. */
 typedef struct {
     const mbma_law_record *record;
     double t, q, beyond;
@@ -80,7 +80,7 @@ MBMA_INLINE place place_of(const mbma_law *law, double x, double d) {
     return place_in(law->head, &law->records[number_of(law, inside, d)], inside, side_of(law->head, d));
 }
 
-/* A polynomial, its derivative, and half of the second; what is not used is not computed. */
+/* A polynomial, its derivative, and half of the second; unused values are not computed. */
 typedef struct {
     double value, slope, bend;
 } taylor;
@@ -101,7 +101,7 @@ MBMA_INLINE taylor taylor_of(mbma_quantity what, const mbma_law_record *record, 
     return polynomial(of_area(what) ? record->area : record->force, t);
 }
 
-/* Sum of c[k] t^k/(power + k); even and odd k apart, whose sums do not wait for each other. */
+/* Sum of c[k] t^k/(power + k); even and odd k separately, as independent sums. */
 MBMA_INLINE double integral(const double *c, double t, double power) {
     const double square = t * t;
     double even = c[MBMA_LAW_DEGREE] * (1.0 / (power + (double)MBMA_LAW_DEGREE)), odd = 0.0;
@@ -146,7 +146,7 @@ double mbma_law_at(const mbma_law *law, mbma_quantity what, double d) {
     return at_place(law, what, depth(law->head, d), d);
 }
 
-/* x of an overclosure and its separation, with all digits next to first contact */
+/* x of an overclosure and its separation, without cancellation next to first contact */
 MBMA_INLINE double depth_of_overclosure(const mbma_law_head *head, double c, double d) {
     return side_of(head, d) < 0.0 ? 2.0 * c * head->scale : depth(head, d);
 }
@@ -203,7 +203,7 @@ size_t mbma_law_fill(size_t n, const double *d, const mbma_law *law, double *for
             const mbma_law_record *const record = at.record[k];
             energy[first + k] = 0.5 * mbma_fma(at.beyond[k], integral(record->force, at.t[k], 1.0), record->energy);
         }
-        /* no branch above: entries of the first record, and outside the law, are mended here */
+        /* no branch above: entries of the first record, and outside the law, are corrected here */
         for (size_t k = 0; k < some && bad + below > 0; k++)
             if (!(depth(&head, gap[k]) >= head.low && head.lowest <= gap[k] && gap[k] <= head.highest))
                 for (int what = MBMA_FORCE; what <= MBMA_ENERGY; what++)
@@ -230,7 +230,7 @@ double mbma_law_overclosure(const mbma_law *law, mbma_quantity which, double wan
             c = mbma_held(next, low, high);
             break;
         }
-        /* steps that do not halve may go to and fro for ever */
+        /* steps that do not halve may oscillate forever */
         const bool good = slope > 0.0 && low < next && next < high && fabs(next - c) <= 0.5 * before;
         const double follows = good ? next : 0.5 * (low + high);
         if (follows == c || follows == low || follows == high)

@@ -1,7 +1,7 @@
 /* The compiled core of mbma_tables: contact of rough surfaces by the magnification-based multi-asperity (MBMA) model.
  *
  * Numbers and arrays in, numbers and status out. No function allocates, keeps state, reads or writes files, or sets
- * errno; any thread may call any of them. Functions on arrays return how many entries are not MBMA_OK; the answers of
+ * errno; any thread may call any of them. Functions on arrays return how many entries are not MBMA_OK; the results of
  * these are NaN. Equation numbers are those of Guo, Ma and Zhu, arXiv:1712.06264.
  *
  * SPDX-License-Identifier: BSD-3-Clause. Copyright (c) 2026, mbma_tables contributors.
@@ -17,7 +17,7 @@ extern "C" {
 #endif
 
 typedef enum {
-    MBMA_OK = 0,         /* the answers hold */
+    MBMA_OK = 0,         /* the results are valid */
     MBMA_X_BELOW = 1,    /* X is below the range of the table */
     MBMA_X_ABOVE = 2,    /* X is above the range of the table */
     MBMA_MU_ABOVE = 3,   /* mu is above the range of the table */
@@ -52,11 +52,11 @@ size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *c
 /* ---- totals.c: force and area of surfaces ----------------------------------------------------------------------- */
 
 #define MBMA_MAX_ZETA_1 1e8
-#define MBMA_MIN_APPROACH 1e-140 /* squares of what is of its order do not underflow */
+#define MBMA_MIN_APPROACH 1e-140 /* squares of numbers of this order do not underflow */
 
-/* How the paper's equations are read: summit density is m4/(density_divisor m2) (2); beta (B.6) and phi (28); floors of
- * zeta_d (27) and zeta_u (30); whether islands stand h_d below z_max (35), whether sigma is the summits' (32), and
- * whether K1 is as printed in (47). */
+/* Variant of the paper's equations: summit density is m4/(density_divisor m2) (2); beta (B.6) and phi (28); floors of
+ * zeta_d (27) and zeta_u (30); whether islands are offset by h_d below z_max (35), whether sigma is the summits' (32),
+ * and whether K1 is as printed in (47). */
 typedef struct {
     double density_divisor, beta, phi, floor_d, floor_u;
     int offset, summit_sigma, printed;
@@ -78,9 +78,6 @@ enum { MBMA_TOTALS_COLUMNS = 5 };
 size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
                    double rtol, const mbma_variant *variant, const mbma_cells *cells, int slopes, double *out,
                    double *error, uint8_t *status, int64_t *islands);
-
-/* Nodes and weights of QUADPACK's Gauss-Kronrod rules of 21 and 31 nodes on [-1, 1]. */
-int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss);
 
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
@@ -145,8 +142,8 @@ typedef struct {
 
 #define MBMA_ISLANDS_WORK(nodes) ((nodes) * ((nodes) + 9))
 
-/* Newton's method (34)-(37): `phi` (n, 3) receives Phi_F, Phi_A and an estimate of their relative error, whose size the
- * caller judges, `steps` the steps; profiles (n, nodes) where `rho` is not NULL. `coarse` is the small basis of the
+/* Newton's method (34)-(37): `phi` (n, 3) receives Phi_F, Phi_A and an estimate of their relative error, which the
+ * caller checks, `steps` the steps; profiles (n, nodes) where `rho` is not NULL. `coarse` is the small basis of the
  * first guess, `work` space for MBMA_ISLANDS_WORK numbers. */
 size_t mbma_solve_islands(size_t n, const double *X, const double *mu, double rtol, const mbma_basis *fine,
                           const mbma_basis *coarse, double *phi, int64_t *steps, uint8_t *status, double *rho,
@@ -267,7 +264,8 @@ typedef struct {
     double low[2], high[2];   /* of Hurst exponent and ln zeta_1, between which surfaces are answered */
 } mbma_spline;
 
-/* The calibrated law: forces F over A0 E* g with g the rms gradient; mean separations u and other heights over h_rms. */
+/* The calibrated law: forces F over A0 E* g with g the rms gradient; mean separations u and other heights over h_rms.
+ * `ends.h` has how forces end at h_max. */
 typedef struct {
     mbma_spline log_force;               /* of a surface without end, over ln u */
     double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */
@@ -304,8 +302,8 @@ size_t mbma_spline_values(const mbma_spline *spline, const mbma_surfaces *surfac
 
 /* ---- spectrum_laws.c: Persson's theory and the calibrated law of a spectrum --------------------------------------- */
 
-/* A spectrum as a quadrature rule, wavenumbers x rising, over any one, q0; shares of h_rms^2 that sum up to 1, and of g^2
- * of the waves below; g over q0 h_rms, and Nayak's alpha. F is over A0 E* g, mean separations u and h_max over h_rms. */
+/* A spectrum as a quadrature rule: wavenumbers x rising, over any one, q0; shares of h_rms^2, of sum 1, and of g^2 of
+ * wavenumbers below; g over q0 h_rms; Nayak's alpha. F is over A0 E* g, mean separations u and h_max over h_rms. */
 typedef struct {
     size_t count;
     const double *x, *variance, *below;
@@ -329,14 +327,14 @@ typedef struct {
 } mbma_spectrum_law;
 
 /* A quadrature rule for power laws between samples: q rising [1/length], a repeated one is a jump; C not negative
- * [length^4], both as in h_rms^2 = 2 pi integral C q dq. How many waves it has, 0 if there is no such spectrum; they are
- * written where `most` are enough, and what they belong to in `facts`: g over q0 h_rms with q0 the first q where C is not
- * zero, Nayak's alpha, h_rms [length], g. */
+ * [length^4], both as in h_rms^2 = 2 pi integral C q dq. Returns the number of wavenumbers, 0 for an invalid spectrum;
+ * they are written if `most` suffices, and their reference values to `facts`: g over q0 h_rms, q0 the first q where
+ * C is not zero, Nayak's alpha, h_rms [length], g. */
 size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_t most, double *x, double *variance,
                            double *below, double facts[4]);
 
 /* Prepares the law of a spectrum on surfaces that end at h_max, which may be infinite; `work` has room for three
- * numbers a wave. */
+ * numbers per wavenumber. */
 mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *constants, double h_max,
                                  double *work, mbma_spectrum_law *law);
 
@@ -344,19 +342,10 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
 size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
                                  double *stiffness);
 
-/* Mean separations at forces > 0, 0 at forces that leave none, and du/d ln F of what is solved for; without `whole` of
+/* Mean separations at forces > 0, 0 at forces that leave none, and du/d ln F of the solution; without `whole` of
  * a surface without end, before the tail's factor. */
 size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, int whole, double *u,
                                     double *slope);
-
-/* ---- hardness.c: contact with a hardness p_m ---------------------------------------------------------------------- */
-
-/* Force F and -dF/du of F^-n = F_el^-n + (eta Q)^-n, n = light + by_eta eta + by_share Q, from the elastic force and
- * -dF_el/du and from the share Q and dQ/du at a mean gap. Lengths are in h_rms, forces in A0 E* g; eta = p_m/(E* g) is
- * infinite where nothing yields. */
-size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffness, const double *share,
-                         const double *slope, const double *eta, double light, double by_eta, double by_share,
-                         double *force, double *steepness);
 
 #ifdef __cplusplus
 }

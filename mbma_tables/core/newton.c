@@ -11,15 +11,15 @@
 #include "mbma.h"
 
 enum {
-    RUNS = 2,           /* eights at once */
+    RUNS = 2,           /* vectors of eight at once */
     LEAST_NODES = 8,    /* of a basis */
-    TOGETHER = 4,       /* neighbouring modes of which the largest counts, for single ones may vanish */
+    TOGETHER = 4,       /* neighbouring modes; the largest is used, since single ones may vanish */
     MAX_STEPS = 200,    /* of Newton's method, which takes up to about 40 */
-    MAX_WIDENINGS = 20, /* of the radius; one was the most seen */
+    MAX_WIDENINGS = 20, /* changes of the radius; at most one was observed */
     QUARTERINGS = 10    /* of the interval that holds the radius */
 };
 #define COARSE_TOLERANCE 1e-4
-#define MIN_COARSE_RATIO 1.5 /* a rough solution first, where the basis is larger than its by this factor */
+#define MIN_COARSE_RATIO 1.5 /* a coarse solution first, if the basis is larger than its basis by this factor */
 #define ROUNDING 1e-14
 #define TINY 1e-300
 #define NEGLIGIBLE 1e-17 /* a relative effect of the deformation below which the sphere is rigid */
@@ -70,7 +70,7 @@ size_t mbma_island_extents(size_t n, const double *X, const double *mu, double s
 
 /* ---- linear algebra, in one order on every processor ---- */
 
-/* Columns of a row from `first` on, in eights of which the last overlap rather than leave a rest. */
+/* Columns of a row from `first` on, in groups of eight; the last ones overlap instead of leaving a remainder. */
 MBMA_INLINE void eights_from(size_t first, size_t n, size_t at[RUNS]) {
     for (size_t r = 0; r < RUNS; r++)
         at[r] = first + 8 * (r + 1) <= n ? first + 8 * r : n - 8;
@@ -140,7 +140,7 @@ MBMA_INLINE double gap_at(const island *of, const mbma_basis *b, const double *w
     return of->squared * b->v[i] - of->X + w[i] / b->root_weights[i];
 }
 
-/* Step until the relative error of the pressure is below `tolerance`. Returns the error that the last step leaves, the
+/* Step until the relative error of the pressure is below `tolerance`. Returns the error after the last step, the
  * square of its relative change of pressure; NaN where MAX_STEPS did not suffice. */
 static double newton_steps(island *of, const mbma_basis *b, double tolerance, double *w) {
     const size_t n = b->nodes;
@@ -216,7 +216,7 @@ static mbma_status solve(island *of, double rtol, const mbma_basis *b, const mbm
         return MBMA_OK;
     }
     if (few >= LEAST_NODES && (double)n >= MIN_COARSE_RATIO * (double)few) {
-        /* begin with a rough solution on few nodes, carried over by its Legendre modes */
+        /* begin with a coarse solution on few nodes, interpolated by its Legendre modes */
         memset(of->rough, 0, few * sizeof *of->rough);
         if (newton_steps(of, coarse, COARSE_TOLERANCE, of->rough) <= COARSE_TOLERANCE) {
             for (size_t k = 0; k < few; k++)
@@ -230,7 +230,7 @@ static mbma_status solve(island *of, double rtol, const mbma_basis *b, const mbm
             return MBMA_UNRESOLVED;
         fill_profile(of, b);
         const double force = dot(of->p, b->root_weights, n), area = dot(of->covered, b->root_weights, n);
-        /* what lies outside a, for pressure and area as they decay over a rigid sphere */
+        /* contribution outside a, with pressure and area decaying as on a rigid sphere */
         const double edge = of->squared - of->X + of->w[n - 1] / b->root_weights[n - 1];
         const double missed = mbma_max(halves_of(edge).five_halves / (5.0 * force), whole(2, edge) / (2.0 * area));
         const double cut = missed / of->squared;

@@ -1,7 +1,7 @@
 /* Islands by the universal table: Phi_F and Phi_A over X and mu (34-40). */
 #include "phi.h"
 
-/* Slopes that are constantly not wanted are not computed. */
+/* Slopes are not computed if the flag is constant and false. */
 MBMA_INLINE mbma_status fill(phi found, bool slopes, double *row) {
     row[0] = found.value[0], row[1] = found.value[1], row[2] = found.error;
     for (int q = 0; q < 2 && slopes; q++)

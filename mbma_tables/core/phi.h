@@ -11,7 +11,7 @@ typedef struct {
     double value, by_x, by_y;
 } gradient;
 
-/* The sum of row[k] x^k by halves; its derivative, which costs nothing where it is not used. */
+/* The sum of row[k] x^k by halves; and its derivative, which is not computed if unused. */
 MBMA_INLINE gradient along_x(eight row, double x) {
     const double x2 = x * x, x3 = 4.0 * x * x2;
     const four high = HIGH_FOUR(row), sum = fma4(high, x2 * x2, LOW_FOUR(row));

@@ -10,14 +10,14 @@ enum { NODES = MBMA_PANEL_NODES, CHECKS = MBMA_PANEL_CHECKS, PLACES = NODES + CH
 enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
 
 /* of errors of a panel */
-static const double AT_ENDS = 1.01;  /* times as much is missed at the ends as next to them */
+static const double AT_ENDS = 1.01;  /* ratio of errors at the ends to those next to them */
 static const double BETWEEN = 3.0;   /* times more at gaps between those checked, and past turning points */
-static const double HIGH = 6.0;      /* of sigma_d: islands beyond carry less than 1e-7, where there are others */
+static const double HIGH = 6.0;      /* of sigma_d: islands beyond contribute less than 1e-7, if there are others */
 static const double LEADS = 20.0;    /* by which exponents of the smallest islands exceed those of others that count */
 static const double LEAST_APPROACH = 1e-290;
 /* of errors of a series */
-static const double TAIL_SHARE = 5.0; /* of the last two terms, for all that follow: they may fall slowly */
-static const double OLDER = 0.25;     /* of the two before them, for the last two may be small by chance */
+static const double TAIL_SHARE = 5.0; /* factor on the last two terms for all omitted ones, which may decrease slowly */
+static const double OLDER = 0.25;     /* factor on the two before them, since the last two may be small by chance */
 static const double SLOPES = 0.1;     /* of their relative error counts */
 static const double THIN = 1e-3;      /* width over gap of panels in which values round to more than slopes change */
 static const double LEAST_LOG = -700.0; /* of ln F in subnormal numbers */
@@ -35,13 +35,13 @@ MBMA_INLINE void combined(const double *restrict values, const double *restrict 
 /* The power of the compression that sums begin with: of force, area, number of islands, Hertz area. */
 static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 
-/* What weights lack at delta in the panel from 0, whose rule has the power 2: delta to one power less. */
+/* Factor missing in the weights at delta in the panel from 0, whose rule has the power 2: delta to one power less. */
 static double lead(double power, int row, double delta) {
     const double square = delta * delta;
     return !(power > 1) || row == 2 ? 1.0 : row == 0 ? square * sqrt(delta) : row == 1 ? square * cbrt(delta) : square;
 }
 
-/* How delta rises over the width of a panel at a place in [0, 1]. */
+/* Derivative of delta over the width of a panel at a place in [0, 1]. */
 static double rise(double power, double at) { return power > 1 ? 2.0 * at : 1.0; }
 
 /* Adds to `out` the sums of rows, then their slopes by the compression, of the first islands, times exp(least/2). */
@@ -95,7 +95,7 @@ MBMA_INLINE void series_at(const double *series, int rows, int terms, double x, 
     }
 }
 
-/* Bound on what a series leaves out. */
+/* Bound on the truncation error of a series. */
 static double tail(const double *series, int terms) {
     return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
 }
@@ -129,7 +129,7 @@ void mbma_profile_series(const mbma_panel_rule *rules, size_t panels, const int6
             combined(own, &r->inside[0][0], count, count * (gaps + 1), NODES * (GAPS + 1), inside[row]);
             combined(own, &r->ends[0][0], count, gaps, GAPS, ends[row]);
         }
-        /* where force turns, slopes are as good as those of a straight line */
+        /* at a maximum of force, slopes are as accurate as those of a straight line */
         double steepest[ROWS], values[ROWS][TERMS];
         for (int row = 0; row < rows; row++)
             steepest[row] = 1.0;
@@ -167,7 +167,7 @@ void mbma_profile_series(const mbma_panel_rule *rules, size_t panels, const int6
     }
 }
 
-/* The panel of a compression, by halves, without branches that nothing foretells. */
+/* The panel of a compression, by bisection, without unpredictable branches. */
 MBMA_INLINE size_t panel_at(double c, size_t panels, const double *edges) {
     size_t first = 0, left = panels;
     while (left > 1) {
@@ -210,7 +210,7 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
                 /* subnormal numbers, digit by digit */
                 if (!(logs[row][k] > LEAST_LOG && sum > 1e-290))
                     sum = exp(logs[row][k] + (begins ? BEGUN[row] * log(c[k]) : 0.0));
-                /* beyond the profile, and for NaN, there is no answer */
+                /* beyond the profile, and for NaN, the result is NaN */
                 const bool inside = c[k] > 0.0 && x[k] <= 1.0 + 1e-12 * edges[panel[k] + 1] / width[k];
                 const double none = c[k] <= 0.0 ? 0.0 : NAN;
                 out[(size_t)row * n + start + k] = inside ? sum : none;
@@ -222,7 +222,7 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
     }
 }
 
-/* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */
+/* Bound on the relative error of one panel: of the interpolated islands, and of its sums. */
 static double missed_by(const mbma_panel_rule *r, double low, double high, const double *fields, size_t stride,
                         int rows, double last) {
     double finer[ROWS + 2][2 * NODES], seen[ROWS + 2][CHECKS + 1], fine_weight[2 * NODES], coarse[3][NODES];
@@ -241,7 +241,7 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
             if (known > 0.0) /* underflow to zero is correct here */
                 relative = mbma_max(relative, fabs(seen[row][k] / known - 1.0));
         }
-        /* heights count where the Gaussian does: near the gap of its top */
+        /* heights matter where the Gaussian is large: near the gap of its maximum */
         const double true_shift = shift[NODES + k], true_rate = rate[NODES + k];
         const double at = mbma_held(true_shift / true_rate, high, last);
         const double off_shift = seen[rows][k] - true_shift, off_rate = seen[rows + 1][k] - true_rate;
@@ -282,7 +282,7 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
         add_sums(c[k], least[k], &all, 1, 2 * count, sum);
         add_sums(c[k], least[k], &few, 1, count, other);
         const double scale = mbma_exp(0.5 * (lowest - least[k]));
-        /* up to its own end the panel from 0 is all there is */
+        /* up to its own end, the panel from 0 is the only one */
         if (k == 0 && r->power > 1)
             alone = fabs(other[0] / sum[0] - 1.0);
         most = mbma_max(most, scale * sum[0]);

@@ -1,10 +1,11 @@
-/* Persson's theory and the calibrated law of any isotropic spectrum, as sums over its waves.
+/* Persson's theory and the calibrated law of any isotropic spectrum, as sums over wavenumbers.
  *
- * With g(x) the rms gradient of the waves below x and y = F g/g(x), a wave's part in the mean separation is a function
- * of y alone: u(F) = sum of share I(y), I(y) = integral from y to infinity of dW/y', where W is a polynomial of
- * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F, F over g(x) of the last wave.
+ * With g(x) the rms gradient of wavenumbers below x and y = F g/g(x), each contributes a function of y to the mean
+ * separation: u(F) = sum of share I(y), I(y) = integral from y to infinity of dW/y', where W is a polynomial of
+ * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F, F over g(x) of the last one.
  */
 #include "elementary.h"
+#include "ends.h"
 #include "mbma.h"
 
 enum { ORDER = MBMA_ORDER, CELLS = 85, NODES = 12, FEW_NODES = 4, MOST_STEPS = 100 };
@@ -12,7 +13,7 @@ enum { ORDER = MBMA_ORDER, CELLS = 85, NODES = 12, FEW_NODES = 4, MOST_STEPS = 1
 #define LOWEST -14.0   /* ln y of the first cell, up to whose end I is linear in ln y, */
 #define HIGHEST 3.0    /* and of the last, above which I is below 1e-350 */
 #define CELL_RATE 5.0  /* cells in 1 of ln y */
-#define TINY 2e-12     /* of the last two coefficients of a panel, over which it is halved */
+#define TINY 2e-12     /* of the last two coefficients; a panel with larger ones is halved */
 #define NARROWEST 0.02 /* panel */
 #define NOTHING 80.0   /* exp(-80) of the largest part */
 #define CLOSE 1e-12    /* of ln F */
@@ -42,7 +43,7 @@ static double angle_of(int j) { return MBMA_PI * (j + 0.5) / (double)ORDER; }
 
 static double node(int j) { return cos(angle_of(j)); }
 
-/* Powers from values at the nodes; the last two Chebyshev coefficients, which tell the error. */
+/* Powers from values at the nodes; the last two Chebyshev coefficients estimate the error. */
 static double powers_of(const double value[ORDER], double p[ORDER]) {
     double before[ORDER] = {0.0}, term[ORDER] = {1.0}, last[2] = {0.0};
     memset(p, 0, ORDER * sizeof *p);
@@ -82,12 +83,8 @@ static double integrated_down(double from, double to, const double weight[3], do
 }
 
 static void inner_integral(const double weight[3], double p[CELLS][ORDER]) {
-    const double z = 2.0 * exp(2.0 * HIGHEST);
-    double series = 1.0, at = HIGHEST, value[ORDER];
-    /* exp(z) z E1(z) */
-    for (int k = 8; k > 0; k--)
-        series = 1.0 - k / z * series;
-    double own = 0.5 * ROOT_8_PI / z * series * (weight[0] + 3.0 * weight[1] + 16.0 * weight[2]);
+    /* what lies above counts for less than exp(-80) of this */
+    double at = HIGHEST + 0.05, own = 0.0, value[ORDER];
     for (int cell = CELLS - 1; cell >= 0; cell--) {
         for (int j = 0; j < ORDER; j++) {
             const double next = LOWEST + (cell + 0.5 * (1.0 + node(j))) / CELL_RATE;
@@ -106,7 +103,7 @@ static void inner_integral(const double weight[3], double p[CELLS][ORDER]) {
 typedef struct {
     double p[CELLS][ORDER]; /* I of a law's own W */
     size_t count;
-    double *log_g, *fall, *share; /* of waves: ln g(x) and 1/g(x)^2 - 1, in terms of the last one's g(x) */
+    double *log_g, *fall, *share; /* of wavenumbers: ln g(x) and 1/g(x)^2 - 1, in terms of the last one's g(x) */
 } wave_sum;
 
 /* ln u + 2 F^2. */
@@ -114,7 +111,7 @@ static double sum_at(const wave_sum *w, double log_force) {
     const double square = 2.0 * exp(2.0 * log_force);
     double sum = 0.0;
     for (size_t k = 0; k < w->count; k++) {
-        /* waves that are closed, but for the last one */
+        /* wavenumbers in full contact, except the last one */
         if (square * w->fall[k] > NOTHING && k + 1 < w->count)
             continue;
         const double at = mbma_min((log_force - w->log_g[k] - LOWEST) * CELL_RATE, (double)CELLS);
@@ -127,7 +124,7 @@ static double sum_at(const wave_sum *w, double log_force) {
     return log(sum);
 }
 
-/* Panels from `start` to `end`, halved until polynomials hold. */
+/* Panels from `start` to `end`, halved until polynomials meet the tolerance. */
 static bool fill_panels(const wave_sum *w, double start, double end, mbma_spectrum_law *law) {
     while (start < end && law->panels < MBMA_MOST_PANELS) {
         double width = 2.0 * (end - start), value[ORDER], tail;
@@ -200,7 +197,7 @@ static double separation_of(const mbma_spectrum_law *law, double log_force, doub
     return u;
 }
 
-/* What the tail takes from ln F. */
+/* Decrease of ln F by the tail's factor. */
 static double tail_at(const mbma_spectrum_law *law, double u) { return law->tail * u * u * u; }
 
 mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *c, double h_max, double *work,
@@ -242,7 +239,7 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
     return good ? MBMA_OK : MBMA_UNRESOLVED;
 }
 
-/* Whether a law was prepared: nothing is read beyond its panels. */
+/* Whether a law was prepared, so that nothing is read beyond its panels. */
 static bool is_prepared(const mbma_spectrum_law *law) { return law->panels > 0 && law->panels <= MBMA_MOST_PANELS; }
 
 size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
@@ -256,20 +253,21 @@ size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const d
         if (ready && gap > 0.0 && gap < law->h_max && gap <= FARTHEST) {
             double slope;
             const double value = log_force_of(law, gap, &slope) + law->shift - tail_at(law, gap), endless = exp(value);
-            const double F = -endless * expm1(law->end - value), over = F / law->t0;
+            double steep;
+            const double F = endless * mbma_ended(law->end - value, &steep), over = F / law->t0;
             force[k] = F;
             area[k] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (law->s0 + over)));
-            stiffness[k] = (3.0 * tail_at(law, gap) / gap - 1.0 / (slope * gap)) * endless;
+            stiffness[k] = (3.0 * tail_at(law, gap) / gap - 1.0 / (slope * gap)) * endless * steep;
         }
         bad += force[k] != force[k];
     }
     return bad;
 }
 
-/* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for it. */
+/* Newton's method for ln F of a surface without end, before the tail's factor ln F + tail. */
 static double separation_at(const mbma_spectrum_law *law, double log_force, double end, double tail, double *slope) {
-    const double over = log_force - end, heaviest = law->edge[law->panels];
-    const double goal = over < 700.0 ? end + fmax(over, 0.0) + log1p(exp(-fabs(over))) : log_force;
+    const double heaviest = law->edge[law->panels];
+    const double goal = log_force - end < 700.0 ? mbma_endless(log_force, end) : log_force;
     double low = -800.0, high = heaviest, x = goal - law->shift, u = 0.0;
     *slope = 0.0;
     for (int step = 0; step < MOST_STEPS && goal - law->shift < heaviest; step++) {
@@ -315,24 +313,24 @@ typedef struct {
 
 static piece piece_of(const double *q, const double *C, size_t base, size_t k) {
     const double start = log(q[k] / q[base]), width = log1p((q[k + 1] - q[k]) / q[k]);
-    /* also where the quotient overflows or is none */
+    /* also if the quotient overflows or is NaN */
     const double rise = fmin(fmax(log(C[k + 1] / C[k]), -750.0), 750.0);
     const piece found = {start, width, C[k] / C[base] * exp(2.0 * start), rise / width + 2.0};
     return found;
 }
 
-/* What a rise from the piece's start adds to the integral of C q^(order + 1) dq. */
+/* Contribution to the integral of C q^(order + 1) dq from the piece's start up to `rise`. */
 static double part_of(const piece *s, int order, double rise) {
     return s->content * exp(order * s->start) * rise * growth((s->power + order) * rise);
 }
 
 /* Where the panel that begins at t = ln x ends, and whether few nodes are enough. Panels are graded towards the longest
- * wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one, neither what it
- * holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
+ * wavelength, where the gradient of longer ones vanishes, and the shortest ones, which matter at heavy loads; in a
+ * panel neither the variance nor the gradient changes much. `before` is the gradient's square up to the piece. */
 static double panel_end(const piece *s, double t, double last, double before, bool *few) {
     const double first = fmin(last, 1.0), left = last - t, rise = t - s->start, power = fabs(s->power) + 2.0;
     const double low = t > 0.0 ? fmax(t * exp(2.0), first * exp(-40.0)) : first * exp(-40.0);
-    /* steps that rounding leaves, and those in which a gradient that jumps counts for nothing */
+    /* steps due to rounding, and those in which a jump of the gradient is negligible */
     const double least = 1e-14 * t, finest = least + 1e-13 * s->width;
     double width = fmin(fmin(low - t, 1.0), left > first / 512.0 ? 0.5 * left : left), change = 2.0;
     width = fmin(fmin(width, s->start + s->width - t), 3.0 / power);

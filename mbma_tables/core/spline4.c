@@ -2,7 +2,7 @@
 #include "eight.h"
 #include "mbma.h"
 
-#define BEYOND 1e-9 /* of a cell: how far rounding may take a place off the ends of its axis */
+#define BEYOND 1e-9 /* of a cell: largest rounding error of a place beyond the ends of its axis */
 
 typedef struct {
     int64_t cell;

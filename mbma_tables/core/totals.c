@@ -1,10 +1,10 @@
 /* Force and area of a surface at a gap: adaptive Gauss-Kronrod quadrature over the approaches of its islands (44-50).
  *
  * Below the floor of zeta_d the approach is mapped by x = scale sinh(t)^2, a power at 0 and geometric beyond the
- * boundary layer; above it the integrand is little more than a Gaussian of x, and x itself serves.
+ * boundary layer; above it the integrand is nearly a Gaussian of x, and x itself is used.
  */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("no-thread-jumps") /* which makes branches that keep the loop over nodes from vectorising */
+#pragma GCC optimize("no-thread-jumps") /* which adds branches that prevent vectorisation of the loop over nodes */
 #endif
 #include "island.h"
 #include "phi.h"
@@ -12,31 +12,29 @@
 enum { MAX_INTERVALS = 200, BY_HURST = 1, BY_LOG_ZETA, BY_COMPRESSION, BY_PEAK, BELOW_KINK, COLUMNS };
 enum { BY_LOG_E = BY_LOG_ZETA }; /* over nodes, derivatives are by H at given e = zeta_1^(-2H), and by ln e */
 
-#define NARROW 2.5     /* in h_rms: above the floor of zeta_d, the smaller rule resolves a Gaussian this wide to 1e-8 */
-#define LEAST (-700.0) /* of exponents: below it a Gaussian is nothing */
+#define LEAST (-700.0) /* of exponents: below it a Gaussian is negligible */
 #define NEAR_ONE 0.1   /* p l below which a difference goes by its series */
 
 /* A Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8. With a lower floor
- * of zeta_d than the paper's the difference counts more. */
+ * of zeta_d than the paper's the difference has a larger factor. */
 #define PAPER_FLOOR 1.5
 #define SAFETY 4.0
 #define SAFETY_BELOW 400.0
 
-/* A whole rule, nodes filled up with 0 to whole vectors. */
-enum { MOST_NODES = 32 };
+/* The whole rule, nodes filled up with 0 to whole vectors. */
+enum { COUNT = 31, MOST_NODES = 32 };
 typedef struct {
-    int count;
     double nodes[MOST_NODES], kronrod[MOST_NODES], gauss[MOST_NODES];
 } rule;
 
-/* A surface with the gap asked for, by what its sums are made, and what they have cost. */
+/* A surface and gap, the settings of its sums, and the number of evaluations. */
 typedef struct {
     surface s;
     double compression, peak; /* (h_max - d)/h_rms and h_max/h_rms */
     double safety, table_error;
     int64_t islands;
     const mbma_cells *cells;
-    rule rules[2];
+    rule r;
 } gap;
 
 /* An interval of the mapped approach, whether zeta_d and zeta_u are at their floors in it, and its sums. */
@@ -108,8 +106,7 @@ MBMA_INLINE void node_slopes(bool by_hurst, double height, bool floor_d, bool fl
 MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const interval *p, const rule *restrict r,
                             const gap *g, at_nodes *restrict out) {
     const double half = 0.5 * (p->high - p->low), centre = 0.5 * (p->high + p->low), scale = g->s.map_scale;
-    const int padded = (r->count + 7) / 8 * 8;
-    for (int k = 0; k < padded; k++) {
+    for (int k = 0; k < MOST_NODES; k++) {
         const double t = mbma_fma(half, r->nodes[k], centre);
         /* sinh and cosh by expm1: exponentials would cancel at small t */
         const double more = mbma_expm1(t), inverse = 1.0 / (more + 1.0), rise = 0.5 * (more + more * inverse);
@@ -152,7 +149,7 @@ static int first_intervals(const gap *g, interval *intervals) {
 
 /* One Kronrod rule over an interval: its sums, with K1 (47), and their relative error. */
 MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
-    const rule *const r = &g->rules[!(p->floor_d && p->high - p->low < NARROW)];
+    const rule *const r = &g->r;
     double sums[2][COLUMNS] = {{0.0}}, gauss[2] = {0.0};
     at_nodes at;
     /* loops of their own for compilers, with constants */
@@ -164,8 +161,8 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
         fill_nodes(false, true, slopes, p, r, g, &at);
     else
         fill_nodes(false, false, slopes, p, r, g, &at);
-    g->islands += r->count;
-    for (int k = 0; k < r->count; k++) {
+    g->islands += COUNT;
+    for (int k = 0; k < COUNT; k++) {
         const phi found = phi_at(g->cells, at.X[k], at.mu[k]);
         if (found.status != MBMA_OK)
             return found.status;
@@ -181,7 +178,7 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
                                                    found.by_X[q] * at.by[by][0][k] + found.by_mu[q] * at.by[by][1][k]);
         }
     }
-    /* of both sums: both integrands resolve alike, and one may agree by chance */
+    /* the larger of both: both integrands are resolved alike, and one may agree by chance */
     const double difference = mbma_max(fabs(gauss[0] / sums[0][0] - 1.0), fabs(gauss[1] / sums[1][0] - 1.0));
     const double scaled = g->safety * difference;
     p->error = sums[0][0] > 0.0 && sums[1][0] > 0.0 ? mbma_min(difference, scaled * sqrt(scaled)) : 0.0;
@@ -218,7 +215,7 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
         if (!(force > 0.0 && area > 0.0))
             return MBMA_OK;
         if (errors[0] <= rtol * force && errors[1] <= rtol * area) {
-            /* no less than was asked for: sums of an interval may agree by chance */
+            /* at least the requested one: sums of an interval may agree by chance */
             *bound = mbma_max(mbma_max(errors[0] / force, errors[1] / area), rtol) + g->table_error;
             return MBMA_OK;
         }
@@ -234,7 +231,7 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
             intervals[count] = *p;
             p->high = intervals[count++].low = 0.5 * (p->low + p->high);
         }
-        if (count == present) /* of NaN, in rtol for instance */
+        if (count == present) /* for NaN, for example in rtol */
             return MBMA_UNRESOLVED;
     }
 }
@@ -278,38 +275,32 @@ static int end_slopes(const gap *g, double sums[2][COLUMNS]) {
     return status;
 }
 
-/* QUADPACK's Gauss-Kronrod rules of 21 and 31 nodes (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983), which
- * are symmetric: nodes from 1 to 0. Every second one, from the second on, is also a Gauss node. */
+/* QUADPACK's Gauss-Kronrod rule of 31 nodes (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983), which is
+ * symmetric: nodes from 1 to 0. Every second one, from the second on, is also a Gauss node. */
 static const struct {
     double nodes[16], kronrod[16], gauss[8];
-} HALF_RULES[2] = {
-    {{0.9956571630258081, 0.9739065285171717, 0.9301574913557082, 0.8650633666889845, 0.7808177265864169,
-      0.6794095682990244, 0.5627571346686047, 0.4333953941292472, 0.2943928627014602, 0.14887433898163122, 0.0},
-     {0.011694638867371874, 0.032558162307964725, 0.054755896574351995, 0.07503967481091996, 0.0931254545836976,
-      0.10938715880229764, 0.12349197626206584, 0.13470921731147334, 0.14277593857706009, 0.14773910490133849,
-      0.1494455540029169},
-     {0.06667134430868814, 0.1494513491505806, 0.21908636251598204, 0.26926671930999635, 0.29552422471475287}},
-    {{0.9980022986933971, 0.9879925180204854, 0.9677390756791391, 0.937273392400706, 0.8972645323440819,
-      0.8482065834104272, 0.790418501442466, 0.7244177313601701, 0.650996741297417, 0.5709721726085388,
-      0.4850818636402397, 0.3941513470775634, 0.29918000715316884, 0.20119409399743451, 0.1011420669187175, 0.0},
-     {0.005377479872923349, 0.015007947329316122, 0.02546084732671532, 0.03534636079137585, 0.04458975132476488,
-      0.05348152469092809, 0.06200956780067064, 0.06985412131872826, 0.07684968075772038, 0.08308050282313302,
-      0.08856444305621176, 0.09312659817082532, 0.09664272698362368, 0.09917359872179196, 0.10076984552387559,
-      0.10133000701479154},
-     {0.03075324199611727, 0.07036604748810812, 0.10715922046717194, 0.13957067792615432, 0.16626920581699392,
-      0.1861610000155622, 0.19843148532711158, 0.2025782419255613}}};
+} HALF = {
+    {0.9980022986933971, 0.9879925180204854, 0.9677390756791391, 0.937273392400706, 0.8972645323440819,
+     0.8482065834104272, 0.790418501442466, 0.7244177313601701, 0.650996741297417, 0.5709721726085388,
+     0.4850818636402397, 0.3941513470775634, 0.29918000715316884, 0.20119409399743451, 0.1011420669187175, 0.0},
+    {0.005377479872923349, 0.015007947329316122, 0.02546084732671532, 0.03534636079137585, 0.04458975132476488,
+     0.05348152469092809, 0.06200956780067064, 0.06985412131872826, 0.07684968075772038, 0.08308050282313302,
+     0.08856444305621176, 0.09312659817082532, 0.09664272698362368, 0.09917359872179196, 0.10076984552387559,
+     0.10133000701479154},
+    {0.03075324199611727, 0.07036604748810812, 0.10715922046717194, 0.13957067792615432, 0.16626920581699392,
+     0.1861610000155622, 0.19843148532711158, 0.2025782419255613}};
 
-int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss) {
-    if (count != 21 && count != 31)
-        return MBMA_INVALID;
-    for (int k = 0; k < count; k++) {
-        const bool upper = 2 * k >= count;
-        const int own = upper ? count - 1 - k : k, which = count == 31;
-        nodes[k] = upper ? HALF_RULES[which].nodes[own] : -HALF_RULES[which].nodes[own];
-        kronrod[k] = HALF_RULES[which].kronrod[own];
-        gauss[k] = own % 2 ? HALF_RULES[which].gauss[own / 2] : 0.0;
+/* The whole rule; Gauss weights are zero at nodes of Kronrod's alone. */
+static rule whole_rule(void) {
+    rule r = {{0.0}, {0.0}, {0.0}};
+    for (int k = 0; k < COUNT; k++) {
+        const bool upper = 2 * k >= COUNT;
+        const int own = upper ? COUNT - 1 - k : k;
+        r.nodes[k] = upper ? HALF.nodes[own] : -HALF.nodes[own];
+        r.kronrod[k] = HALF.kronrod[own];
+        r.gauss[k] = own % 2 ? HALF.gauss[own / 2] : 0.0;
     }
-    return MBMA_OK;
+    return r;
 }
 
 size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
@@ -322,11 +313,7 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
     memset(&g, 0, sizeof g);
     g.cells = cells;
     g.safety = v->floor_d >= PAPER_FLOOR ? SAFETY : SAFETY_BELOW;
-    for (int k = 0; k < 2; k++) {
-        rule *const r = &g.rules[k];
-        r->count = k ? 31 : 21;
-        mbma_kronrod(r->count, r->nodes, r->kronrod, r->gauss);
-    }
+    g.r = whole_rule();
     for (size_t k = 0; k < n; k++) {
         double sums[2][COLUMNS] = {{0.0}}, *const row = out + 2 * columns * k;
         int found = MBMA_OK;

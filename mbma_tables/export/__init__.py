@@ -2,7 +2,7 @@
 
 
 def __getattr__(name: str) -> tuple[str, ...]:
-    """Names of the targets of a group: SOLVERS, DATA, LAWS, SUBROUTINES, FMUS, GRAPHS, CODE."""
+    """Names of the targets of a group: SOLVERS, FIELDS, DATA, LAWS, SUBROUTINES, FMUS, CODE."""
     from mbma_tables.export.targets import GROUPS, group, names
 
     if name == "SUBROUTINES":

@@ -1,4 +1,4 @@
-"""The command that wrote a file, in the file's header, and how it is found there to write the file again."""
+"""The command that wrote a file, stored in the file's header, from which the file can be written again."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _INPUT = re.compile(r"input ([^;]*): sha256 ([0-9a-f]{64});")
 
 
 def made_by(words: Iterable[str], out: pathlib.Path, inputs: Iterable[pathlib.Path]) -> tuple[str, ...]:
-    """Lines of a header: hashes of the input files, and the words after `mbma export`, those of --out last."""
+    """Lines of a header: hashes of the input files, and the arguments of `mbma export`, --out last."""
     words = list(words)
     if "--out" in words:
         del words[words.index("--out") : words.index("--out") + 2]
@@ -38,7 +38,7 @@ def made_by(words: Iterable[str], out: pathlib.Path, inputs: Iterable[pathlib.Pa
 
 
 def written_by(words: Iterable[str]) -> str:
-    """The line of a header with the words after `mbma export`."""
+    """The line of a header with the arguments of `mbma export`."""
     command = urllib.parse.quote(shlex.join(words).replace("  ", " %20"), safe=f"{PLAIN}%")
     return f"written by mbma_tables {__version__}: mbma export {command};"
 
@@ -48,12 +48,12 @@ def _digest(path: pathlib.Path) -> str:
 
 
 def again(path: pathlib.Path) -> tuple[str, list[str]]:
-    """The version that wrote a file, and the words after `mbma export` that write it again in its place.
+    """The version that wrote a file, and the arguments of `mbma export` that write it again in its place.
 
     Raises
     ------
     InputError
-        Where the file has no command, or an input file is not what it was.
+        If the file contains no command, or an input file has changed.
     """
     content = read_file(path, MAX_BYTES)
     if content.startswith(b"PK"):

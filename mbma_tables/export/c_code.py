@@ -1,7 +1,7 @@
 """The model as C: the core's own files, its tables as data beside them, and calls of one surface on top.
 
-Tables are text, in the shortest decimals that give back every bit, so that the files mean the same to any compiler on
-any machine; 150,000 numbers are 3 MB of text and a fraction of a second of compiling.
+Tables are text, in the shortest decimals that reproduce every bit, so that any compiler on any machine reads the same
+numbers; 150,000 numbers are 3 MB of text and a fraction of a second of compiling.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MODEL = {
     "mbma_model.c": "the MBMA model and the calibrated law of one surface in C11.",
     "mbma_data.c": "the tables of the MBMA model and of the calibrated law in C11.",
 }
-# what the library is compiled with; roundings do not depend on the compiler
+# flags of the library; rounding does not depend on the compiler
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 USAGE = (
     f"Compile with cc {' '.join(FLAGS)} -march=native -c {' '.join(CORE)} mbma_model.c mbma_data.c, and link the C "
@@ -161,7 +161,7 @@ def _cells(cells: FloatArray) -> Iterator[str]:
 
 
 def header(title: str, usage: str, about: list[str]) -> list[str]:
-    """Paragraphs of a file's opening comment: what it is and what made it, what it holds, conventions, licence."""
+    """Paragraphs of a file's opening comment: description, origin, contents, conventions, licence."""
     return [title, f"Written by mbma_tables {__version__}. {usage}", *about, CONVENTIONS, *LICENCE]
 
 
@@ -198,7 +198,7 @@ def about_theories() -> list[str]:
     ]
     return [
         "Law calibrated on boundary elements, by a table of force over Hurst exponent, q1/q0 and mean separation, in C "
-        f"also of any spectrum, as Persson's theory, by a sum over waves. Table: {', '.join(ranges)}; other "
+        f"also of any spectrum, as Persson's theory, by a sum over wavelengths. Table: {', '.join(ranges)}; other "
         "separations continue by the law's limits.",
         f"Largest relative error of the table against the law: {table.error:.2g}. Simulations scatter about the law by "
         "percents to tens of percents, which the documentation lists.",

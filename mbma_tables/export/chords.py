@@ -2,7 +2,7 @@
 
 Linear interpolation over a step h has an error of about h^2 y''/8. Rows are spaced so that this is the same fraction of
 y everywhere above a floor, and are then moved by half of it, so that the error has both signs; the last row stays on
-the curve, for a solver has nothing beyond it.
+the curve, because a solver has no rows beyond it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def chosen_rows(
     evenly: bool = False,
     jump: bool = False,
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Rows of a curve on fine points, as a file holds them, and their largest relative error above `floor`."""
+    """Rows of a curve given on fine points, as written to a file, and their largest relative error above `floor`."""
     # with a jump the first two fine points are rows
     begin = fine_x[:1], fine_y[:1]
     if jump:
@@ -63,12 +63,12 @@ def chosen_rows(
 
 
 def rounded(values: FloatArray) -> FloatArray:
-    """Numbers as a file holds them."""
+    """Numbers as written to a file."""
     return np.array([float(number(value)) for value in values])
 
 
 def _not_below(value: float) -> float:
-    """A number as a file holds it, rounded up, so that rows reach it; what is one but for rounding stays."""
+    """A number as written to a file, rounded up so that rows reach it, unless it equals one up to rounding."""
     return float(Context(prec=DIGITS, rounding=ROUND_CEILING).create_decimal(float(value) * (1 - 1e-13)))
 
 
@@ -118,7 +118,7 @@ def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArra
     beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
     moved = np.maximum(y - beside * np.maximum(y, floor), 0.0)
     moved[0], moved[-1] = y[0], y[-1]
-    # pressure rises and leakage falls; conductance may fall where the model's stiffness jumps
+    # pressure increases and leakage decreases; conductance may decrease where the model's stiffness jumps
     for keeps, accumulated in ((np.greater_equal, np.maximum), (np.less_equal, np.minimum)):
         if keeps(np.diff(fine_y), 0).all():
             moved = accumulated.accumulate(moved)

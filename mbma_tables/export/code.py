@@ -1,6 +1,6 @@
 """The whole model as source code: the core's C, and Fortran and JavaScript over it; written, built and replayed.
 
-Interfaces of these languages are written from the C's headers, whose comments say what each call does.
+The interfaces in these languages are generated from the C headers, whose comments describe each call.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ class BuildError(InputError):
 
 
 def built_by(command: list[str], texts: Mapping[str, str], made: str, *last: str) -> bytes:
-    """What a compiler makes of C sources among texts."""
+    """The output of a compiler for the C sources among texts."""
     with tempfile.TemporaryDirectory() as work:
         for name, text in texts.items():
             write_file(pathlib.Path(work, name), text.encode())
@@ -164,14 +164,14 @@ def built_by(command: list[str], texts: Mapping[str, str], made: str, *last: str
 
 @dataclasses.dataclass(frozen=True)
 class Replay:
-    """What a replay in the target found."""
+    """Result of a replay in the target."""
 
     program: str
     points: dict[str, int]  # rows replayed, by kind
     largest: dict[str, float]  # relative difference, by kind
-    failed: int  # answers beyond their tolerance, and rows that were refused
-    reason: str  # why it did not run or did not end well; empty where all is right
-    ran: bool = True  # False where the program is not installed
+    failed: int  # results beyond their tolerance, and rows that were rejected
+    reason: str  # why it did not run or failed; empty if all is right
+    ran: bool = True  # False if the program is not installed
 
 
 def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
@@ -203,7 +203,7 @@ def _run(command: list[str], folder: str) -> subprocess.CompletedProcess[str]:
 
 
 def read_report(program: str, done: subprocess.CompletedProcess[str]) -> Replay:
-    """What a self-test printed: kind, rows, largest difference; then how many failed."""
+    """The output of a self-test: kind, rows, largest difference; then the number of failures."""
     points: dict[str, int] = {}
     largest: dict[str, float] = {}
     failed = -1
@@ -225,7 +225,7 @@ DEFAULTS = {"E_star": "1", "rtol": "1e-8"}  # of arguments in JavaScript
 
 
 class Argument(NamedTuple):
-    """Of a call: a number or a structure that is read, or a place that is written."""
+    """Argument of a call: a number or a structure that is read, or a pointer that is written to."""
 
     kind: str  # "double" or a structure
     name: str
@@ -238,7 +238,7 @@ class Declared:
 
     def __init__(self, headers: str) -> None:
         self.statuses: list[tuple[str, str, str]] = re.findall(r"MBMA_(\w+) = (\d+),? +/\* (.*?) \*/", headers)
-        # with what the header says of them
+        # with the header's comments on them
         self.structures: dict[str, tuple[str, list[str]]] = {}
         self.calls: dict[str, tuple[str, list[Argument]]] = {}
         for paragraph in headers.split("\n\n"):

@@ -1,7 +1,7 @@
 """Conformance points beside exported code, which its self-test replays.
 
-A row of the points' file is: kind, tolerance, how many arguments and they, then for each answer the answer and what its
-difference is taken relative to. Lines that begin with # say what the kinds are.
+A row of the points' file contains: kind, tolerance, number of arguments, the arguments, and each result with the scale
+of its difference. Lines that begin with # describe the kinds.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def rows(kind: str, arguments: Iterable[Any], answers: Any, scales: Any = None, 
     given = np.broadcast_arrays(*arguments, tolerance)
     expected = np.array([np.broadcast_to(answer, given[0].shape) for answer in answers])
     units = np.abs(expected) if scales is None else np.array([np.broadcast_to(unit, given[0].shape) for unit in scales])
-    # a number that is exactly 0 is met exactly
+    # results that are exactly 0 must be exactly 0
     pairs = np.stack([expected, np.where(units == 0, 1.0, units)], axis=1).reshape(-1, given[0].size)
     for *own, most, numbers in zip(*(column.ravel().tolist() for column in given), pairs.T.tolist(), strict=True):
         yield ",".join((kind, *map(repr, (most, len(own), *own, *numbers))))
@@ -69,7 +69,7 @@ def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Rows:
     """Values and slopes at flat (X, mu), mu > 0, by the compiled runtime."""
     values, by_X, by_mu = model.slopes(X, mu)
     slopes = np.stack([by_X.phi_F, by_mu.phi_F, by_X.phi_A, by_mu.phi_A])
-    # where a derivative changes sign there is nothing to be relative to but the value over the argument
+    # where a derivative changes sign, its error is taken relative to value/argument
     places, numbers = np.array([X, mu, X, mu]), np.array([values.phi_F, values.phi_F, values.phi_A, values.phi_A])
     scales = np.maximum(np.abs(slopes), np.where(places > 0, np.abs(numbers / np.maximum(places, 1e-300)), 0.0))
     yield from rows("phi", (X, mu), values)
@@ -120,7 +120,7 @@ def _contact_rows(kind: str, given: tuple[Any, ...], values: Any, units: Any, sl
 
 
 def status_rows(model: UniversalModel) -> Rows:
-    """Points outside the table, and what is said of them."""
+    """Points outside the table, and the expected status."""
     X, mu = model.content.axes
     middle = 0.5 * (X.low + X.high)
     places = {
@@ -139,7 +139,7 @@ def status_rows(model: UniversalModel) -> Rows:
 
 
 def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
-    """The closed form at those of some points that lie in its range."""
+    """The closed form at the points that lie in its range."""
     functions, form = FUNCTIONS[FORM], RANGES[FORM]
     (X_low, X_high), (_, mu_high) = form["X"], form["mu"]
     place = np.array([X, mu])[:, (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)]
@@ -158,7 +158,7 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
         *(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
     ]
     lines = [
-        # with the answers and tolerances that are stored in the table
+        # with the results and tolerances that are stored in the table
         *rows(
             "phi",
             places,

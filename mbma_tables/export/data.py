@@ -12,7 +12,7 @@ import numpy as np
 from mbma_tables.common.arguments import finite_array, needed, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import written_bytes
-from mbma_tables.export.law_rows import LawTable
+from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import Target
 from mbma_tables.export.text import checked_name, comment, csv_cell
 
@@ -39,6 +39,8 @@ def _header(law: LawTable) -> dict[str, Any]:
         "theory": law.theory,
         "comments": list(law.comments),
         "floor": law.floor,
+        "units": {name: unit for name, (_, unit) in law.columns.items()},
+        "facts": {name: list(fact) for name, fact in law.facts.items()},
     }
 
 
@@ -47,8 +49,8 @@ def to_csv(law: LawTable) -> bytes:
     stream = io.StringIO()
     stream.write(comment(law.comments, "#"))
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([csv_cell(f"{law.x_name} [{law.x_unit}]"), csv_cell(f"{law.y_name} [{law.y_unit}]")])
-    writer.writerows(zip(law.x.tolist(), law.y.tolist(), strict=True))
+    writer.writerow([csv_cell(f"{name} [{unit}]") for name, (_, unit) in law.columns.items()])
+    writer.writerows(zip(*(values.tolist() for values, _ in law.columns.values()), strict=True))
     return stream.getvalue().encode()
 
 
@@ -58,12 +60,12 @@ def to_json(law: LawTable) -> bytes:
 
 
 def _content(law: LawTable) -> dict[str, Any]:
-    content = _header(law) | {"columns": {law.x_name: law.x.tolist(), law.y_name: law.y.tolist()}}
+    content = _header(law) | {"columns": {name: values.tolist() for name, (values, _) in law.columns.items()}}
     return content if law.behaviour is None else content | {"behaviour": _content(law.behaviour)}
 
 
 def from_json(content: str | bytes) -> LawTable:
-    """The law in a file of `to_json`; anything else is refused."""
+    """The law in a file of `to_json`; other files are rejected."""
     try:
         return _law_of(json.loads(content))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
@@ -71,13 +73,20 @@ def from_json(content: str | bytes) -> LawTable:
 
 
 def _law_of(held: dict[str, Any]) -> LawTable:
-    x, y = (finite_array(held[axis], held["columns"][held[axis]]) for axis in ("x", "y"))
-    if x.ndim != 1 or x.shape != y.shape or not (np.diff(x) > 0).all():
-        raise ValueError("two columns of one length are needed, the first of them rising")
+    columns = {str(name): finite_array(str(name), values) for name, values in held["columns"].items()}
     x_name, y_name, x_unit, y_unit = (str(held[name]) for name in ("x", "y", "x_unit", "y_unit"))
+    x, y = columns.pop(x_name), columns.pop(y_name)
+    if x.ndim != 1 or any(x.shape != other.shape for other in (y, *columns.values())) or not (np.diff(x) > 0).all():
+        raise ValueError("two columns of one length are needed, the first of them rising")
+    more = {name: (values, str(held["units"][name])) for name, values in columns.items()}
+    facts = {
+        str(name): (number_in(name, value, 0, 1e300), str(unit))
+        for name, (value, unit) in held.get("facts", {}).items()
+    }
     comments, behaviour = tuple(map(str, held["comments"])), _law_of(held["behaviour"]) if "behaviour" in held else None
     error, floor = (number_in(name, held[name], 0, 1e300) for name in ("largest_error", "floor"))
-    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, str(held["theory"]), floor, behaviour)
+    theory = str(held["theory"])
+    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, theory, floor, behaviour, more, facts)
 
 
 def to_matlab(law: LawTable) -> bytes:
@@ -85,11 +94,12 @@ def to_matlab(law: LawTable) -> bytes:
     from scipy.io import savemat
 
     stream = io.BytesIO()
-    text = {name: value for name, value in _header(law).items() if name not in ("x", "y", "comments")}
+    text = {name: value for name, value in _header(law).items() if name not in ("x", "y", "comments", "facts")}
     comments = np.array(law.comments, dtype=object)
     named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
+    named |= {name: values[:, None] for name, (values, _) in law.more.items()}
     savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
-    # the first 116 bytes are free text, where scipy puts the time: the same law gives the same bytes
+    # the first 116 bytes are free text, where scipy writes the time: replaced, for identical bytes
     return b"MATLAB 5.0 MAT-file, mbma_tables".ljust(116) + stream.getvalue()[116:]
 
 
@@ -110,7 +120,7 @@ def to_netcdf(law: LawTable) -> bytes:
         "interpolation": "linear",
     }
     # CF 2.5.1: a coordinate has no missing values, nor has anything here
-    whole = {name: {"_FillValue": None} for name in (law.x_name, law.y_name)}
+    whole = {name: {"_FillValue": None} for name in law.columns}
     return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole))
 
 
@@ -119,7 +129,7 @@ def to_hdf5(law: LawTable) -> bytes:
     h5py = needed("h5py", "hdf5")
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
-        for name, values, unit in ((law.x_name, law.x, law.x_unit), (law.y_name, law.y, law.y_unit)):
+        for name, (values, unit) in law.columns.items():
             file[name] = values
             file[name].attrs["units"] = unit
         file.attrs["comments"] = "\n".join(law.comments)
@@ -131,7 +141,7 @@ def to_hdf5(law: LawTable) -> bytes:
 def to_parquet(law: LawTable) -> bytes:
     """A Parquet file: two columns, the header as metadata of the schema."""
     pyarrow, parquet = (needed(module, "parquet") for module in ("pyarrow", "pyarrow.parquet"))
-    table = pyarrow.table({law.x_name: law.x, law.y_name: law.y})
+    table = pyarrow.table({name: values for name, (values, _) in law.columns.items()})
     table = table.replace_schema_metadata({name: json.dumps(value) for name, value in _header(law).items()})
     stream = io.BytesIO()
     parquet.write_table(table, stream)

@@ -1,7 +1,7 @@
 """One page to explore a surface in a browser: the exported C as WebAssembly, its tables and the drawing, in one file.
 
-The module is compiled once, by `python -m generate explorer`, from C whose numbers are variables: a page sets them from
-the tables of the day, so that writing one needs no compiler.
+The module is compiled once, by `python -m generate explorer`, from C whose constants are variables: a page sets them
+from the current tables, so that writing one needs no compiler.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def packed(values: Any) -> dict[str, Any]:
 
 
 def _model(values: dict[str, Any]) -> dict[str, Any]:
-    """The compiled module and everything that it is filled with."""
+    """The compiled module and all data passed to it."""
     return {
         "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
         "tables": {name: packed(value) for name, value in values.items()},
@@ -73,7 +73,7 @@ def _model(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _limits() -> dict[str, Any]:
-    """What theories were tested for, in the words of `Contact.reasons`, and their scatter."""
+    """Tested ranges of theories, with the texts of `Contact.reasons`, and their scatter."""
     table = calibrated_table.shipped()
     return {
         "log_area": table.log_area.tolist(),
@@ -99,7 +99,7 @@ def _start(surface: AnySurface) -> dict[str, Any]:
     if isinstance(surface, Surface) and surface.shape == ():
         return {name: float(getattr(surface, name)) for name in surface.parameters}
     if not isinstance(surface, MeasuredSurface):
-        raise InputError("the page is of one surface: take one of the batch")
+        raise InputError("the page shows one surface: take one of the batch")
     if surface.q.size > MAX_SAMPLES:
         raise InputError(
             f"the page takes at most {MAX_SAMPLES} samples of a spectrum, and this one has {surface.q.size}: "
@@ -107,7 +107,7 @@ def _start(surface: AnySurface) -> dict[str, Any]:
         )
     pairs = zip(surface.q.tolist(), surface.C.tolist(), strict=True)
     spectrum = "\n".join(f"{q!r} {C!r}" for q, C in pairs)
-    # five numbers near it, for who turns the spectrum off
+    # the nearest five numbers, for use without the spectrum
     q0, q1, h_rms = (float(getattr(surface, name)) for name in ("q0", "q1", "h_rms"))
     return {"hurst": 0.8, "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": float(surface.h_max), "spectrum": spectrum}
 
@@ -122,9 +122,9 @@ def explorer_page(
 ) -> str:
     """A page of HTML that shows how a surface touches, with sliders; it needs neither a server nor a network.
 
-    Of a measured surface it takes the spectrum, of at most 500 samples, and h_max: heights and maps, which the
-    calibrated law goes by in Python, are not in it. Without a modulus stresses are over E*. Theory and variant are
-    those drawn at first, by default MBMA, of a spectrum the calibrated law.
+    Of a measured surface it uses the spectrum, of at most 500 samples, and h_max; heights and maps, which the
+    calibrated law uses in Python, are not included. Without a modulus stresses are over E*. Theory and variant are
+    the initial ones; the default is MBMA, for a spectrum the calibrated law.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def explorer_page(
         "limits": _limits(),
         "model": _model(c_code.tables(universal_model())),
     }
-    # a script of data ends at nothing but its own tag
+    # a script element with data ends only at its closing tag
     text = json.dumps(data).replace("<", "\\u003c")
     scripts = "\n".join(page_file(name).decode() for name in SCRIPTS)
     parts = {

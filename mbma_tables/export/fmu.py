@@ -18,14 +18,14 @@ from mbma_tables import __version__
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.code import BuildError, built_by
-from mbma_tables.export.joint import Joint
-from mbma_tables.export.law_code import MORE, AskedLaw, asked_law, code_name, text_of
+from mbma_tables.export.exported_law import ExportedLaw
+from mbma_tables.export.law_code import AskedLaw, asked_law, code_name, text_of
 from mbma_tables.export.law_numbers import LawNumbers
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
 
-# what the C of both standards calls by different names
+# names that differ in the C of both standards
 STANDARDS = {
     "fmu": {"FMI": "fmi2", "INSTANCE": "fmi2Component", "REAL": "Real", "SIZE": "", "SEEDS": ""}
     | {"LOGGER": "fmi2CallbackLogger", "NAMED": "m->name, ", "FORMAT": '"%s", '},
@@ -34,6 +34,7 @@ STANDARDS = {
 }
 SAID = {
     "conductance": "through the contact, over nominal area",
+    "tangential_stiffness": "shear stress over displacement before any slip",
     "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
 }
 # names of platforms in FMI 3.0; folders in FMI 2.0, which has none of ARM, ends of libraries, and zig's names
@@ -87,15 +88,21 @@ def fmu(
     law, variables = text_of("c-law", name, found), _variables(found)
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{target} {law}')}}}"
     parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "START": repr(_start(found.numbers))}
-    parts |= {name.upper(): found.more.get(name, "") and repr(found.ratio) for name in MORE}
+    parts |= {
+        "LEAKAGE": found.more.get("leakage", ""),
+        "SLOPED": "LAW" if found.sloped is found.exported.law else "ELASTIC",
+    }
     least, most = found.numbers.c_least, found.numbers.c_most
     parts |= {"LEAST": "-INFINITY" if found.numbers.ends else repr(least), "MOST": repr(most)}
     parts |= {"WRAPPER": filled(f"{parts['FMI']}.c"), "DECLARED": filled(f"{parts['FMI']}.h")}
-    source, third = filled("fmu.c", **parts), target == "fmu3"
+    source, third = (
+        filled("fmu.c", {what: repr(ratio) for what, ratio in found.slopes.items()}, **parts),
+        target == "fmu3",
+    )
     built = _binaries(name, source, third, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
     said = "\n".join((*found.said, f"binaries: {listed}"))
-    files = {"modelDescription.xml": _description(third, name, token, said, variables, found.joint)}
+    files = {"modelDescription.xml": _description(third, name, token, said, variables, found.exported)}
     files[f"sources/{name}.c"] = source.encode()
     if third:
         files["sources/buildDescription.xml"] = _build(name)
@@ -129,8 +136,8 @@ def _start(numbers: LawNumbers) -> float:
 
 
 def _variables(found: AskedLaw) -> list[dict[str, str]]:
-    """What XML says of each variable, by value reference."""
-    length, stress, numbers = found.joint.length, found.joint.stress, found.numbers
+    """XML attributes of each variable, by value reference."""
+    length, stress, numbers = found.exported.length, found.exported.stress, found.numbers
     ends = {"max": repr(numbers.c_most)} | ({} if numbers.ends else {"min": repr(numbers.c_least)})
     asked = {"start": repr(_start(numbers)), **ends, "description": "h_max less the mean separation"}
     outputs = {
@@ -147,7 +154,9 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     ]
 
 
-def _description(third: bool, name: str, token: str, text: str, variables: list[dict[str, str]], joint: Joint) -> bytes:
+def _description(
+    third: bool, name: str, token: str, text: str, variables: list[dict[str, str]], exported: ExportedLaw
+) -> bytes:
     """modelDescription.xml of either standard."""
     root = ET.Element(
         "fmiModelDescription",
@@ -161,7 +170,7 @@ def _description(third: bool, name: str, token: str, text: str, variables: list[
         if not third:
             ET.SubElement(ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"})
     units = ET.SubElement(root, "UnitDefinitions")
-    bases = _units(joint)
+    bases = _units(exported)
     for unit in dict.fromkeys(variable["unit"] for variable in variables):
         named = ET.SubElement(units, "Unit", {"name": unit})
         if unit in bases:
@@ -188,17 +197,17 @@ def _description(third: bool, name: str, token: str, text: str, variables: list[
     return _xml(root)
 
 
-def _units(joint: Joint) -> dict[str, dict[str, str]]:
+def _units(exported: ExportedLaw) -> dict[str, dict[str, str]]:
     """Units of the law by those of SI."""
-    length, stress = factor(joint.length, "m"), factor(joint.stress, "Pa", "stress")
+    length, stress = factor(exported.length, "m"), factor(exported.stress, "Pa", "stress")
     base = {
         "s": ({"s": 1}, 1.0),
         "1": ({}, 1.0),
-        joint.length: ({"m": 1}, length),
-        joint.stress: ({"kg": 1, "m": -1, "s": -2}, stress),
-        f"{joint.stress}/{joint.length}": ({"kg": 1, "m": -2, "s": -2}, stress / length),
-        f"{joint.stress} {joint.length}": ({"kg": 1, "s": -2}, stress * length),
-        f"{joint.length}^3": ({"m": 3}, length**3),
+        exported.length: ({"m": 1}, length),
+        exported.stress: ({"kg": 1, "m": -1, "s": -2}, stress),
+        f"{exported.stress}/{exported.length}": ({"kg": 1, "m": -2, "s": -2}, stress / length),
+        f"{exported.stress} {exported.length}": ({"kg": 1, "s": -2}, stress * length),
+        f"{exported.length}^3": ({"m": 3}, length**3),
     }
     return {
         unit: {key: str(power) for key, power in powers.items()} | {"factor": repr(size)}

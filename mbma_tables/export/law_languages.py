@@ -1,4 +1,4 @@
-"""How a contact law is written in each language: templates, numbers and arrays, and what a user must know."""
+"""How a contact law is written in each language: templates, formats of numbers and arrays, notes for the user."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ Columns = dict[str, FloatArray]
 
 
 class Language(NamedTuple):
-    """How a law is written in one language.
+    """Format of a law in one language.
 
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
     rows of polynomials by their places in the template, whose names begin with a prefix; None where the law is read by
     the core's C. `subroutine` is the template of a solver's user subroutine that calls the law, `parts` what else is
     filled in. `own_name` has key words where the law's name stands alone, as that of a module or package. `beside` has
-    other files by the ends of their names, each a target or a template; `inverts` is whether it has `overclosure`.
+    other files by the ends of their names, each a target or a template; `inverts` is whether it has `overclosure`,
+    `unloads` whether it has an unloading stiffness that is not its own slope.
     """
 
     template: str
@@ -40,6 +41,7 @@ class Language(NamedTuple):
     own_name: str = ""
     beside: tuple[tuple[str, str], ...] = ()
     inverts: bool = True
+    unloads: bool = True
 
 
 def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
@@ -50,7 +52,7 @@ def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str
 
 
 def _braces(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """The same in braces, as Modelica has them."""
+    """The same in braces, for Modelica."""
     return {
         place: text.replace("[", "{").replace("]", "}").replace(",\n}", "\n}")
         for place, text in _lists(prefix, columns, polynomials).items()
@@ -119,7 +121,7 @@ CALLED = (
     "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
     "tests; not run in Abaqus."
 )
-LAST = "At pressures beyond the law's range the last value is taken, and a line on stderr tells of the first one."
+LAST = "At pressures beyond the law's range the last value is used, with one warning on stderr."
 SUBROUTINE = C._replace(beside=())
 GAPCON = SUBROUTINE._replace(subroutine="gapcon.c", only_conductance=True)
 LANGUAGES = {
@@ -152,6 +154,7 @@ LANGUAGES = {
         _with_infinity("-np.inf"),
         _lists,
         parts=(("NP", "np"), ("NUMPY", "asked"), ("JAX", "")),
+        unloads=False,
     ),
     "jax-law": Language(
         "law.py",
@@ -162,6 +165,7 @@ LANGUAGES = {
         _with_infinity("-jnp.inf"),
         _lists,
         parts=(("NP", "jnp"), ("NUMPY", ""), ("JAX", "asked")),
+        unloads=False,
     ),
     "matlab-law": Language(
         "law.m",
@@ -171,6 +175,7 @@ LANGUAGES = {
         _with_infinity("-Inf"),
         _matrices,
         own_name="case catch classdef continue elseif global otherwise parfor return spmd switch try while",
+        unloads=False,
     ),
     "modelica-law": Language(
         "law.mo",

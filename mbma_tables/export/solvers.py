@@ -1,6 +1,6 @@
-"""Contact laws in the words of finite-element and system codes; each target is a `Grammar` of rows.
+"""Contact laws in the formats of finite-element and system codes; each target is a `Grammar` of rows.
 
-CalculiX 2.20 was run with what is written here, force and conductance; the others are written from their manuals.
+CalculiX 2.20 was run with these cards, force and conductance; the others follow the manuals.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import in_unit, modulus_and_units
-from mbma_tables.export.law_rows import QUANTITIES, LawTable
+from mbma_tables.export.law_rows import QUANTITIES
+from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import Grammar, Target
 from mbma_tables.export.text import DIGITS, checked_name, comment, number, opening
 from mbma_tables.surfaces.any_surface import AnySurface
 
-MIN_CALCULIX_STEP = 1e-10  # overclosures that are closer are moved apart when they are read
+MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
 MAX_ID = 99_999_999  # of a card: eight columns
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
 DEPARTURES = (0.01, 0.1)  # of the exponential law from Persson's theory: the pressures of these are stated
@@ -52,7 +53,7 @@ def _interaction(name: str, *cards: str) -> str:
 
 
 def _card(head: str, law: LawTable) -> str:
-    """A card with its rows, the other way about than in the law: pressure, overclosure, or conductance, pressure."""
+    """A card with the columns swapped: pressure, overclosure, or conductance, pressure."""
     return f"{head}\n" + "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True))
 
 
@@ -61,14 +62,24 @@ def _exponential_card(u0: float, p0: float) -> str:
     return f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{number(u0 * math.log(100))}, {number(p0)}\n"
 
 
+def _friction(law: LawTable) -> tuple[float, float, float]:
+    """Coefficient, stick slope, and the displacement at which slip begins."""
+    friction, slope, pressure = (law.facts[name][0] for name in ("friction", "stick", "stick_pressure"))
+    return friction, slope, friction * pressure / slope
+
+
+def _stick(law: LawTable) -> str:
+    return "*FRICTION\n{:.10g}, {:.10g}\n".format(*_friction(law)) if "friction" in law.facts else ""
+
+
 def _calculix(law: LawTable, name: str) -> str:
     if (np.diff(law.x) <= MIN_CALCULIX_STEP).any():
         raise InputError(
             f"rows are closer than {MIN_CALCULIX_STEP:g} {law.x_unit}, which CalculiX cannot tell apart: take fewer "
             "rows or a smaller unit of length"
         )
-    cards = _interaction(name, _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law))
-    return _notes(CALCULIX_TABULAR, name=name) + cards
+    behaviour = _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law)
+    return _notes(CALCULIX_TABULAR, name=name) + _interaction(name, behaviour, _stick(law))
 
 
 def _calculix_heat(law: LawTable, name: str) -> str:
@@ -83,12 +94,15 @@ def _calculix_heat(law: LawTable, name: str) -> str:
     middle, spread = (off.max() + off.min()) / 2, (off.max() - off.min()) / 2
     said = {"low": f"{p[0]:.4g}", "high": f"{p[-1]:.4g}", "by_p": math.expm1(spread), "by_c": f"{spread * u0:.2g}"}
     said |= {"slope": number(p[-1] / c[-1]), "name": name, "stress": rows.y_unit, "length": rows.x_unit}
-    cards = _exponential_card(u0, math.exp(middle)), _card("*GAP CONDUCTANCE", law)
+    cards = _exponential_card(u0, math.exp(middle)), _stick(law), _card("*GAP CONDUCTANCE", law)
     return _notes(CALCULIX_HEAT, **said) + _interaction(name, *cards)
 
 
 def _abaqus(law: LawTable, name: str) -> str:
     cards = [_card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)]
+    if "friction" in law.facts:
+        friction, _, slip = _friction(law)
+        cards.append(f"*FRICTION, ELASTIC SLIP={number(slip)}\n{number(friction)}\n")
     if law.behaviour is not None:
         cards.append(_card("*GAP CONDUCTANCE, PRESSURE", law))
     return _interaction(name, *cards)
@@ -105,8 +119,8 @@ def exponential(
 ) -> str:
     """CalculiX's card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20).
 
-    Its header states the pressures up to which it is within 1% and 10% of Persson's theory. Abaqus has a card of that
-    name for another curve, which ends at a clearance.
+    Its header states the pressures up to which it is within 1% and 10% of Persson's theory. In Abaqus the card of that
+    name defines another curve, which ends at a clearance.
     """
     from mbma_tables.theories import Persson
 
@@ -114,7 +128,7 @@ def exponential(
     modulus, units = modulus_and_units(E_star, surface, stress_unit)
     for kind in ("length", "stress"):
         if getattr(units, kind) in (None, "1"):
-            raise InputError(f"{kind}_unit is missing: a law without units is read wrongly sooner or later")
+            raise InputError(f"{kind}_unit is missing: a law without units is easily misread")
     h_rms = float(surface.h_rms)
     near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).pressure
     u0 = h_rms / math.log(near / far)
@@ -137,7 +151,7 @@ def exponential(
 
 
 def _lsdyna(law: LawTable, curve: int = 1) -> str:
-    """To be included: without *END, which would end the deck that it is pasted into."""
+    """For inclusion: without *END, which would end the including deck."""
     curve = whole_number_in("curve", curve, 1, MAX_ID)
     head = f"*DEFINE_CURVE\n{curve:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
     return head + "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
@@ -156,11 +170,12 @@ def _optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
 
 
 def _columns(law: LawTable) -> str:
-    return "".join(f"{number(x)} {number(y)}\n" for x, y in zip(law.x, law.y, strict=True))
+    rows = zip(*(values for values, _ in law.columns.values()), strict=True)
+    return "".join(" ".join(map(number, row)) + "\n" for row in rows)
 
 
 def _matrix(law: LawTable, name: str) -> str:
-    return f"double {checked_name(name, MAX_NAME)}({law.x.size},2)\n{_columns(law)}"
+    return f"double {checked_name(name, MAX_NAME)}({law.x.size},{len(law.columns)})\n{_columns(law)}"
 
 
 calculix = Grammar(
@@ -171,6 +186,7 @@ calculix = Grammar(
     # of more conductances, 2.20 keeps the last twenty, without a message
     {"pressure": 200, "conductance": 20},
     "ROUGH",
+    friction="Its stick slope is that of one pressure.",
 )
 abaqus = Grammar(
     "Abaqus",
@@ -178,16 +194,23 @@ abaqus = Grammar(
     {"pressure": _abaqus, "conductance": _abaqus},
     "Abaqus continues the last slope beyond the last row: stay within the range.",
     named="ROUGH",
+    friction="Its stiffness before slip is proportional to pressure, the coefficient times that over the elastic slip.",
 )
-STAY = "Stay within the rows: what the solver has beyond them was not tried."
-lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(QUANTITIES, _lsdyna), STAY)
+STAY = "Stay within the rows: the solver's behaviour beyond them was not tested."
+lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(("pressure", "conductance", "leakage"), _lsdyna), STAY)
 optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
-comsol = Grammar("COMSOL", "%", dict.fromkeys(QUANTITIES, _columns), "Interpolation: linear; extrapolation: none.")
+comsol = Grammar(
+    "COMSOL",
+    "%",
+    dict.fromkeys(QUANTITIES, _columns),
+    "Data format: Spreadsheet; functions by position in file. Interpolation: linear; extrapolation: none.",
+)
 moose = Grammar(
     "MOOSE",
     "#",
     dict.fromkeys(QUANTITIES, _columns),
-    "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns; constant outside the rows",
+    "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns; constant outside the rows. Of more "
+    "than two columns: xy_in_file_only = false, y_index_in_file = 1, 2, ...",
 )
 # of Modelica's CombiTable1Ds
 modelica = Grammar(

@@ -1,7 +1,7 @@
 """Targets: programs and formats that laws are written for, each declared once, where it is written.
 
 A new one is a function and a `Target` in the tuple TARGETS of its module: what it is written from, the quantities and
-options that it takes, and, for rows, its comments, its limits and what the program does outside them.
+options that it takes, and, for rows, its comments, units, limits and what the program does outside them.
 """
 
 from __future__ import annotations
@@ -16,18 +16,31 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.export.text import comment
 
 if TYPE_CHECKING:
-    from mbma_tables.export.law_rows import LawTable
+    from mbma_tables.export.law_table import LawTable
 
-LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit"})
-ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "direction"}
+LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"})
+ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "quantity", "peklenik", "direction"}
 CODE = LAW | {"name", "leakage", "direction"}
+FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
-GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "GRAPHS": "onnx", "CODE": "code"}
+GROUPS = {
+    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
+}  # fmt: skip
+SI = ("m", "Pa")
+# by quantity: the options that are of it alone, and what its rows are against
+OPTIONS = {
+    "conductance": {"conductivity", "conductivity_unit"}, "tangential_stiffness": {"kappa"}, "film": {"peklenik"},
+}  # fmt: skip
+AGAINST = {
+    "pressure": "overclosure", "conductance": "pressure", "tangential_stiffness": "pressure",
+    "leakage": "pressure", "hydraulic_aperture": "pressure",
+    "film": "mean_separation",
+}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """What is written for one program, or in one format.
+    """Declaration of the output for one program, or in one format.
 
     Parameters
     ----------
@@ -42,6 +55,10 @@ class Target:
         Of the first file's name, where it must be that; functions are then called by the rest of it.
     alone : bool
         Whether the first file is of use without the others.
+    quantity : str
+        Of the rows, where none is asked for; "pressure" by default.
+    units : pair of str, optional
+        Of length and of stress, where the program asks for them.
     """
 
     name: str
@@ -50,6 +67,8 @@ class Target:
     rows: bool = True
     end: str = ""
     alone: bool = True
+    quantity: str = "pressure"
+    units: tuple[str, str] | None = None
 
     def files(self, *given: Any, **options: Any) -> Mapping[str, bytes]:
         """The files by the ends of their names, that of the first being ""."""
@@ -60,15 +79,17 @@ class Target:
 
 @dataclasses.dataclass(frozen=True)
 class Grammar:
-    """How a program reads the rows of a law; called with a `LawTable` it gives the text of a file."""
+    """Format of the rows of a law for a program; called with a `LawTable` it returns the text of a file."""
 
     program: str
     mark: str  # of comments
     body: Mapping[str, Callable[..., str]]  # by quantity: what stands below the comments, of the law and what is named
-    beyond: str  # what the program does outside the rows, and what else its user must know
+    beyond: str  # behaviour of the program outside the rows, and further notes for its user
     most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
-    named: str | None = None  # what a name stands for that is not given; None where there is none
+    named: str | None = None  # default name; None if there is none
     first: str = ""  # line of the file
+    units: tuple[str, str] | None = None  # of length and of stress, where it has to be these
+    friction: str = ""  # what the user of its friction card must know; empty where there is none
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
         """The text of a file.
@@ -76,25 +97,35 @@ class Grammar:
         Raises
         ------
         InputError
-            For a quantity that the program does not take, more rows than it holds, and a name that it cannot read.
+            For a quantity or units that the program does not take, more rows than it holds, and a name that it cannot
+            read.
         """
-        if law.y_name not in self.body:
-            taken = " or ".join(f"{y} against {'overclosure' if y == 'pressure' else 'pressure'}" for y in self.body)
+        if law.quantity not in self.body:
+            taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
             raise InputError(f"{self.program} takes {taken} here, got {law.y_name} against {law.x_name}")
+        if self.units and (own := tuple(law.facts[fact][1] for fact in ("h_rms", "E_star"))) != self.units:
+            raise InputError(f"{self.program} is written in {' and '.join(self.units)}, got {' and '.join(own)}")
         if law.x.size > (most := self.most.get(law.y_name, law.x.size)):
             raise InputError(
                 f"{self.program} holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows"
             )
+        if "friction" in law.facts and not self.friction:
+            raise InputError(f"{self.program} takes no friction here")
         named = {} if self.named is None else {"name": self.named if name is None else name}
+        said = [self.friction] if "friction" in law.facts else []
         return (
             self.first
-            + comment([*law.comments, self.beyond], self.mark)
-            + self.body[law.y_name](law, **named, **numbers)
+            + comment([*law.comments, *said, self.beyond], self.mark)
+            + self.body[law.quantity](law, **named, **numbers)
         )
 
     def target(self, name: str) -> Target:
         """The target of this name."""
-        return Target(name, self, ROWS if self.named is None else ROWS | {"name"})
+        takes = ROWS if self.named is None else ROWS | {"name"}
+        for quantity, options in OPTIONS.items():
+            takes -= options if quantity not in self.body else set()
+        takes |= FRICTION if self.friction else set()
+        return Target(name, self, takes, quantity=next(iter(self.body)), units=self.units)
 
 
 @functools.cache
@@ -111,5 +142,5 @@ def targets() -> dict[str, Target]:
 
 
 def names(*groups: str) -> tuple[str, ...]:
-    """What a user may name, of some groups or of all; a target of an option, with a space in its name, is none."""
+    """Names that a user may give, of some groups or of all; targets with a space in the name belong to an option."""
     return tuple(name for key in groups or GROUPS for name in group(key) if " " not in name)

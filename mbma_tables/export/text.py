@@ -1,11 +1,11 @@
-"""How text and numbers are written into other codes: nothing that a user or a table says becomes code there."""
+"""Writing text and numbers into other codes, so that no text of a user or a table is executed there."""
 
 from __future__ import annotations
 
 import importlib.resources
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,9 @@ from mbma_tables.common.errors import InputError
 COMMENT_WIDTH = 108
 DIGITS = 10  # of the numbers in a law's file
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
-# what ends or begins a comment in C, ends a script in a page, or is a trigraph
+# begin or end of a C comment, end of a script in a page, trigraphs
 _MARKS = re.compile(r"\*(?=/)|/(?=\*)|<(?=[/!])|\?(?=\?)")
-# what a spreadsheet would take for a formula
+# first characters of a formula in a spreadsheet
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
@@ -36,7 +36,9 @@ def printable(text: str) -> str:
 
 
 def comment(lines: Iterable[str], mark: str) -> str:
-    """Lines as comments that reach from a mark to the end of the line."""
+    """Lines as comments that reach from a mark to the end of the line, "<!--" for comments of XML."""
+    if mark == "<!--":
+        return "".join(f"<!-- {printable(line).replace('--', '-%2D')} -->\n" for line in lines)
     return "".join(f"{mark} {printable(line)}".rstrip() + "\n" for line in lines)
 
 
@@ -55,7 +57,7 @@ def block_comment(lines: Iterable[str]) -> str:
 
 
 def opening(paragraphs: Iterable[str], mark: str) -> str:
-    """What a source file begins with: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
+    """Head of a source file: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
     wrap = textwrap.TextWrapper(COMMENT_WIDTH, break_long_words=False, break_on_hyphens=False).wrap
     lines = [line for text in paragraphs for line in wrap(text)]
     return (block_comment(lines) if mark == "/*" else comment(lines, mark)).rstrip()
@@ -82,16 +84,24 @@ def page_file(name: str) -> bytes:
     return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
 
 
-def filled(name: str, **parts: str) -> str:
-    """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty."""
-    chosen = re.compile(r"@IF ([A-Z]+)@(\n)?(.*?)@END@(?(2)\n)", re.S)
-    text = chosen.sub(lambda found: parts[found[1]] and found[3], template(name))
+def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
+    """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty.
+
+    @EACH@ ... @END@ is repeated for each function that is a slope times a ratio: @WHAT@, @PLACE@ and @RATIO@.
+    """
+    chosen = re.compile(r"@(?:IF ([A-Z]+)|EACH)@(\n)?(.*?)@END@(?(2)\n)", re.S)
+
+    def repeated(text: str) -> str:
+        own = ({"WHAT": what, "PLACE": what.upper(), "RATIO": ratio} for what, ratio in each.items())
+        return "".join(re.sub("@(WHAT|PLACE|RATIO)@", lambda place: one[place[1]], text) for one in own)  # noqa: B023
+
+    text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), template(name))
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
 
 def csv_cell(text: str) -> str:
-    """A header of a CSV column, which no spreadsheet takes for a formula; the csv module quotes it."""
+    """A header of a CSV column that no spreadsheet interprets as a formula; the csv module quotes it."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 

@@ -1,4 +1,4 @@
-"""Islands by the paper's four numbers: what the axes of the four-parameter table mean."""
+"""Islands by the paper's four numbers: the axes of the four-parameter table."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SPHERE_FLOOR = 1.25  # zeta_d at the end of the axis `sphere`, below the paper's
 def band_fields(spread: FloatArray, sphere: FloatArray, hurst: FloatArray, variant: Variant) -> FloatArray:
     """(mu, sigma zeta_d^H, F_hat zeta_d^(1+H) per Phi_F, A_hat zeta_d^2 per Phi_A), stacked first.
 
-    Arrays of one shape. All are finite for every zeta_d, in which powers of it cancel; NaN of what is no band.
+    Arrays of one shape. All are finite for every zeta_d, because its powers cancel; NaN unless zeta_u > zeta_d.
     """
     from scipy.special import exprel
 
@@ -39,7 +39,7 @@ def band_fields(spread: FloatArray, sphere: FloatArray, hurst: FloatArray, varia
 
 
 class Coordinates(NamedTuple):
-    """Islands in the four-parameter table: in the order of its axes, and what else follows from the four numbers."""
+    """Islands in the four-parameter table: coordinates in the order of its axes, and derived quantities."""
 
     X: FloatArray
     spread: FloatArray
@@ -51,7 +51,7 @@ class Coordinates(NamedTuple):
     area: FloatArray  # A_hat per Phi_A, 2 pi D R_u R_d sigma^2
 
     def some(self, chosen: Any) -> Coordinates:
-        """The islands at these places."""
+        """The islands at these indices."""
         return Coordinates(*(field[chosen] for field in self))
 
 

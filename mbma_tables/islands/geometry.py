@@ -5,15 +5,15 @@ Units as in `surfaces.spectrum`: heights in s, lengths in 1/q0. With e = zeta_1^
     zeta_d^(-2H) = e + a,   zeta_u^(-2H) = e + b
 
 so that m0 = a - b, h_d = sqrt(a), h_u = sqrt(b) and log(zeta_u/zeta_d) = log1p((a - b)/(e + b))/(2H) keep
-their digits when both ends run into zeta_1, that is when delta goes to 0.
+their accuracy when both ends tend to zeta_1, that is for delta to 0.
 
-On a surface that is its own spectrum lengths are its own. With T(q) = m_0(q..q_1), the roughness finer than q, the
+On a surface given by a spectrum, lengths have its unit. With T(q) = m_0(q..q_1), the roughness finer than q, the
 paper's (27) and (30) read
 
     T(q_d) = (4 beta/3 delta s/h_rms)^2,   T(q_u) = (phi/(1 + phi) delta)^2,   h_d = sqrt(T(q_d)),
 
 with floors of q_d and q_u at multiples of q_L, the spectrum's `longest`. On a self-affine spectrum these are the
-paper's equations; s/h_rms = (1 - zeta_1^(-2H))^(-1/2) is theirs alone, and 1 on any other.
+paper's equations; s/h_rms is (1 - zeta_1^(-2H))^(-1/2) on these and 1 on any other.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def floor_offset(hurst: Any, zeta_1: Any, floor: float) -> Any:
 
 
 def summit_sigma(m0: Any, alpha: Any, summits: bool) -> Any:
-    """Standard deviation of summit heights (2), or of all heights where a variant says so."""
+    """Standard deviation of summit heights (2), or of all heights in variants that use these."""
     return np.sqrt((1.0 - (BROADENING / alpha if summits else 0.0)) * m0)
 
 
@@ -85,7 +85,7 @@ def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Variant) ->
 def _fields(
     delta: FloatArray, bands: tuple[FloatArray, ...], D_top: Any, R_top: Any, variant: Variant
 ) -> dict[str, FloatArray]:
-    """`FIELDS` of islands from their bands, and the summits of all wavelengths (top)."""
+    """`FIELDS` of islands from their bands, and from the summits of all wavelengths (top)."""
     _, _, R_d, R_u, D, sigma, root_a, root_b, _, _, _ = bands
     h_d = root_a if variant.offset else np.zeros_like(root_a)
     return dict(zip(BANDS, bands, strict=True)) | {
@@ -97,7 +97,7 @@ def _fields(
 
 
 class Floors(NamedTuple):
-    """Where q_d and q_u reach their floors, and how fast the roots of T rise with delta until then."""
+    """Values at which q_d and q_u reach their floors, and the slopes of the roots of T in delta up to there."""
 
     at_d: Place
     at_u: Place
@@ -120,11 +120,11 @@ def s_over_h_rms(surface: MeasuredSurface) -> float:
 
 
 def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:
-    """The floors of a variant, refused where the spectrum ends below that of q_u."""
+    """The floors of a variant; an error if the spectrum ends below that of q_u."""
     if not surface.q1 > variant.floor_u * surface.longest:
         raise OutOfRangeError(
             f"the spectrum ends at q = {surface.q1:.4g}, and MBMA's smallest band at {variant.floor_u:g} times "
-            f"{surface.longest:.4g}, where most height is: measure shorter wavelengths, or ask another theory"
+            f"{surface.longest:.4g}, where most height is: measure shorter wavelengths, or use another theory"
         )
     at_d, at_u = (surface.laws.place(floor * surface.longest) for floor in (variant.floor_d, variant.floor_u))
     root_d, root_u = (float(np.sqrt(surface.laws.above(place))) for place in (at_d, at_u))

@@ -4,9 +4,7 @@ Heights are in units of the summits' standard deviation sigma, radii in units of
 
     d(rho) = rho^2 - X + w(rho),   p = (mu/2) F_{3/2}(d),   w = (4/pi) integral t/(t + rho) p K(k) dt
 
-so that every island of every surface is one point of two functions Phi_F(X, mu) and Phi_A(X, mu). The classical method
-is the paper's, the damped iteration of Greenwood and Tripp: rings of equal width, the pressure taken constant over
-each, and w <- w + damping (w[p] - w) until nothing changes. It slows down and then diverges as mu grows.
+so that every island of every surface is one point of two functions Phi_F(X, mu) and Phi_A(X, mu).
 """
 
 from __future__ import annotations
@@ -14,26 +12,22 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, number_in, require, whole_number_in
-from mbma_tables.common.errors import ConvergenceError, InputError
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.core import core, in_blocks
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.islands.spectral import basis
 
-Method = Literal["newton", "classical"]
-
 LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), *range(256, 513, 64)])
 MIN_SOLVER_RTOL = 1e-13
-MAX_NODES = {"newton": 1024, "classical": 2048}  # a few seconds for an island
-CLASSICAL_RINGS = 200
+MAX_NODES = 1024  # a few seconds for an island
 BLOCK = 1 << 22  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
 COARSE_NODES = 12  # of the first guess
-MAX_DEFORMATION = 1e12  # of the damped iteration: one this large is divergence
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,7 +43,7 @@ class IslandSolution:
     error : ndarray
         Estimate of the larger relative error of the two.
     iterations, nodes : ndarray of int
-        Newton steps (or damped iterations) and nodes (or rings) of each solution.
+        Newton steps and nodes of each solution.
     """
 
     X: FloatArray
@@ -59,30 +53,19 @@ class IslandSolution:
     error: FloatArray
     iterations: NDArray[np.int64]
     nodes: NDArray[np.int64]
-    method: Method
     rtol: float
-    damping: float
-    max_iterations: int
 
     @functools.cached_property
     def _profiles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         count = int(np.max(self.nodes))
-        shape = (*np.shape(self.X), count)
-        if self.method == "newton":
-            profiles = np.empty((3, np.size(self.X), count))
-            _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles)
-        else:
-            rows = [
-                solve_classical(x, m, count, self.damping, self.rtol, self.max_iterations)[4:]
-                for x, m in zip(np.ravel(self.X), np.ravel(self.mu), strict=True)
-            ]
-            profiles = np.stack([np.stack(row) for row in rows], axis=1)
+        shape, profiles = (*np.shape(self.X), count), np.empty((3, np.size(self.X), count))
+        _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles)
         rho, pressure, gap = (rows.reshape(shape) for rows in profiles)
         return rho, pressure, gap
 
     @property
     def rho(self) -> FloatArray:
-        """Radii of the profiles over L, shape (..., nodes); solved for when first asked."""
+        """Radii of the profiles over L, shape (..., nodes); solved on first access."""
         return self._profiles[0]
 
     @property
@@ -124,7 +107,7 @@ def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
 
 
 def _nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
-    """Gauss nodes that usually give `rtol`; the estimate of each solution decides."""
+    """Gauss nodes that usually give `rtol`; the error estimate of each solution is then checked."""
     digits = max(-math.log10(rtol), 3.0)
     softness = np.log10(np.maximum(mu, 1.0)) / 12
     wanted: FloatArray = digits * np.sqrt(np.maximum(X, 0) + 5) * (1 + softness)
@@ -146,93 +129,9 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
         found, taken = _newton(X[now], mu[now], rtol, int(count))
         phi[now], used[now] = found, count
         steps[now] += taken
-        # nodes that were asked for give what they give
+        # a requested number of nodes is used as it is
         failed[now] = ~(found[:, 2] <= (rtol if nodes is None else np.inf))
     return phi, steps, used, failed | ~np.isfinite(phi).all(axis=1)
-
-
-def _solve_classical(
-    X: FloatArray, mu: FloatArray, rtol: float, rings: int, damping: float, max_iterations: int
-) -> tuple[Any, ...]:
-    """The same by the damped iteration."""
-    phi = np.full((X.size, 3), np.nan)
-    steps = np.zeros(X.size, dtype=np.int64)
-    failed = np.ones(X.size, dtype=bool)
-    for k in range(X.size):
-        fine, coarse = (
-            solve_classical(X[k], mu[k], count, damping, rtol, max_iterations) for count in (rings, rings // 2)
-        )
-        change = [abs(c / f - 1) if f else 0.0 for f, c in zip(fine[2:4], coarse[2:4], strict=True)]
-        phi[k] = *fine[2:4], max(change) + rtol
-        steps[k], failed[k] = fine[0], not (fine[1] and coarse[1])
-    return phi, steps, np.full(X.size, rings), failed
-
-
-def ring_matrix(rings: int) -> FloatArray:
-    """w at the rings' middles per unit radius a, from pressures on `rings` rings of equal width (Eq. 37)."""
-    from scipy.special import ellipkm1
-
-    r = (np.arange(rings) + 0.5) / rings
-    t, rho = r[None, :], r[:, None]
-    complement = ((t - rho) / (t + rho)) ** 2
-    np.fill_diagonal(complement, 1.0)
-    matrix: FloatArray = 4 / np.pi * t / (t + rho) * ellipkm1(complement) / rings
-    # the midpoint rule across ln|t - rho| is of second order with ln(h/2 pi) in the ring itself
-    np.fill_diagonal(matrix, 2 / np.pi * np.log(16 * np.pi * r * rings) / rings)
-    return matrix
-
-
-@np.errstate(all="ignore")
-def iterate(
-    X: float,
-    mu: float,
-    a: float,
-    matrix: FloatArray,
-    damping: float,
-    tolerance: float,
-    max_iterations: int,
-    w: FloatArray,
-    p: FloatArray,
-) -> tuple[int, bool, float, float]:
-    """Iterate from w = 0; returns iterations, whether it converged, Phi_F and Phi_A, NaN where it diverged."""
-    width = a / w.size
-    rho, loads = width * (np.arange(w.size) + 0.5), np.empty(w.size)
-    gap, iterations, converged = rho**2 - X, 0, False
-    w[:] = 0.0
-    while True:
-        core.height_integrals(3, gap + w, loads)
-        p[:] = mu / 2 * loads  # (36)
-        if converged or iterations == max_iterations:
-            break
-        change = damping * (a * (matrix @ p) - w)
-        w += change
-        iterations, scale = iterations + 1, np.abs(w).max()
-        if not scale < MAX_DEFORMATION:
-            return iterations, False, math.nan, math.nan
-        converged = bool(np.abs(change).max() <= tolerance * damping * scale)
-    core.height_integrals(2, gap + w, loads)
-    force, area = (float(2 * np.pi * width * (rho @ part)) for part in (p, loads))
-    if not math.isfinite(force + area):
-        return iterations, False, math.nan, math.nan
-    return iterations, converged, force, area
-
-
-def radius(X: float, mu: float, rtol: float) -> float:
-    """Where an island ends, as far as a relative error `rtol` tells."""
-    squared = np.empty(1)
-    core.island_extents(np.array([X]), np.array([mu]), 0.03 * rtol, squared)
-    return math.sqrt(squared[0])
-
-
-def solve_classical(
-    X: float, mu: float, rings: int, damping: float, rtol: float, max_iterations: int
-) -> tuple[int, bool, float, float, FloatArray, FloatArray, FloatArray]:
-    """One island; returns iterations, converged, Phi_F, Phi_A, rho, pressure, gap."""
-    a = radius(X, mu, rtol)
-    w, p = np.zeros(rings), np.zeros(rings)
-    rho = a * (np.arange(rings) + 0.5) / rings
-    steps, converged, force, area = iterate(X, mu, a, ring_matrix(rings), damping, rtol, max_iterations, w, p)
-    return steps, converged, force, area, rho, p, rho**2 - X + w
 
 
 def solve(
@@ -240,9 +139,6 @@ def solve(
     mu: ArrayLike,
     rtol: float = 1e-10,
     nodes: int | None = None,
-    method: Method = "newton",
-    damping: float = 0.3,
-    max_iterations: int = 2000,
 ) -> IslandSolution:
     """Solve the island problem for phi_F, phi_A and the profiles of pressure and gap.
 
@@ -256,12 +152,7 @@ def solve(
     rtol : float
         Relative error asked of phi_F and phi_A, at least 1e-13; it sets the node count.
     nodes : int, optional
-        Use this many Gauss nodes (8 to 1024) or rings (to 2048) instead; then `error` says what accuracy they gave.
-    method : {"newton", "classical"}
-        Newton on the spectral discretisation, or the damped iteration of Greenwood and Tripp (1967) on
-        `nodes` rings (200 if not given), whose mesh error `error` states and `rtol` does not control.
-    damping, max_iterations : float, int
-        For "classical": the share of each correction that is taken, and the steps allowed.
+        Use this many Gauss nodes (8 to 1024) instead; then `error` is the accuracy reached.
 
     Returns
     -------
@@ -272,7 +163,7 @@ def solve(
     InputError
         NaN, infinite, masked or empty input, a negative `mu`, an `rtol` outside [1e-13, 0.1].
     ConvergenceError
-        Where the accuracy was not reached; its `mask` says which entries, its `result` holds the rest.
+        Where the accuracy was not reached: at entries of its `mask`; its `result` holds the others.
 
     Examples
     --------
@@ -286,28 +177,19 @@ def solve(
     approach, stiffness = finite_array("X", X), finite_array("mu", mu)
     require("mu", stiffness, stiffness >= 0, "at least 0")
     rtol = number_in("rtol", rtol, MIN_SOLVER_RTOL, 0.1)
-    if method not in MAX_NODES:
-        raise InputError(f"method must be 'newton' or 'classical', got {method!r}")
-    nodes = None if nodes is None else whole_number_in("nodes", nodes, 8, MAX_NODES[method])
-    damping = number_in("damping", damping, 1e-6, 1.0)
-    max_iterations = whole_number_in("max_iterations", max_iterations, 1, 10**9)
+    nodes = None if nodes is None else whole_number_in("nodes", nodes, 8, MAX_NODES)
     shape = broadcast_shape(X=approach, mu=stiffness)
     flat_X, flat_mu = (np.broadcast_to(each, shape).ravel() for each in (approach, stiffness))
-    if method == "newton":
-        phi, steps, used, missed = _solve_newton(flat_X, flat_mu, rtol, nodes)
-    else:
-        rings = nodes or CLASSICAL_RINGS
-        phi, steps, used, missed = _solve_classical(flat_X, flat_mu, rtol, rings, damping, max_iterations)
-    fields: list[Any] = [part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)]
-    fields += [method, rtol, damping, max_iterations]
+    phi, steps, used, missed = _solve_newton(flat_X, flat_mu, rtol, nodes)
+    fields: list[Any] = [*(part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)), rtol]
     result = IslandSolution(*fields)
     failed = missed.reshape(shape)
     if failed.any():
         first = int(np.flatnonzero(missed)[0])
         raise ConvergenceError(
-            f"{method} did not reach the accuracy asked for at {int(failed.sum())} of {failed.size} "
+            f"the solver did not reach the requested accuracy at {int(failed.sum())} of {failed.size} "
             f"entries, the first at X = {flat_X[first]:.6g}, mu = {flat_mu[first]:.6g} "
-            f"(reached {phi[first, 2]:.1e}, asked {rtol:.1e})",
+            f"(reached {phi[first, 2]:.1e}, requested {rtol:.1e})",
             failed,
             result,
         )

@@ -4,8 +4,8 @@ phi is the standard normal density; n = 1/2, 1, 3/2, 2, 5/2. Eqs. (36) and (38) 
 and F_1; F_{5/2} and F_2 are their integrals over a rigid sphere.
 
 Each F_n is eight polynomial pieces (`generate/tables/height_coefficients.py`), accurate to 1e-13 relative for x <= 10
-and to 5e-13 up to 37. The core has its own because scipy's parabolic cylinder functions lose five digits near x = -6
-and seven near 6 and answer NaN at -100.
+and to 5e-13 up to 37. The core does not use scipy's parabolic cylinder functions, which lose five digits near x =
+-6 and seven near 6 and return NaN at -100.
 """
 
 from __future__ import annotations

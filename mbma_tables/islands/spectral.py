@@ -1,4 +1,4 @@
-"""Spectral form of the elastic half-space under an axisymmetric pressure (Eq. 37).
+"""Spectral form of the elastic half-space under an axisymmetric pressure (Eq. 37), and under one in the plane.
 
 With v = (rho/a)^2 on [0, 1] and shifted Legendre polynomials, the Abel transform of the k-th polynomial is
 sin((2k+1) psi)/(2k+1) at s = a cos(psi), and Eq. (37) is two Abel transforms in a row. Its Galerkin matrix
@@ -6,12 +6,19 @@ is therefore rational, symmetric and positive definite:
 
     integral_0^1 P_k w[P_l] dv = (8 a/pi) I_kl / ((2k+1)(2l+1)),
     I_kl = (1/(1 - 4 (k-l)^2) - 1/(1 - 4 (k+l+1)^2)) / 2
+
+In the plane, with x over a in [-1, 1] and P_m, P_n of even degree, the kernel is -(2/pi) ln|x - s|, and by Neumann's
+integral 2 Q_n of P_n over x - s
+
+    -integral P_m P_n ln|x - s| dx ds = (4/(2n + 1)) (1/((m-n+1) (m+n)) - 1/((m-n-1) (m+n+2)))
+
+and 6 - 4 ln 2 for m = n = 0.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -24,14 +31,14 @@ class Basis(NamedTuple):
 
     v: FloatArray  # Gauss nodes in v = (rho/a)^2
     root_weights: FloatArray  # square roots of their weights; vectors of the solver are values times these
-    modes: FloatArray  # row k takes such a vector to its k-th orthonormal Legendre coefficient
+    modes: FloatArray  # row k maps such a vector to its k-th orthonormal Legendre coefficient
     operator: FloatArray  # w = a * operator @ p in such vectors; symmetric, positive definite
 
 
 def gauss_legendre(n: int) -> tuple[FloatArray, FloatArray]:
     """Gauss nodes and weights on [0, 1], relative accuracy of a few n eps at the ends too.
 
-    Made here because numpy and scipy form 1 - x^2 from a rounded x and lose up to five digits of the end weights,
+    Computed here because numpy and scipy form 1 - x^2 from a rounded x and lose up to five digits of the end weights,
     which the pressure at an island's edge needs. Here t = 1 - x is the unknown and the recurrence runs over differences
     of Legendre polynomials.
     """
@@ -61,15 +68,37 @@ def gauss_legendre(n: int) -> tuple[FloatArray, FloatArray]:
 def basis(nodes: int) -> Basis:
     """The basis of `nodes` Gauss points; computed once, read-only."""
     v, weights = gauss_legendre(nodes)
-    root_weights = np.sqrt(weights)
     k = np.arange(nodes)
     odd = 2.0 * k + 1
-    modes = (legendre.legvander(2 * v - 1, nodes - 1) * root_weights[:, None] * np.sqrt(odd)).T
     difference = (k[:, None] - k) ** 2
     total = (k[:, None] + k + 1) ** 2
     overlap = (1 / (1 - 4.0 * difference) - 1 / (1 - 4.0 * total)) / 2
-    galerkin = 8 / np.pi * overlap / np.sqrt(np.outer(odd, odd))
-    # sums in one order whatever the BLAS and its threads: tables rebuild to the bit
+    values = legendre.legvander(2 * v - 1, nodes - 1)
+    return _made(v, weights, values, odd, 8 / np.pi * overlap / np.sqrt(np.outer(odd, odd)))
+
+
+@functools.lru_cache(maxsize=64)
+def plane_basis(nodes: int) -> Basis:
+    """The same in the plane, of pressures that are even in x, at nodes in (0, 1); v is (x/a)^2.
+
+    Displacements are those against a point at the distance a.
+    """
+    x, weights = (part[nodes:] for part in gauss_legendre(2 * nodes))
+    x = 2 * x - 1
+    m, n = 2.0 * np.arange(nodes)[:, None], 2.0 * np.arange(nodes)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        overlap = 4 / (2 * n + 1) * (1 / ((m - n + 1) * (m + n)) - 1 / ((m - n - 1) * (m + n + 2)))
+    overlap[0, 0] = 6 - 4 * np.log(2)
+    odd = 2 * n + 1
+    values = legendre.legvander(x, 2 * nodes - 1)[:, ::2]
+    return _made(x**2, 2 * weights, values, odd, overlap * np.sqrt(np.outer(odd, odd)) / np.pi)
+
+
+def _made(v: FloatArray, weights: FloatArray, values: Any, odd: Any, galerkin: FloatArray) -> Basis:
+    """The basis of polynomials at the nodes, with their Galerkin matrix when they are orthonormal."""
+    root_weights = np.sqrt(weights)
+    modes = (values * root_weights[:, None] * np.sqrt(odd)).T
+    # order of summation independent of BLAS and threads, so that tables are reproducible
     half = np.einsum("ki,kl->il", modes, galerkin)
     operator = np.einsum("il,lj->ij", half, modes)
     made = Basis(v, root_weights, modes, (operator + operator.T) / 2)

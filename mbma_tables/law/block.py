@@ -1,8 +1,8 @@
-"""A contact law's block, whose layout `core/mbma.h` describes: its places, its inverse, and softening.
+"""The block of a contact law (layout in `core/mbma.h`): its indices, its inverse, and softening.
 
 The inverse is polynomials of x in buckets of force or area, found from their bits: `INVERSE_HEAD` numbers, then records
-of centre, rate, the sign of the side and INVERSE_DEGREE + 1 coefficients. They are guesses, which a Newton step on the
-law itself makes exact.
+of centre, rate, the sign of the side and INVERSE_DEGREE + 1 coefficients. They are starting values for a Newton step on
+the law itself.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mbma_tables.core import core
 DEGREE = 8
 CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = 0, 1, 2, 3 + DEGREE, 4 + 2 * DEGREE  # in a record
 RECORD = 5 + 2 * DEGREE
-# quantities, by which questions name them
+# names of the quantities
 QUANTITIES = ("pressure", "area", "stiffness", "area_slope", "energy")
 FORCE, AREA = range(2)
 
@@ -71,7 +71,7 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     core.inverse_nodes(wanted, block, which, end, x, side)
     records = np.zeros((centre.size, INVERSE_RECORD))
     records[:, 0] = centre
-    records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > 0)
+    records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > np.finfo(float).tiny)
     records[:, 2] = side.reshape(-1, points.size)[:, points.size // 2]
     records[:, 3:] = x.reshape(-1, points.size) @ transform
     head = np.zeros(INVERSE_HEAD)

@@ -18,13 +18,13 @@ LIGHT, HEAVY = 1e-2, 0.99  # overclosures of the default ends, over that of the 
 class ContinuedLaw:
     """Pressure of a `ContactLaw` between two mean separations, and straight lines that continue it with its slope.
 
-    Towards wide gaps the line crosses zero: pressure is negative there, a pull that holds free bodies in trial steps.
+    Towards wide gaps the line crosses zero: pressure is negative there, which attracts separated bodies in trial steps.
     Neither end is a law of contact: check with `inside` that a solution lies between them.
 
     Attributes
     ----------
     law : ContactLaw
-        What is continued.
+        The law that is continued.
     light, heavy : float
         Mean separations of the ends [length].
     """
@@ -34,7 +34,7 @@ class ContinuedLaw:
     heavy: float
 
     def pressure_and_stiffness(self, mean_separation: ArrayLike | str) -> tuple[Numbers, Numbers]:
-        """F/A0 and -dp/du, the derivative of just this pressure, in one pass."""
+        """F/A0 and its derivative -dp/du, in one pass."""
         u = self._given(mean_separation)
         held = np.clip(u, self.heavy, self.light)
         pressure, stiffness = self.law.pressure_and_stiffness(held)
@@ -49,7 +49,7 @@ class ContinuedLaw:
         return self.pressure_and_stiffness(mean_separation)[1]
 
     def inside(self, mean_separation: ArrayLike | str) -> Any:
-        """Whether the law itself answers, or the bodies are apart, where its pressure is zero: not at first contact."""
+        """Whether the law itself applies, or the bodies are apart and its pressure is zero; False at first contact."""
         u = self._given(mean_separation)
         return (self.heavy <= u) & (u <= self.light)
 

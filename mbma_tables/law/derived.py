@@ -1,4 +1,4 @@
-"""What follows from a law, computed when first read: unloading, sliding, softening, leakage, its picture."""
+"""Quantities derived from a law on first access: unloading, sliding, softening, leakage, its picture."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from mbma_tables.law.leakage import LeakageLaw
 
 
-DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
+DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors of the polynomials
 
 
 class Derived:
-    """The part of a `ContactLaw` that is computed when first read."""
+    """The part of a `ContactLaw` that is computed on first access."""
 
     def unloading_stiffness(
         self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
@@ -36,19 +36,19 @@ class Derived:
 
         With a hardness it is made from the law of the elastic contact, which is fitted when this is first called.
         """
-        found: Numbers = self._elastic.stiffness(mean_separation, separation=separation)
-        if math.isinf(self.hardness):
-            return found
-        from mbma_tables.laws.hardness import frozen_factor
-
-        return found * float(frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient))))
+        law, factor = self.unloading
+        found: Numbers = factor * law.stiffness(mean_separation, separation=separation)
+        return found
 
     @functools.cached_property
-    def _elastic(self: Any) -> Any:
-        """The law of the elastic contact."""
+    def unloading(self: Any) -> tuple[Any, float]:
+        """The law of the elastic contact, and `unloading_stiffness` over its stiffness."""
         if math.isinf(self.hardness):
-            return self
-        return dataclasses.replace(self.elastic(), units=self.units)
+            return self, 1.0
+        from mbma_tables.laws.hardness import frozen_factor
+
+        factor = frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient)))
+        return dataclasses.replace(self.elastic(), units=self.units), float(factor)
 
     def tangential(
         self: Any,
@@ -135,7 +135,7 @@ class Derived:
         from mbma_tables.law.leakage import leakage_law
 
         if self.surface is None:
-            raise InputError("leakage needs the surface, which this law does not hold")
+            raise InputError("leakage needs the surface, which this law does not contain")
         return leakage_law(self, self.surface)
 
     def _figure(self: Any) -> Figure:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from scipy import LowLevelCallable
 
     class Law:
-        """As `core/binding.c` has it, which answers floats and small arrays without Python."""
+        """Type of the law in `core/binding.c`, which evaluates floats and small arrays without Python."""
 
         pressure: Callable[..., Numbers]
         area: Callable[..., Numbers]
@@ -58,7 +58,7 @@ class ContactLaw(Law, Derived, Displayed):
     Attributes
     ----------
     h_max : float
-        Highest point [length]; where contact ends there, laws answer zero from this gap on.
+        Highest point [length]; if contact ends there, results are zero at this gap and above.
     E_star : float
         Effective modulus, in whose unit force is.
     lowest, highest : float
@@ -67,7 +67,7 @@ class ContactLaw(Law, Derived, Displayed):
         Bound on the relative error of force and area, of the polynomials and of what they were made from together.
         With a hardness it does not hold within 1e-6 h_max of last contact, where islands turn elastic one by one.
     turning_point, area_turning_point : float or None
-        Gap below which force, or area, falls again, where it does; inverses end there.
+        Gap below which force, or area, decreases under compression, if it does; inverses end there.
     theory, variant, island_model : str
         What made it; variant and island model are empty where the theory is not MBMA.
     block : ndarray
@@ -77,11 +77,11 @@ class ContactLaw(Law, Derived, Displayed):
     units : Units
         Of lengths and stresses, as far as the surface and the modulus knew theirs.
     surface : Surface
-        Whose law it is.
+        The surface of the law.
     hardness : float
         Infinite where nothing yields.
     elastic : callable or None
-        With a hardness, what makes the law of the elastic contact.
+        With a hardness, function that makes the law of the elastic contact.
     materials : Pair or None
         Where they are named.
     gaps : theory or None
@@ -154,12 +154,12 @@ class ContactLaw(Law, Derived, Displayed):
         return gaps, d
 
     def _ask(self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]) -> Any:
-        """What `fill` writes, in blocks, where it returns that all is in range; else `check` raises."""
+        """Result of `fill`, in blocks, if it reports that all is in range; else `check` raises."""
         if is_labelled(given):
             from mbma_tables.surfaces.labels import apply
 
             return apply(lambda block: self._ask(block, count, check, fill), (given,), count)
-        # entries of plain arrays are checked as they are answered
+        # entries of plain arrays are checked during evaluation
         plain = type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
         known = given if plain else check(given)
         flat = np.ascontiguousarray(known).reshape(-1)
@@ -183,17 +183,17 @@ class ContactLaw(Law, Derived, Displayed):
         return self._ask(given, len(wanted), check, fill)
 
     def _ask_one(self, what: int, mean_separation: Any, separation: Any) -> Any:
-        """What a method of `Law` does not answer itself."""
+        """Arguments that a method of `Law` does not evaluate itself."""
         return self._values((QUANTITIES[what],), mean_separation, separation)[0]
 
     def __call__(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Numbers:
-        """The same as `pressure`."""
+        """Same as `pressure`."""
         return self.pressure(mean_separation, separation=separation)
 
     def pressure_and_stiffness(
         self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
     ) -> tuple[Numbers, Numbers]:
-        """F/A0 and -dp/du in one pass, as iterations need them."""
+        """F/A0 and -dp/du in one pass, for iterations."""
         pressure, stiffness = self._values(("pressure", "stiffness"), mean_separation, separation)
         return pressure, stiffness
 
@@ -207,7 +207,7 @@ class ContactLaw(Law, Derived, Displayed):
         Raises
         ------
         OutOfRangeError
-            Where the branch does not reach the value; the message has its end.
+            If the branch does not reach the value; the message has the branch's end.
         """
         if (pressure is None) == (area is None):
             raise InputError("give pressure or area, one of them")
@@ -259,8 +259,8 @@ class ContactLaw(Law, Derived, Displayed):
     def slope_error(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Any:
         """Bound on the error of `stiffness` over 2F/l, and of `area_slope` over A/l, against those of the theory.
 
-        l = h_max - d where contact ends there, else h_max + d. It covers what the polynomials leave out, and for MBMA
-        the error of the islands, which the sum over them passes on to slopes; not the own error of another theory.
+        l = h_max - d where contact ends there, else h_max + d. It includes the error of the polynomials, and for MBMA
+        that of the islands as it propagates to slopes; not the error of another theory itself.
         """
         d = self.separations(mean_separation, separation)
         head = self.block
@@ -311,8 +311,8 @@ class ContactLaw(Law, Derived, Displayed):
         Returns
         -------
         scipy.LowLevelCallable
-            NaN outside the law. For ctypes, cffi and what else calls C, `function` is of ctypes and `user_data` its
-            last argument; the law lives as long as that.
+            NaN outside the law. For ctypes, cffi and other callers of C, `function` is a ctypes function and
+            `user_data` its last argument, which keeps the law alive.
 
         Examples
         --------

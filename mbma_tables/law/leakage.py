@@ -120,7 +120,7 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
     try:
         pieces = fit.side_pieces(side, rtol)
     except ConvergenceError:
-        # what the law's polynomials miss of each other where they meet grows towards the blocked gap
+        # jumps between the law's polynomials are amplified towards the blocked gap
         pieces = fit.side_pieces(side, max(RTOL, law.error))
     block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[at.LOWEST], top))
     block.view(np.int64)[at.ENDS] = blocked
@@ -148,7 +148,7 @@ def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
 
 
 def _between_nodes(pieces: fit.Pieces, values: fit.Values) -> float:
-    """Relative error midway between the nodes of the fit: kinks of the flow may show in no coefficient."""
+    """Relative error midway between the nodes of the fit, because kinks of the flow may not affect its coefficients."""
     t = np.cos(np.pi * np.arange(fit.SAMPLES + 1) / fit.SAMPLES)
     records = pieces.records
     x = np.minimum(records[:, at.CENTRE, None] + t / records[:, at.RATE, None], 1.0)

@@ -1,6 +1,6 @@
-"""`contact_law`: one surface's pressure and area by any theory, frozen into polynomials of the gap.
+"""`contact_law`: one surface's pressure and area by any theory, fitted by polynomials of the gap.
 
-MBMA's laws are made from a profile of the surface's islands, other theories' from their answers; `law_pieces` fits
+MBMA's laws are made from a profile of the surface's islands, others from the theory's results; `law_pieces` fits
 the polynomials and bounds their errors.
 """
 
@@ -10,7 +10,7 @@ import functools
 import math
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -30,19 +30,17 @@ from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.island import check_band
-from mbma_tables.totals.island_sum import Pairs, totals_of
-from mbma_tables.totals.profile import profile, source_of
+from mbma_tables.totals.profile import profile
 
 MIN_LAW_RTOL = 1e-9
-RESOLVED = 1e-3  # a polynomial this close is one whose error its coefficients show
+RESOLVED = 1e-3  # for polynomials this accurate the last coefficients estimate the error
 POWERS = (3.5, 10 / 3)  # of h_max - d, in which MBMA's force and area start
-ROUGH_LEVERAGE = 30.0  # as `Profile.leverage`, where there is no profile
-LAYER_SHARE = 0.5  # of the boundary layer, up to which those powers leave little
+LAYER_SHARE = 0.5  # of the boundary layer, up to which these powers dominate
 FIRST_OCTAVES = 20  # below which a theory that ends at h_max is a power of h_max - u
 MOST_OCTAVES = 60
 MAX_SPAN = 10.0  # u/h_max up to which a theory without last contact is covered
 LOWEST = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # u/h_max from which a theory may answer
-LOOKED_AT = 24  # places at which a theory's own error is looked at
+LOOKED_AT = 24  # points at which a theory's own error is evaluated
 SHARE = 0.1  # of the median of a theory's own errors: the polynomials need not be closer to it
 
 
@@ -58,7 +56,7 @@ def contact_law(
     hardness: float | str | None = None,
     materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> ContactLaw:
-    """Pressure and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
+    """Pressure and area of one surface as functions of its gap, for many gaps and for inverses.
 
     Parameters
     ----------
@@ -72,7 +70,7 @@ def contact_law(
     island model, variant, E_star
         As for `contact`; `island_model` may be a user-defined island model.
     hardness, materials : optional
-        As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
+        As for `contact`: the law of loading. Its `energy` is then the work of loading, not that recovered on unloading.
 
     Returns
     -------
@@ -114,15 +112,15 @@ def contact_law(
     if one.labelled:
         one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))
     if one.shape != ():
-        raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
+        raise InputError(f"a law needs one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, "gaps": chosen.gaps(), **yields}
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:
-        return _theory_law(one, chosen, asked, facts)
+        return theory_law(one, chosen, asked, facts)
     except ConvergenceError as fault:
-        raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
+        raise ConvergenceError(f"theory {chosen.name!r}: {fault}; use a larger rtol", fault.mask) from None
 
 
 def _mbma_law(
@@ -136,27 +134,12 @@ def _mbma_law(
         check_band(surface, variant)
         stress = float(surface.q0 * surface.s)
         shape = float(surface.hurst), float(surface.zeta_1), h_max / h_rms
-    end, errors = 2 * h_max, [0.0]
-    kept: Any = None
-    try:
-        kept = profile(shape, model, variant, inner)
-    except ConvergenceError:
-        if not isinstance(surface, Surface):
-            raise
-        # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
-        source, leverage = source_of(shape, variant), ROUGH_LEVERAGE
-    else:
-        # the law ends with the island model's table; rounding may pass full compression
-        end = min(float(kept.edges[-1]) * h_rms, end)
-        source, leverage = kept.source, kept.leverage
+    kept = profile(shape, model, variant, inner)
+    # the law ends with the island model's table; rounding may pass full compression
+    end, source = min(float(kept.edges[-1]) * h_rms, 2 * h_max), kept.source
 
     def values(x: FloatArray) -> FloatArray:
-        if kept is None:
-            sums = totals_of(model, Pairs.of(cast(Surface, surface), x * end), variant, max(0.03 * inner, MIN_RTOL))
-            found, error = np.stack([sums.force, sums.area]), float(sums.error.max())
-        else:
-            found, error = kept.totals(x * end / h_rms), kept.error
-        errors.append(error)
+        found = kept.totals(x * end / h_rms)
         if not found.all():
             raise OutOfRangeError(f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow")
         found[0] *= stress
@@ -168,10 +151,10 @@ def _mbma_law(
     start, first = fit.first_record(lambda start: fit.power_record(values, start, POWERS), octaves, tolerance)
     facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
     side, limits = fit.Side(-1, start, values, tuple(kinks)), (h_max - end, math.inf)
-    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: max(errors), leverage, facts)
+    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: kept.error, kept.leverage, facts)
 
 
-def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
+def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
     """A law fitted to a theory's answers: x from first contact, from u = 0, or from both where force has no bound."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
     # below the elastic theory's end, and with a hardness towards u = 0, force depends on the logarithm of u
@@ -190,7 +173,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
         return np.stack([found.pressure, found.area])
 
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
-    # where it has far larger errors at some gaps, as at the lightest contact of a small map, these do not count
+    # far larger errors at some gaps, as at the lightest contact of a small map, are ignored
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
     bends = np.asarray(theory.bends(surface), dtype=float)
 

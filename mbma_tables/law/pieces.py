@@ -2,7 +2,7 @@
 
 A side of a law is its stretch of gaps with one sign of d that has its own x in (0, 1]: the depth below h_max, or the
 height above full compression. Octaves of x are cut into equal buckets, doubled in number until every polynomial meets
-the tolerance. Of 16 Chebyshev coefficients nine are kept: what is left bounds the error of value and of slope.
+the tolerance. Of 16 Chebyshev coefficients nine are kept; the others bound the error of value and of slope.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from mbma_tables.law import block as at
 SAMPLES = 16
 MAX_RECORDS = 4000
 TAIL_SHARE = 4.0  # of the last two coefficients, for all that follow: they fall by 2 at least
-NEAR = 1e-7  # relative width of a bucket too narrow to fit, which takes its neighbour's polynomials
+NEAR = 1e-7  # relative width of a bucket too narrow to fit, for which its neighbour's polynomials are used
 FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # of the octaves below x = 1, where Gaussians of heights bend; 2 below
 SLOPES = 100.0  # times the tolerance of values: that of slopes, over F/x where they are smaller
 COARSE, COARSE_SLOPES = 1e-7, 10.0  # tolerance above which octaves begin with one bucket; and that of slopes there
@@ -52,7 +52,7 @@ class Pieces(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """Of a fit: matrices from an interval's ends to its samples, from values there to a series, errors and monomials.
+    """Matrices of a fit: from an interval's ends to its samples, from values there to a series, errors and monomials.
 
     The series has the even and odd parts of what is left out in its first two terms, so that neighbours join.
     """
@@ -83,7 +83,7 @@ def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
     """Records of intervals (n, 2) of x and bounds on their errors, (n, RECORD + 3)."""
     rule = _rule()
     found = positive(values((ends @ rule.places).ravel())).reshape(2, -1, SAMPLES)
-    # sums that no number of threads changes, as those of matrix products may be
+    # sums independent of the number of threads, unlike matrix products
     terms = np.einsum("rki,ij->rkj", found, rule.series)
     left = np.einsum("rki,ji->rkj", np.abs(terms), rule.bounds) / found.min(axis=-1, keepdims=True)
     low, high = ends.T
@@ -113,7 +113,7 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
         for e, stop, (value, _, slope) in zip(pending, stops, worst, strict=True):
             if value <= rtol:
                 enough.setdefault(e, FOR_SLOPES * counts[e])
-            # slopes of what carries noise do not become better
+            # more buckets do not improve the slopes of noisy values
             if value <= rtol and (slope <= slopes or counts[e] >= enough[e]):
                 done[e] = made[stop - len(cuts[e]) : stop]
             else:
@@ -130,7 +130,7 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
     whole = np.concatenate([done[e] for e in counts])
     for k, (low, high) in enumerate(ends for e in counts for ends in cuts[e]):
         if high - low <= NEAR * low:
-            # too narrow for slopes: what lies beside it, on the side that has no kink
+            # too narrow for slopes: use the neighbour on the side without a kink
             whole[k] = whole[min(max(k + 1 if low in side.kinks else k - 1, 0), place - 1)]
     return Pieces(whole[:, : at.RECORD], whole[:, at.RECORD : -1], rows)
 
@@ -142,7 +142,7 @@ def _equal(e: int, count: int) -> list[tuple[float, float]]:
 
 
 def _buckets(side: Side, e: int, count: int) -> list[tuple[float, float]]:
-    """They, cut at kinks."""
+    """The same ends, with the kinks inserted."""
     equal, inside = _equal(e, count), {kink for kink in side.kinks if 2.0**e < kink < 2.0 ** (e + 1)}
     if side.start <= 2.0**e and not inside:
         return equal
@@ -151,7 +151,7 @@ def _buckets(side: Side, e: int, count: int) -> list[tuple[float, float]]:
 
 
 def positive(found: FloatArray) -> FloatArray:
-    """Forces and areas, refused where they are not positive numbers."""
+    """Forces and areas; an error unless they are positive numbers."""
     if not (found.min() > 0 and found.max() < math.inf):
         raise OutOfRangeError("no positive force and area on all of this surface's gaps")
     return found
@@ -255,7 +255,7 @@ def fill_energies(records: FloatArray, order: Any, signs: FloatArray, scale: flo
 
 
 def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[int, float] | None]:
-    """Where force, and area, first stop rising with compression: place among records in its order, t; None if never."""
+    """Where force, and area, first stop increasing with compression: index of the record, t; None if never."""
     series = own[:, at.FORCE_AT : at.ENERGY_AT].reshape(-1, KEPT)
     found: list[tuple[int, float] | None] = [None, None]
     # a polynomial whose Bernstein coefficients are positive is positive

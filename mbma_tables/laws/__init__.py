@@ -1,1 +1,1 @@
-"""Formulas without a surface: the calibrated laws, hardness, the effective medium of leakage, bearing curves."""
+"""Formulas: calibrated laws, hardness, leakage, gas, bearing curves; BEM."""

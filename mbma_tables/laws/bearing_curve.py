@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 
-FRACTIONS = np.logspace(-4.5, 0, 91)  # shares of the map, from the highest point down
+FRACTIONS = np.logspace(-4.5, 0, 91)  # shares of the map, from the highest point downward
 MIN_TOP_POINTS = 16  # gradients are averaged over at least so many points
 QUANTILES = 1 - np.concatenate([[0], np.logspace(-5, -1, 61)[:-1], np.linspace(0.1, 1, 139)])
 BANDS = 40
@@ -39,8 +39,8 @@ class Bearing:
     h_max: float  # above the mean
     gradient: float  # rms in two dimensions
     quantiles: FloatArray  # heights below which shares `QUANTILES` of the map lie, highest first, shape (200,)
-    mean_height: FloatArray  # M(a), mean height of the highest share a of the map, a = `FRACTIONS`
-    # (2/sqrt(pi)) <|w|>/sqrt(2) over the same tops, w the gradient whitened by its own tensor: 1 if Gaussian.
+    mean_height: FloatArray  # M(a), mean height of the highest fraction a of the map, a = `FRACTIONS`
+    # (2/sqrt(pi)) <|w|>/sqrt(2) over the same highest parts, w the gradient whitened by its own tensor: 1 if Gaussian.
     # Of ridges, where w has one component, sqrt(pi/2) <|w|>
     top_gradient: FloatArray
     tension_force: FloatArray  # mean pressures F at which full contact would pull on shares `FRACTIONS` of the map,
@@ -57,7 +57,7 @@ def wavevectors(shape: tuple[int, ...], sizes: tuple[float, float]) -> tuple[Flo
 
 
 def half_plane_weights(shape: tuple[int, ...]) -> FloatArray:
-    """How many wavevectors each column of the real transform stands for."""
+    """Number of wavevectors represented by each column of the real transform."""
     weights = np.full(shape[1] // 2 + 1, 2.0)
     weights[0] = 1.0
     if shape[1] % 2 == 0:
@@ -91,7 +91,7 @@ def radial_spectrum(heights: FloatArray, sizes: tuple[float, float]) -> RadialSp
 def bearing(heights: FloatArray, sizes: tuple[float, float], part: tuple[slice, ...] = ()) -> Bearing:
     """Curves of a periodic map; its mean is taken off, gradients are spectral.
 
-    Where all but a `part` are mirror images they are of that part: images would hide a lay at an angle to the axes.
+    If all but a `part` are mirror images, gradients are of that part: images hide a lay at an angle to the axes.
     """
     whole = heights - heights.mean()
     qx, qy = wavevectors(whole.shape, sizes)

@@ -8,7 +8,7 @@ energy over A0 E* g h_rms. A spectrum enters by its shares w(x) of h_rms^2 per d
     U(F)    = 1/(4 g^) integral x w(x) W(P) d ln x,      W(P) = a P + b P^3 + (1 - a - b) P^16,  g^ = g/(q0 h_rms)
     u_P(F)  = integral from F to infinity of dU/F        so that F = -dU/du, and full contact is exact
     F_G(u)  = F_P(u) exp(-c (1 - nu) u^3)                a Gaussian surface without end
-    F(u)    = F_G(u) - F_G(h_max)                        one that ends at h_max: its stiffness is the endless one's
+    F(u)    = F_G(u) (1 - r)^(3/2)/(1 + r), r = F_G(h_max)/F_G(u)     one that ends at h_max, as Hertz's contacts do
 
 W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a depends on the
 spectrum's narrowness nu = 1/(<x> <1/x>), which needs no Hurst exponent. The compiled core, spectrum_laws.c, keeps
@@ -47,7 +47,7 @@ class Constants:
     weight: float = 0.438  # W's coefficient a,
     weight_slope: float = 0.08577  # its slope in the narrowness less 0.65,
     cubic: float = 0.4279  # and b
-    tail: float = 0.06492  # c of the Gaussian tail factor
+    tail: float = 0.05822  # c of the Gaussian tail factor
 
 
 CONSTANTS = Constants()
@@ -57,15 +57,16 @@ YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g) >= 0 on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
-    return _area(force, light_factor(alpha, constants), constants.area_t0)
+    return area_of(force, light_factor(alpha, constants), constants.area_t0)
 
 
 def area_persson(force: ArrayLike) -> FloatArray:
     """The same by Persson's theory, erf(sqrt(2) F)."""
-    return _area(force, 1.0, 1.0)
+    return area_of(force, 1.0, 1.0)
 
 
-def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
+def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
+    """A/A0 at F/(A0 E* g) by the light factor s0 and t0."""
     from scipy.special import erf
 
     F = np.minimum(force, MOST_FORCE)
@@ -74,7 +75,7 @@ def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """F/(A0 E* g) at A/A0 = erf(e) by the light factor s0: `area` inverted, 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
+    """F/(A0 E* g) at A/A0 = erf(e) by the light-load factor s0; inverts `area`: 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
     wanted, s0, t0 = np.asarray(e, float), np.asarray(light), constants.area_t0
     # at y = e/sqrt(2) the left side is the larger, and the cubic is convex from there to its root
     y = wanted / np.sqrt(2)
@@ -126,7 +127,7 @@ class Spectrum:
 
     @classmethod
     def from_shares(cls, x: ArrayLike, variance: ArrayLike) -> Spectrum:
-        """Bands of wavenumber x (each its root mean square) that hold these shares of the height variance."""
+        """Spectrum from bands of wavenumber x (root mean square of each) with these shares of the height variance."""
         wavenumber, share = np.asarray(x, float), np.asarray(variance, float)
         held = share > 0
         wavenumber, share = wavenumber[held], share[held] / share[held].sum()
@@ -153,14 +154,14 @@ class Law:
 
     @functools.cached_property
     def coefficients(self) -> FloatArray:
-        """Of `POWERS` in W."""
+        """Coefficients of `POWERS` in W."""
         c = self.constants
         a = c.weight + c.weight_slope * (self.spectrum.narrowness - NARROWNESS)
         return np.array([a, c.cubic, 1 - a - c.cubic])
 
     @functools.cached_property
     def _prepared(self) -> FloatArray:
-        """The law as the core takes it."""
+        """The law in the core's format."""
         s, c = self.spectrum, self.constants
         highest = np.inf if self.h_max is None else self.h_max
         constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
@@ -188,7 +189,7 @@ class Law:
         return np.asarray(weights @ (s.x * s.variance / (4 * s.gradient)))
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """u_P and du_P/d ln F, before the tail factor; 0 at loads that leave no gap."""
+        """u_P and du_P/d ln F, before the tail factor; 0 at loads that close the gap."""
         u, slope = self._separations(force, False)
         return u, slope
 

@@ -8,14 +8,14 @@ pressure does not move. Flow per length of seal is K (p1 - p2)/(12 viscosity wid
 The factor beside u^3 is Bruggeman's effective medium of Gaussian gaps, exact to the second order in h_rms/u. R comes
 from the same medium with the gaps of the calibrated law, magnification by magnification: with wavenumbers below
 x resolved, the law's cover P(x) carries the load, and the mean gap there is that of those above x, ubar(x) with rms
-height s(x). What leaves contact between x and x + dx has mean gap u1 = d(ubar P)/dP and heights N(u1, s) + N(-u1, s)
-on h > 0, so that ::
+height s(x). The part that leaves contact between x and x + dx has mean gap u1 = d(ubar P)/dP and heights
+N(u1, s) + N(-u1, s) on h > 0, so that ::
 
     integral over gaps of (h^3 - k)/(h^3 + k) dW = (1 - Ac) (A/Ac)^m
 
-Discs of contact would obstruct like A on the right. Patches of contact obstruct more, light ones most, and k vanishes
-at A = Ac: these are the two constants. Gaps are scaled so that their mean is u. Bruggeman 1935; Dapp, Luecke, Persson,
-Mueser, PRL 108 (2012) 244301 take n = 1/(1 - Ac) dimensions so that k vanishes at Ac.
+For circular contacts the right side would be A. Real patches obstruct flow more, most at light load, and k vanishes at
+A = Ac: m and Ac are the two constants. Gaps are scaled so that their mean is u. Bruggeman 1935; Dapp, Luecke, Persson,
+Mueser, PRL 108 (2012) 244301 use n = 1/(1 - Ac) dimensions so that k vanishes at Ac.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ class FlowConstants:
     exponent: float = 3.04
 
     def closed_form(self, u: ArrayLike, area: ArrayLike) -> FloatArray:
-        """k at mean gaps u [h_rms] and A/A0 without a spectrum, to zeta_1 of 32 only; 0 from the threshold on."""
+        """k at mean gaps u [h_rms] and A/A0 without a spectrum, for zeta_1 up to 32; 0 at and above the threshold."""
         left = np.maximum(1 - np.asarray(area, float) / self.threshold, 0)
         return np.asarray(self.prefactor * np.asarray(u, float) ** 3 * left**self.exponent)
 
     def obstructed(self, area: ArrayLike) -> FloatArray:
-        """What contact takes from the balance of an effective medium."""
+        """Contribution of the contact to the balance of an effective medium."""
         return np.asarray((1 - self.threshold) * (np.asarray(area, float) / self.threshold) ** self.obstruction)
 
 
@@ -94,7 +94,7 @@ def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
     band = np.clip(np.searchsorted(edges, log_x, side="right") - 1, 0, BANDS - 1)
     x, variance = spectrum.x, spectrum.variance
     parts = [np.bincount(band, v, BANDS).astype(float) for v in (variance, variance * x**2, variance * x)]
-    # the last wavenumbers of a map may be rounding
+    # the last wavenumbers of a map may be rounding errors
     held = (parts[0] > 0) & (np.cumsum(parts[1][::-1])[::-1] > NO_SLOPE * parts[1].sum())
     return parts[0][held], parts[1][held] / parts[1].sum(), parts[2][held]
 
@@ -165,7 +165,7 @@ def load_of(spectrum: Spectrum, contact: ArrayLike, constants: Constants = CONST
 
 
 def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
-    """ln R of a spectrum's gaps, which are scaled to their mean; -infinity where blocked."""
+    """ln R for the gaps of a spectrum, scaled by their mean; -infinity where blocked."""
     share, log_cube = found.quadrature
     mean = np.sum(share * np.exp(log_cube / 3), axis=1)
     log_k = effective_medium(share, log_cube, flow.obstructed(np.minimum(found.area, flow.threshold - NEAREST)))
@@ -174,7 +174,7 @@ def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
 
 
 def effective_medium(share: FloatArray, log_cube: FloatArray, blocked: FloatArray) -> FloatArray:
-    """ln k of sum share (h^3 - k)/(h^3 + k) = blocked."""
+    """Solution ln k of sum share (h^3 - k)/(h^3 + k) = blocked."""
     from scipy.optimize.elementwise import find_root
 
     def miss(log_k: FloatArray, load: FloatArray) -> FloatArray:

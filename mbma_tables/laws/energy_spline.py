@@ -1,15 +1,15 @@
-"""Curves through loads at which one surface was simulated, with the elastic energy as a second source of information.
+"""Interpolation between simulated loads of one surface, also by means of the elastic energy.
 
 Lengths in one unit, force and energy over A0 E*. Since dU = -F du, the integral of u over F between two loads is known
 exactly, ::
 
     integral from F1 to F2 of u dF = G2 - G1,    G = U + F u
 
-so a cubic spline of u over ln F has a knot between each two loads, whose value follows from that. A/A0 = erf(F exp(s))
-with a natural cubic spline s of ln(erfinv(A)/F) over ln F. Where a spline is not monotone, as of few loads far apart,
-monotone cubics through the loads take its place.
+so a cubic spline of u over ln F has an extra knot between each two loads, whose value follows from this integral.
+A/A0 = erf(F exp(s)) with a natural cubic spline s of ln(erfinv(A)/F) over ln F. Where a spline is not monotone, as with
+few, distant loads, monotone cubics through the loads replace it.
 
-`Continued` goes on beyond the loads, with the stiffness at the first and the last, ::
+`Continued` extrapolates beyond the loads with the stiffness at the first and the last, ::
 
     light: F ~ (H - u)^n       heavy: F^2 linear in ln u       both: erfinv(A) ~ F
 
@@ -56,7 +56,7 @@ class LoadCurve:
         self._fine_u = np.minimum.accumulate(self._spline(self._fine))
         root = np.log(erfinv(np.minimum(area, LARGEST_AREA)))
         self._root: Any = CubicSpline(self.x, root - self.x, bc_type="natural")
-        self._line = 1.0  # the spline is of what is left beside ln F
+        self._line = 1.0  # spline of the remainder beside ln F
         if not (self._root(self._fine, 1) > -1).all():
             self._root, self._line = PchipInterpolator(self.x, root), 0.0
 
@@ -107,14 +107,14 @@ class LoadCurve:
         return np.asarray(work - force * self._spline(x))
 
     def _integral(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Integral of u over F; the knot between two loads costs no accuracy that matters."""
+        """Integral of u over F; the knots between loads do not reduce the accuracy noticeably."""
         half = (high - low)[..., None] / 2
         t = low[..., None] + half * (1 + NODES)
         return np.asarray((self._spline(t) * np.exp(t) * half) @ WEIGHTS)
 
 
 class Continued(LoadCurve):
-    """The same beyond the loads, from full compression at u = 0 to first contact at u = `top` [length]."""
+    """The curves with extrapolation, from full compression at u = 0 to first contact at u = `top` [length]."""
 
     def __init__(self, rows: FloatArray, top: float) -> None:
         super().__init__(rows)
@@ -125,7 +125,7 @@ class Continued(LoadCurve):
         self._energies = super().energy(self.x[[0, -1]])
 
     def _joined(self, x: FloatArray, inside: Any, light: Any, heavy: Any) -> FloatArray:
-        """A curve of ln F by its three parts; the outer ones know how far beyond the loads they are."""
+        """A curve of ln F in three parts; the outer ones receive the distance beyond the loads."""
         x = np.asarray(x, float)
         low, high = self.x[[0, -1]]
         with np.errstate(all="ignore"):

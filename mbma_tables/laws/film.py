@@ -9,7 +9,7 @@ along x over that along y is gamma, Peklenik's number, has in this medium the de
 
     L = 1/(1 + gamma sqrt(k_y/k_x)),    integral of (h^3 - k)/(k + L (h^3 - k)) dW = (1 - Ac) (A/Ac)^m/(1 - L)
 
-for k_x, and with 1 - L for k_y; contact obstructs as in `mbma_tables.laws.effective_medium`, whose equation this is for
+for k_x, and with 1 - L for k_y; contact obstructs as in `mbma_tables.laws.effective_medium`, whose equation follows for
 gamma = 1. A face that slides over the rough one carries the gap h_c and phi_s = (u - h_c)/h_rms::
 
     h_c = <h/(k + L (h^3 - k))>/<1/(k + L (h^3 - k))>
@@ -30,7 +30,7 @@ from mbma_tables.laws.gas import open_gaps
 
 ROUNDS, RESOLVED = 200, 1e-11
 # root mean square of ln(medium/simulation) at 16 surfaces with gamma from 1 to 8, `generate.machined.film`:
-# of phi without contact, what a lay adds for each e-fold of gamma and A/A0 to the power 1.2, and of phi_s
+# phi without contact; addition by a lay per e-fold of gamma and A/A0 to the power 1.2; phi_s
 OPEN, LAY, SHEAR = 0.022, (12.0, 1.2), 0.15
 WIDEST_LAY = 8.5  # gamma, or its inverse, up to which flow was simulated
 
@@ -67,7 +67,7 @@ def anisotropic_medium(
         if np.abs(step).max(initial=0.0) < RESOLVED:
             break
     else:
-        raise ConvergenceError(f"the medium of gaps is not found to {RESOLVED:g} in {ROUNDS} steps")
+        raise ConvergenceError(f"the effective medium of gaps did not converge to {RESOLVED:g} in {ROUNDS} steps")
     factor = _depolarisation(log_k, peklenik)
     weight = share / (1 + factor[..., None] * (cube / np.exp(log_k)[..., None] - 1))
     carried = np.sum(weight * gap, axis=-1) / (weight.sum(axis=-1) + blocked / (1 - factor))
@@ -80,7 +80,7 @@ def _depolarisation(log_k: FloatArray, peklenik: FloatArray) -> FloatArray:
 
 
 def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowConstants) -> tuple[FloatArray, FloatArray]:
-    """phi of a lay over that of none, and phi_s, along x and y, shape (2, n); u in h_rms, A/A0 below the threshold.
+    """phi over the isotropic phi, and phi_s, along x and y, shape (2, n); u in h_rms, A/A0 below the threshold.
 
     Examples
     --------
@@ -94,8 +94,8 @@ def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowCons
     >>> ((1 - 1.5 / u**2) * ratio[:, 0]).round(4), [1 + 3 * (1 - 3 * c) / 400 for c in (0.8, 0.2)]
     (array([0.9895, 1.0029]), [0.9895, 1.003])
     """
-    share, gap = open_gaps(u, area, 1.0)
     held = np.minimum(area, flow.threshold - NEAREST)
+    share, gap = open_gaps(u, held, 1.0, deepest=1.0)
     blocked = np.where(area > 0, flow.obstructed(held), 0.0)
     k, carried = anisotropic_medium(share, gap, blocked, np.broadcast_to(peklenik, u.shape))
     shear = u - carried

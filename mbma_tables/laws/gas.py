@@ -9,10 +9,10 @@ The gaps are those of Gaussian heights z under a plane, bent where bodies deform
     g = s max(d - z, 0)^q,    q = 1 + 0.3 A/(A + 0.004) (1 - exp(-(eta/0.3)^1.2)),    eta = p_m/(E* g)
 
 with d from the contact's A/A0 and s from its mean gap u. q is fitted to boundary elements of 12 surfaces at three
-hardnesses from 0.3% to 75% contact. On ten others (H 0.2 to 0.9, zeta_1 5 to 64, one to six long waves a side, plateaus
-and filters; eta 0.05 to infinity), with their own A and u, it is within 4% at M = h_rms, 7% at 0.3 h_rms and 13% at 0.1
-h_rms (root mean square 1, 2 and 4%), and up to 27% off at 0.01 h_rms. k/(u + M) is off by up to 12%, 28% and 52% even
-below 5% contact.
+hardnesses from 0.3% to 75% contact. On ten others (H 0.2 to 0.9, zeta_1 5 to 64, one to six longest wavelengths a side,
+plateaus and filters; eta 0.05 to infinity), with their own A and u, it is within 4% at M = h_rms, 7% at 0.3 h_rms and
+13% at 0.1 h_rms (root mean square 1, 2 and 4%), and up to 27% off at 0.01 h_rms. k/(u + M) is off by up to 12%, 28% and
+52% even below 5% contact.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mbma_tables.common.errors import InputError
 
 BEND, LIGHT, SOFT, POWER = 0.3, 0.004, 0.3, 1.2  # constants of q
 DEEP, DEEPEST = 2.5, 1.25  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
-TAIL, NODES = 8.0, 96  # standard deviations of heights that count, and gaps of the quadrature
+TAIL, NODES = 8.0, 96  # range of heights in standard deviations, and number of quadrature nodes
 FULLEST = 1 - 1e-12
 R = 8.314462618  # J/(mol K)
 TEMPERATURES = (200.0, 300.0, 400.0, 500.0, 600.0)  # K
@@ -123,18 +123,19 @@ def mean_inverse(
 
 
 def open_gaps(
-    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf
+    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf, deepest: float = DEEPEST
 ) -> tuple[FloatArray, FloatArray]:
     """Shares of the nominal area and gaps there [length] on a last axis of `NODES`, of contacts as for `mean_inverse`.
 
-    The shares add up to that of the open gaps; the mean gap over the nominal area is u.
+    The shares add up to that of the open gaps; the mean gap over the nominal area is u. With `deepest` 1 gaps are
+    continuous at first contact.
     """
     from scipy.special import ndtri
 
     gap, share, height, cap = (part[..., None] for part in np.broadcast_arrays(u, area, h_rms, eta))
     share = np.minimum(share, FULLEST)
     with np.errstate(divide="ignore"):
-        d = np.minimum(-ndtri(share), np.maximum(DEEPEST * gap / height, DEEP))
+        d = np.minimum(-ndtri(share), np.maximum(deepest * gap / height, DEEP))
     d = np.where(share > 0, d, gap / height)
     q = 1 + BEND * share / (share + LIGHT) * -np.expm1(-((cap / SOFT) ** POWER))
     node, weight = _rule()

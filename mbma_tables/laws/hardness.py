@@ -13,7 +13,7 @@ With eta = p_m/(E* g), g the rms gradient, x = F/(p_m A0) and F in A0 E* g; psi 
 
 Hardness is constant, loading only, frictionless; yielded volume vanishes. The mean gap u has no negative gaps: points
 that yield are flattened. A, A_yield and F go over to the elastic contact as eta grows, and to the bearing curve,
-A = A_yield = x and F = eta Q(u), as it falls.
+A = A_yield = x and F = eta Q(u), as it decreases.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from scipy.special import erf, erfc, erfcx, erfinv, ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.errors import InputError
-from mbma_tables.core import core
 from mbma_tables.laws.bearing_curve import FRACTIONS
 
 IMAGES, TERMS = 0.06, 10  # tau below which images converge faster than a series; its terms, and one
 SHARPEST, NARROW = 1e-200, 3e-3  # least tau; half-width over which a difference goes by powers
-SEEN = 6.0  # from which erfc is less than a rounding of 1
+SEEN = 6.0  # above which erfc is below rounding of 1
 MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
 DEPTH = 30.0  # of a map's valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 LEVELS = -37.2, 9.0, 1500  # of Gaussian heights: nodes; above, the mean gap is the level itself
 LEAST_GAP = 1e-300  # mean gap at which all heights lie above the level
+MOST_ETA, MOST_RATIO = 1e100, 1e300  # larger values give the same force
 ROOT_TWO_PI = np.sqrt(2 * np.pi)
 
 
@@ -64,7 +64,7 @@ CONSTANTS = Constants()
 
 
 def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only where that is."""
+    """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only if that is."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
     return answered(_area, given, 1, c.area_power, c.area_scale, False)[0] * np.maximum(elastic_area, 1.0)
 
@@ -90,7 +90,7 @@ def _area(
     joint = np.exp(np.log1p(np.exp(power * np.log(small / np.maximum(elastic, limit)))) / (2 * power))
     reach = np.where(elastic < limit, e, 0.5 * x / np.sqrt(limit)) * joint
     between = diffused(x, small / joint**2, -1.0 if yielded else 1.0, reach)
-    # rounding may cross the bounds; what is closed has no variance; and nothing touches, or nothing yields
+    # clip rounding; then the cases of full contact, no contact and no yielding
     if yielded:
         share = np.where(e < np.inf, np.maximum(np.minimum(between, x), 0.0), x == 1)
     else:
@@ -102,7 +102,7 @@ def _area(
 def diffused(x: FloatArray, tau: FloatArray, sign: float, reach: FloatArray | None = None) -> FloatArray:
     """Share of a diffusion from x, between walls at 0 and 1, after a variance of 2 tau.
 
-    What has not ended at 0, or with a negative `sign` what has ended at 1; `reach` is x/sqrt(4 tau).
+    The share not absorbed at 0, or with a negative `sign` that absorbed at 1; `reach` is x/sqrt(4 tau).
     """
     over = 0.5 / np.sqrt(np.maximum(tau, SHARPEST))
     reach = x * over if reach is None else reach
@@ -135,6 +135,7 @@ def _difference(centre: FloatArray, half: FloatArray) -> FloatArray:
     return np.asarray(np.where(narrow, cancelled, erfc(centre - half) - erfc(centre + half)))
 
 
+@np.errstate(all="ignore")
 def force(
     elastic_force: ArrayLike,
     stiffness: ArrayLike,
@@ -144,19 +145,32 @@ def force(
     constants: Constants = CONSTANTS,
 ) -> tuple[FloatArray, FloatArray]:
     """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness, and from Q and dQ/du, there."""
-    exponent = constants.force_light, constants.force_eta, constants.force_share
-    found, steep = answered(core.capped_force, (elastic_force, stiffness, share, slope, eta), 2, *exponent)
-    return found, steep
+    own, Q, cap, c = np.asarray(elastic_force), np.asarray(share), np.asarray(eta), constants
+    level = np.where(cap < np.inf, cap * Q, np.inf)
+    small = np.minimum(own, level)
+    exponent = c.force_light + c.force_eta * np.minimum(cap, MOST_ETA) + c.force_share * Q
+    # an infinite force has no weight
+    gain = np.log(np.minimum(np.maximum(own, level) / small, MOST_RATIO))
+    power = np.exp(-exponent * gain)
+    weight = power / (1 + power)
+    # ln F lies so much below that of the smaller; derivatives by the exponent, by the elastic force, and by Q
+    lower = np.log1p(power) / exponent
+    by_elastic = np.where(own <= level, 1 - weight, weight)
+    by_level = (1 - by_elastic) / Q + c.force_share * (lower + weight * gain) / exponent
+    rate = np.where(own < np.inf, by_elastic * stiffness / own, 0.0) - np.where(by_level > 0, by_level * slope, 0.0)
+    # without contact the force is zero
+    touching, rest = small > 0, np.where(cap > 0, small, np.nan)
+    found = np.where(touching, small * np.exp(-lower), rest)
+    return found, np.where(touching, found * rate, rest)
 
 
 def closed(
     heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
 ) -> tuple[FloatArray, FloatArray]:
-    """As `force`, over A0 E* and at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
-    x, c = u / h_rms, CONSTANTS
+    """`force` over A0 E* at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
+    x = u / h_rms
     share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
-    given = pressure / gradient, stiffness / gradient, share, slope / h_rms, eta
-    load, steep = answered(core.capped_force, given, 2, c.force_light, c.force_eta, c.force_share)
+    load, steep = force(pressure / gradient, stiffness / gradient, share, slope / h_rms, eta)
     return load * gradient, steep * gradient
 
 
@@ -166,7 +180,7 @@ def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArra
 
 
 def plane_separation(u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """Gap between mean planes [h_rms] at mean gap u and x = F/(p_m A0): less by what yielded points are flattened."""
+    """Gap between mean planes [h_rms] at mean gap u and x = F/(p_m A0): less the flattening of yielded points."""
     x, cap = np.asarray(load, float), np.asarray(eta, float)
     d = -ndtri(x)
     with np.errstate(invalid="ignore"):
@@ -197,12 +211,12 @@ def _level_spline() -> Any:
 
 @functools.lru_cache(64)
 def _level_at_end(h_max: float) -> Any:
-    """The same of one highest point, kept for inversions."""
+    """Q(u) for one highest point, cached for inversions."""
     return _levels(np.asarray(h_max))
 
 
 def _levels(u: FloatArray) -> FloatArray:
-    """Levels of Gaussian heights at mean gaps [h_rms], of gaps below `LEAST_GAP` as at that."""
+    """Levels of Gaussian heights at mean gaps [h_rms]; smaller gaps are set to `LEAST_GAP`."""
     held = np.minimum(np.maximum(u, LEAST_GAP), LEVELS[1])
     return np.asarray(_level_spline()(np.log(held)) + np.maximum(u - LEVELS[1], 0.0))
 
@@ -216,7 +230,7 @@ class BearingCurve:
         level = np.minimum.accumulate(np.diff(above) / np.diff(FRACTIONS))
         share = np.sqrt(FRACTIONS[1:] * FRACTIONS[:-1])
         gap = level * (1 - share) + np.interp(share, FRACTIONS, above)
-        # the smallest shares are single points: nodes as close as theirs would make steps; the last one ends at valleys
+        # the smallest shares are single points, so nodes must not be as close; the last node ends at the valleys
         kept, last = np.zeros(gap.size, bool), h_max
         for k, own in enumerate(gap):
             if 0 < own < (1 - MIN_SPACING) * last and share[k] < MOST_SHARE:

@@ -1,4 +1,4 @@
-"""The calibrated law where a map is at hand: its tops decide at light loads, its valleys near full contact.
+"""The calibrated law for a height map: its highest parts determine light loads, its valleys loads near full contact.
 
 Lengths in h_rms, force over A0 E* g as in `calibrated`. The gap is zero where pressure is not, so the
 pressure-weighted height H_p = <p h>/<p> obeys H_p = u + 2 U/F exactly; with dU = -F du that is ::
@@ -9,9 +9,9 @@ At light load H_p = M(c A), the mean height of the highest share c A of the map,
 are proportional to it; c = 4/5 exactly for Hertzian contact. The area is the law's with the gradient of the highest
 share 1 - (1 - A)^2 of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
 
-Towards full contact the map's valleys decide: gaps open where the pressures of full contact would pull. u is the
-spectrum's u_P at the force F_D at which Gaussian pressures of full contact pull as much in the mean, <max(-p, 0)>; the
-area is the law's at the force at which they pull on the same share. No constant is fitted there.
+Near full contact the map's valleys dominate: gaps remain where the pressures of full contact would be tensile. u is the
+spectrum's u_P at the force F_D at which Gaussian pressures of full contact have the same mean tension <max(-p, 0)>; the
+area is the law's at the force at which they are tensile on the same share. No constant is fitted there.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from mbma_tables.laws.calibrated import (
     Law,
     Spectrum,
     area,
+    area_of,
     force_of,
     light_factor,
     mean_top_height,
@@ -41,10 +42,10 @@ from mbma_tables.laws.calibrated import (
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
 NODES = 500
 LOG_FORCE = np.linspace(LIGHTEST, HEAVIEST, NODES)
-MIN_TENSION, MIN_SHARE = 1e-12, 1e-4  # pulls on fewer points are one point's
+MIN_TENSION, MIN_SHARE = 1e-12, 1e-4  # tension on fewer points is that of single points
 MIN_RATIO = 0.05
 MIN_GRADIENT = 1e-3
-ELLIPTIC_AREA = 0.03  # contact above which Hertz's elliptic factor holds as it is
+ELLIPTIC_AREA = 0.03  # contact above which Hertz's elliptic factor is used unchanged
 ERF_INVERSE = (1e-7, 3.9)  # erfinv(A) over which F(A) is tabulated
 
 
@@ -60,7 +61,7 @@ class MapConstants:
     breadth_onset: float = 1.512
     gaussian_area: float = 0.2897  # contact where the deviation of a Gaussian surface from M(c A) takes over,
     valley_area: float = 0.6527  # and then the valleys
-    tension_area: float = 0.6  # contact where the area pulled on in full contact takes over from the tops'
+    tension_area: float = 0.6  # contact above which the tensile area in full contact replaces that of the highest parts
     merging_area: float = 0.00761  # contact over which c grows from a single contact's
     elliptic: float = (
         0.7245  # further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces
@@ -73,7 +74,7 @@ MAP_CONSTANTS = MapConstants()
 
 @dataclasses.dataclass(frozen=True)
 class PlateauConstants:
-    """Constants of maps whose valleys and tops disagree at `area` contact, fitted to machined surfaces.
+    """Constants for maps whose light- and full-contact curves disagree at `area` contact, fitted to machined surfaces.
 
     The valleys take over at a contact larger by `shift` (1 - exp(-(D/onset)^4)), D the difference of their
     pressure-weighted heights there [h_rms]: below 0.1 on Gaussian maps, larger on plateaus and with pits.
@@ -112,9 +113,9 @@ def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
 
 
 def convex(force: FloatArray, u: FloatArray) -> FloatArray:
-    """u(F), from the lightest load on, with compliances that fall: where few points touch it may run back a little.
+    """u(F), from the lightest load on, with decreasing compliances: with few points in contact it may reverse slightly.
 
-    Least squares of the compliances, weighted by steps of force: u stays where nothing was wrong.
+    Least squares of the compliances, weighted by steps of force; a monotone u is unchanged.
     """
     steps = np.diff(force)
     compliance = isotonic_regression(-np.diff(u) / steps, weights=steps, increasing=False).x
@@ -123,7 +124,7 @@ def convex(force: FloatArray, u: FloatArray) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MapLaw:
-    """The curve of a map, by its own spectrum and what `bearing` has; M(a) [h_rms], pulls of full contact [E* g]."""
+    """The curve of a map, by its spectrum and its `bearing` curves; M(a) [h_rms], tension in full contact [E* g]."""
 
     spectrum: Spectrum
     mean_height: FloatArray
@@ -168,7 +169,7 @@ class MapLaw:
         return np.asarray(np.minimum.accumulate(mean))
 
     def _tops_area(self) -> FloatArray:
-        """A/A0 by the tops' gradient on the curve's forces."""
+        """A/A0 from the gradient of the highest parts, at the curve's forces."""
         c = self.constants
         e = np.exp(np.linspace(np.log(ERF_INVERSE[0]), np.log(ERF_INVERSE[1]), NODES))
         contact = erf(e)
@@ -181,15 +182,13 @@ class MapLaw:
         return np.asarray(erf(np.exp(np.interp(LOG_FORCE, log_force, np.log(e)))))
 
     def _valleys_area(self) -> FloatArray:
-        """A/A0 of Gaussian pressures of full contact that would pull on the same share as the map's."""
+        """A/A0 for which Gaussian pressures of full contact are tensile on the same share as the map's."""
         pulled = np.exp(np.interp(np.exp(LOG_FORCE), self.tension_force[::-1], np.log(FRACTIONS[::-1])))
         beyond = np.maximum(np.exp(LOG_FORCE) / self.tension_force[0], 1.0)
         force = np.maximum(-ndtri(np.minimum(pulled, 0.5)) / 2, 0.0) * beyond
         alpha = self.spectrum.alpha
         # Hertz's elliptic factor, in the place of alpha's: s0/k^2
-        t = force / self.constants.area_t0
-        s0 = light_factor(alpha, self.constants) / self._ellipse[0] ** 2
-        return np.asarray(erf(force * np.sqrt(2 * (1 + t) / (s0 + t))))
+        return area_of(force, light_factor(alpha, self.constants) / self._ellipse[0] ** 2, self.constants.area_t0)
 
     @functools.cached_property
     def _ellipse(self) -> tuple[float, float]:
@@ -211,7 +210,7 @@ class MapLaw:
         return np.asarray(expit(found))
 
     def gaussian_force(self, force: ArrayLike) -> FloatArray:
-        """F_D: where Gaussian pressures of full contact pull as much in the mean as the map's do at F."""
+        """F_D: force at which Gaussian pressures of full contact have the same mean tension as the map's at F."""
         # <max(-p, 0)> of Gaussian pressures, standard deviation 1/2
         x = np.linspace(-3.0, 4.0, 1500)
         gaussian = 0.5 * np.exp(-2 * x * x) / np.sqrt(2 * np.pi) - x * ndtr(-2 * x)
@@ -220,7 +219,7 @@ class MapLaw:
         own = self.tension_force[kept][::-1]
         given = np.asarray(force, float)
         found = np.interp(given, own, matched) + np.maximum(given - own[-1], 0) * (matched[-1] / own[-1])
-        # at light loads another closure rules: any positive curve that rises
+        # at light loads another approximation applies: any positive increasing curve will do
         return np.asarray(np.maximum(found, MIN_RATIO * given))
 
     @functools.cached_property
@@ -235,7 +234,7 @@ class MapLaw:
         full = np.sum(self.spectrum.x * self.spectrum.variance) / (4 * self.spectrum.gradient)
         energy = full - u * force - (work(log_force[-1]) - work(log_force))
         valleys = u + 2 * energy / force
-        # the tops', with the deviation of a Gaussian surface from M(c A) at the same contact
+        # the curve of the highest parts, with the deviation of a Gaussian surface from M(c A) at the same contact
         grid = np.linspace(LIGHTEST - 2, HEAVIEST + 1, 2000)
         same = np.exp(np.interp(contact, area(np.exp(grid), self.spectrum.alpha, self.constants), grid))
         height = law.separation_persson(same)[0] + 2 * law.energy(same) / same
@@ -246,7 +245,7 @@ class MapLaw:
         factor = single + (self.height_factor - single) * -np.expm1(-contact / m.merging_area)
         top = np.minimum(near * np.log(factor * contact) + (1 - near) * own, 0.0)
         tops = np.interp(top, np.log(FRACTIONS), self.weighted_height)
-        # nothing is left of the tops in full contact
+        # the highest parts have no influence in full contact
         p = self.plateau_constants
         apart = float(np.interp(p.area, contact, valleys - tops))
         valley_area = m.valley_area - p.shift * np.expm1(-((apart / p.onset) ** 4))

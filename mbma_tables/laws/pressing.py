@@ -1,6 +1,6 @@
 """One map pressed at a list of loads by boundary elements, and the flow through its gaps.
 
-Each load, and each flow, is kept in `mbma_tables.common.cache` as soon as it is found.
+Each load, and each flow, is stored in `mbma_tables.common.cache` as soon as it is computed.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ class Table:
     left_out : float
         As of `Press`.
     origin : str
-        What it was found of, and by what.
+        Description of the map and of the simulation.
     """
 
     rows: FloatArray
@@ -212,14 +212,14 @@ class Table:
         return self.flow_gaps, self.flow
 
     def resized(self, up: float, along: float) -> Table:
-        """Of the surface with its heights `up` times as large, and its lengths along the plane `along` times."""
+        """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
         by = np.array([[up / along], [1.0], [up], [up**2 / along]])
         gaps, flow, left_out = self.flow_gaps * up, self.flow * up**3, self.left_out * along
         return dataclasses.replace(self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out)
 
 
 def _digest(*parts: Any) -> str:
-    """SHA-256 of arrays and numbers; of arrays in single precision, which another unit of length leaves as they are."""
+    """SHA-256 of numbers and of arrays, these in single precision, so that it is independent of the unit of length."""
     digest = hashlib.sha256(KEPT.encode())
     for part in parts:
         array = isinstance(part, np.ndarray)

@@ -1,7 +1,7 @@
 """Flow through the gaps of a contact: Reynolds' equation div(h^3 grad p) = 0 on a periodic grid of gaps.
 
 Finite volumes with the harmonic mean of h^3 at faces; mean pressure gradients along both axes share one sparse
-factorisation. What is closed by contact is found by labelling connected gaps, never from a small number.
+factorisation. Closed gaps are found by labelling connected gaps, not by a small conductance.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
                 if there not in place:
                     place[there] = met
                     heap.append(there)
-                # the same gap reached in two cells: a path around the torus
+                # the same gap reached in two cells: a closed path around the periodic cell
                 winds[start] |= np.not_equal(met, place[there])
     component[~winds[component].any(axis=1)] = 0
     along: Any = winds.any(axis=0)

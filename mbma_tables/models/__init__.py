@@ -1,6 +1,6 @@
-"""Island models: anything that answers (X, mu) with force, area and a bound on its own error.
+"""Island models: force, area and error of an island at (X, mu).
 
-Totals take any of them, by name or as an object, and do not ask which. Two need no table: the exact solver and the
+Totals accept any of them, by name or as an object. Two need no table: the exact solver and the
 rigid sphere.
 """
 
@@ -17,21 +17,20 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
-OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
+OUTSIDE = ("raise", "exact", "nan")  # options for islands that a table does not cover
 QUANTITIES = ("pressure", "area")
-FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
-MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
+MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that may be requested of totals and islands
 CLOSED_FORM_ERROR = 1e-14
 
 
 def check_outside(outside: str) -> None:
-    """Refuse what is none of `OUTSIDE`."""
+    """Reject values that are not in `OUTSIDE`."""
     if outside not in OUTSIDE:
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
 
 
 class Certificate(NamedTuple):
-    """Relative errors of one function on points that no fit saw, and its number of fitted coefficients."""
+    """Relative errors of one function at held-out points, and its number of fitted coefficients."""
 
     coefficients: int
     largest: float
@@ -41,10 +40,7 @@ class Certificate(NamedTuple):
 
 
 class IslandAnswer(NamedTuple):
-    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
-
-    Where a model was asked for one of the two and the other would have cost more, the other is NaN.
-    """
+    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape."""
 
     phi_F: FloatArray
     phi_A: FloatArray
@@ -57,7 +53,7 @@ class IslandModel(Protocol):
 
     @property
     def name(self) -> str:
-        """What results call it."""
+        """Name of the model in results."""
 
     def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
         """Phi_F, Phi_A and a bound on their relative error at finite X and mu >= 0, arrays of one shape."""
@@ -65,28 +61,26 @@ class IslandModel(Protocol):
 
 @runtime_checkable
 class GeometryModel(Protocol):
-    """An island model that needs more of an island than X and mu, or has cheaper ways to answer one quantity."""
+    """An island model that needs more of an island than X and mu."""
 
     @property
     def name(self) -> str:
-        """What results call it."""
+        """Name of the model in results."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
 
-        `outside` is one of `OUTSIDE`; `which` is FORCE, AREA or BOTH. Used in place of `answer` where both exist.
+        `outside` is one of `OUTSIDE`. Used in place of `answer` where both exist.
         """
 
 
 AnyModel = IslandModel | GeometryModel
 
 
-def answer_islands(
-    model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
-) -> IslandAnswer:
-    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked."""
+def answer_islands(model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+    """Phi_F and Phi_A of islands by any model; results of models of X and mu are checked."""
     if isinstance(model, GeometryModel):
-        return model.of_islands(islands, outside, which)
+        return model.of_islands(islands, outside)
     shape = islands["X"].shape
     given: Any = model.answer(islands["X"], islands["mu"])
     try:
@@ -96,7 +90,7 @@ def answer_islands(
         raise InputError(f"island model {model.name!r} {wanted}: {fault}") from None
     bad = ~(np.isfinite(phi_F) & np.isfinite(phi_A) & (error >= 0))
     if outside != "nan" and bad.any():
-        raise OutOfRangeError(f"island model {model.name!r} has no answer for {int(bad.sum())} islands", bad)
+        raise OutOfRangeError(f"island model {model.name!r} has no result for {int(bad.sum())} islands", bad)
     return IslandAnswer(phi_F, phi_A, error)
 
 
@@ -134,5 +128,5 @@ def exact_model(rtol: float) -> ExactModel:
 
 
 def island_model_name(island_model: str | AnyModel) -> str:
-    """The name that results give an island model."""
+    """The name of an island model in results."""
     return island_model if isinstance(island_model, str) else getattr(island_model, "name", "")

@@ -1,6 +1,6 @@
 """Closed forms: the island model "formula", and total force and area without a sum over islands.
 
-The forms are in `core/closed_forms.h`, which the generator writes; docs/formula.md shows them.
+The forms are in `core/closed_forms.h`, written by `generate`; docs/formula.md lists them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, answered, broadcast_shape, finite_array, positive_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.core import core
-from mbma_tables.models import BOTH, IslandAnswer
+from mbma_tables.models import IslandAnswer
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.universal import Ranged
 from mbma_tables.surfaces.surface import Surface
@@ -67,27 +67,23 @@ class FormulaModel(Ranged):
             raise InputError(f"form must be one of {ISLAND_FORMS}, got {form!r}")
         self.form, self.ranges, self.holds = form, RANGES[form], f", where the {form} form holds"
 
-    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A with the largest error that the form's certificate states, as `UniversalModel.answer`.
-
-        `which` is FORCE, AREA or BOTH; what is not asked for is NaN.
-        """
-        wanted = RESULTS if which == BOTH else (RESULTS[which],)
+    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A with the largest error that the form's certificate states, as `UniversalModel.answer`."""
 
         def fill(flat_X: FloatArray, flat_mu: FloatArray) -> FloatArray:
             out = np.full((3, flat_X.size), np.nan)
             (low, high), (least, most) = self.ranges["X"], self.ranges["mu"]
             inside = (flat_X >= low) & (flat_X <= high) & (flat_mu >= least) & (flat_mu <= most)
-            for name in wanted:
-                out[RESULTS.index(name), inside] = FUNCTIONS[self.form][name](flat_X[inside], flat_mu[inside])
-            out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in wanted)
+            for row, name in enumerate(RESULTS):
+                out[row, inside] = FUNCTIONS[self.form][name](flat_X[inside], flat_mu[inside])
+            out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in RESULTS)
             return out
 
         return self._answered(X, mu, outside, fill)
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, or the one asked for."""
-        return self.answer(islands["X"], islands["mu"], outside=outside, which=which)
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A of islands."""
+        return self.answer(islands["X"], islands["mu"], outside=outside)
 
 
 class ClosedTotals(NamedTuple):

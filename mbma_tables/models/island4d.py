@@ -1,4 +1,4 @@
-"""The island model of the four-parameter table: the paper's numbers in, F_hat and A_hat out, from one file."""
+"""The island model of the four-parameter table: F_hat and A_hat as functions of the paper's numbers, from one file."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from mbma_tables.core import core, in_blocks
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, to_axes
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
+from mbma_tables.models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.schema import TableContent, error_cell
 
 RAW = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
-STEP = 1e-5  # relative, of a raw number or of the spread: central differences of closed forms err by its square
-BLOCK = 1 << 15  # islands between two looks for Ctrl-C
+STEP = 1e-5  # relative step of a raw number or of the spread; the error of central differences is its square
+BLOCK = 1 << 15  # islands between two checks for Ctrl-C
 
 
 def _broadcast(*values: ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """The shape of the four raw numbers, and they in it."""
+    """The common shape of the four raw numbers, and the numbers broadcast to it."""
     given = {name: finite_array(name, value) for name, value in zip(RAW, values, strict=True)}
     shape = broadcast_shape(**given)
     return shape, [np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values()]
@@ -49,7 +49,7 @@ def at_places(coefs: FloatArray, places: FloatArray, slopes: bool = False) -> Fl
 class Lookup:
     """F_hat = F^i q0/(E* s), A_hat = A^i q0^2/eta and the bound on their relative error, arrays of one shape.
 
-    `F_by` and `A_by` hold derivatives by the four raw numbers, where they were asked for. Unpacks to the first three.
+    `F_by` and `A_by` hold derivatives by the four raw numbers, if requested. Unpacks to the first three.
     """
 
     F_hat: Any
@@ -63,7 +63,7 @@ class Lookup:
 
 
 class Island4dModel(Displayed):
-    """F_hat and A_hat by the paper's four numbers, from a four-parameter table and nothing else.
+    """F_hat and A_hat by the paper's four numbers, from a four-parameter table alone.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class Island4dModel(Displayed):
         Parameters
         ----------
         delta_over_h_rms : array_like
-            Approach of the island; h_rms read at zeta_1 without bound, Delta + zeta_d^(-H).
+            Approach of the island; with h_rms that for infinite zeta_1, Delta + zeta_d^(-H).
         zeta_d, zeta_u : array_like
             Magnifications of Eqs. (27) and (30), 1 < zeta_d < zeta_u.
         hurst : array_like
@@ -125,7 +125,7 @@ class Island4dModel(Displayed):
         outside : {"raise", "exact", "nan"}
             For islands that the table does not cover: an error, the exact solver, or NaN.
         derivatives : bool
-            Whether derivatives by the four numbers are asked for; these come from the table alone.
+            Whether to compute derivatives by the four numbers; these come from the table alone.
         parallel : bool
             Whether to use all cores, for large batches.
 
@@ -165,14 +165,14 @@ class Island4dModel(Displayed):
     ) -> tuple[NDArray[np.int8], ...]:
         """Where islands lie on the axes X, spread, sphere and hurst: -1 below, 0 inside, 1 above.
 
-        Below in spread is answered, to first order in mu; below in sphere there is nothing.
+        Islands below the spread are computed to first order in mu; there are none below the axis sphere.
         """
         shape, raw = _broadcast(delta_over_h_rms, zeta_d, zeta_u, hurst)
         delta, low, high, H = (array.ravel() for array in raw)
         place = to_axes(delta, low, high, H, self.variant)
         return tuple(axis.side(x.reshape(shape)) for axis, x in zip(self.content.axes, place, strict=False))
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands, through their band and not through mu; `outside` as in `lookup`."""
         shape = np.shape(islands["X"])
         X, width, zeta_d, hurst, mu = (
@@ -188,7 +188,7 @@ class Island4dModel(Displayed):
         return IslandAnswer(phi[0].reshape(shape), phi[1].reshape(shape), error.reshape(shape))
 
     def _covers(self, place: Coordinates) -> NDArray[np.bool_]:
-        # below the first spread the expansion about the rigid sphere answers
+        # below the first spread by the expansion about the rigid sphere
         covered = [
             (x <= axis.high) & ((x >= axis.low) | (axis is self._spread))
             for axis, x in zip(self.content.axes, place, strict=False)
@@ -196,13 +196,13 @@ class Island4dModel(Displayed):
         return np.asarray(np.all(covered, axis=0))
 
     def _refuse_ends(self, hurst: FloatArray, zeta_d: FloatArray) -> None:
-        """Refuse what the axes hurst and sphere do not cover."""
+        """Reject islands that the axes hurst and sphere do not cover."""
         low, high = self._hurst.low, self._hurst.high
         require("hurst", hurst, (hurst >= low) & (hurst <= high), f"in [{low:g}, {high:g}]")
         require("zeta_d", zeta_d, zeta_d >= SPHERE_FLOOR, f"at least {SPHERE_FLOOR:g}")
 
     def _refuse(self, place: Coordinates, inside: NDArray[np.bool_], shape: tuple[int, ...]) -> None:
-        """Name the first axis that an island leaves."""
+        """Raise an error with the first axis whose range an island leaves."""
         if inside.all():
             return
         spread, X = place.spread.reshape(shape), place.X.reshape(shape)
@@ -214,7 +214,7 @@ class Island4dModel(Displayed):
     def _answer(
         self, place: Coordinates, inside: NDArray[np.bool_], outside: str, parallel: bool
     ) -> tuple[FloatArray, FloatArray]:
-        """(Phi_F, Phi_A) and the bound on their error, outside the table by the rule that was asked for."""
+        """(Phi_F, Phi_A) and the bound on their error, outside the table by the requested rule."""
         if inside.all():
             phi = greenwood_tripp.rigid_sphere(place.X, place.mu) * np.exp(self.log_ratio(place, parallel))
             return phi, self.error(place)
@@ -252,11 +252,11 @@ class Island4dModel(Displayed):
         return np.asarray(self._error[tuple(error_cell(axis, count, p) for axis, count, p in every)])
 
     def _moving(self, raw: Any, below: NDArray[np.bool_]) -> FloatArray:
-        """What log F_hat and log A_hat follow: positions on the axes, log(mu), X, and the logarithms of both scales."""
+        """Variables of log F_hat and log A_hat: positions on the axes, log(mu), X, logarithms of both scales."""
         delta, zeta_d, zeta_u, hurst = raw
         at = to_axes(delta, zeta_d, zeta_u, hurst, self.variant)
         places, log_mu = self._positions(at), np.log(at.mu)
-        # below the table only mu moves the logarithm
+        # below the table the logarithm depends on mu only
         places[1] = np.where(below, 0.0, places[1])
         return np.stack([*places, log_mu, at.X, np.log(at.force) + log_mu, np.log(at.area)])
 

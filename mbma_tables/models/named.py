@@ -1,4 +1,4 @@
-"""Island models by name; closed forms and netCDF are imported where they are asked for."""
+"""Island models by name; closed forms and netCDF are imported when needed."""
 
 from __future__ import annotations
 

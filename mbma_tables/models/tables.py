@@ -1,4 +1,4 @@
-"""Opening tables: the shipped ones by kind, once a process, and any other from its file; checking what they answer."""
+"""Opening tables: the shipped ones by kind, once per process, others from their file; verification of their results."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _opened(kind: str) -> UniversalModel | Island4dModel:
 
 
 def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:
-    """A table as an island model, for `contact`, `contact_law`, `island` and `Scene` to take as their `island_model`.
+    """A table as an island model, for the argument `island_model` of `contact`, `contact_law`, `island` and `Scene`.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     Raises
     ------
     TableFileError
-        Where the file cannot be used; the message says why and what to do.
+        If the file cannot be used; the message has the reason and the remedy.
 
     Examples
     --------
@@ -71,17 +71,17 @@ def universal_model() -> UniversalModel:
 
 
 class Verdict(NamedTuple):
-    """What a check of a file found: largest relative differences to the answers that are stored in it."""
+    """Result of the check of a file: largest relative differences from the stored results."""
 
     path: str
     kind: str
-    points: int  # answered by the table as opened, and by the installed solver
+    points: int  # of the table as opened, and of the installed solver
     table_error: float
     solver_error: float
 
 
 def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
-    """Answers at the conformance points by the table and by the solver, each (2, points)."""
+    """Results at the conformance points by the table and by the solver, each (2, points)."""
     points, model = content.conformance, _model(content)
     if isinstance(model, UniversalModel):
         X, mu, scales = points["X"], points["mu"], np.ones((2, 1))
@@ -99,7 +99,7 @@ def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
 def verify(path: os.PathLike[str] | str, kind: str | None = None) -> Verdict:
     """Check a table file, which must be of a `kind` where one is given: hashes, types, shapes and conformance points.
 
-    Answers by the table or by the solver further from the stored ones than their tolerance raise `TableFileError`.
+    Raises `TableFileError` if results of the table or of the solver differ from the stored ones beyond their tolerance.
     """
     content = read_table(path, kind)
     points = content.conformance

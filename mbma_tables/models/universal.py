@@ -16,25 +16,25 @@ from mbma_tables.common.display import Displayed, Variable
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.plots import draw_lines
 from mbma_tables.core import core, in_blocks
-from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
+from mbma_tables.models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
-SHOWN = 65  # places along an axis of the table as a Dataset
-BLOCK = 1 << 16  # islands between two looks for Ctrl-C
+SHOWN = 65  # points along an axis of the table as a Dataset
+BLOCK = 1 << 16  # islands between two checks for Ctrl-C
 TERMS = 8  # of each polynomial along each axis
 RECORD = 8 + 2 * TERMS**2  # doubles of a cell, `mbma_cell` of mbma.h
 
 
 class Ranged:
-    """A model of X and mu in `ranges`: what lies outside is refused, solved exactly, or NaN."""
+    """A model of X and mu in `ranges`; points outside raise an error, are solved exactly, or give NaN."""
 
     ranges: Mapping[str, tuple[float, float]]
-    holds = ""  # what a refusal says beside a range
+    holds = ""  # further text of the error beside a range
 
     def _inside(
         self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
     ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Flat arguments and their common shape, refused where the model does not reach."""
+        """Flat arguments and their common shape; an error for those outside the model's range."""
         given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
         for name, array in given.items() if refuse else ():
             low, high = self.ranges[name]
@@ -47,7 +47,7 @@ class Ranged:
     def _answered(
         self, X: ArrayLike, mu: ArrayLike, outside: str, fill: Callable[[FloatArray, FloatArray], FloatArray]
     ) -> IslandAnswer:
-        """Rows that `fill` answers of flat arguments, NaN outside of the ranges."""
+        """Rows computed by `fill` from flat arguments, NaN outside the ranges."""
         check_outside(outside)
         flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
         out = fill(flat_X, flat_mu)
@@ -103,7 +103,7 @@ class UniversalModel(Ranged, Displayed):
         Parameters
         ----------
         X, mu : array_like
-            They broadcast.
+            The arguments of Phi; they broadcast.
         parallel : bool
             Whether to use all cores, for large batches.
         outside : {"raise", "exact", "nan"}
@@ -126,24 +126,24 @@ class UniversalModel(Ranged, Displayed):
         in_blocks(fill, X.size, BLOCK, workers)
         return rows
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, both: one costs what both do."""
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A of islands."""
         return self.answer(islands["X"], islands["mu"], outside=outside)
 
     def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
-        """Answers, and their derivatives by X and by mu, in one pass; the errors are those of the answers."""
+        """Results and their derivatives by X and by mu, in one pass; the errors are those of the results."""
         flat_X, flat_mu, shape = self._inside(X, mu)
         columns = self._filled(flat_X, flat_mu, True).T
         force, area, error, F_X, F_mu, A_X, A_mu = (column.reshape(shape)[()] for column in columns)
         return IslandAnswer(force, area, error), IslandAnswer(F_X, A_X, error), IslandAnswer(F_mu, A_mu, error)
 
     def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:
-        """Where arguments lie on each axis: -1 below, 0 inside, 1 above. Below in mu is answered, to first order."""
+        """Where arguments lie on each axis: -1 below, 0 inside, 1 above."""
         return self._X.side(finite_array("X", X)), self._mu.side(finite_array("mu", mu))
 
     @functools.cached_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
-        """The table as the core takes it, `mbma_cells` of mbma.h: cells, places, and the numbers."""
+        """The table in the core's format, `mbma_cells` of mbma.h: cells, indices and numbers."""
         X_low, X_high, mu_low, mu_high = (self.content.auxiliary[name][1] for name in CELL_EDGES)
         count = X_low.size
         # doubles on lines of the cache, eight each
@@ -160,7 +160,7 @@ class UniversalModel(Ranged, Displayed):
         records[:, 8:] = np.einsum("cfjp,jq->cfqp", by_X, powers).reshape(count, -1)
 
         first, last = (int(bits >> BUCKET_BITS) for bits in np.array([mu_high.min(), self._mu.high]).view(np.int64))
-        # the bucket below the first edge stands for all that is less
+        # the bucket below the first edge contains all smaller values
         buckets = ((np.arange(first - 1, last + 1)) << BUCKET_BITS).view(float)
         buckets[0] = 0.0
         lows, firsts = np.unique(X_low, return_index=True)
@@ -170,14 +170,12 @@ class UniversalModel(Ranged, Displayed):
         strip_cells = np.split(np.arange(count), firsts[1:])
         places += [own[np.searchsorted(mu_low[own], buckets, side="right") - 1] for own in strip_cells]
         ends = self._X.low, self._X.high, float(X_STEPS), self._mu.high
-        found = (
-            records.reshape(-1),
-            np.concatenate(places).astype(np.int32),
-            np.array([*ends, first - 1, buckets.size], dtype=float),
-        )
-        if not core.table_fits(*found):
+        numbers = np.array([*ends, first - 1, buckets.size], dtype=float)
+        starts, cells = places[0], np.concatenate(places[1:])
+        # the core does not look whether places lie inside the table
+        if not (cells.min() >= 0 and cells.max() < count and starts.max() + buckets.size <= steps.size + cells.size):
             raise TableFileError("the cells of the universal table do not cover its range")
-        return found
+        return records.reshape(-1), np.concatenate(places).astype(np.int32), numbers
 
 
 def fractions_of_mu(low: FloatArray, high: FloatArray) -> FloatArray:

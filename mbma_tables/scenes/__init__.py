@@ -1,1 +1,1 @@
-"""Scenes: a surface, materials, what is prescribed, and only the effects that are called for."""
+"""Scenes: simulation of the requested effects only, planned by cost."""

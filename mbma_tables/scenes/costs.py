@@ -1,7 +1,7 @@
-"""What each way to an answer costs: the measurements shipped in tables/cost.csv.
+"""Measured costs of the methods, from tables/cost.csv.
 
 A cost is a time divided by that of a fixed piece of work timed in the same run; the row "unit" has the seconds
-of that work on the machine that measured. `python -m generate pages cost` measures.
+of that work on the machine that measured. `python -m generate cost` measures.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 from mbma_tables.common.files import shipped_file
 
 UNIT = "unit"
-TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # fields that are no numbers
+TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # text fields
 
 
 class Row(NamedTuple):
-    """One measurement: what answered, what was asked of it, largest relative error found, time and evaluations."""
+    """One measurement: method, task, largest relative error found, time and evaluations."""
 
     island_model: str
     variant: str  # "gap rtol=1e-06", "island", "open"
-    quantity: str  # "both", "pressure" or "area"
+    quantity: str  # "both", or "pressure" that a law is inverted for
     error: float | None
     cost: float  # time over that of the fixed work; seconds in the row of island model `UNIT`
     evaluations: float | None = None  # islands for a gap, pressures for an exact island, height integrals for a table
@@ -35,7 +35,7 @@ class Row(NamedTuple):
 
     @property
     def rtol(self) -> float | None:
-        """The tolerance asked for, where the variant names one."""
+        """The requested tolerance, if the variant contains one."""
         _, found, text = self.variant.partition(" rtol=")
         return float(text) if found else None
 
@@ -46,11 +46,9 @@ class Costs(NamedTuple):
     rows: tuple[Row, ...]
     seconds: float
 
-    def of(self, island_model: str, what: str, rtol: float | None = None, quantity: str = "both") -> float:
+    def of(self, island_model: str, what: str, rtol: float | None = None) -> float:
         """Seconds at the loosest measured tolerance that meets `rtol`, else the tightest; NaN if none was measured."""
         rows = [row for row in self.rows if row.island_model == island_model and row.what == what]
-        # a quantity that was not measured alone costs what both do
-        rows = [row for row in rows if row.quantity == quantity] or [row for row in rows if row.quantity == "both"]
         if not rows:
             return math.nan
         # of a call or of opening a table there is one row, without a tolerance
@@ -60,16 +58,16 @@ class Costs(NamedTuple):
 
 
 class Distance(NamedTuple):
-    """A way to a theory's answers: its cost, and the theory's distance from boundary elements on held-out surfaces.
+    """A method for a theory: its cost, and the theory's deviation from boundary elements on held-out surfaces.
 
-    Distances are root mean squares of ln(theory/simulation), of area at equal force and of force at equal mean
+    Deviations are root mean squares of ln(theory/simulation), of area at equal force and of force at equal mean
     separation, light at 1-10% contact and deep at 10-97%.
     """
 
     theory: str
     way: str
     cost: float  # of a point, over that of the fixed work
-    once: float  # of what is made beforehand for a surface
+    once: float  # of preparation for a surface
     area_light: float
     area_deep: float
     force_light: float

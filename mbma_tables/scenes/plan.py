@@ -1,9 +1,9 @@
-"""From effects and tolerance to steps.
+"""The plan of a scene: steps from effects and tolerance.
 
-Nothing but the scene decides: the island model is the universal table where its certificate allows, else the exact
-solver, and many gaps go through a contact law. The tolerance is split in one way. A step whose results amplify the
-error of force and area by a factor (`AMPLIFICATION`) has the tolerance over that factor; one half of it is for the
-islands, the other for what is made of them, a quadrature or the polynomials of a law.
+The plan depends on the scene only: the island model is the universal table where its certificate suffices, else the
+exact solver, and many gaps are evaluated by a contact law. The tolerance is divided as follows. A step whose results
+amplify the error of force and area by a factor (`AMPLIFICATION`) has the tolerance over that factor; one half of it is
+for the islands, the other for the quadrature or the polynomials of a law.
 """
 
 from __future__ import annotations
@@ -20,14 +20,13 @@ from mbma_tables.models import AnyModel
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.problem import INVERTED, OF_LAW, OUTPUTS, REFINEMENTS, Problem
 
-ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is asked of its quadrature or law
+ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is for its quadrature or law
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
 # p(r) at a point converges later than its integrals
 AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
-# gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: the
-# universal table's profiles answer a further gap in half a microsecond, the others sum its islands
-MIN_LAW_GAPS = {"universal": 4000, "exact": 20}
-MIN_LAW_GAPS_OF_OTHERS = 150
+# gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: profiles of
+# islands answer a further gap in half a microsecond
+MIN_LAW_GAPS, MIN_LAW_GAPS_OF_OTHERS = 4000, 150  # of MBMA, and of other theories
 MIN_THEORY_LAW_RTOL = 1e-9
 YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # times an elastic call and an elastic answer of many (docs/yield.md)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
@@ -38,14 +37,14 @@ class Step:
     """One step of a plan."""
 
     name: str
-    why: str  # which effects asked for it
+    why: str  # effects that need it
     what: str  # what it evaluates
     island_model: str | AnyModel | None
-    rtol: float | None  # asked of the totals, the law or the solver
+    rtol: float | None  # relative tolerance of the totals, the law or the solver
     count: int  # gaps, islands or points evaluated
-    error: float  # certified beforehand; NaN where only the answers can say
+    error: float  # certified beforehand; NaN if known from the results only
     seconds: float  # by the measured costs, without first use; NaN where nothing was measured
-    theory: str | None = None  # the scene's, where it is not MBMA, in a step that asks it
+    theory: str | None = None  # name of the scene's theory if it is not MBMA, in steps that use it
 
     @property
     def island_model_name(self) -> str | None:
@@ -58,7 +57,7 @@ class Plan:
     """Steps in the order in which they run."""
 
     steps: tuple[Step, ...]
-    left_out: tuple[str, ...]  # effects that were not asked for
+    left_out: tuple[str, ...]  # effects that were not requested
     switched_off: tuple[str, ...]  # refinements of the model that are off
     rtol: float  # of the whole
     overhead: float  # seconds that every scene takes
@@ -67,7 +66,7 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """For all steps and what surrounds them, without first use."""
+        """Seconds for all steps and the overhead, without first use."""
         return self.overhead + sum(step.seconds for step in self.steps)
 
     @property
@@ -76,7 +75,7 @@ class Plan:
         return max((step.error for step in self.steps if step.island_model is not None or step.theory), default=0.0)
 
     def text(self) -> str:
-        """As a database prints a query plan."""
+        """The plan as text, like a query plan of a database."""
         times = f"time={duration(self.seconds)}, first use in a process {duration(self.first_use)} more"
         lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})", f"  theory: {self.theory}"]
         for step in self.steps:
@@ -128,19 +127,19 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
 
 
 def seconds_by_theory(costs: Costs, theory: str, count: int, inverse: bool, energy: bool = False) -> float:
-    """Seconds of another theory than MBMA asked directly, by mean separation or by pressure or area."""
+    """Seconds of a theory other than MBMA without a law, by mean separation, pressure or area."""
     each = costs.of(theory, "invert" if inverse else "gap") + (costs.of(theory, "energy") if energy else 0.0)
     return costs.of(theory, "call") + count * each
 
 
 def certified_error(island_model: str | AnyModel, asked: float) -> float:
-    """Bound on the relative error of islands, for results at `asked`; NaN where it is known after the fact only."""
+    """Bound on the relative error of islands, for results at `asked`; NaN if it is known afterwards only."""
     if island_model == "universal":
         from mbma_tables.models.tables import open_table
 
         certificate = open_table(island_model).content.attributes
         return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))
-    # the exact solver works to a tenth of what is asked
+    # the exact solver works to a tenth of the requested tolerance
     return {"exact": 0.1 * asked, "rigid": 0.0}.get(_name(island_model), math.nan)
 
 
@@ -182,8 +181,7 @@ class _Planner:
             steps.append(self.law(of_law))
         elif totals:
             what = f"sum over islands at {self.count} gaps (Eqs. 48, 49)"
-            both = (", ".join(totals), what, None, totals[0] if len(totals) == 1 else "both")
-            steps.append(self.law(totals) if self.many_gaps() else self.summed("totals", *both))
+            steps.append(self.law(totals) if self.many_gaps() else self.summed("totals", ", ".join(totals), what, None))
         if hertz:
             what = "adaptive sum over islands with eta = 1, the Hertz area"
             steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
@@ -193,7 +191,7 @@ class _Planner:
         if "pressure_profile" in outputs:
             steps.append(self.profiles())
         followed = {
-            "validity": f"where the theory is tested, and its scatter, at {self.count} gaps",
+            "validity": f"validity and scatter of the theory at {self.count} gaps",
             "leakage": f"flow through the gaps of contacts at {self.count} gaps",
         }
         steps += [
@@ -211,8 +209,7 @@ class _Planner:
 
     def many_gaps(self) -> bool:
         """Whether totals at the prescribed gaps cost more than a law, where there is one."""
-        fewest = MIN_LAW_GAPS.get(_name(self.island_model(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
-        if self.count < fewest or "finite_height" in self.problem.dropped:
+        if self.count < MIN_LAW_GAPS or "finite_height" in self.problem.dropped:
             return False
         from mbma_tables.law.make import MIN_LAW_RTOL
 
@@ -235,12 +232,14 @@ class _Planner:
         what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
         return Step("law", ", ".join(why), what, island_model, asked, self.count, error, seconds)
 
-    def summed(self, name: str, why: str, what: str, priced_as: str | None, quantity: str = "both") -> Step:
+    def summed(self, name: str, why: str, what: str, priced_as: str | None) -> Step:
         """A sum over islands at every gap; `priced_as` is an island model whose totals cost about the same."""
         island_model = self.island_model(self.rtol)
         asked = (1 - ISLAND_SHARE) * self.rtol
         priced = priced_as or _name(island_model)
-        seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked, quantity)
+        # its islands are answered once, as for a law
+        seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked)
+        seconds = min(seconds, self.costs.of(priced, "law", asked))
         error = asked + certified_error(island_model, asked)
         return Step(name, why, what, island_model, asked, self.count, error, seconds)
 
@@ -251,7 +250,7 @@ class _Planner:
         return Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, seconds)
 
     def by_theory(self, why: Sequence[str]) -> Step:
-        """Another theory's answers: its own, or through its law where that costs less and force and area suffice."""
+        """Results of another theory: computed directly, or by its law if that costs less and force and area suffice."""
         outputs, theory = self.problem.outputs, self.problem.theory_name
         inverse = self.problem.prescribed in INVERTED
         rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
@@ -263,11 +262,11 @@ class _Planner:
         if pays and not outputs & set(OF_LAW):
             name, asked, seconds = "law", rtol, by_law
             error = (AMPLIFICATION["inverse"] if inverse else 1.0) * (rtol + own)
-        what = f"pressure, area and what follows from them at {self.count} gaps"
+        what = f"pressure, area and derived quantities at {self.count} gaps"
         return Step(name, ", ".join(why), what, None, asked, self.count, error, seconds, theory=theory)
 
     def yielding(self, why: Sequence[str]) -> Step:
-        """A theory's elastic answers through a hardness."""
+        """A theory's elastic results, corrected for a hardness."""
         theory, inverse = self.problem.theory_name, self.problem.prescribed in INVERTED
         mbma = self.problem.theory == "mbma"
         call = self.costs.of(theory, "call")
@@ -276,11 +275,11 @@ class _Planner:
         # the elastic errors of force and of area at that force may add up
         island_model, asked = (self.island_model(self.rtol / 2), ISLAND_SHARE * self.rtol / 2) if mbma else (None, None)
         error = 2 * (asked + certified_error(island_model, asked) if island_model and asked else self.own_error())
-        what = f"pressure, area and what yields at {self.count} gaps"
+        what = f"pressure, area and yielded share at {self.count} gaps"
         return Step("contact", ", ".join(why), what, island_model, asked, self.count, error, seconds, theory=theory)
 
     def own_error(self) -> float:
-        """The numerical error that the scene's theory states of an answer."""
+        """Bound of the scene's theory on its numerical error."""
         from mbma_tables.theories import get_theory
 
         surface = self.problem.surface
@@ -288,11 +287,11 @@ class _Planner:
 
     def seconds_of_law(self, inverse: bool) -> float:
         """Of a law's answers at the gaps."""
-        found = self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        found = self.costs.of("law", "invert") if inverse else 0.0
         return self.count * (self.costs.of("law", "lookup") + found)
 
     def seconds_of_slopes(self) -> float:
-        """Of totals with derivatives, which cost about four times those without."""
+        """Seconds of totals with derivatives, about four times those without."""
         if self.problem.theory != "mbma":
             return self.count * self.costs.of(self.problem.theory_name, "gap")
         return 4 * self.count * self.costs.of("universal", "gap", self.rtol)

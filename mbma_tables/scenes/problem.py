@@ -1,4 +1,4 @@
-"""The problem that a scene states, its effects among it, checked when it is made; `plan` and `run` solve it."""
+"""The problem defined by a scene, with its effects, checked on construction; `plan` and `run` solve it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
 
-# effects; docs/scenes.md says what each is
+# effects, described in docs/scenes.md
 OUTPUTS = (
     "pressure",
     "area",
@@ -43,12 +43,12 @@ PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
 INVERTED = ("pressures", "areas")  # gaps follow from them
 MIN_RTOL, MAX_RTOL = 1e-10, 0.1
 DEFAULT_RTOL = 1e-6
-DEFAULT_RTOL_OF_OTHERS = 1e-4  # theories that no one table certifies
+DEFAULT_RTOL_OF_OTHERS = 1e-4  # theories without a certified table
 MAX_SECONDS = 1e6
 
 
 def chosen(on: Iterable[str], off: Iterable[str]) -> tuple[frozenset[str], frozenset[str]]:
-    """Outputs asked for and refinements switched off, checked against each other."""
+    """Requested outputs and disabled refinements, checked against each other."""
     wanted, without = list(on), list(off)
     for name in (*wanted, *without):
         if name not in EFFECTS:
@@ -63,19 +63,19 @@ def chosen(on: Iterable[str], off: Iterable[str]) -> tuple[frozenset[str], froze
             )
     outputs = frozenset(wanted) & frozenset(OUTPUTS)
     if not outputs:
-        raise InputError(f"no effect is asked for: on needs at least one of {', '.join(OUTPUTS)}")
+        raise InputError(f"no effect is requested: on needs at least one of {', '.join(OUTPUTS)}")
     dropped = frozenset(without)
     if "yield" in outputs and (dropped or outputs & set(ELASTIC)):
         name = sorted(dropped | outputs & set(ELASTIC))[0]
-        raise InputError(f"{name!r} is of elastic contacts, and effect 'yield' is on: leave one of the two out")
+        raise InputError(f"{name!r} is for elastic contacts, and effect 'yield' is on: leave one of the two out")
     if "finite_height" in dropped and outputs & set(OF_LAW):
         name = sorted(outputs & set(OF_LAW))[0]
         raise InputError(f"{name!r} comes from a law, which ends at h_max: leave finite_height on, or {name!r} out")
     if outputs == {"pressure_profile"} and "finite_height" in dropped:
-        raise InputError("finite_height does not touch single islands: leave it out of off")
+        raise InputError("finite_height does not affect single islands: leave it out of off")
     if "pressure_profile" in outputs and "sphere_deformation" in dropped:
         raise InputError(
-            "pressure_profile is of the deformed sphere: leave sphere_deformation on, or pressure_profile out"
+            "pressure_profile is that of the deformed sphere: leave sphere_deformation on, or pressure_profile out"
         )
     return outputs, dropped
 
@@ -158,13 +158,13 @@ class Problem:
         vars(self).update(derived)
 
     def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:
-        """The prescribed numbers; None where nothing asks for gaps."""
+        """The prescribed numbers; None if no effect needs gaps."""
         given = [name for name in PRESCRIBED if getattr(self, name) is not None]
         if len(given) > 1:
             raise InputError(f"{' and '.join(given)} are given: prescribe one of {', '.join(PRESCRIBED)}")
         if not at_gaps:
             if given:
-                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or ask for 'pressure'")
+                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or request 'pressure'")
             return None
         if not given:
             raise InputError(f"nothing is prescribed: give one of {', '.join(PRESCRIBED)}")
@@ -237,7 +237,7 @@ class Problem:
             raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
 
     def _check_theory(self) -> None:
-        """What is MBMA's alone is refused beside other theories."""
+        """Reject options of MBMA beside other theories."""
         if isinstance(self.theory, str) and self.theory not in (*THEORIES, *OF_MAPS):
             raise InputError(f"no theory is named {self.theory!r}; {nearest(self.theory, (*THEORIES, *OF_MAPS))}")
         if not isinstance(self.theory, str):
@@ -259,10 +259,10 @@ class Problem:
 
     @property
     def theory_name(self) -> str:
-        """What results call the theory."""
+        """Name of the theory in results."""
         return self.theory if isinstance(self.theory, str) else self.theory.name
 
     @property
     def prescribed(self) -> str | None:
-        """Which of `PRESCRIBED` was given."""
+        """Name of the given quantity of `PRESCRIBED`."""
         return next((name for name in PRESCRIBED if getattr(self, name) is not None), None)

@@ -1,4 +1,4 @@
-"""Carry a plan out, and say what was found: an xarray Dataset of quantities with their units, and what made them."""
+"""Execute a plan: an xarray Dataset of quantities with their units and provenance."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
-    """The quantities of a problem with their units, and what made them; an error above the tolerance is refused."""
+    """The quantities of a problem with units and provenance; raises if their error exceeds the tolerance."""
     surface, h_max = problem.surface, float(problem.surface.h_max)
     if "finite_height" in problem.dropped:
         plain: Any = surface
@@ -56,7 +56,7 @@ def height_without_end(problem: Problem, rtol: float) -> float:
 def _units(problem: Problem) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every quantity that a scene can hold."""
     hertz = "subscale_area" in problem.dropped
-    # the name that has its unit, and what it is
+    # the quantity with the same unit, and the description
     quantities = {name: (name, text) for name, text in MEANINGS.items()} | {
         "nominal_pressure": ("pressure", "F/A0 as prescribed"),
         "prescribed_area": ("area", "A/A0 as prescribed"),
@@ -84,7 +84,7 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
 
 
 def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
-    """Quantities that were found; coordinates are gaps and what was prescribed."""
+    """The computed quantities; coordinates are gaps and the prescribed quantity."""
     import xarray as xr
 
     problem, units = run.problem, _units(run.problem)
@@ -121,7 +121,7 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
 
 
 def _hashes(problem: Problem, island_models: set[str]) -> dict[str, str]:
-    """Hashes of the values of the tables that answered."""
+    """Hashes of the values of the tables used."""
     used = sorted(island_models & set(TABLES))
     if not used:
         return {}

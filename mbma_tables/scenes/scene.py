@@ -1,4 +1,4 @@
-"""A scene: what is pressed, how far, which effects matter, how accurate, or how long it may take."""
+"""A scene: surface, gaps or loads, requested effects, and tolerance or time budget."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 
 MAX_AREA = 0.99
 CANDIDATES = ("calibrated", "persson", "greenwood_williamson")
-# what is asked: the quantity of tables/calibrated.nc whose distance from simulations decides
+# effect: the quantity of tables/calibrated.nc whose deviation from simulation is compared
 QUANTITIES = {"stiffness": "stiffness", "conductance": "stiffness", "pressure": "pressure", "energy": "pressure"}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scene(Problem):
-    """What to simulate: checked when it is made, and run as often as wanted.
+    """Description of a simulation, checked on construction; it can be run repeatedly.
 
     Parameters
     ----------
     surface : Surface
         One surface, not a batch.
     effects : sequence of str
-        Effects asked for, names of `mbma_tables.scenes.problem.OUTPUTS`.
+        Requested effects, names of `mbma_tables.scenes.problem.OUTPUTS`.
     without : sequence of str
         Refinements of the model switched off: "subscale_area", "sphere_deformation", "finite_height".
     separations, mean_separations, pressures, areas : array_like, one of them
@@ -45,10 +45,10 @@ class Scene(Problem):
     E_star : float or str
         Effective modulus; stresses come out in its unit. 1 gives them over E*. A text has its unit: "100 GPa".
     hardness : float or str, optional
-        Largest pressure that the softer body bears, in the unit of `E_star`, for "yield": the theory's elastic answer
-        goes through `mbma_tables.laws.hardness`, and conductance is that of the frozen contact.
+        Largest pressure that the softer body bears, in the unit of `E_star`, for "yield": the theory's elastic result
+        is corrected by `mbma_tables.laws.hardness`, and conductance is that of the frozen contact.
     rtol : float, optional
-        Relative error asked for, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
+        Requested relative error, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
     seconds : float, optional
         Instead of `rtol`: a time budget, spent on as much accuracy as the measured costs allow.
     variant : str or Variant
@@ -67,16 +67,16 @@ class Scene(Problem):
     points : int
         Points of the distribution of "island_statistics", over the approach.
     length_unit : str, optional
-        Of a surface that does not know its own.
+        For a surface without a unit.
     stress_unit : str, optional
-        That `E_star` is in, or is converted to where it has one of its own.
+        Unit of `E_star`; a text with another unit is converted.
     title : str, optional
         For the result.
 
     Raises
     ------
     InputError, OutOfRangeError
-        For anything without a meaning, or that contradicts something else; the message says what to write instead.
+        For meaningless or contradictory arguments; the message has the correction.
 
     Examples
     --------
@@ -98,7 +98,7 @@ class Scene(Problem):
         Raises
         ------
         InputError
-            For mistakes in the file: one message that starts with its path and says what to write instead.
+            For errors in the file: one message that starts with its path and has the correction.
         """
         file = pathlib.Path(path)
         entries = read_toml(file, "scene")
@@ -109,19 +109,19 @@ class Scene(Problem):
 
     @classmethod
     def from_mapping(cls, content: Mapping[str, Any]) -> Scene:
-        """The scene of what a TOML file would hold; files in it are relative to the current folder."""
+        """The scene of the content of a TOML file; paths in it are relative to the current folder."""
         return cls(**_arguments(content, pathlib.Path(), "scene"))
 
     def plan(self) -> Plan:
-        """How it will be computed: steps with island models, tolerances, certified errors and measured costs."""
+        """The planned steps with island models, tolerances, certified errors and measured costs."""
         return make_plan(self)
 
     def explain(self) -> str:
-        """The plan as text, and in one line which theory is nearer to brute force where another is."""
+        """The plan as text, with a line on the theory that is closer to simulation, if there is one."""
         return self.plan().text() + advice(self)
 
     def run(self, progress: Callable[[str, int, int], None] | None = None) -> xarray.Dataset:
-        """Compute what was asked for.
+        """Compute the requested effects.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
     prescribed = dict(content.get("prescribed", {}))
     for name in INVERTED:
         if "over_h_rms" in prescribed and name in prescribed:
-            raise InputError(f"[prescribed]: over_h_rms is about lengths, {name} have none: leave it out")
+            raise InputError(f"[prescribed]: over_h_rms is for lengths, {name} are not: leave it out")
     if not prescribed and "prescribed" in content:
         raise InputError(f"[prescribed] is empty: give one of {', '.join(PRESCRIBED)}")
     statistics = content.get("island_statistics", {})
@@ -182,7 +182,7 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
 
 
 def advice(problem: Problem) -> str:
-    """One line about a gap, stiffness or conductance asked of MBMA; empty where there is nothing to say."""
+    """Advice if a gap, stiffness or conductance is requested of MBMA; else empty."""
     asked = {name: quantity for name, quantity in QUANTITIES.items() if name in problem.outputs}
     if problem.prescribed in INVERTED:
         asked = {"gap": "pressure"} | {name: quantity for name, quantity in asked.items() if quantity == "stiffness"}
@@ -193,9 +193,9 @@ def advice(problem: Problem) -> str:
     from mbma_tables.theories.calibrated_table import shipped
     from mbma_tables.theories.mbma import Mbma
 
-    # stiffness first: it is the more telling where both are asked
+    # stiffness first, if both are requested
     name, quantity = next((pair for pair in asked.items() if pair[1] == "stiffness"), next(iter(asked.items())))
-    # distances at the contact that the calibrated law expects, in the middle of what is prescribed
+    # deviations at the contact fraction by the calibrated law, in the middle of the prescribed range
     area = float(np.median(contacts))
     rows = {"mbma": Mbma(variant=problem.variant).scatter_name(problem.surface), **{row: row for row in CANDIDATES}}
     spread = {
@@ -209,7 +209,7 @@ def advice(problem: Problem) -> str:
     price = seconds_by_theory(measured, nearest, problem.gaps.size, problem.prescribed in INVERTED)
     reasons = contact(problem.surface, area=min(area, MAX_AREA), theory=nearest).reasons
     return (
-        f"  advice: for {name} theory {nearest!r} is nearer to boundary elements, {_size(spread[nearest])} instead of "
+        f"  advice: for {name} theory {nearest!r} is closer to boundary elements, {_size(spread[nearest])} instead of "
         f"{_size(spread['mbma'])} at {area:.2%} contact, in {duration(price)} instead of "
         f"{duration(make_plan(problem, measured).seconds)}{'; not tested there: ' if reasons else ''}"
         f"{', '.join(reasons)}\n"
@@ -224,7 +224,7 @@ def _size(spread: float) -> str:
 
 
 def _contacts(problem: Problem) -> Any:
-    """Contact fractions that the calibrated law expects where surfaces touch."""
+    """Contact fractions by the calibrated law where surfaces touch."""
     from mbma_tables.laws.calibrated import area
     from mbma_tables.theories import get_theory
 

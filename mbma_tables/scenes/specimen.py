@@ -35,7 +35,7 @@ MAX_TOML_BYTES, MAX_SPECTRUM_BYTES = 2**20, 16 * 2**20
 
 @dataclasses.dataclass(frozen=True)
 class Specimen:
-    """A surface, and what is known about it besides its five numbers."""
+    """A surface with its units and material."""
 
     surface: AnySurface
     title: str
@@ -50,17 +50,17 @@ class Specimen:
 
     @property
     def units(self) -> Units:
-        """Of its lengths and stresses."""
+        """Units of its lengths and stresses."""
         return Units(self.surface.unit, "1" if self.E_star is None else self.stress_unit)
 
     @property
     def modulus(self) -> float | str:
-        """E* for `contact`: with its unit where that is known, 1 where there is none."""
+        """E* for `contact`: with its unit if known, 1 without a material."""
         number = 1.0 if self.E_star is None else self.E_star
         return number if self.stress_unit is None else f"{number!r} {self.stress_unit}"
 
     def in_units(self, length: str | None, stress: str | None) -> Specimen:
-        """The same in units asked for: converted from those that are known, said to be in them otherwise."""
+        """The specimen in the requested units: converted from known units, else taken to be in them."""
         modulus, unit = self.E_star, self.stress_unit
         if stress is not None:
             stress = known(stress, "stress")
@@ -106,7 +106,7 @@ def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated,
 
 
 def _printable(path: pathlib.Path) -> str:
-    """The file's name, bytes that are no text replaced."""
+    """The file's name, with undecodable bytes replaced."""
     return os.fsencode(path.name).decode("utf-8", "replace")
 
 
@@ -181,7 +181,7 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
         raise InputError(f"[surface]: {' and '.join(given)} are given: one of name, map, psd or numbers")
     treatment = {name: numbers.pop(name) for name in (*MAP_OPTIONS, "model") if name in numbers}
     if treatment and given != ["map"]:
-        raise InputError(f"[surface]: {', '.join(treatment)}: about a measured map, which is missing: give map = ...")
+        raise InputError(f"[surface]: {', '.join(treatment)}: for a measured map, which is missing: give map = ...")
     if given in (["name"], ["map"]) and numbers:
         raise InputError(f"[surface]: {given[0]} and numbers ({', '.join(numbers)}) are given: leave one of them out")
     if texts["convention"] is not None and given != ["psd"]:
@@ -208,7 +208,7 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
     """The surface of two columns of text, q and C, in a unit of length."""
     if set(numbers) != {"h_max"}:
         raise InputError(f"[surface]: a psd needs h_max = ... and no other number, got {', '.join(numbers) or 'none'}")
-    # not by its name: numpy would unpack .gz, .bz2 and .xz, whatever they grow to
+    # not by its name: numpy would unpack .gz, .bz2 and .xz files of any size
     content = read_file(path, MAX_SPECTRUM_BYTES)
     try:
         columns = numbers_of(content.decode("utf-8").splitlines(), "," if path.suffix == ".csv" else None)
@@ -218,7 +218,7 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
     if columns.shape[1] != 2:
         raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")
     h_max = Units(unit).number("h_max", numbers["h_max"])
-    # a profile's spectrum is no isotropic one: five numbers are fitted to it
+    # the spectrum of a profile is not isotropic: five numbers are fitted to it
     model = "self-affine" if convention == "profile" else "measured"
     q, C = columns.T
     surface = Surface.from_spectrum(q, C, h_max=h_max, convention=convention, unit=unit, model=model)
@@ -226,14 +226,14 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
 
 
 def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
-    """The entries of a TOML file; `what` says of which kind it should be."""
+    """The entries of a TOML file; `what` is its kind, for messages."""
     try:
         content = read_file(path, MAX_TOML_BYTES)
     except InputError as fault:
         raise InputError(f"{fault}; give the path of a {what} file") from None
     try:
         entries = tomllib.loads(content.decode("utf-8"))
-        # refuses whole numbers and nesting that no message could quote
+        # rejects integers and nesting too large for a message
         repr(entries)
     except (ValueError, RecursionError) as fault:
         raise InputError(f"{path} is not a TOML file: {fault}") from None
@@ -249,7 +249,7 @@ def schema() -> dict[str, Any]:
 
 
 def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:
-    """Refuse what a JSON schema does not allow, with its place and what to write instead."""
+    """Raise an error for entries that a JSON schema does not allow, with their place and the correction."""
     import jsonschema
 
     faults = list(jsonschema.Draft202012Validator(rules).iter_errors(entries))

@@ -29,12 +29,12 @@ def _asked(problem: Problem, step: Step) -> tuple[Variant, float, str | AnyModel
 
 
 def _outside(island_model: str | AnyModel) -> str:
-    """What to do about islands outside a table: solve them."""
+    """Option for islands outside a table: solve them."""
     return "exact" if island_model_name(island_model) in ("universal", "island4d") else "raise"
 
 
 def _shape(surface: AnySurface) -> Any:
-    """What profiles ask of a surface."""
+    """The surface as an argument of profiles: its numbers, or itself."""
     if not isinstance(surface, Surface):
         return surface
     return float(surface.hurst), float(surface.zeta_1), float(surface.h_max / surface.h_rms)

@@ -1,4 +1,4 @@
-"""The steps of a plan: each imports, reads and evaluates what it needs and nothing else."""
+"""The steps of a plan; each imports, reads and evaluates only what it needs."""
 
 from __future__ import annotations
 
@@ -22,13 +22,12 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]
 TABLES = ("universal", "island4d")  # island models that are tables
-BLOCK = 64  # gaps between two reports of progress, where a gap is slow
 MAX_SLOPE_OF_STIFFNESS = 3.0  # of log(stiffness) by log(h_max - d); 5/2 next to first contact
 
 
 @dataclasses.dataclass
 class Run:
-    """A plan on its way: what steps hand on, and what they found."""
+    """A plan in execution: values passed between steps, and results."""
 
     problem: Problem
     surface: AnySurface
@@ -41,14 +40,14 @@ class Run:
     reasons: dict[str, list[int]] | None = None
 
     def close(self, step: Step, error: float, island_model: str | None) -> None:
-        """Note the error bound that a step reached, and its island model."""
+        """Record the error bound that a step reached, and its island model."""
         self.errors[step.name] = error
         if island_model is not None:
             self.island_models[step.name] = island_model
 
 
 def _law(run: Run, step: Step) -> None:
-    """Through a law, for MBMA one tight enough for the slopes and gaps that are asked."""
+    """By a law; for MBMA its tolerance suffices for the requested slopes and gaps."""
     from mbma_tables.law.make import MIN_LAW_RTOL, contact_law
 
     problem, wanted = run.problem, run.problem.outputs
@@ -93,7 +92,7 @@ def _find_gaps(run: Run, law: ContactLaw) -> float:
 
 
 def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
-    """What was prescribed, and the quantities at gaps that were asked for, by name."""
+    """The prescribed quantity, and the requested quantities at gaps, by name."""
     problem, wanted = run.problem, run.problem.outputs
     values: dict[str, Any] = {}
     if problem.prescribed in INVERTED:
@@ -132,7 +131,7 @@ def _contact(run: Run, step: Step) -> None:
 
 
 def _asked(run: Run) -> Contact:
-    """The scene's contact, with what follows from it."""
+    """The scene's contact, with derived quantities."""
     from mbma_tables.answers.contact import contact
     from mbma_tables.theories.mbma import Mbma
 
@@ -175,24 +174,17 @@ def _totals(run: Run, step: Step) -> None:
     assert step.island_model is not None
     own = {"pressure"} if "subscale_area" in problem.dropped else {"pressure", "area"}
     wanted = tuple(sorted(problem.outputs & own, reverse=True))
-    block = run.gap.size if step.island_model_name in ("universal", "rigid") else BLOCK
-    answers = []
-    for first in range(0, run.gap.size, block):
-        answer = contact(
-            run.surface,
-            separation=run.gap[first : first + block],
-            island_model=step.island_model,
-            variant=problem.variant,
-            E_star=problem.E_star,
-            rtol=step.rtol,
-            outside="exact" if step.island_model_name in TABLES else "raise",
-            quantities=wanted,
-        )
-        answers.append(answer)
-        run.progress(step.name, min(first + block, run.gap.size), run.gap.size)
-    for name in wanted:
-        run.found[name] = (("gap",), np.concatenate([getattr(answer, name) for answer in answers]))
-    run.close(step, max(float(answer.error.max()) for answer in answers), step.island_model_name)
+    found = contact(
+        run.surface,
+        separation=run.gap,
+        island_model=step.island_model,
+        variant=problem.variant,
+        E_star=problem.E_star,
+        rtol=step.rtol,
+        outside="exact" if step.island_model_name in TABLES else "raise",
+    )
+    run.found |= {name: (("gap",), getattr(found, name)) for name in wanted}
+    run.close(step, float(found.error.max()), step.island_model_name)
 
 
 def _islands(run: Run, step: Step) -> None:
@@ -209,7 +201,7 @@ def _islands(run: Run, step: Step) -> None:
 
 
 class OtherTheory(NamedTuple):
-    """Force and area by a theory, and standard deviations of their logarithms; NaN where there is no answer."""
+    """Force and area by a theory, and standard deviations of their logarithms; NaN where the theory has none."""
 
     pressure: FloatArray
     area: FloatArray

@@ -1,1 +1,1 @@
-"""Rough surfaces: spectra, surfaces, variants, measured maps, the paper's cases."""
+"""Surfaces by numbers, spectrum, profile or map; the paper's variants."""

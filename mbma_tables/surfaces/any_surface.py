@@ -1,4 +1,4 @@
-"""What every surface answers, five numbers or a measured spectrum: moments, summits, and the sum of two surfaces."""
+"""Base class of surfaces, given by five numbers or a spectrum: moments, summits, and the sum of two surfaces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mbma_tables.surfaces import spectrum
 
 
 def frozen(values: Any) -> Any:
-    """The same numbers, which nobody can write to where they are a plain array."""
+    """The same numbers; a plain array is made read-only."""
     if isinstance(values, np.ndarray):
         values.setflags(write=False)
     return values
@@ -40,19 +40,19 @@ MEANINGS = {
 
 
 class AnySurface(Displayed, abc.ABC):
-    """A rough surface, or a batch: what theories and everything above them ask."""
+    """A rough surface, or a batch of them: the interface that theories and their users need."""
 
-    parameters: ClassVar[tuple[str, ...]] = ()  # names of the numbers that make it; none where a spectrum does
+    parameters: ClassVar[tuple[str, ...]] = ()  # names of the numbers that define it; empty if a spectrum does
 
-    # plain fields of one class, properties of the other; `MEANINGS` says what they are
+    # fields in one class, properties in the other; `MEANINGS` describes them
     q0: Any
     q1: Any
     h_rms: Any
     h_max: Any
     m2: Any
     m4: Any
-    unit: str | None  # of length; None where it is not known
-    provenance: tuple[Mapping[str, Any], ...]  # where it comes from, a plain record each step
+    unit: str | None  # of length; None if not known
+    provenance: tuple[Mapping[str, Any], ...]  # origin, a plain record for each step
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -65,11 +65,11 @@ class AnySurface(Displayed, abc.ABC):
         return False
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
-        """Why it is not the isotropic Gaussian surface that theories are of, nor one like those simulated."""
+        """Reasons why it is neither the isotropic Gaussian surface of theories nor similar to those simulated."""
         return ()
 
     def with_numbers(self, *numbers: Any) -> Self:
-        """The same kind of surface of other `parameters`, in their order."""
+        """The same kind of surface with other `parameters`, in their order."""
         return self
 
     @abc.abstractmethod
@@ -78,11 +78,11 @@ class AnySurface(Displayed, abc.ABC):
 
     @abc.abstractmethod
     def sampled(self) -> Any:
-        """The same surface by samples of its spectrum; of a batch there are none."""
+        """The same surface given by samples of its spectrum; not available for a batch."""
 
     @abc.abstractmethod
     def scaled(self, factor: float, unit: str | None) -> Self:
-        """The same surface in another length unit, of which the old one is `factor`."""
+        """The same surface in another length unit; `factor` is the old unit in the new one."""
 
     def to(self, unit: str) -> Self:
         """The same surface in another unit of length.
@@ -104,7 +104,7 @@ class AnySurface(Displayed, abc.ABC):
 
     @property
     def resolution(self) -> str:
-        """Shortest wavelength of a measured surface, and what shorter ones would change; empty for other surfaces."""
+        """Shortest wavelength of a measured surface, and the influence of shorter ones; empty for other surfaces."""
         told = [entry["told"] for entry in self.provenance if entry["step"] in ("resolution", "extrapolated")]
         return "; ".join(told)
 
@@ -164,25 +164,25 @@ class AnySurface(Displayed, abc.ABC):
         return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
 
     def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
-        """The one rough surface that stands for two that touch: spectra add, heights convolve.
+        """The equivalent rough surface of two in contact: spectra add, heights convolve.
 
         Parameters
         ----------
         other : AnySurface
             The other surface; both are independent of each other.
         nominal_area : float or str, optional
-            A0 [length^2], of which the highest point is taken, as for `Surface`.
+            A0 [length^2], which determines the highest point, as for `Surface`.
 
         Returns
         -------
         MeasuredSurface
-            Its h_max is reached by as small a share of it as theirs by them: of Gaussian surfaces the root of the sum
-            of squares. It is in the unit of the first.
+            Its h_max is exceeded by as small a share of heights as those of both: for Gaussian surfaces the root of the
+            sum of squares. It has the unit of the first.
 
         Raises
         ------
         InputError
-            For a batch, and where one knows its unit and the other does not.
+            For a batch, and if only one has a unit.
 
         Examples
         --------

@@ -73,7 +73,7 @@ def core(heights: FloatArray) -> dict[str, float]:
     count = curve.size
     ratio, width = (np.arange(count) + 0.5) / count, max(round(CORE * count), 2)
     secants = curve[: count - width + 1] - curve[width - 1 :]
-    # of several least ones, as of even heights, the middle
+    # the middle one if several are least, as for uniform heights
     least = np.flatnonzero(secants <= secants.min() * (1 + 1e-12))
     part = slice(first := int(least[least.size // 2]), first + width)
     centre, level = ratio[part].mean(), curve[part].mean()

@@ -14,14 +14,14 @@ from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.spectral import resolution
 from mbma_tables.surfaces.surface import MeasuredSurface
 
-SQUARES = ("h_rms", "gradient")  # whose mean is that of squares
+SQUARES = ("h_rms", "gradient")  # fields averaged as squares
 
 
 def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
-    """The surface of which several maps were measured, each a `Surface.from_map`, alike in size and treatment.
+    """The surface from several measured maps of it, each a `Surface.from_map` of similar size and treatment.
 
-    Spectra, quantiles of heights and the curves of highest parts are averaged. h_max is the mean of the scans': that of
-    one scan's area.
+    Spectra, quantiles of heights and the curves of highest parts are averaged. h_max is the mean of that of the scans,
+    for the area of one scan.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
         raise InputError("average takes two or more surfaces of Surface.from_map")
     first = scans[0]
     if len({scan.unit is None for scan in scans}) > 1:
-        raise InputError("some scans know their unit and some do not: make them with unit=...")
+        raise InputError("some scans have a unit and some do not: make them with unit=...")
     known = [scan if scan.unit == first.unit else scan.to(str(first.unit)) for scan in scans]
     q = np.unique(np.concatenate([scan.q for scan in known]))
     spectra = np.array([scan.power_spectrum(q) for scan in known])
@@ -92,7 +92,7 @@ def _mean(parts: Sequence[Any], name: str) -> Any:
 
 
 def _heights(parts: Sequence[Heights]) -> Heights:
-    """Of all scans together; moments about their means add."""
+    """The distribution of all scans; moments about their means add."""
     h_rms = _mean(parts, "h_rms")
     skewness = np.mean([part.skewness * part.h_rms**3 for part in parts]) / h_rms**3
     kurtosis = np.mean([part.kurtosis * part.h_rms**4 for part in parts]) / h_rms**4

@@ -12,9 +12,9 @@ from mbma_tables.common.errors import InputError
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A named surface, its length unit, None where all is over h_rms, and where the paper uses it.
+    """A named surface, its length unit (None if lengths are over h_rms), and its place in the paper.
 
-    `numbers` are arguments of `Surface`, or of `Surface.from_moments` where the paper gives moments.
+    `numbers` are arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments.
     """
 
     name: str

@@ -19,9 +19,9 @@ from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_arr
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 
-LEAST = 2.0  # h_max/h_rms from which on maxima are few and far between
+LEAST = 2.0  # h_max/h_rms above which maxima are rare
 STEPS = 60  # the error of a level falls fourfold in each, or faster
-ENDS = (0.16, 0.84)  # shares of surfaces between whose highest points a spread is stated
+ENDS = (0.16, 0.84)  # shares of surfaces below the two ends of the stated spread
 
 
 def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, probability: ArrayLike = 0.5) -> FloatArray:
@@ -37,7 +37,7 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
 
     Examples
     --------
-    A joint of 20 mm x 20 mm with waves from 250 um on [um]:
+    A joint of 20 mm x 20 mm with wavelengths up to 250 um [um]:
 
     >>> from mbma_tables import Surface
     >>> from mbma_tables.surfaces.extremes import highest_point
@@ -71,6 +71,6 @@ def of_area(surface: Any, nominal_area: Any, h_max: Any) -> tuple[Any, tuple[Map
         raise InputError("nominal_area is of numbers and arrays: give DataArrays h_max, of extremes.highest_point")
     area = finite_array("nominal_area", Units(surface.unit).number("nominal_area", nominal_area))
     median, *ends = (highest_point(surface.h_rms, surface.m2, area, chance) for chance in (0.5, *ENDS))
-    told = "h_max is the median of Gaussian surfaces of the nominal area, two of three of which are between from and to"
+    told = "h_max is the median over Gaussian surfaces of the nominal area; two of three are between from and to"
     record = {"step": "nominal_area", "nominal_area": area.tolist(), "from": ends[0].tolist(), "to": ends[1].tolist()}
     return median[()], (*surface.provenance, record | {"assumed": [told]})

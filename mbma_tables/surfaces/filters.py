@@ -9,12 +9,12 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 
-GAUSSIAN = math.log(2)  # of the filter's exponent: waves of its nesting index are halved
-LAST_WAVES = 0.01  # amplitude below which waves count as taken out by an S-filter
+GAUSSIAN = math.log(2)  # of the filter's exponent: wavelengths equal to the nesting index are halved
+LAST_WAVES = 0.01  # amplitude below which wavelengths count as removed by an S-filter
 
 
 def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
-    """Heights less their least-squares polynomial of that total degree: what the library's modes do, without it."""
+    """Heights less their least-squares polynomial of that total degree: same as SurfaceTopography's modes."""
     bases = [
         np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), degree))[0] for count in heights.shape
     ]
@@ -26,12 +26,12 @@ def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
 
 
 def last_wave(nesting: float) -> float:
-    """Wavenumber from which on an S-filter leaves less than `LAST_WAVES` of a wave."""
+    """Wavenumber above which an S-filter leaves less than `LAST_WAVES` of the amplitude."""
     return 2 * math.pi / nesting * math.sqrt(-math.log(LAST_WAVES) / GAUSSIAN)
 
 
 def gaussian(values: FloatArray, steps: tuple[float, ...], name: str, nesting: float) -> FloatArray:
-    """Periodic heights after a Gaussian filter, of which "s_filter" leaves long waves and "l_filter" short ones."""
+    """Periodic heights after a Gaussian filter: "s_filter" keeps long wavelengths, "l_filter" short ones."""
     waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(values.shape, steps, strict=True)]
     q2: Any = np.add.outer(waves[0] ** 2, waves[1] ** 2) if values.ndim == 2 else waves[0] ** 2
     left = np.exp(-GAUSSIAN * q2 * (nesting / (2 * math.pi)) ** 2)

@@ -1,4 +1,4 @@
-"""The distribution of a surface's heights: measured, Gaussian, or of the sum of two."""
+"""The height distribution of a surface: measured, Gaussian, or of the sum of two."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ TAIL_NODES = 400  # shares at which heights are convolved
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Heights:
-    """The distribution of a surface's heights about their mean."""
+    """The height distribution of a surface about its mean."""
 
     quantiles: FloatArray  # above which `SHARES` of the surface lie, highest first [length]
     h_rms: float
     h_max: float
     skewness: float  # 0 if Gaussian
     kurtosis: float  # 3 if Gaussian
-    top: float  # share of the surface that its highest point stands for
+    top: float  # share of the surface represented by its highest point
 
     @classmethod
     def of(cls, heights: ArrayLike) -> Heights:
-        """Of sampled heights, of any shape and mean."""
+        """The distribution of sampled heights, of any shape and mean."""
         values = np.sort(finite_array("heights", heights), axis=None)
         values = values - values.mean()
         size = float(np.abs(values).max())
         if not size > 0:
-            raise InputError("heights are all the same: nothing is left once their mean is subtracted")
+            raise InputError("heights are all the same: without their mean they are zero")
         scaled = values / size
         variance = float(np.mean(scaled**2))
         return cls(
@@ -50,19 +50,19 @@ class Heights:
 
     @classmethod
     def gaussian(cls, h_rms: float, h_max: float) -> Heights:
-        """Of a Gaussian surface with that highest point."""
+        """The distribution of a Gaussian surface with that highest point."""
         from scipy.special import ndtr, ndtri
 
         quantiles = np.clip(-h_rms * ndtri(SHARES), -h_max, h_max)
         return cls(quantiles, h_rms, h_max, 0.0, 3.0, max(float(ndtr(-h_max / h_rms)), MIN_SHARE))
 
     def scaled(self, factor: float) -> Heights:
-        """The same in another unit."""
+        """The same distribution in another unit."""
         lengths = (factor * self.quantiles, factor * self.h_rms, factor * self.h_max)
         return Heights(*lengths, self.skewness, self.kurtosis, self.top)
 
     def convolved(self, other: Heights) -> Heights:
-        """Of the sum of two independent heights; cumulants add."""
+        """The distribution of the sum of two independent heights; cumulants add."""
         from scipy.special import ndtr, ndtri
 
         # as fine in both tails as in the middle
@@ -78,7 +78,7 @@ class Heights:
             # in the scale in which a Gaussian is straight
             return np.asarray(np.interp(ndtri(share), deviates, sums[order]))
 
-        # as for two Gaussians, the squares of whose h_max add: the logarithms of shares, weighted by variance
+        # logarithms of shares weighted by variance: for two Gaussians the squares of h_max then add
         squares = np.array([self.h_rms, other.h_rms]) ** 2
         top = math.exp(float(squares @ np.log([self.top, other.top])) / squares.sum())
         h_rms = math.sqrt(squares.sum())
@@ -91,7 +91,7 @@ class Heights:
 
     @property
     def is_gaussian(self) -> bool:
-        """Whether skewness and kurtosis are a Gaussian's exactly: heights that were not measured."""
+        """Whether skewness and kurtosis are exactly Gaussian, that is, the heights were not measured."""
         return self.skewness == 0 and self.kurtosis == 3
 
 

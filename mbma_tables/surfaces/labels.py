@@ -1,6 +1,6 @@
 """xarray in, xarray out: functions of plain arrays on DataArrays, dask-backed ones lazily and in parallel.
 
-Blocks are answered by the same functions as plain arrays; which block runs where is dask's business.
+Blocks are evaluated by the same functions as plain arrays; dask schedules them.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from mbma_tables.surfaces.any_surface import AnySurface
 
 
 def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
-    """The tuple that `function` answers of broadcast arguments, block by block where they are dask arrays."""
-    # xarray comes in with its own objects
+    """The tuple of results of `function` for broadcast arguments, block by block for dask arrays."""
+    # xarray is imported already if its objects are passed
     import xarray as xr
 
     whole = all(np.size(argument) for argument in arguments)
@@ -44,14 +44,14 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
 
 
 def refuse_plain(arguments: Mapping[str, Any]) -> None:
-    """Refuse arrays without names beside DataArrays."""
+    """Reject arrays without names beside DataArrays."""
     for name, given in arguments.items():
         if not is_labelled(given) and np.ndim(given):
             raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
 
 
 def agree(**arguments: Any) -> None:
-    """Refuse plain arrays that do not broadcast, or that stand beside DataArrays."""
+    """Reject plain arrays that do not broadcast, or that are combined with DataArrays."""
     if any(map(is_labelled, arguments.values())):
         refuse_plain(arguments)
     else:
@@ -59,7 +59,7 @@ def agree(**arguments: Any) -> None:
 
 
 def apply_to_surface(answer: Any, surface: AnySurface, arrays: Mapping[str, Any], outputs: int) -> Any:
-    """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are refused."""
+    """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are errors."""
     count = len(surface.parameters)
     arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(arrays)
     refuse_plain(arguments)

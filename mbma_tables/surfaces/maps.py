@@ -27,7 +27,7 @@ from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, Treated, Treatmen
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
 WINDOW_OVERLAP = (35 / 18) ** 2  # Fourier components under that window that count as one independent component
-MAX_KURTOSIS = 50.0  # all slopes on 2% of the points; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
+MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
 S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
 MAX_ANISOTROPY = 0.3  # of a cosine around the circle: four times the power one way than across it
@@ -65,7 +65,7 @@ def radial_spectrum(
 
 
 def _refuse_edges(heights: FloatArray) -> None:
-    """Refuse a map of facets: between steps, ridges or spikes, its spectrum alone can look self-affine."""
+    """Reject a map of facets (steps, ridges or spikes), whose spectrum alone can look self-affine."""
     scale = float(np.abs(heights).max())
     steps = [np.diff(heights / scale, axis=axis).ravel() for axis in (0, 1)]
     squares, fourths = (sum(float(np.mean(step**power)) for step in steps) / 2 for power in (2, 4))
@@ -96,7 +96,7 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     own = unit if own is None else known(own)
     if own is not None and unit not in (None, own):
         by, own = factor(own, unit), unit
-        # steps that are given are in the unit that is
+        # given steps are in the given unit
         grid, steps = grid * by, steps if lengths else tuple(step * by for step in steps)
     units = Units(own)
     given |= {name: units.number(name, given[name]) for name in given.keys() & {*LENGTHS, "outliers"}}
@@ -131,11 +131,11 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
     return _with_anisotropy(fitted, q, C * waves, directions)
 
 
-# grid steps in wavenumber: below are few wavelengths, which a window weighs by chance; none lies on this limit
+# grid steps in wavenumber; a window weights the few wavelengths below at random; none lies on this limit
 LONG = 4.0 * (1 - 1e-9)
 RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest wavelengths under a window may change; sums that are met
 STEEPEST = 30.0  # by which `matched` may tilt a spectrum
-TOLD = 0.05  # relative difference of rms gradients that is told, and half of that of h_rms
+TOLD = 0.05  # relative difference of rms gradients that is reported, and half of that of h_rms
 
 
 def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
@@ -147,7 +147,7 @@ def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> Flo
         return math.log(2 * laws.moment(2) / laws.moment(0) / square)
 
     if q.size < 2:
-        # refused later
+        # rejected later
         return C
     slope = excess(-STEEPEST) < 0 < excess(STEEPEST)
     tilted = C * (q / q[0]) ** brentq(excess, -STEEPEST, STEEPEST) if slope else C
@@ -158,7 +158,7 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
     """C with another variance and mean squared gradient, by its few longest wavelengths."""
     from scipy.optimize import least_squares
 
-    # the likeliest change, where ln C is known as the inverse number of samples: it goes like C times 1 and q^2
+    # the likeliest change if the variance of ln C is the inverse number of samples: proportional to C times 1 and q^2
     ways = np.stack([C / C.max(), C * q**2 / (C * q**2).max()])
 
     def misses(by: FloatArray) -> FloatArray:
@@ -168,10 +168,10 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
     with np.errstate(all="ignore"):
         known = np.isfinite(misses(np.zeros(2))).all()
     if not known:
-        # one wavelength, or moments beyond what numbers hold
+        # one wavelength, or moments that overflow
         return C
     found = least_squares(misses, np.zeros(2), bounds=(-RAISED, RAISED), xtol=1e-12)
-    # not where heights are of a trend, of which the window shows no wavelength
+    # not for heights with a trend, which has no wavelength under the window
     changed = C * np.exp(found.x @ ways)
     return np.asarray(changed * (variance / PowerLaws(q, changed).moment(0)) if np.abs(found.fun).max() < MET else C)
 
@@ -200,7 +200,7 @@ def _unwindowed(
 
 
 def _disagreement(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> list[str]:
-    """What is to be told where a spectrum has neither the variance nor the mean squared gradient of the heights."""
+    """Lines to report if a spectrum differs in variance or mean squared gradient from the heights."""
     laws = PowerLaws(q, C)
     h_rms, gradient = math.sqrt(laws.moment(0) / variance), math.sqrt(2 * laws.moment(2) / slopes)
     if max(abs(h_rms - 1), abs(gradient - 1)) <= TOLD:
@@ -212,7 +212,7 @@ def _disagreement(q: FloatArray, C: FloatArray, variance: float, slopes: float) 
 
 
 def _within_band(treated: Treated, scale: float, spectrum: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Entries of a radial spectrum, lengths over `scale`, whose wavelengths were kept: a window smears some beyond."""
+    """Entries of a radial spectrum, lengths over `scale`, within the band kept; a window smears some beyond it."""
     q = spectrum[0] / scale
     held = (q >= treated.waves[0] * (1 - 1e-9)) & (q <= treated.waves[1] * (1 + 1e-9))
     if not held.any():
@@ -227,7 +227,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
     q, C, waves, _ = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
     bins = log_bins(q, C, waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP))
-    # of ridges, or of a few cosines, some hold no wavelength
+    # for ridges, or a few cosines, some bins have no wavelength
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
     values = values if treated.periodic else mirrored(values)
@@ -241,10 +241,10 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     C_bins, variance, whole = np.exp(bins.log_c), own.h_rms**2, slopes(0.0)
     if treated.plain:
         changed = raised(bins.q, C_bins, variance, whole)
-        # a tilt where the longest wavelengths are not few, as of a step
+        # a tilt if there are many long wavelengths, as for a step
         C_bins = matched(bins.q, C_bins, variance, whole / variance) if changed is C_bins else changed
         few = _disagreement(bins.q, C_bins, variance, whole) if bins.q.size > 1 else []
-        notes += [{"step": "few waves", "told": line} for line in few]
+        notes += [{"step": "few wavelengths", "told": line} for line in few]
     else:
         seen, floor = C * waves * q**2 * grid[0] * grid[1], LONG * max(grid)
         parts = float(seen[q >= floor].sum()), slopes(floor)
@@ -277,7 +277,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
 def _with_anisotropy(
     fitted: dict[str, Any], q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
 ) -> dict[str, Any]:
-    """The same with its anisotropy noted; refused where its fitted wavelengths favour a direction."""
+    """The fitted surface with its anisotropy; an error if its fitted wavelengths have a preferred direction."""
     fit = fitted["fit"]
     inside = (q >= fit.q_low) & (q <= fit.q_high)
     # whitened by the law; weights between equal ones of each wavevector and of each octave
@@ -294,7 +294,7 @@ def _with_anisotropy(
 def measured_surface(
     treated: Treated, h_max: float | None = None, shortest: Any = None, hurst: Any = None
 ) -> SpectralSurface:
-    """The surface of a treated map or line scan, continued to a shorter wavelength where that is asked for."""
+    """The surface of a treated map or line scan, extrapolated to a shorter wavelength if requested."""
     if (shortest is None) != (hurst is None):
         raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
     surface = (measured_profile if treated.heights.ndim == 1 else measured_map)(treated, h_max)
@@ -303,7 +303,7 @@ def measured_surface(
 
 
 def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
-    """A measured spectrum continued to a shorter wavelength [length] by a power law that is stated, not measured."""
+    """A measured spectrum continued to a shorter wavelength [length] by a given power law."""
     wave, exponent = (
         number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30),
         number_in("extrapolate_hurst", hurst, 0.0, 1.0),
@@ -320,7 +320,7 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     level = float(np.mean(np.log(known[known > 0]) + slope * np.log(octave[known > 0])))
     q = np.geomspace(last, end, max(2, math.ceil(math.log2(end / last) * STEPS_PER_OCTAVE) + 1))
     samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
-    # curves of the map's summits and valleys are not known with the wavelengths added
+    # the curves of the map do not include the added wavelengths
     C = np.append(surface.C, np.exp(level - slope * np.log(q)))
     plain = dataclasses.replace(surface, bearing=None, bands=None, map=None, table=None, scans=())
     longer = dataclasses.replace(plain, q=np.append(surface.q, q), C=C, samples=samples)

@@ -1,4 +1,4 @@
-"""Measured maps and line scans as they come: files, arrays, topographies of SurfaceTopography (the extra `maps`)."""
+"""Reading of measured maps and line scans: files, arrays, topographies of SurfaceTopography (the extra `maps`)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import numbers_of, read_file
 from mbma_tables.common.units import factor, known
 
-LISTS = (2, 3)  # columns of a list of points, which is no matrix of heights
+LISTS = (2, 3)  # columns of a list of points, as opposed to a matrix of heights
 MAX_TEXT_BYTES, MAX_HEADER_BYTES = 256 * 2**20, 2**14
-MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: fourth powers of them, which C has, keep their digits
+MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: their fourth powers, as in C, neither overflow nor underflow
 
 
 def library() -> Any:
-    """SurfaceTopography, without its remarks on its own optional parts."""
+    """SurfaceTopography, without its warnings on missing optional parts."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return needed("SurfaceTopography", "maps")
@@ -49,10 +49,10 @@ def read_measurement(
     if not piped and not os.path.isfile(place):
         raise InputError(f"there is no file {os.fspath(path)!r}{': it is a folder' if os.path.isdir(place) else ''}")
     with warnings.catch_warnings():
-        # its readers complain of what they go around
+        # its readers warn of faults that they correct
         warnings.simplefilter("ignore")
         try:
-            # opened here: its readers leave open what they cannot read
+            # opened here, because its readers leave unreadable files open
             with io.BytesIO(sys.stdin.buffer.read()) if piped else open(place, "rb") as stream:
                 named = _units_of_header(stream.read(MAX_HEADER_BYTES))
                 stream.seek(0)
@@ -60,19 +60,19 @@ def read_measurement(
                     return _channel_of(reader, place, dx, dy, unit, channel, named)
         except MbmaError:
             raise
-        # its readers raise whatever their parsers raise
+        # its readers pass on any exception of their parsers
         except Exception as fault:
             reason = str(fault).strip().splitlines() or [type(fault).__name__]
             if place.suffix.lower() == ".csv":
                 with module.open_topography(io.BytesIO(_without_commas(place))) as reader:
                     return _channel_of(reader, place, dx, dy, unit, channel, named)
             name = type(fault).__name__
-            why = "no reader knows its format" if name == "CannotDetectFileFormat" else f"{name}: {reason[0]}"
+            why = "no reader supports its format" if name == "CannotDetectFileFormat" else f"{name}: {reason[0]}"
             raise InputError(f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}") from None
 
 
 def _without_commas(path: pathlib.Path) -> bytes:
-    """A matrix of numbers with commas or semicolons as that library's plain text."""
+    """A matrix of numbers with commas or semicolons, converted to that library's plain text."""
     try:
         lines = read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig").replace(";", ",").splitlines()
         numbers = numbers_of(lines, ",")
@@ -141,7 +141,7 @@ def _channel_of(
             for name, count, step in zip(("dx", "dy")[:: -1 if turned else 1], chosen.nb_grid_pts, steps, strict=False)
         )
     elif dx is not None or dy is not None:
-        raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit=... says what they are in)")
+        raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit=... sets their unit)")
     found = reader.topography(**given)
     return found.transpose() if turned else found
 
@@ -192,7 +192,7 @@ def grid_of(
 
 
 def heights_of(grid: Any, dimensions: int = 2) -> Any:
-    """Heights as a masked array of floats, NaN being undefined; refused where they are infinite or no numbers."""
+    """Heights as a masked array of floats, NaN being undefined; an error if they are infinite or not numbers."""
     try:
         values = np.ma.asanyarray(grid)
     except (TypeError, ValueError) as fault:

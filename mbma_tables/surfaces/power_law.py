@@ -15,12 +15,12 @@ from scipy.special import betaincc
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
-BINS_PER_DECADE = 20  # 12% wide: a break is placed to that, a dense spectrum still averages many entries
-MIN_POINTS = 6  # two make the line, four judge it
+BINS_PER_DECADE = 20  # 12% wide: accuracy of a break's position; bins of a dense spectrum still average many entries
+MIN_POINTS = 6  # two define the line, four test it
 MIN_PIECE = 3  # bins in a roll-off or in what follows a cut; fewer would fit noise
-SCATTER = 0.1  # of ln C beyond counting statistics: what a real surface strays from a power law
-HURST_TOLERANCE = 0.05  # bias of H on small windowed maps: up to here above 1 the surface holds H = 1
-MARGIN = 6.0  # of Bayesian information: beyond it the evidence is held to be strong
+SCATTER = 0.1  # of ln C beyond counting statistics: deviation of real surfaces from a power law
+HURST_TOLERANCE = 0.05  # bias of H on small windowed maps: fitted values up to this far above 1 are set to 1
+MARGIN = 6.0  # of Bayesian information: larger differences count as strong evidence
 EXACT = 1e-6  # mean misfit at which a spectrum counts as computed, not measured
 MIN_END_RATIO = 0.8  # of largest wavenumber to a profile's q1: there the drop is 30%; with less, q1 would be guessed
 TYPICAL_SLOPE = 3.5  # C q^3.5 is nearly flat for every H, so that averages within a bin do not depend on its filling
@@ -59,7 +59,7 @@ class PowerLaw:
 
 
 def _profile_damping(q: FloatArray, slope: float, end: float) -> FloatArray:
-    """How far ln C_1D lies below its power law as wavelengths beyond `end` are missing; exact for Eq. (6)."""
+    """Decrease of ln C_1D below its power law due to missing wavelengths beyond `end`; exact for Eq. (6)."""
     with np.errstate(divide="ignore"):
         damping: FloatArray = np.log(betaincc(slope / 2, 0.5, np.minimum(q / end, 1.0) ** 2))
     return damping
@@ -128,7 +128,7 @@ def find_law(bins: Bins, unit: float, offset: float, breaks: bool) -> PowerLaw:
         laws.append(PowerLaw(start, stop, log_k, -slope, error, misfit, parameters, level))
 
     def criterion(law: PowerLaw) -> float:
-        # each piece by its own scatter, or a tail that no line describes would hide what the law misses
+        # each piece by its own scatter, or a tail that no line fits would hide the misfit of the law
         pieces = (
             (roll_offs[law.start][0], law.start),
             (law.misfit - roll_offs[law.start][0] - departures[law.stop], law.stop - law.start),
@@ -137,7 +137,7 @@ def find_law(bins: Bins, unit: float, offset: float, breaks: bool) -> PowerLaw:
         return _criterion(pieces, law.parameters)
 
     best = min(laws, key=criterion)
-    # a roll-off and its law can also be described as a law and what follows its cut: only one is self-affine
+    # a roll-off and its law can also be described as a law and its departure: only one of them is self-affine
     likely = [
         law
         for law in laws
@@ -171,7 +171,7 @@ def with_end_of_profile(bins: Bins, unit: float, law: PowerLaw) -> PowerLaw:
     best = min(trials, key=lambda trial: float(trial.cost))
     before, more, _ = _roll_off(np.log(bins.q / unit), bins, law.start)
     misfit, parameters = before + 2 * best.cost, 3 + more
-    # judged by the scatter of this very spectrum: the drop is no guess but what every end looks like
+    # compared with the scatter of this spectrum: every band end has such a drop
     plain = _criterion([(law.misfit, count)], law.parameters, EXACT)
     if _criterion([(misfit, count)], parameters, EXACT) >= plain:
         return law

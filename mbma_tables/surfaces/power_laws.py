@@ -1,7 +1,7 @@
-"""An isotropic spectrum as power laws between its samples: moments of any band in closed form, and where one begins.
+"""An isotropic spectrum as power laws between its samples: moments of any band in closed form, and their inverse.
 
-A place in the spectrum is a piece and a distance ln(upper end/q) below its upper end, so that bands that run into the
-shortest wavelength keep their digits.
+A place in the spectrum is a piece and a distance ln(upper end/q) below its upper end, so that bands that tend to the
+shortest wavelength keep their accuracy.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ class PowerLaws:
             self.slope = np.log(self.high / self.low) / self.width
         self._before: dict[int, FloatArray] = {}
         everything = np.arange(self.width.size)
-        # what overflows shows as a moment that is not finite
+        # overflow appears as a moment that is not finite
         with np.errstate(all="ignore"):
             for order in SHARES:
                 content = self._up(order, everything, self.width)
                 self._before[order] = np.append(0.0, np.cumsum(content))
-            # summed from the shortest wavelength, which small sums are about
+            # summed from the shortest wavelength, for accurate small sums
             self._after = np.append(np.cumsum(self._up(0, everything, self.width)[::-1])[::-1], 0.0)
 
     def moment(self, order: int) -> float:
@@ -76,13 +76,13 @@ class PowerLaws:
         return float(self._before[order][-1])
 
     def _up(self, order: int, piece: Any, width: Any) -> FloatArray:
-        """What a width from a piece's lower end up adds to a moment."""
+        """Contribution to a moment of a width above a piece's lower end."""
         power = self.slope[piece] + order + 2
         start = 2 * math.pi * SHARES[order] * self.low[piece] * np.exp((order + 2) * self.log_low[piece])
         return np.asarray(start * width * growth(power, width))
 
     def _down(self, order: int, place: Place, width: Any) -> FloatArray:
-        """What a width from a place up adds to a moment, inside its piece."""
+        """Contribution to a moment of a width above a place, inside its piece."""
         piece, rest = place
         power = self.slope[piece] + order + 2
         start = 2 * math.pi * SHARES[order] * self.high[piece] * np.exp((order + 2) * self.log_high[piece])
@@ -103,7 +103,7 @@ class PowerLaws:
         return np.asarray(self._after[place.piece + 1] + self._down(0, place, place.rest))
 
     def where_above_is(self, variance: Any) -> Place:
-        """Where T(q) has these values, at most m_0."""
+        """Places at which T(q) has these values, at most m_0."""
         wanted = np.asarray(variance, float)
         # _after falls; the piece whose content brings the sum to the wanted value
         piece = self.width.size - np.searchsorted(self._after[::-1], wanted, side="left")

@@ -1,6 +1,6 @@
-"""Line scans: the isotropic surface whose profile was measured.
+"""Line scans: the isotropic surface of a measured profile.
 
-A profile's spectrum C_1D, with h_rms^2 = integral C_1D dq/pi, is the isotropic one seen from the side:
+A profile's spectrum C_1D, with h_rms^2 = integral C_1D dq/pi, follows from the isotropic one:
 C_1D(q) = 4 pi integral from q of C q' dq'/sqrt(q'^2 - q^2), an Abel transform. Its inverse is sought as a power law
 between nodes, as straight in its logarithms as the scatter of the measurement allows, with the profile's variance of
 height and gradient.
@@ -23,7 +23,7 @@ from mbma_tables.surfaces.treatment import MIN_POWER, Treated
 
 PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # between two nodes
-STRAIGHT = 1.0  # change of slope, d ln C/d ln q, from node to node that is as likely as one standard deviation
+STRAIGHT = 1.0  # standard deviation of the change of slope, d ln C/d ln q, from node to node
 HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
 OVERLAP = 35 / 18  # Fourier components under a Hann window that count as one independent component
 END = 1e-3  # share of the squared gradient in the wavelengths above the surface's last
@@ -47,7 +47,7 @@ class ProfileSpectrum:
 
     @classmethod
     def of(cls, treated: Treated) -> ProfileSpectrum:
-        """Of a treated line scan; errors are those of the wavelengths that were kept."""
+        """The spectrum of a treated line scan; errors are those of the wavelengths kept."""
         heights, step = treated.heights, treated.steps[0]
         length = heights.size * step
         unit = 2 * math.pi / length
@@ -58,7 +58,7 @@ class ProfileSpectrum:
         low, high = treated.waves
         held = q >= low * (1 - 1e-9)
         if held.any():
-            # nothing but rounding and leakage beyond where the surface ends
+            # beyond the surface's end there is only rounding and spectral leakage
             rest = np.cumsum((C * q**2 * held)[::-1])[::-1]
             held &= rest > END * rest[0]
         q, C = q[held], C[held]
@@ -96,10 +96,10 @@ class ProfileSpectrum:
         middle = np.log(fine[1:] * fine[:-1]) / 2
         between = np.stack([np.interp(middle, log_q, row) for row in np.eye(log_q.size)], axis=1)
         independent = np.maximum(self.count, 1.0)
-        # bins without power, as of a square wave, are left out
+        # bins without power, as for a square profile, are omitted
         lit = self.mean > MIN_POWER * self.mean.max()
         weight, mean = np.sqrt(independent) * lit, np.where(lit, self.mean, 1.0)
-        # the logarithm of a mean of few samples lies low
+        # the logarithm of a mean of few samples is biased low
         wanted = np.log(mean) - digamma(independent) + np.log(independent)
         bend = np.diff(np.diff(np.eye(log_q.size), axis=0) / np.diff(log_q)[:, None], axis=0) / STRAIGHT
         sums = np.stack([np.pi * np.diff(fine**2), np.pi / 2 * np.diff(fine**4)])
@@ -133,12 +133,12 @@ def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
     scale = float(np.abs(treated.heights).max())
     steps, waves = (treated.steps[0] / scale,), (scale * treated.waves[0], scale * treated.waves[1])
     scaled = dataclasses.replace(treated, heights=treated.heights / scale, steps=steps, waves=waves)
-    # oblique wavelengths shorter than a cut-off are seen longer along the line: the spectrum is cut, not the trace
+    # oblique wavelengths appear longer along the line: the cut-off applies to the spectrum, not to the trace
     uncut = scaled.heights if treated.uncut is None else treated.uncut / scale
     found = ProfileSpectrum.of(dataclasses.replace(scaled, heights=uncut))
     heights = Heights.of(scaled.heights)
     if found.longest > ROLLED_OFF:
-        # a few wavelengths have no distribution
+        # the distribution needs more than a few wavelengths
         heights = Heights.gaussian(found.h_rms, heights.h_max)
     end = min(waves[1], float(found.edges[-1]))
     q = np.append(found.edges[found.edges < end], end)
@@ -154,7 +154,7 @@ def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
 
 
 def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]:
-    """What a single trace tells, how well, and what it cannot."""
+    """Notes on the accuracy of a single trace and on what it does not determine."""
     errors = (
         f"h_rms is known to {found.h_rms_error:.1%} and the rms gradient to {found.gradient_error:.1%} (one standard "
         "error, of a Gaussian surface)"

@@ -1,4 +1,4 @@
-"""The self-affine surface that a power spectrum fits, and how well it does."""
+"""The self-affine surface fitted to a power spectrum, and the quality of the fit."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
 CONVENTIONS = ("paper", "isotropic", "profile")
-MAX_RESIDUAL = 0.2  # of log10 C, a factor 1.6: beyond it the law says little about any one scale
-MAX_HURST_ERROR = 0.1  # the model's answers at H and H +- 0.1 differ by tens of percent
-MAX_EXCESS = 10.0  # C over the law in a single bin; chance gives this less than once in 1e4
-MAX_PEAK = 100.0  # C over both its neighbourhoods; chance, in single samples, gives this twice in 1e4
+MAX_RESIDUAL = 0.2  # of log10 C, a factor 1.6: larger ones make the fit meaningless at single wavelengths
+MAX_HURST_ERROR = 0.1  # the model's results at H and H +- 0.1 differ by tens of percent
+MAX_EXCESS = 10.0  # C over the law in a single bin; random with a probability below 1e-4
+MAX_PEAK = 100.0  # C over both its neighbourhoods; random in single samples with a probability of 2e-4
 MIN_VARIANCE_SHARE = 0.1  # of the variance; a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
 
 
 @dataclasses.dataclass(frozen=True)
 class SpectrumFit:
-    """How well a self-affine band describes a measured spectrum. Units follow the measurement's length unit.
+    """Quality of the fit of a self-affine band to a measured spectrum, in the measurement's unit of length.
 
     Examples
     --------
@@ -58,10 +58,10 @@ class SpectrumFit:
     q1: float
     q_low: float  # least and largest wavenumber of the points that the line was fitted to
     q_high: float
-    points: int  # how many spectral points (logarithmic bins) those are
+    points: int  # number of these spectral points (logarithmic bins)
     residual: float  # rms deviation of log10 C from the law, bins weighted by what they average
-    roll_off: float | None  # where the spectrum turns flat below the law; None where it does not
-    cut_off: float | None  # where it leaves the law above, likewise
+    roll_off: float | None  # wavenumber below which the spectrum is flat; None if it is not
+    cut_off: float | None  # wavenumber above which it departs from the law, likewise
     variance_share: float  # of the measured variance of height, inside [q0, q1]
     convention: str  # of the spectrum given; 'paper' for a map
     windowed: bool = False
@@ -97,7 +97,7 @@ def fit_psd(q: ArrayLike, C: ArrayLike, h_max: Any, convention: str, band: Any) 
     C_1D of Eq. (6) is 2 pi B(H + 1/2, 1/2) q C(q), exactly so where q1 is infinite; towards q1 it drops (by 7%
     at q1/2, to zero at q1). Where that drop describes the spectrum better than a plain power law it is fitted
     too; the surface's q1 is where it ends if that is within 1.25 of the largest wavenumber, which else is q1.
-    A profile shows oblique wavelengths longer than they are: its roll-off is placed to a factor of 1.5 only.
+    Oblique wavelengths appear longer in a profile: its roll-off is determined within a factor of 1.5 only.
     """
     if h_max is None:
         raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
@@ -194,7 +194,7 @@ def fit_spectrum(
     law, hurst, error = _law_of(bins, unit, profile, breaks=band is None)
     used = bins[law.start : law.stop]
     residual = math.sqrt(np.average((used.log_c - law.log_at(used.q, unit)) ** 2, weights=used.weight))
-    # a map without roll-off reaches to its own size, though its longest wavelengths are too few to be fitted
+    # without roll-off the band extends to the map's size, though the longest wavelengths are too few to be fitted
     q0, q1 = band or band_of(bins, law, unit, (unit, float(q.max())))
     fit = SpectrumFit(
         hurst=hurst,
@@ -258,7 +258,7 @@ def _binned(q: FloatArray, C: FloatArray, counts: FloatArray, usable: tuple[floa
 
 
 def _refuse_peak(bins: Bins) -> None:
-    """Refuse a wavelength so strong that a break would be fitted beside it."""
+    """Raise an error for a wavelength so strong that a break would be fitted beside it."""
     y, side = bins.log_c, MIN_PIECE
     rise = y[side:-side] - np.maximum(y[: -2 * side], y[2 * side :])
     if rise.size and rise.max() > math.log(MAX_PEAK):

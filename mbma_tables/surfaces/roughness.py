@@ -1,4 +1,4 @@
-"""From the numbers of a drawing or of a profilometer to a self-affine surface, with every assumption in words.
+"""A self-affine surface from the numbers of a drawing or of a profilometer, with each assumption stated.
 
 A profile along any line of an isotropic surface has its variance of height m0 and, for the variance of slope, m2, while
 the gradient of the surface has 2 m2. Everything else here follows from Gaussian heights.
@@ -22,32 +22,33 @@ SLOPES = ("Rdq", "Sdq", "Rsm")
 SUMMITS = ("Sds", "Spd")
 WAVES = ("longest", "shortest")
 TOPS = ("h_max", "Sp", "nominal_area")
-ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, *TOPS[1:])
+ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, "rolloff", *TOPS[1:])
 ASSUMED = "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled or worn face"
 SAID = {
-    "Rq": "h_rms = Rq: the profile is long and held no filter that takes out wavelengths of the surface",
+    "Rq": "h_rms = Rq: the profile is long and no filter removed wavelengths of the surface",
     "Ra": "h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered",
-    "Sq": "h_rms = Sq: the map is large and held no filter that takes out wavelengths of the surface",
+    "Sq": "h_rms = Sq: the map is large and no filter removed wavelengths of the surface",
     "Sa": "h_rms = sqrt(pi/2) Sa: heights are Gaussian; the map is large and unfiltered",
-    "Rdq": "m2 = Rdq^2: the surface is isotropic, and Rdq was measured down to the shortest wave",
-    "Sdq": "m2 = Sdq^2/2: the surface is isotropic, and Sdq was measured down to the shortest wave",
+    "Rdq": "m2 = Rdq^2: the surface is isotropic, and Rdq was measured down to the shortest wavelength",
+    "Sdq": "m2 = Sdq^2/2: the surface is isotropic, and Sdq was measured down to the shortest wavelength",
     "Rsm": "m2 = (2 pi h_rms/Rsm)^2: heights are Gaussian, every upward crossing of the mean line counts (Rice 1945);"
-    " where an instrument leaves out small ones, the slope found here is a lower bound",
+    " if an instrument omits small ones, the slope found here is a lower bound",
     "Sds": "m4 = 6 pi sqrt(3) m2 Sds: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted",
     "Spd": "m4 = 6 pi sqrt(3) m2 Spd: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted; where "
     "small ones are pruned, as ISO 25178-2 does, the curvature found here is a lower bound",
     "longest": "q0 = 2 pi/longest: no roughness of longer waves",
     "shortest": "q1 = 2 pi/shortest: no roughness of shorter waves",
+    "rolloff": "the spectrum is flat from the longest wave to this one, and one power law from there on",
     "hurst": "the spectrum is one power law with this Hurst exponent between its longest and its shortest wave",
     "h_max": "contact begins at h_max above the mid-plane",
     "nominal_area": "contact begins at the highest point of a Gaussian surface of this area, the median",
-    "Sp": "h_max = Sp: contact begins at the highest point of the map, which a larger one would exceed",
+    "Sp": "h_max = Sp: contact begins at the highest point of the map; a larger map has a higher one",
 }
 TYPICAL = "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) times it of N independent points"
 
 
 def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str | None:
-    """Which of the names is given, at most one."""
+    """The one of the names that is given; an error for several."""
     found = [name for name in names if name in given]
     if len(found) > 1 or (needed and not found):
         raise InputError(f"{what}: give one of {', '.join(names)}; got {' and '.join(found) or 'none'}")
@@ -60,10 +61,10 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     height = _one_of(HEIGHTS, given, "the height of roughness")
     slope = _one_of(SLOPES, given, "the slope of roughness", needed=False)
     summits = _one_of(SUMMITS, given, "the density of summits", needed=False)
-    top = _one_of(TOPS, given, f"the highest point, which Rq and Ra do not tell ({TYPICAL})")
+    top = _one_of(TOPS, given, f"the highest point, which Rq and Ra do not determine ({TYPICAL})")
     if "hurst" not in given:
         raise InputError(
-            "hurst is missing: a drawing does not tell it; 0.8 is common, and `sensitivity` says what it costs"
+            "hurst is missing: a drawing does not tell it; 0.8 is common, and `sensitivity` gives its influence"
         )
     band = [name for name in (slope, summits, *(wave for wave in WAVES if wave in given)) if name is not None]
     if len(band) != 2 or band[0] in SUMMITS or (summits and not slope):
@@ -71,6 +72,8 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
             "the band of wavelengths needs a slope (Rdq, Sdq or Rsm) with one of longest, shortest and Sds, or longest "
             f"and shortest; got {' and '.join(band) or 'none'}"
         )
+    if "rolloff" in given and slope is not None:
+        raise InputError("rolloff needs longest and shortest: from a slope no band follows")
     arrays = {name: finite_array(name, value) for name, value in given.items()}
     for name, array in arrays.items():
         require(name, array, array > 0, "positive")
@@ -88,7 +91,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         few = long <= spectrum.MIN_ZETA_1 * short
         require(f"longest{said}", long, ~few, f"more than 3 times shortest, {describe_entries(short, few)}")
     q0, q1 = _band(at, h_rms, slope, summits)
-    used = ("hurst", height, top, *band)
+    used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
     record = {
         "step": "from_roughness",
@@ -96,9 +99,25 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         "unit": unit,
         "assumed": [ASSUMED, *(SAID[name] for name in used)],
     }
-    surface = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms}
+    surface: dict[str, Any] = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms}
     surface[top if top == "nominal_area" else "h_max"] = at[top]
-    return surface | {"unit": unit, "provenance": (record,)}
+    surface |= {"unit": unit, "provenance": (record,)}
+    return surface if "rolloff" not in given else _rolled_off(surface, at["rolloff"])
+
+
+def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
+    """Arguments of a surface whose spectrum is flat down to a wavelength."""
+    if rolloff.ndim:
+        raise InputError(f"rolloff is of one surface, got shape {rolloff.shape}")
+    hurst, q0, q1, h_rms = (float(surface.pop(name)) for name in ("hurst", "q0", "q1", "h_rms"))
+    start = 2 * math.pi / float(rolloff)
+    good = np.asarray(q0 < start < q1 / spectrum.MIN_ZETA_1)
+    allowed = f"between 3 times shortest, {6 * math.pi / q1:.6g}, and longest, {2 * math.pi / q0:.6g}"
+    require("rolloff", rolloff, good, allowed)
+    law = -math.expm1(-2 * hurst * math.log(q1 / start)) / (2 * hurst)
+    level = h_rms**2 / (2 * math.pi * start**2 * ((1 - (q0 / start) ** 2) / 2 + law))
+    C = level * np.array([1.0, 1.0, (q1 / start) ** (-2 - 2 * hurst)])
+    return surface | {"q": np.array([q0, start, q1]), "C": C}
 
 
 def _band(
@@ -136,7 +155,7 @@ def _ratio(hurst: FloatArray, wanted: FloatArray, slope: FloatArray, name: str, 
     bounds = [slope * (end / wanted) ** (-0.5 if name == "Rsm" else 0.5) for end in (least, most)]
     low, high = (float(f(np.stack(bounds))) for f in (np.min, np.max))
     good = (wanted > least) & (wanted < most)
-    require(name, slope, good, f"between {low:.4g} and {high:.4g}, for a band of 3 < q1/q0 < 1e8 with these waves")
+    require(name, slope, good, f"between {low:.4g} and {high:.4g}, for 3 < q1/q0 < 1e8 with these wavelengths")
     found = find_root(
         lambda x, h, goal: np.log(ratio(x, h) / goal), ends, args=(hurst, wanted), tolerances={"xrtol": 1e-15}
     )

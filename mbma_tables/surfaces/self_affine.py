@@ -1,4 +1,4 @@
-"""Five numbers that make a self-affine surface, or arrays of them, and what follows from them."""
+"""The five numbers of a self-affine surface, or arrays of them, and derived quantities."""
 
 from __future__ import annotations
 
@@ -32,13 +32,14 @@ from mbma_tables.surfaces.roughness import surface_of_roughness
 if TYPE_CHECKING:
     from mbma_tables.surfaces.psd import SpectrumFit
 
+LARGEST = 1e50  # of lengths and wavenumbers, whose powers stay finite
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class SelfAffine(AnySurface):
-    """The numbers of `Surface`, checked, and the constructors that need no measurement."""
+    """The numbers of `Surface`, checked, and the constructors without a measurement."""
 
     hurst: Any
     q0: Any
@@ -64,9 +65,11 @@ class SelfAffine(AnySurface):
             # perhaps lazy: checked block by block, where numbers are computed
             return
         given = {name: finite_array(name, getattr(self, name)) for name in PARAMETERS}
-        require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
+        require("hurst", given["hurst"], (given["hurst"] >= np.finfo(float).tiny) & (given["hurst"] <= 1), "in (0, 1]")
         for name in ("q0", "q1", "h_rms", "h_max"):
             require(name, given[name], given[name] > 0, "positive")
+            sized = (given[name] >= 1 / LARGEST) & (given[name] <= LARGEST)
+            require(name, given[name], sized, f"from {1 / LARGEST:g} to {LARGEST:g}: take another unit of length")
         shape = broadcast_shape(**given)
         vars(self).update({name: frozen(np.array(spread(array, shape)))[()] for name, array in given.items()})
         zeta_1 = np.asarray(self.zeta_1)
@@ -77,7 +80,7 @@ class SelfAffine(AnySurface):
         """Set the highest point of a Gaussian surface of that area."""
         units = Units(self.unit)
         numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
-        # what follows from the other numbers, checked as they are
+        # derived from the other numbers; checked like them
         like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
         h_max, provenance = of_area(like, nominal_area, self.h_max)
         vars(self).update(h_max=h_max, provenance=provenance)
@@ -87,7 +90,7 @@ class SelfAffine(AnySurface):
         return f"Surface({', '.join([*numbers, *([f'unit={self.unit!r}'] if self.unit else [])])})"
 
     def scaled(self, factor: float, unit: str | None) -> Self:
-        """The same surface in another length unit, of which the old one is `factor`."""
+        """The same surface in another length unit; `factor` is the old unit in the new one."""
         numbers = {name: getattr(self, name) / factor for name in ("q0", "q1")}
         numbers |= {name: getattr(self, name) * factor for name in ("h_rms", "h_max")}
         return dataclasses.replace(self, **numbers, unit=unit)
@@ -121,7 +124,7 @@ class SelfAffine(AnySurface):
         Returns
         -------
         Surface
-            zeta_1 from alpha = m0 m4/m2^2, which rises with it, then q0 from m2/m0.
+            zeta_1 from alpha = m0 m4/m2^2, which increases with it, then q0 from m2/m0.
 
         Raises
         ------
@@ -157,10 +160,11 @@ class SelfAffine(AnySurface):
         Spd: Any = None,
         longest: Any = None,
         shortest: Any = None,
+        rolloff: Any = None,
         nominal_area: Any = None,
         unit: str | None = None,
-    ) -> Self:
-        """The self-affine surface that numbers of a drawing or a profilometer describe.
+    ) -> Any:
+        """The surface that numbers of a drawing or a profilometer describe.
 
         One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength (or slope
         and density of summits); nothing is filled in. `provenance` holds the meaning assumed for each number;
@@ -180,12 +184,16 @@ class SelfAffine(AnySurface):
             Summits per area [1/length^2].
         longest, shortest : array_like, optional
             Wavelengths at which the roughness ends [length].
+        rolloff : float or str, optional
+            Wavelength down from which the spectrum follows its power law [length]; between `longest` and it the
+            spectrum is flat, as of most machined faces. Without, the law holds from `longest` on.
         unit : str, optional
             The unit of length.
 
         Returns
         -------
         Surface
+            Self-affine; with a `rolloff` a `MeasuredSurface` with this spectrum.
 
         Raises
         ------
@@ -202,7 +210,12 @@ class SelfAffine(AnySurface):
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
         given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
-        return cls(**surface_of_roughness(unit, given))
+        return cls._made(surface_of_roughness(unit, given))
+
+    @classmethod
+    def _made(cls, numbers: dict[str, Any]) -> Any:
+        """Of numbers, which may be those of a spectrum."""
+        return cls(**numbers)
 
     @classmethod
     def named(cls, name: str) -> Self:
@@ -211,7 +224,7 @@ class SelfAffine(AnySurface):
         Raises
         ------
         InputError
-            For an unknown name; the message lists those there are.
+            For an unknown name; the message lists the known ones.
 
         Examples
         --------
@@ -263,7 +276,7 @@ class SelfAffine(AnySurface):
 
 
 def check_model(model: str, band: Any) -> None:
-    """Refuse an unknown model of a measurement, and a band to be fitted where nothing is."""
+    """Reject an unknown model of a measurement, and a band without a fit."""
     if model not in ("measured", "self-affine"):
         raise InputError(f"model must be 'measured' or 'self-affine', got {model!r}")
     if model == "measured" and band is not None:

@@ -1,4 +1,4 @@
-"""A surface given by its spectrum: what was measured, or stated in samples, with no fit in between."""
+"""A surface given by its spectrum, measured or as samples, without a fit."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from mbma_tables.surfaces.treatment import Treated
 if TYPE_CHECKING:
     from mbma_tables.laws.pressing import Table
 
-# of the surfaces of docs/data/boundary_elements.nc. As isotropic Gaussian ones they give area within 20% between 1% and
-# 10% contact, and beyond these it is wrong by 30% to factors
+# ranges of the surfaces of docs/data/boundary_elements.nc. If they are taken as isotropic Gaussian ones, area is within
+# 20% between 1% and 10% contact; outside the ranges it is wrong by 30% to factors
 BY_SPECTRUM = {
     "skewness of heights": (-0.4, 0.4),
     "kurtosis of heights": (2.4, 4.4),
     "kurtosis of slopes": (2.8, 3.3),
     "anisotropy": (1.0, 4.1),
 }
-# of maps like those whose law is as near as stated; of all of which several were pressed (docs/data/machined.nc, too),
-# whose law by their map is wrong by up to 80%
+# ranges of maps with the stated scatter; and of all kinds of which several were simulated (also docs/data/machined.nc),
+# for which the law by their map is wrong by up to 80%
 BY_MAP = {
     "skewness of heights": (-0.5, 0.5),
     "kurtosis of heights": (2.0, 4.0),
@@ -44,8 +44,8 @@ BY_MAP = {
 }
 PRESSED = {"skewness of heights": (-3.1, 3.3), "kurtosis of slopes": (2.6, 16.5), "anisotropy": (1.0, 17.6)}
 WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried
-SAME_LAW = 0.01  # of ln C about one power law: a spectrum this straight counts as self-affine
-FINE = 1.02  # between wavenumbers of a sum of spectra: a sum of power laws is none, by 1e-4 at most
+SAME_LAW = 0.01  # largest deviation of ln C from one power law for which a spectrum counts as self-affine
+FINE = 1.02  # ratio of wavenumbers in a sum of spectra, which deviates from power laws between them by at most 1e-4
 NO_POWER = 1e-3  # share of the squared gradient beyond the last wavelengths that count
 SIDE = 1e-12  # beside a wavenumber, relative
 
@@ -66,11 +66,11 @@ class SpectralSurface(AnySurface):
     heights : Heights, optional
         Distribution of heights; a Gaussian that ends at h_max if not given.
     bearing : Bearing, optional
-        Curves of a periodic map: what its tops and valleys look like (`mbma_tables.laws.bearing_curve`).
+        Curves of a periodic map: shape of its highest and lowest parts (`mbma_tables.laws.bearing_curve`).
     bands : RadialSpectrum, optional
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
     map : Treated, optional
-        The treated heights themselves, which `theory="simulated"` presses.
+        The treated heights themselves, for `theory="simulated"`.
     table : Table, optional
         What boundary elements found of them already (`mbma_tables.laws.pressing`).
     scans : tuple of MeasuredSurface, optional
@@ -82,14 +82,14 @@ class SpectralSurface(AnySurface):
     unit : str, optional
         The unit of length, such as "um"; None where it is not known. Results carry it.
     provenance : sequence of mapping, optional
-        What was done to the measurement, a plain record each step: {"step": "detrend", "kind": "plane"}, ...
+        The treatment of the measurement, a plain record for each step: {"step": "detrend", "kind": "plane"}, ...
     nominal_area : float or str, optional
         Instead of h_max, as for `Surface`.
 
     Raises
     ------
     InputError, OutOfRangeError
-        For what is no spectrum: NaN, wrong shapes, negative values, less than a factor 3 of wavenumbers.
+        For an invalid spectrum: NaN, wrong shapes, negative values, less than a factor 3 of wavenumbers.
 
     Examples
     --------
@@ -196,11 +196,11 @@ class SpectralSurface(AnySurface):
         return float(q[self.laws.between(0, start, end).argmax()])
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
-        """Why it lies outside of the surfaces that BEM was compared with, as a map or as an isotropic Gaussian one."""
+        """Reasons why it is unlike the surfaces compared with BEM, as a map or as an isotropic Gaussian one."""
         return self.outside(BY_MAP if by_map else BY_SPECTRUM, by_map)
 
     def outside(self, tested: Mapping[str, tuple[float, float]], by_map: bool = False) -> tuple[str, ...]:
-        """Which of its statistics lie outside of ranges that were tested, and the remedy."""
+        """Statistics that lie outside tested ranges, and the remedy."""
         known = {"skewness of heights": self.skewness, "kurtosis of heights": self.kurtosis}
         if self.bearing is not None:
             known["kurtosis of slopes"] = self.bearing.slope_kurtosis
@@ -223,7 +223,7 @@ class SpectralSurface(AnySurface):
         return self
 
     def scaled(self, factor: float, unit: str | None) -> Self:
-        """The same surface in another length unit, of which the old one is `factor`."""
+        """The same surface in another length unit; `factor` is the old unit in the new one."""
         return dataclasses.replace(self.resized(factor, factor), unit=unit)
 
     def resized(self, up: float, along: float) -> Self:
@@ -276,7 +276,7 @@ class SpectralSurface(AnySurface):
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 
     def added(self, other: SpectralSurface) -> Self:
-        """The surface that stands for two; see `AnySurface.combined`."""
+        """The equivalent surface of two; see `AnySurface.combined`."""
         if (self.unit is None) != (other.unit is None):
             raise InputError(
                 f"one surface is in {self.unit or other.unit!r}, the unit of the other is not known: "
@@ -287,7 +287,7 @@ class SpectralSurface(AnySurface):
         low, high = min(self.q0, other.q0), max(self.q1, other.q1)
         fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
         grid = np.unique(np.clip(np.concatenate([fine, self.q, other.q]), low, high))
-        # both sides of every wavenumber, for where a band ends the sum jumps
+        # both sides of every wavenumber, since the sum jumps at the ends of bands
         above, below = (
             self.laws.at(side) + other.laws.at(side) for side in (grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE))
         )
@@ -296,10 +296,10 @@ class SpectralSurface(AnySurface):
         told = []
         if self.bearing is not None or other.bearing is not None:
             told.append(
-                "curves of the maps' summits and valleys are left out: how the two lie on each other is not known"
+                "curves of the maps' summits and valleys are not used: the relative position of the maps is not known"
             )
         if (stretch := _anisotropy(self, other)) is not None:
-            told.append(f"lays are taken to be parallel: anisotropy {stretch:.3g} at most")
+            told.append(f"lays are assumed to be parallel: anisotropy {stretch:.3g} at most")
         record = {"step": "combined", "of": [list(self.provenance), list(other.provenance)]}
         both = type(self)(
             q[kept],
@@ -315,10 +315,10 @@ class SpectralSurface(AnySurface):
 
 
 def resolution(surface: SpectralSurface) -> dict[str, Any]:
-    """A record of how much the shortest octave of a measured spectrum matters."""
+    """A record of the influence of the shortest octave of a measured spectrum."""
     laws, q = surface.laws, surface.q
     below = laws.below(2, laws.place(q))
-    # a map may be sampled more finely than what it shows
+    # the map may be sampled more finely than its shortest wavelength
     end = float(q[np.argmax(below >= (1 - NO_POWER) * below[-1])])
     before = float(laws.below(2, laws.place(np.asarray(end / 2))))
     factor = math.sqrt(laws.moment(2) / before) if before > 0 else math.inf

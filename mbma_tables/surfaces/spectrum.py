@@ -1,7 +1,7 @@
 """Moments and summits of a self-affine spectrum over a band of magnifications (Eqs. 2, 3, 6, 7, 22, 31), and back.
 
 Units: heights in s = h_rms / sqrt(1 - zeta_1^(-2H)), lengths in 1/q0. A band [za, zb] is given by log(za) and
-log(zb/za), so that a band of any width, however narrow, keeps its digits.
+log(zb/za), so that narrow bands keep their accuracy.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def moment_of(order: int, hurst: Any, log_za: Any, log_ratio: Any) -> Any:
 def alpha_of(hurst: Any, log_ratio: Any) -> Any:
     """Nayak's bandwidth parameter m0 m4/m2^2, Eq. (3): a function of zb/za alone, 1.5 where that is 1."""
     g2 = growth(2.0 - 2.0 * hurst, log_ratio)
-    # grouped so that nothing overflows
+    # grouped to avoid overflow
     return 1.5 * (growth(-2.0 * hurst, log_ratio) / g2) * (growth(4.0 - 2.0 * hurst, log_ratio) / g2)
 
 

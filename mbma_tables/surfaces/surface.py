@@ -1,4 +1,4 @@
-"""The public surfaces: five numbers or a measured spectrum, with the constructors that lead from one to the other."""
+"""The public surfaces, given by five numbers or a spectrum, and the conversions between them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Surface(SelfAffine):
     """A self-affine surface with the spectrum C(q) ~ q^(-2-2H) between q0 and q1 (Eq. 6).
 
     Lengths are in one unit. Every argument may be an array; they broadcast to a batch of surfaces. Where one is
-    an xarray DataArray, dask-backed or not, `contact` answers with DataArrays, and arguments are checked then.
+    an xarray DataArray, dask-backed or not, `contact` returns DataArrays and checks the arguments then.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ class Surface(SelfAffine):
     unit : str, optional
         The unit of length, such as "um"; None where it is not known. Results carry it.
     fit : SpectrumFit, optional
-        Where the surface was fitted to a measurement: how well, in the measurement's unit.
+        Quality of the fit, in the measurement's unit, if the surface was fitted to a measurement.
     provenance : sequence of mapping, optional
-        What it was made from, and what was assumed; a plain record each step.
+        Origin and assumptions; a plain record for each step.
 
     Raises
     ------
@@ -56,9 +56,11 @@ class Surface(SelfAffine):
     Surface(hurst=0.8, q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6)
     >>> print(f"{surface.zeta_1:g}, rms gradient {surface.rms_gradient:.4f}")
     200, rms gradient 0.5414
-    >>> Surface(hurst=[0.5, 0.8], q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6).alpha.round(1)
-    array([100.5, 387.8])
     """
+
+    @classmethod
+    def _made(cls, numbers: dict[str, Any]) -> Surface | MeasuredSurface:
+        return MeasuredSurface(**numbers) if "C" in numbers else cls(**numbers)
 
     @classmethod
     @hinted
@@ -83,7 +85,7 @@ class Surface(SelfAffine):
             Wavenumber, 1/length, positive, in any order and spacing.
         C : array_like, shape (n,)
             Spectrum [length^4; a profile's length^3], not negative; a power law is taken between neighbours. A fit
-            leaves out what a masked array hides.
+            omits masked entries.
         h_max, nominal_area : float, optional
             As for `Surface`; h_max is that of `heights` if neither is given.
         heights : array_like, optional
@@ -184,13 +186,13 @@ class Surface(SelfAffine):
         model : {"measured", "self-affine"}, optional
             The map's own spectrum, heights and curves, without a fit, or five numbers fitted to it.
         extrapolate_to, extrapolate_hurst : float, optional
-            Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; what
-            that changes is told.
+            Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; its
+            influence is recorded.
         outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter, tip_radius, reliable, window : optional
-            As in `mbma_tables.surfaces.treatment.Treatment`; what was done is the surface's `provenance`.
+            As in `mbma_tables.surfaces.treatment.Treatment`; the treatment is recorded in `provenance`.
         unit : str, optional
-            Unit of the answer and of plain lengths, to which lengths of a file are converted, or which they have where
-            it names none; dx may name its own, such as "195 nm", in which heights are too without a unit.
+            Unit of the result and of plain lengths; lengths of a file are converted to it, or taken to be in it if the
+            file names none. dx may have its own, such as "195 nm", which is then that of heights if `unit` is missing.
         channel : int, optional
             Of a file with several maps.
 
@@ -204,9 +206,9 @@ class Surface(SelfAffine):
         Raises
         ------
         InputError, OutOfRangeError
-            For input that is no map: holes, a missing or negative step, an unknown trend, nothing but a plane.
+            For an invalid map: holes, a missing or negative step, an unknown trend, nothing but a plane.
         NotSelfAffineError
-            With model="self-affine", where the map is no such surface; the message has the reason and the numbers.
+            With model="self-affine", where the map is not self-affine; the message has the reason and the numbers.
 
         Examples
         --------
@@ -256,7 +258,7 @@ class Surface(SelfAffine):
         unit: str | None = None,
         channel: int | None = None,
     ) -> MeasuredSurface:
-        """The isotropic surface of which a line was measured, by a stylus for instance.
+        """The isotropic surface from a measured line scan, for example by a stylus.
 
         Parameters
         ----------
@@ -268,12 +270,12 @@ class Surface(SelfAffine):
         periodic, detrend, extrapolate_to, extrapolate_hurst, outliers ... channel
             As for `from_map`; `tip_radius` is the stylus's.
         h_max, nominal_area : float, optional
-            As for `Surface`; by default h_max is the line's, which lies below that of a surface.
+            As for `Surface`; by default h_max is that of the line, which is lower than that of a surface.
 
         Returns
         -------
         MeasuredSurface
-            Its `provenance` says how well h_rms and gradient are known, and what one trace cannot tell.
+            Its `provenance` has the accuracy of h_rms and gradient, and the limitations of a single trace.
 
         Raises
         ------
@@ -298,7 +300,7 @@ class Surface(SelfAffine):
         return dataclasses.replace(MeasuredSurface.of(known), h_max=given, nominal_area=nominal_area)
 
     def sampled(self) -> MeasuredSurface:
-        """The same surface by its spectrum, two samples of which hold all of it; of a batch there are none."""
+        """The same surface given by its spectrum, of which two samples suffice; not available for a batch."""
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum: take one surface at a time")
         ends = np.array([self.q0, self.q1])
@@ -311,11 +313,11 @@ class MeasuredSurface(SpectralSurface):
 
     @classmethod
     def of(cls, known: SpectralSurface) -> MeasuredSurface:
-        """The same spectrum, with what leads to five numbers."""
+        """The same spectrum, with the fit of five numbers."""
         return cls(**{field.name: getattr(known, field.name) for field in dataclasses.fields(known)})
 
     def fit(self, band: tuple[float, float] | None = None) -> Surface:
-        """The self-affine surface nearest to it: five numbers, and how well they describe the spectrum.
+        """The self-affine surface nearest to it: five numbers, and the quality of the fit.
 
         Parameters
         ----------
@@ -335,12 +337,10 @@ class MeasuredSurface(SpectralSurface):
 
         Examples
         --------
-        >>> import numpy as np
-        >>> from mbma_tables import Surface
-        >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
-        >>> nearest = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1).fit()
-        >>> f"H = {nearest.hurst:.2f} from q = {nearest.q0:.2f}, {nearest.fit.variance_share:.0%} of the variance"
-        'H = 0.80 from q = 1.00, 58% of the variance'
+        >>> from mbma_tables import Surface  # the spectrum is flat up to q = 1
+        >>> face = Surface.from_spectrum([0.2, 1, 50], [0.01, 0.01, 7.6e-9], h_max=1.1)
+        >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
+        H = 0.80 from q = 1.00
         """
         from mbma_tables.surfaces.psd import fit_samples
 

@@ -1,7 +1,7 @@
 """Measured maps and line scans, treated by SurfaceTopography (the extra `maps`), each step on record.
 
-Terms are that library's: detrend modes, windows, harmonic filling of undefined data, short and long cut-off, tip
-radius. Only the search for outliers is added here.
+Terms are those of that library: detrend modes, windows, harmonic filling of undefined data, short and long cut-off,
+tip radius. Only the search for outliers is added here.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
 DETRENDS = ("mean", "plane", "quadratic", "median", "height", "mad-tilt", "slope", "curvature", "mad-curvature")
 FILLS = ("harmonic",)
-MIN_GRID = 32  # points along each side: 16 wavenumbers, of which a window spoils the first
-FREE_HOLES = 0.05  # share of undefined points that is filled unasked
+MIN_GRID = 32  # points along each side: 16 wavenumbers, the first of which is distorted by a window
+FREE_HOLES = 0.05  # share of undefined points that is filled without being requested
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
 MIN_POWER = 1e-24  # of the strongest wavelength: below it rounding, not a measured wavelength
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter")  # options that are lengths
-FORM = 0.5  # share of the height variance in a tilt or a bow from which on it is told
-USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier, and share of the points up to which they are told
+FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
+USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier; share of points up to which they are reported
 CUTS = {"long_cutoff": "longcut", "short_cutoff": "shortcut"}  # by that library
 CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
 CALLED |= {"s_filter": "an S-filter", "l_filter": "an L-filter"}
@@ -38,15 +38,15 @@ Provenance = tuple[Mapping[str, Any], ...]
 
 @dataclasses.dataclass(frozen=True)
 class Treatment:
-    """What is done to a measurement, in this order.
+    """The treatment of a measurement; steps are done in this order.
 
     Attributes
     ----------
     outliers : float, optional
         Points further from the median of their 3 x 3 neighbourhood than this many standard deviations of such
-        differences, by their 99% quantile, are taken out and filled; 10 finds bad pixels and little else.
+        differences, by their 99% quantile, are removed and filled; 10 finds bad pixels and little else.
     fill : {"harmonic"}, optional
-        How undefined points are filled (`interpolate_undefined_data`). Up to 5% are filled unasked, harmonically.
+        How undefined points are filled (`interpolate_undefined_data`). By default up to 5% are filled harmonically.
     detrend : str, optional
         Mode of `detrend`: mean, median, height (or plane), mad-tilt, slope, curvature (or quadratic), mad-curvature.
         By default the mean of periodic data, the plane of any other.
@@ -54,8 +54,8 @@ class Treatment:
         Wavelengths [length]: shorter ones, below the instrument's resolution, and longer ones, form, are left out
         (`shortcut`, `longcut`). Data that are not periodic are continued by their mirror images for that.
     s_filter, l_filter : float, optional
-        Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve waves of this length: an
-        S-filter takes out shorter ones, those below 0.39 times it wholly, an L-filter longer ones.
+        Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve this wavelength. An
+        S-filter removes shorter ones, completely below 0.39 times the index, an L-filter longer ones.
     tip_radius : float, optional
         Of a scanning probe or stylus [length]: sets `short_cutoff` where `scanning_probe_reliability_cutoff` finds
         wavelengths that such a tip cannot follow.
@@ -91,25 +91,25 @@ OPTIONS = ("unit", "dx", "dy", "channel", "periodic", *(field.name for field in 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Treated:
-    """Heights as they go into a spectrum, and how they came about."""
+    """Heights for a spectrum, and their treatment."""
 
     heights: Any  # [length], shape (nx, ny) or (n,); none undefined in the end
     steps: tuple[float, ...]  # sampling step along each axis [length]
-    periodic: bool  # else they continue by their mirror images where that is needed
+    periodic: bool  # else they are continued by their mirror images if needed
     unit: str | None  # of length, that the file names
-    waves: tuple[float, float] = (0.0, math.inf)  # wavenumbers between which the wavelengths are that were kept
+    waves: tuple[float, float] = (0.0, math.inf)  # smallest and largest wavenumber kept
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
     window: str | None = None
     uncut: Any = None  # heights before the short cut-off, where there is one
 
     def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
-        """The same after a step, which is recorded."""
+        """The heights after a step, with its record."""
         record = {"step": step, **numbers, "told": told}
         return dataclasses.replace(self, heights=heights, provenance=(*self.provenance, record))
 
     @property
     def read(self) -> dict[str, Any]:
-        """The record of what was read, which comes before all that was done to it."""
+        """The record of the data read, which precedes those of the treatment."""
         shape, unit = self.heights.shape, f" {self.unit}" if self.unit else ""
         sides = " x ".join(f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True))
         told = (
@@ -159,12 +159,12 @@ def treat(
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
         raise InputError(
-            f"{' x '.join(map(str, heights.shape))} points hold too few scales; the least is "
+            f"{' x '.join(map(str, heights.shape))} points have too few wavelengths; needed are at least "
             f"{' x '.join([str(MIN_GRID)] * heights.ndim)}"
         )
     known = Treated(heights, steps, periodic, unit, window=treatment.window)
     with warnings.catch_warnings():
-        # that library's calls of numpy are its own affair
+        # warnings of numpy inside that library are ignored
         warnings.simplefilter("ignore")
         known = _without_outliers(known, treatment.outliers)
         known = _flattened(_filled(known, treatment.fill), treatment.detrend)
@@ -187,7 +187,7 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
         flat = without_polynomial(heights, degree)
     size = float(np.abs(heights).max())
     if not float(np.abs(flat).max()) > max(1e3 * np.finfo(float).eps * size, MIN_LENGTH):
-        raise InputError(f"the map is flat: nothing is left once its {trend} is subtracted")
+        raise InputError(f"the map is flat: without its {trend} it is zero")
     before, after = float(np.std(heights)), float(np.std(flat))
     told = f"{trend} subtracted" + (f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else "")
     for more, form in ((1, "tilt"), (2, "bow")) if degree is not None else ():
@@ -204,7 +204,7 @@ def _counted(count: int, size: int) -> str:
 
 
 def _harmonic(known: Treated) -> FloatArray:
-    """Heights, where they are undefined smooth."""
+    """Heights, with undefined points filled smoothly."""
     heights = known.heights
     if np.ma.getmaskarray(heights).any():
         scan = wrapped(heights, known.steps, known.periodic)
@@ -213,11 +213,11 @@ def _harmonic(known: Treated) -> FloatArray:
 
 
 def _without_outliers(known: Treated, asked: float | None) -> Treated:
-    """Heights with what stands out of its neighbourhood undefined; where that was not asked for, a few are told."""
+    """Heights with outliers undefined; if not requested, a few outliers are only reported."""
     from scipy.ndimage import median_filter
 
     heights, whole = known.heights, _harmonic(known)
-    # far outliers bend what their neighbours are filled with, not their median
+    # far outliers distort the filling of their neighbours, not their median
     difference = whole - median_filter(whole, MEDIAN_POINTS, mode="wrap" if known.periodic else "mirror")
     measured = ~np.ma.getmaskarray(heights)
     scale = float(np.quantile(np.abs(difference[measured]), USUAL)) / USUAL_DEVIATES
@@ -253,7 +253,7 @@ def _filled(known: Treated, fill: str | None) -> Treated:
 
 
 def _resolution(known: Treated, treatment: Treatment, info: Mapping[str, Any]) -> tuple[Treated, float | None]:
-    """Shortest wavelength that is kept: the largest of what is given, the tip follows, the file states; None: all."""
+    """Shortest wavelength kept: the largest of those given, resolved by the tip and stated by the file; None: all."""
     found = [(treatment.short_cutoff, "as given")] if treatment.short_cutoff is not None else []
     tip, stated = treatment.tip_radius, (info.get("instrument") or {}).get("parameters") or {}
     if tip is None and not (treatment.reliable and known.unit and {"tip_radius", "resolution"} & set(stated)):
@@ -311,7 +311,7 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
 
 
 def mirrored(values: FloatArray) -> FloatArray:
-    """Heights and their mirror images along each axis, which continue them periodically."""
+    """Heights with their mirror images along each axis, which continue them periodically."""
     for axis in range(values.ndim):
         values = np.concatenate([values, np.flip(values, axis)], axis)
     return values

@@ -1,7 +1,7 @@
-"""Variants of the paper: the few choices that its text leaves open or prints wrongly, by name.
+"""Variants of the paper: named choices where its text is ambiguous or misprinted.
 
 `printed` is exactly the printed equations. `reported`, the default, takes every summit density without its
-pi, and so gives the results that the paper reports. Nothing else is tuned in these two. `fitted` has its constants
+pi, and so gives the results that the paper reports. Nothing else is adjusted in these two. `fitted` has its constants
 fitted to the contact area of boundary elements, and adds areas as a cover: its area at a force is good to full contact,
 its separation is no better than theirs.
 """
@@ -26,13 +26,13 @@ class Variant:
     Attributes
     ----------
     name : str
-        Every result says by it which variant made it.
+        Name of the variant in results.
     density_divisor : float
         Summit density is m4/(density_divisor m2), wherever one enters (Eqs. 2, 32, 39, 43a).
     jacobian : {"printed", "exact"}
         K1 of (47): 1 - 4 beta/3, or 1 - (4 beta/3)/sqrt(1 - zeta_1^(-2H)) as (46) with (27b) gives.
     offset : bool
-        Whether islands stand h_d below z_max (Eqs. 35, 41).
+        Whether islands are offset by h_d below z_max (Eqs. 35, 41).
     summit_sigma : bool
         sigma of an island and of the islands' heights is the summits' (Eqs. 32, 43a); else sqrt(m0).
     beta : float
@@ -89,13 +89,13 @@ class Variant:
 
     @property
     def recorded(self) -> list[float]:
-        """What table files record."""
+        """The numbers recorded in table files."""
         numbers = self.density_divisor, self.beta, self.phi, self.floor_d, self.floor_u
         return [*map(float, numbers), bool(self.offset), bool(self.summit_sigma)]
 
     @property
     def numbers(self) -> FloatArray:
-        """What the core takes, `mbma_variant` of mbma.h."""
+        """The numbers for the core, `mbma_variant` of mbma.h."""
         return np.array([*self.recorded, self.jacobian == "printed"], dtype=float)
 
 

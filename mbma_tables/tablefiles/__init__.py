@@ -1,1 +1,1 @@
-"""Table files: what one holds, how it is written, opened, checked and interpolated."""
+"""Table files: schema, reading, checking."""

@@ -24,7 +24,7 @@ from mbma_tables.tablefiles import schema
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
 MAX_BYTES = 256 * 2**20  # of a file, and of its values
-# the HDF5 library crashes where threads enter it together, and a child must not be forked while one is in it
+# the HDF5 library is not thread-safe, and a process must not be forked during its calls
 HDF5_LOCK = threading.RLock()
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(before=HDF5_LOCK.acquire, after_in_parent=HDF5_LOCK.release, after_in_child=HDF5_LOCK.release)
@@ -54,7 +54,7 @@ def _attributes_of(owner: Any) -> dict[str, Any]:
 
 
 def attributes_digest(dataset: netCDF4.Dataset) -> str:
-    """SHA-256 of every attribute of a file but this hash itself, and of each variable's dimensions and attributes."""
+    """SHA-256 of all attributes of a file except this hash, and of the dimensions and attributes of its variables."""
     own = _attributes_of(dataset)
     content = {"": {name: value for name, value in own.items() if name != "attributes_sha256"}}
     for name, variable in dataset.variables.items():
@@ -83,7 +83,7 @@ def read_sealed(path: pathlib.Path) -> bytes:
 def verified(
     dataset: netCDF4.Dataset, required: tuple[str, ...] = ("values_sha256",)
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]], dict[str, Any]]:
-    """Attributes of an open file, those of its variables, and their values, all as their hashes and types say."""
+    """Attributes of an open file, those of its variables, and their values, checked by hashes and types."""
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
     own = _attributes_of(dataset)
@@ -107,7 +107,7 @@ def verified(
 
 
 def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
-    """The table in an open file whose kind and format are known."""
+    """The table in an open file of known kind and format."""
     own, described, values = verified(dataset, schema.REQUIRED)
     names, fields = [name for name, _ in schema.AXES[kind]], ("long_name", "transform", "offset", "first", "last")
     axes = tuple(schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size)) for name in names)

@@ -1,4 +1,4 @@
-"""Tables of a user's own surface: what boundary elements found of one map, in a sealed netCDF-4 file like other tables.
+"""Tables of a user's own surface: BEM results of one map, in a netCDF-4 file with a checksum like other tables.
 
 Each variable has its dimensions named, a `long_name` and `units`; hashes and the seal are those of `netcdf`.
 """
@@ -32,7 +32,7 @@ ADVICE = "make it anew: `mbma fit MAP --simulate --out OWN.nc`"
 
 
 def is_own(path: os.PathLike[str] | str) -> bool:
-    """Whether a file ends as a sealed table does."""
+    """Whether a file ends with a table's checksum."""
     try:
         with open(path, "rb") as stream:
             stream.seek(-SEAL_LENGTH, os.SEEK_END)

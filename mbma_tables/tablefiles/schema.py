@@ -1,10 +1,10 @@
-"""What a table file holds: every name of the format, the type of every attribute, and how the parts fit one another.
+"""Contents of a table file: names of the format, types of the attributes, consistency of the parts.
 
 The universal table is a list of cells of (X, mu), each with a Chebyshev series of Phi_F/mu and of Phi_A. The
 four-parameter table holds the logarithm of the ratio to the rigid sphere at the nodes of four axes, and the spline
-coefficients that interpolate it. Both have bounds on the error, conformance points, and attributes that say where all
-of it came from. `docs/tables.md` describes the format for readers in other languages.
-The core relies on what is checked here, and the text of attributes goes into exported files.
+coefficients that interpolate it. Both have bounds on the error, conformance points, and attributes on the
+origin of all. `docs/tables.md` describes the format for readers in other languages.
+The core relies on these checks, and the text of attributes is written to exported files.
 """
 
 from __future__ import annotations
@@ -130,24 +130,24 @@ class TableContent:
     local_error: FloatArray  # largest relative error in each cell (of a coarser grid: near it), times its factor; F, A
     # name -> (dimensions, values, attributes): edges of cells; log(Phi/Phi of the rigid sphere) at nodes, coordinates
     auxiliary: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, Any]]]
-    conformance: dict[str, FloatArray]  # arguments and answers of the points to replay, shape (points,)
-    attributes: dict[str, Any]  # beyond those that follow from the rest
+    conformance: dict[str, FloatArray]  # arguments and results of the conformance points, shape (points,)
+    attributes: dict[str, Any]  # attributes that do not follow from the rest
 
     @property
     def size(self) -> str:
-        """How many cells or nodes it has, in words."""
+        """Number of cells or nodes, as text."""
         if self.kind == UNIVERSAL:
             return f"{self.coefficients.shape[0]} cells"
         return " x ".join(f"{axis.nodes} {axis.name}" for axis in self.axes)
 
     def facts(self) -> dict[str, str]:
-        """What it covers and how right it is, for a line."""
+        """Range and error of the table, in one line."""
         ranges = ", ".join(f"{axis.name} {axis.low:g} to {axis.high:g}" for axis in self.axes)
         errors = ", ".join(f"{f} {self.attributes[f'largest_error_{f}']:.2g}" for f in FUNCTIONS)
         return {"covers": ranges, "size": self.size, "largest held-out error": errors}
 
     def arrays(self) -> dict[str, Any]:
-        """Every array that the values' hash covers, by the name that it has in the file."""
+        """All arrays included in the values' hash, by their names in the file."""
         named: dict[str, Any] = {axis.name: axis.values for axis in self.axes}
         for number, function in enumerate(FUNCTIONS):
             named[f"{COEFFICIENTS[self.kind]}_{function}"] = self.coefficients[..., number]
@@ -166,7 +166,7 @@ def dimensions(kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def error_cell(axis: Axis, cells: int, position: Any) -> Any:
-    """Which cell of the error field a position lies in."""
+    """Cell of the error field that contains a position."""
     scaled = np.asarray(position) * (cells / (axis.nodes - 1))
     return np.clip(np.floor(scaled).astype(np.intp), 0, cells - 1)
 
@@ -175,7 +175,7 @@ def _matches(pattern: str) -> Callable[[str], bool]:
     return lambda text: re.fullmatch(pattern, text) is not None
 
 
-# the first pattern that a name matches says what the attribute must be
+# the first pattern that matches a name determines the type of the attribute
 ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], bool], str], ...] = (
     ("certificate_points|spline_degree", int, lambda value: value > 0, "a whole number above 0"),
     ("target|.*_error_[FA]", float, lambda value: 0 <= value < np.inf, "a finite number, at least 0"),
@@ -188,7 +188,7 @@ ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], bool], str], ...] = (
 
 
 def check_attribute(owner: str, name: str, value: Any) -> None:
-    """Raise ValueError where an attribute of a file (`owner` empty) or of a variable is not what its name says."""
+    """Raise ValueError if an attribute of a file (`owner` empty) or of a variable does not have its name's type."""
     expected, good, text = next(row[1:] for row in ATTRIBUTES if re.fullmatch(row[0], name))
     if type(value) is not expected or not good(value):
         shown = repr(value)[:60]
@@ -198,7 +198,7 @@ def check_attribute(owner: str, name: str, value: Any) -> None:
 def _check_axis(axis: Axis) -> None:
     low, high = LIMITS.get(axis.name, (-np.inf, np.inf))
     positive = axis.low + axis.offset > 0 or axis.transform == "linear"
-    # lookups know an offset of X alone
+    # lookups support an offset on the axis X only
     known = axis.offset == 0 or axis.name == "X"
     if not (positive and known and low <= axis.low < axis.high <= high and axis.nodes > 1):
         raise ValueError(f"has axis {axis.name} from {axis.low:g} to {axis.high:g} with offset {axis.offset:g}")
@@ -207,7 +207,7 @@ def _check_axis(axis: Axis) -> None:
 
 
 def _check_nodes(content: TableContent) -> None:
-    """Raise ValueError where the values of a table are not over the nodes of its axes."""
+    """Raise ValueError if the shapes of a table's values differ from its axes."""
     nodes = tuple(axis.nodes for axis in content.axes)
     knots = tuple(count + DEGREE - 1 for count in nodes)
     cells = content.local_error.shape[:-1]
@@ -232,7 +232,7 @@ def _check_cells(content: TableContent) -> None:
         raise ValueError("has error bounds that are not over its cells")
     X_low, X_high, mu_low, mu_high = edges
     starts = mu_low == 0
-    # each cell goes on where the one before it ends, up to the end of its strip
+    # each cell begins where the previous one ends, up to the end of its strip
     upwards = (mu_low[1:] == mu_high[:-1]) & (X_low[1:] == X_low[:-1]) & (X_high[1:] == X_high[:-1])
     onwards = (mu_high[:-1] == mu.high) & (X_low[1:] == X_high[:-1])
     ends = (X_low[0], X_high[-1], mu_high[-1]) == (X.low, X.high, mu.high) and starts[0] and mu.low == 0
@@ -249,7 +249,7 @@ def _check_cells(content: TableContent) -> None:
 
 @np.errstate(all="ignore")
 def check_content(content: TableContent) -> None:
-    """Raise ValueError where the parts of a table do not fit one another."""
+    """Raise ValueError if the parts of a table are inconsistent."""
     axes = tuple((axis.name, axis.transform) for axis in content.axes)
     if axes != AXES[content.kind]:
         raise ValueError(f"has axes {axes}, not {AXES[content.kind]}")

@@ -1,4 +1,4 @@
-"""Theories of rough contact behind one protocol: MBMA, Persson, Greenwood-Williamson, or a user-defined object."""
+"""Theories of rough contact, one file each, behind one protocol."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _NAMED = dict(zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliams
 # a theory's module is imported when first needed
 _HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson", "BoundaryElements": "simulated"}
 _HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
-OF_MAPS = ("corrected", "simulated")  # theories of one map, made by pressing it
+OF_MAPS = ("corrected", "simulated")  # theories of one map, made by simulating it
 # of MBMA
 OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise", "workers": 1}
 
@@ -59,7 +59,7 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     Raises
     ------
     InputError
-        For an unknown name, an object that is no theory, and those of a map for a surface without one.
+        For an unknown name, an object that is not a theory, and theories of a map for a surface without one.
 
     Examples
     --------
@@ -87,14 +87,14 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
 
 @functools.cache
 def default_theory(name: str) -> Theory:
-    """One of `THEORIES` with its defaults, made once a process."""
+    """One of `THEORIES` with its defaults, made once per process."""
     return get_theory(name)
 
 
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The theory as given; without one "mbma" for five numbers or its options, and for a measured surface the nearest.
+    """The given theory; by default "mbma" for five numbers or its options, the most accurate for measured surfaces.
 
-    That is "simulated" for a surface opened from a table, "corrected" for maps that are fit for it, "calibrated" for
+    The latter is "simulated" for a surface opened from a table, "corrected" for suitable maps, "calibrated" for
     others.
     """
     from mbma_tables.surfaces.surface import Surface

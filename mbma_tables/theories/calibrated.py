@@ -1,4 +1,4 @@
-"""The law calibrated on boundary elements as a theory: self-affine surfaces by its table, others by the law itself."""
+"""The law calibrated on BEM as a theory: self-affine surfaces by its table, others by the law itself."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 TESTED_HEIGHTS = (2.5, 8.0)
 NEAREST = 0.95  # of h_max: where the certificate of the table ends
 TAIL = 3.0, 0.8  # u/h_rms from which the error of the table grows, and its rate: exp(0.8 (u/h_rms - 3))
-# standard deviations that come on top of what is stated for Gaussian maps, of maps without `departures` and of others;
-# of docs/data/machined.nc, where so many leave 70% within one and 93.5% within two
+# standard deviations added to that of Gaussian maps, for maps without `departures` and for others; with these, 70% of
+# docs/data/machined.nc lie within one and 93.5% within two standard deviations
 MAP_SCATTER = {"area": (0.038, 0.075), "pressure": (0.046, 0.13), "stiffness": (0.13, 0.21)}
 LIKE_SCANS = 1e-3, 0.9  # A/A0 at which scans are compared
 MANY = 1000  # entries for which polynomials of one surface are made
-ROUNDING = 1e-14  # what a separation loses beside h_max
+ROUNDING = 1e-14  # rounding of a separation beside h_max
 
 
 def _own_law(surface: MeasuredSurface) -> OwnLaw:
-    # what maps need of scipy takes long to import
+    # imports scipy, which takes long
     from mbma_tables.theories.calibrated_curves import own_law
 
     return own_law(surface)
 
 
 def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
-    """Relative error at shares of h_max; nearer to it than NEAREST force is a small difference, which loses digits."""
+    """Relative error at shares of h_max; nearer to it than NEAREST, force is a small difference with cancellation."""
     near = (share > NEAREST) & (share < 1)
     error = np.array(np.broadcast_to(stated, share.shape))
     error[near] = nearer * error[near] + ROUNDING / (1 - share[near])
@@ -49,7 +49,7 @@ def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
 
 
 class Batch:
-    """Surfaces bound to the table, for about so many entries."""
+    """Surfaces prepared for the table, for about so many entries."""
 
     def __init__(self, surface: Surface, entries: int) -> None:
         names = ("hurst", "zeta_1", "h_max", "h_rms", "rms_gradient")
@@ -124,7 +124,7 @@ def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatA
 
 
 def area_reasons(area: FloatArray) -> dict[str, Any]:
-    """Contact fractions that were not simulated, or hardly."""
+    """Contact fractions with no or few simulations."""
     low, high = TESTED_AREA
     below = (area > 0) & (area < low * (1 - 1e-9))
     return {f"A/A0 is below {low:g}": below, f"A/A0 is above {high:g}": area > high * (1 + 1e-9)}
@@ -133,16 +133,16 @@ def area_reasons(area: FloatArray) -> dict[str, Any]:
 class Calibrated(Theory):
     """Persson's energy integral with cover and weight calibrated on boundary elements.
 
-    Self-affine surfaces are answered by its table, those outside of it (H below 0.1, zeta_1 above 1e5,
+    Self-affine surfaces are evaluated by its table, those outside of it (H below 0.1, zeta_1 above 1e5,
     h_max above 8 h_rms) by the law's
-    quadrature. A surface that is its own spectrum is answered by that; where its heights were
-    measured, they decide the separation, and where they were measured as a map, its tops and valleys the area, too.
+    quadrature. For a surface given by a spectrum, the spectrum is used; measured heights determine the separation,
+    and a measured map also determines the area, by its highest and lowest parts.
     """
 
     name = "calibrated"
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """From full contact, or where a map's curve ends before, to last contact."""
+        """From full contact, or from the end of a map's curve, to last contact."""
         high = np.asarray(surface.h_max, dtype=float)
         return (
             np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else np.zeros_like(high)
@@ -166,7 +166,7 @@ class Calibrated(Theory):
         return TheoryAnswer(pressure, area, stiffness, _error(stated, 2.0, x / (np.asarray(surface.h_max) / h_rms)))
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Of self-affine surfaces by the table."""
+        """Results for self-affine surfaces by the table."""
         if isinstance(surface, MeasuredSurface):
             return super().curve(surface, quantity)
         batch = _bound(cast(Surface, surface), np.empty(0))
@@ -202,7 +202,7 @@ class Calibrated(Theory):
         return np.asarray(np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max))
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
-        """A/A0 at a force over A0 E*, but for a map in closed form."""
+        """A/A0 at a force over A0 E*, in closed form except for a map."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).area(np.asarray(pressure, float))
         return law_area(
@@ -210,20 +210,20 @@ class Calibrated(Theory):
         )
 
     def heights(self, surface: AnySurface) -> Any:
-        """Those of a map, or Gaussian."""
+        """Heights of a map, or Gaussian."""
         own = _own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons for which answers lie outside what boundary elements have tested."""
+        """Reasons why results lie outside the range tested against boundary elements."""
         if isinstance(surface, MeasuredSurface):
             law = _own_law(surface)
             straight = np.zeros(answer.area.shape, dtype=bool)
             if law.curve is not None:
                 straight |= law.curve.straight(np.asarray(mean_separation) / law.h_rms)
             text = (
-                "the light-load and near-full-contact approximations disagree for this map: one stiffness stands for a "
-                "range of forces"
+                "the light-load and near-full-contact approximations disagree for this map: stiffness is constant "
+                "over a range of forces"
             )
             return {text: straight & (answer.area >= TESTED_AREA[0])} | area_reasons(answer.area)
         assert isinstance(surface, Surface)
@@ -237,11 +237,11 @@ class Calibrated(Theory):
         return found | area_reasons(answer.area)
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """Why a measured surface is not like those that boundary elements have tested."""
+        """Reasons why a measured surface is unlike those tested against boundary elements."""
         return surface.departures(by_map=self.scatter_name(surface) != self.name)
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
-        """As of any theory; of maps with what comes on top of that of Gaussian ones."""
+        """Scatter as of any theory; for maps with an addition to that of Gaussian ones."""
         if self.scatter_name(surface) == self.name:
             return super().scatter(surface, quantity, area)
         assert isinstance(surface, MeasuredSurface)
@@ -252,6 +252,6 @@ class Calibrated(Theory):
         return np.hypot(stated, _spread(surface, quantity, area)) if surface.scans else stated
 
     def scatter_name(self, surface: AnySurface) -> str:
-        """With a map at hand scatter is much smaller."""
+        """Advice: with a map the scatter is much smaller."""
         by_map = isinstance(surface, MeasuredSurface) and surface.bearing is not None
         return f"{self.name}_map" if by_map else self.name

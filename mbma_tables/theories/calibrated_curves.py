@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mbma_tables.laws.hardness import BearingCurve
 
 MAP_ERROR = 3e-2  # of a map's curve, which is smoother than the nodes of its law: nine maps in ten
-STRAIGHT, SAME = 1.0, 1e-9  # of ln F, over which one stiffness is no curve; differences that are rounding
+STRAIGHT, SAME = 1.0, 1e-9  # range of ln F over which constant stiffness is unreliable; differences due to rounding
 NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
 
 
@@ -65,7 +65,7 @@ class Curve:
         # -d ln F/d ln u where full contact is continued
         self._heaviest_rate = -float(rate[0])
         self._law = law
-        # both approximations may disagree: gaps close, or run back, at partial contact
+        # both approximations may disagree: gaps close, or increase with load, at partial contact
         heaviest = float(total[0])
         closed = float(self.area(np.array(heaviest))) < TESTED_AREA[1]
         self.end, self.heaviest = (float(np.exp(fine[0])), heaviest) if closed else (0.0, np.inf)
@@ -91,7 +91,7 @@ class Curve:
         return pressure, self.area(pressure), stiffness
 
     def straight(self, u: FloatArray) -> NDArray[np.bool_]:
-        """Where one stiffness stands for a whole range of forces."""
+        """True within ranges of constant stiffness, where the approximations disagree."""
         found = [(u >= low) & (u <= high) for low, high in self._straight]
         return np.asarray(np.logical_or.reduce([np.zeros(np.shape(u), dtype=bool), *found]))
 
@@ -99,7 +99,7 @@ class Curve:
         """A/A0 at a force, in proportion below the law's lightest load."""
         known = np.clip(pressure, np.exp(LOG_FORCE[0]), np.exp(LOG_FORCE[-1]))
         area = self._law.area(known) * np.minimum(pressure / known, 1)
-        # what is left to full contact falls on like that of Gaussian pressures
+        # the remaining open area decreases as for Gaussian pressures
         left = erfc(np.sqrt(2) * np.maximum(pressure, known)) / erfc(np.sqrt(2) * known)
         return np.where(pressure > known, 1 - (1 - area) * left, area)
 
@@ -135,7 +135,7 @@ def own_law(surface: MeasuredSurface) -> OwnLaw:
 
 
 class OwnLaw:
-    """The law of a surface that is its own spectrum: of the spectrum, or with its heights or its map's curves."""
+    """The law of a surface given by a spectrum: by the spectrum alone, or with its heights or its map's curves."""
 
     def __init__(self, surface: MeasuredSurface) -> None:
         self.h_rms, self.h_max = float(surface.h_rms), float(surface.h_max)
@@ -168,7 +168,7 @@ class OwnLaw:
 
     @property
     def end(self) -> float:
-        """Mean separation [length] at which the curve ends: 0 but where a map's gap closes at partial contact."""
+        """Mean separation [length] at which the curve ends: 0 unless a map's gap closes at partial contact."""
         return 0.0 if self.curve is None else self.curve.end * self.h_rms
 
     def answer(self, u: FloatArray) -> tuple[list[FloatArray], float]:

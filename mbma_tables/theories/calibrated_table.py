@@ -1,8 +1,8 @@
 """The calibrated law's table: ln F_G over Hurst exponent, zeta_1 and mean separation, and errors against simulations.
 
 F_G is the force of `mbma_tables.laws.calibrated` on a surface without end. The end at h_max and the area are closed
-forms, applied here. Below the table's least separation full contact rules, F^2 linear in ln u; above its largest ln F
-is linear in u.
+forms, applied here. Below the table's least separation F^2 is linear in ln u, as near full contact; above its largest
+one ln F is linear in u.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "pressure", "stiffness")
-FEW, MIN_SHARED = 64, 40  # surfaces up to which, and entries a surface from which, its polynomials are worth making
+FEW, MIN_SHARED = 64, 40  # most surfaces, and least entries per surface, for which polynomials are made
 
 Owners = NDArray[np.int64]
 
@@ -47,17 +47,17 @@ class SurfaceSpline:
 
     @property
     def last(self) -> float:
-        """Where the last axis ends."""
+        """End of the last axis."""
         return float(self.first[2] + self.cells[2] * self.step[2])
 
     @functools.cached_property
     def core_table(self) -> tuple[Any, FloatArray, Any]:
-        """Coefficients, numbers and cells as the core takes them."""
+        """Coefficients, numbers and cells in the core's format."""
         numbers = [*self.first, *(1 / self.step), *self.covered[:2].ravel(), *self.law_constants]
         return np.pad(self.coefficients.ravel(), (0, 2)), np.array(numbers), self.cells
 
     def covers(self, hurst: FloatArray, log_zeta_1: FloatArray) -> Any:
-        """Which surfaces lie inside the table."""
+        """Mask of surfaces inside the table."""
         (low, high), (start, stop) = self.covered[:2]
         return (low <= hurst) & (hurst <= high) & (start <= log_zeta_1) & (log_zeta_1 <= stop)
 
@@ -81,7 +81,7 @@ class Table(SurfaceSpline):
     log_area: FloatArray  # ln of contact fractions
 
     def given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
-        """The table and surfaces (columns: H, ln zeta_1, h_max/h_rms) as the core takes them, for so many entries."""
+        """The table and surfaces (columns: H, ln zeta_1, h_max/h_rms) in the core's format, for so many entries."""
         ends = np.empty((surfaces.shape[1], 2))
         core.calibrated_ends(*self.core_table, *surfaces, None, None, ends)
         return *self.core_table, *surfaces, ends, self.shared(surfaces, entries)

@@ -54,5 +54,5 @@ def applies(surface: AnySurface) -> bool:
 
 @functools.lru_cache(maxsize=8)
 def of_map(name: str, surface: AnySurface) -> BoundaryElements:
-    """The theory of that name of a surface's map, kept while it is asked again."""
+    """The theory of that name for a surface's map, cached."""
     return {kind.name: kind for kind in (BoundaryElements, Corrected)}[name].of(surface)

@@ -16,7 +16,7 @@ from mbma_tables.common.arguments import FloatArray
 ENOUGH = 2e-8  # relative, of derivatives or of their scale
 HALVINGS = 10  # of the step, at most
 INTEGRAL_RTOL = 1e-9
-LEAST_LEVEL = 4  # of the rule of energies, whose estimate of its error may vanish by chance where it is coarse
+LEAST_LEVEL = 4  # of the rule for energies, whose error estimate may be too small by chance on coarse intervals
 
 # places over the step, and weights of the derivative: in their middle, and at the first of them
 CENTRAL: tuple[Any, Any] = np.array([-1.0, -0.5, 0.5, 1.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 6
@@ -35,8 +35,8 @@ def differences(
 ) -> tuple[FloatArray, FloatArray]:
     """Derivatives at 0, shape (kinds, entries), and estimates of their errors.
 
-    ``function(k, x)`` has kinds as rows, of entries `k` at x. `side` is 0, or that on which to step; `scale` a size of
-    derivatives; steps are halved so often at most, and until errors relative to the larger of both are `enough`.
+    ``function(k, x)`` has kinds as rows, of entries `k` at x. `side` is 0, or the side of the steps; `scale` a size of
+    derivatives; steps are halved at most `halvings` times, until errors relative to the larger of both are `enough`.
     """
     found, error = np.zeros(scale.shape), np.full(scale.shape, np.inf)
     for (places, weights), apart in ((CENTRAL, 0), (ONE_SIDED, 1)):
@@ -60,7 +60,7 @@ def differences(
 
 
 def integral(function: Callable[..., Any], edges: FloatArray) -> tuple[FloatArray, Any]:
-    """Integrals of function(x, place) between rows of edges, shape (m, ...), and which were not found.
+    """Integrals of function(x, place) between rows of edges, shape (m, ...), and a mask of those that failed.
 
     A place is the flat number of an entry, as a float.
     """

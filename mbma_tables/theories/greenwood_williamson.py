@@ -13,8 +13,8 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 EPSILON = 1e-13  # accuracy of the height integrals
-MAX_DEPTH = 37.0  # of d over the summits' standard deviation, where force is still a normal number
-MAX_AREA = 0.1  # A/A0 up to which asperities may pass for independent
+MAX_DEPTH = 37.0  # of d over the summits' standard deviation, where force does not underflow
+MAX_AREA = 0.1  # A/A0 up to which asperities are nearly independent
 
 
 class GreenwoodWilliamson(Theory):
@@ -44,11 +44,11 @@ class GreenwoodWilliamson(Theory):
         return TheoryAnswer(pressure, area, 4 * strength * height_integral(0.5, x), np.full(np.shape(x), EPSILON))
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] from u = 0 to where force underflows."""
+        """Mean separations [length] from u = 0 to the underflow of force."""
         high = np.asarray((surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float)
         return np.zeros_like(high), high
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons for which answers lie outside what the theory was made for."""
+        """Reasons why results lie outside the theory's assumptions."""
         dense = {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}
         return {**super().reasons(surface, answer, mean_separation), **dense}

@@ -1,4 +1,4 @@
-"""The MBMA model as a theory: totals of its islands at separations d = 2 u - h_max (50), and where they end."""
+"""The MBMA model as a theory: totals of its islands at separations d = 2 u - h_max (50), and their range."""
 
 from __future__ import annotations
 
@@ -10,22 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, require, whole_number_in
-from mbma_tables.models import BOTH, ISLAND_MODELS, QUANTITIES, AnyModel, check_outside, island_model_name
+from mbma_tables.models import QUANTITIES, AnyModel, check_outside, island_model_name
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
-from mbma_tables.theories.differences import differences
-from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Curve, Theory, TheoryAnswer, select
-from mbma_tables.totals.contact import Sums, Totals, totals_at
+from mbma_tables.theories.protocol import SCAN, Curve, Theory, TheoryAnswer, select
+from mbma_tables.totals.contact import Totals, totals_at
 from mbma_tables.totals.island import check_band
-from mbma_tables.totals.island_sum import QUADRATURE_SHARE, kinks
+from mbma_tables.totals.island_sum import QUADRATURE_SHARE, Sums, kinks
 from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
 SECTIONS = 24  # of a scan's step, to 1e-6
 MOST_WORKERS = 1024
-MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md)
+MAX_AREA = 0.1  # above it islands begin to overlap (docs/fidelity.md)
 
 
 class Mbma(Theory):
@@ -52,7 +51,6 @@ class Mbma(Theory):
         self.island_model, self.variant, self.rtol, self.outside = island_model, get_variant(variant), rtol, outside
         self.workers = whole_number_in("workers", workers, 1, MOST_WORKERS)
         self.variant_name, self.island_model_name = self.variant.name, island_model_name(island_model)
-        self._by_table = self.island_model_name == "universal" and outside != "exact"
 
     @functools.cached_property
     def sums(self) -> Sums:
@@ -62,7 +60,7 @@ class Mbma(Theory):
 
     @functools.cached_property
     def _scanned(self) -> Mbma:
-        """As it is, but with NaN in place of errors where islands are not covered."""
+        """The same theory, but with NaN instead of errors for islands that are not covered."""
         if self.outside != "raise":
             return self
         return Mbma(self.island_model, self.variant, self.rtol, "nan", self.workers)
@@ -76,43 +74,33 @@ class Mbma(Theory):
         separation: FloatArray,
         E_star: ArrayLike = 1.0,
         derivatives: bool | str = False,
-        quantities: tuple[str, ...] = QUANTITIES,
     ) -> Totals:
         """Force and area at separations d [length] of the surface's broadcast shape."""
         gap = np.asarray(separation, float)
         require("separation", gap, gap >= -surface.h_max, "at least -h_max, where the model ends at full compression")
         if isinstance(surface, Surface):
             check_band(surface, self.variant)
-        which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
-        return totals_at(surface, gap, self.sums, E_star, derivatives, which)
-
-    def _has_slopes(self, surface: AnySurface) -> bool:
-        return self._by_table or isinstance(surface, MeasuredSurface)
+        return totals_at(surface, gap, self.sums, E_star, derivatives)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
         u = np.asarray(mean_separation, dtype=float)
-        slopes = "separation" if self._has_slopes(surface) else False
-        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives=slopes)
-        if found.pressure_by is None:
-            return TheoryAnswer(found.pressure, found.area, self._differences(surface, u), found.error)
+        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives="separation")
         # du = dd/2
-        return TheoryAnswer(found.pressure, found.area, -2 * found.pressure_by["separation"], found.error)
+        stiffness = -2 * found.pressure_by["separation"]  # type: ignore[index]
+        return TheoryAnswer(found.pressure, found.area, stiffness, found.error)
 
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
-        """By its own differentiated sums."""
-        if not self._has_slopes(surface):
+        """Derivatives by differentiated sums."""
+        by_table = self.island_model_name == "universal" and self.outside != "exact"
+        if not by_table and not isinstance(surface, MeasuredSurface):
             return None
         gap = 2 * np.asarray(mean_separation) - np.asarray(surface.h_max)
         found = self.totals(surface, gap, derivatives=True)
         return tuple(_at_mean_separation(by) for by in (found.pressure_by, found.area_by))
 
-    def looks(self, surface: AnySurface) -> int:
-        """Few of island models that take long."""
-        return super().looks(surface) if self._has_slopes(surface) else FEW_LOOKS
-
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Force or area, without slopes where these are differences."""
+        """Force or area, and the slope of force."""
         h_max, which = np.asarray(surface.h_max), QUANTITIES.index(quantity)
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
@@ -120,27 +108,7 @@ class Mbma(Theory):
             steep = -2 * found.pressure_by["separation"]  # type: ignore[index]
             return (found.area, found.area * steep / found.pressure, False) if which else (found.pressure, steep, True)
 
-        def without_slopes(u: FloatArray) -> tuple[Any, Any, bool]:
-            found = getattr(totals_at(surface, 2 * u - h_max, self.sums, which=which), quantity)
-            return found, np.full(np.shape(found), np.nan), False
-
-        return values if self._has_slopes(surface) else without_slopes
-
-    def _differences(self, surface: AnySurface, u: FloatArray) -> FloatArray:
-        """-dF/du by differences, for island models without derivatives."""
-        h_max, shape = np.asarray(surface.h_max), np.broadcast_shapes(u.shape, surface.shape)
-        gap, depth = (np.broadcast_to(each, shape).ravel() for each in (2 * u - h_max, h_max - u))
-
-        def force_at(k: Any, x: FloatArray) -> FloatArray:
-            some = select(surface, shape, k)
-            held = np.maximum(gap[k] - 2 * x, -np.asarray(some.h_max))
-            return np.asarray(self.totals(some, held, quantities=("pressure",)).pressure)[None]
-
-        # by what is less than u; not beyond full compression
-        step, side = 0.1 * depth, np.where(np.broadcast_to(u, shape).ravel() < 0.1 * depth, -1.0, 0.0)
-        nothing = np.zeros((1, depth.size))
-        slope, _ = differences(force_at, step, side, nothing, 3, 10 * self.rtol)
-        return np.where(depth > 0, slope[0], 0.0).reshape(shape)
+        return values
 
     def bends(self, surface: AnySurface) -> FloatArray:
         """Mean separations [length] at which the largest island reaches the floor of zeta_d, and of zeta_u."""
@@ -164,27 +132,19 @@ class Mbma(Theory):
 
     def softening(self, surface: AnySurface) -> FloatArray:
         """Mean separation [length] below which stiffness falls with compression; NaN where it does not."""
-        unknown = np.full(surface.shape, np.nan)
-        if (
-            self._has_slopes(surface)
-            or self.island_model_name not in ISLAND_MODELS
-            or self.island_model_name == "rigid"
-        ):
-            return self._maximum(surface, "stiffness", unknown)
-        # of the same islands by the table, whose derivatives are at hand
-        return Mbma("universal", self.variant, outside="nan")._maximum(surface, "stiffness", unknown)
+        return self._maximum(surface, "stiffness", np.full(surface.shape, np.nan))
 
     def scatter_name(self, surface: AnySurface) -> str:
-        """That of the variant: those with a name were compared with boundary elements, no other was."""
+        """Scatter of the variant: only the named ones were compared with boundary elements."""
         name = self.variant.name
         if self.variant not in NAMED.values():
             return f"{self.name}, user-defined variant"
         return self.name if name == "reported" else f"{self.name}_{name}"
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Where the paper's own assumptions fail."""
+        """Reasons where the paper's assumptions fail."""
         return {
-            f"areas of islands are added, A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
+            f"areas of islands are added without overlap, but A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
             & (self.variant.addition == "sum"),
             "stiffness falls with compression here, which no simulation shows": mean_separation
             < self.softening(surface),
@@ -196,7 +156,7 @@ class Mbma(Theory):
         depth = np.arange(1, SCAN + 1) / SCAN
         h_max = np.asarray(surface.h_max, dtype=float)
         batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))
-        # where some islands are not covered, it is looked for among the rest
+        # entries whose islands are not covered are ignored
         found = self._scanned.curve(batch, kind)(h_max[..., None] * (1 - depth))[row]
         falls = np.diff(np.reshape(found, (-1, SCAN)), axis=-1) < 0
         turns = np.flatnonzero(falls.any(axis=-1))
@@ -217,7 +177,7 @@ def _at_mean_separation(by: Any) -> dict[str, FloatArray]:
 
 
 def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
-    """Where a function of arrays is highest between `low` and `high`, by golden sections."""
+    """Maximum of a function of arrays between `low` and `high`, by golden sections."""
     inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_inner, at_outer = value(inner), value(outer)
     for _ in range(SECTIONS):

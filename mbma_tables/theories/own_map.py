@@ -1,4 +1,4 @@
-"""The map of a surface, made ready for boundary elements: its continuation, and loads at which to press it."""
+"""Preparation of a surface's map for boundary elements: its continuation, and the loads to simulate."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.calibrated_curves import own_law
 
-# A/A0 by the law of the map at which it is pressed
+# A/A0 by the law of the map, at which it is simulated
 AREAS = (7e-4, 0.0015, 0.006, 0.012, 0.05, 0.09, 0.22, 0.3, 0.52, 0.65, 0.88, 0.95)
-MOST_POINTS = 2**20  # of a map that is pressed as it is
+MOST_POINTS = 2**20  # of a map that is simulated without change
 REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
 
 
@@ -33,7 +33,7 @@ def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
 
 
 def unresolved(points: float, area: FloatArray) -> dict[str, NDArray[np.bool_]]:
-    """The reason against grids with so few sampling steps along the shortest wavelength, and where it holds."""
+    """The reason against grids with too few sampling steps per shortest wavelength, and its mask."""
     text = f"the map's shortest wavelength has {points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
     return {text: np.full(area.shape, points < MIN_POINTS * (1 - ROUNDING))}
 
@@ -54,7 +54,7 @@ def reduced(values: FloatArray, points: float, mirrored: bool) -> tuple[FloatArr
 
 
 def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
-    """F/(A0 E*) at which the quick law of a map has contact areas; its area never refuses, its separation may."""
+    """F/(A0 E*) at which the quick law of a map has given contact areas; uses areas only, which never fail."""
     octaves = np.arange(-20 * REFINED, 4 * REFINED) / REFINED
     pressure = float(surface.rms_gradient) * 2.0**octaves
     area = np.maximum.accumulate(own_law(surface).area(pressure)) + 1e-15 * np.arange(pressure.size)
@@ -72,14 +72,14 @@ def map_of(surface: AnySurface) -> Treated:
     whole = surface.map if isinstance(surface, MeasuredSurface) else None
     if whole is None or whole.heights.ndim != 2:
         raise InputError(
-            "theories 'simulated' and 'corrected' press a height map, and this surface has none: make it by "
+            "theories 'simulated' and 'corrected' need a height map, and this surface has none: make it by "
             "Surface.from_map, neither combined nor extrapolated nor fitted"
         )
     return whole
 
 
 def origin_of(whole: Treated, tolerance: float) -> str:
-    """Which map was pressed, and how."""
+    """Description of the map simulated, and of the method."""
     digest = hashlib.sha256(np.ascontiguousarray(whole.heights, "<f8").tobytes()).hexdigest()
     points = " x ".join(map(str, whole.heights.shape))
     return f"boundary elements, tolerance {tolerance:g}, of the map of {points} points with SHA-256 {digest[:16]}"

@@ -1,4 +1,4 @@
-"""A simulated map as a netCDF file that opens without the map: its loads and flow, its spectrum and its curves."""
+"""A simulated map as a netCDF file that can be used without the map: its loads and flow, spectrum and curves."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ ROWS = {
 }
 NUMBERS = {
     "points": "sampling steps along the shortest wavelength",
-    "elements": "elements of the map that do not repeat each other",
+    "elements": "independent elements of the map",
     "left_out": "wavelength below which a large map was cut off, 0 if it was not",
     "anisotropy": "root of the ratio of the gradient tensor's eigenvalues",
 }
-# parts of the surface, by the names of their fields; `band` of a spectrum tells of the map's own grid
+# parts of the surface, by the names of their fields; `band` of a spectrum is for the map's own grid
 PARTS: dict[str, Any] = {"heights": Heights, "bearing": Bearing, "bands": RadialSpectrum}
 FAITHFUL = 1e-6  # relative, of curves at the loads they go through
 POWERS = {

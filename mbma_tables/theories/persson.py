@@ -26,7 +26,7 @@ GAMMA = YANG_PERSSON.weight  # Eq. (19)
 LAMBDA = 4.047  # Eq. (21b)
 DECAY = 45.0  # exp(-DECAY) of an integrand's largest value counts as nothing
 MAX_RATIO = 26.0  # p0 over E* sqrt(m2) at which u is still a normal number, about exp(-676)
-MIN_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load that the inverse answers
+MIN_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load of the inverse
 INVERSE_RTOL = 1e-10  # of a load found from its separation
 
 # exp(-t) over [0, DECAY]: 64 nodes leave 1e-15
@@ -35,7 +35,7 @@ _T, _T_WEIGHTS = DECAY / 2 * np.add(np.polynomial.legendre.leggauss(64), [[1], [
 
 @functools.lru_cache(maxsize=32)
 def _own_law(surface: MeasuredSurface) -> Law:
-    """Persson's theory of a surface's own spectrum, with Yang and Persson's weight."""
+    """Persson's theory for a surface's own spectrum, with Yang and Persson's weight."""
     return Law(spectrum_of(surface), None, YANG_PERSSON)
 
 
@@ -110,7 +110,7 @@ class Persson(Theory):
         return np.array([u0 * (log_lambda - np.log(given[0])), np.full(given[0].shape, -u0)])
 
     def _forces(self, law: Law, given: FloatArray) -> FloatArray:
-        """Force over A0 E* g and -dF/du at u/h_rms, and u/h_rms at the lightest and the heaviest load answered."""
+        """Force over A0 E* g and -dF/du at u/h_rms, and u/h_rms at the lightest and the heaviest load covered."""
         u, lightest = given
         if not self._is_full:
             u0, log_lambda = _light(law)
@@ -121,7 +121,7 @@ class Persson(Theory):
         return np.array([force, stiffness, law.separation_persson(lightest)[0], np.broadcast_to(least, u.shape)])
 
     def scatter_name(self, surface: AnySurface) -> str:
-        """The two forms differ by more than their distance from boundary elements."""
+        """One name per form: they differ by more than their scatter against boundary elements."""
         return self.name if self._is_full else f"{self.name}_{self.method}"
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
@@ -130,7 +130,7 @@ class Persson(Theory):
         Raises
         ------
         OutOfRangeError
-            Also where u is so small or so large that the force of the full form is no normal number.
+            Also where the force of the full form over- or underflows.
         """
         pressure, stiffness = self._force(surface, mean_separation)
         error = np.full(pressure.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
@@ -150,7 +150,7 @@ class Persson(Theory):
         pressure, stiffness, most, least = _by_law(surface, given, self._forces)
         inside = (u >= least * h_rms) & (u <= most * h_rms)
         reached = [np.max(least * h_rms / unit), np.min(most * h_rms / unit)]
-        text = "within what normal numbers reach, {:.3g} to {:.6g}".format(*reached)
+        text = "within the range of normal numbers, {:.3g} to {:.6g}".format(*reached)
         require("mean_separation/s", u / unit, inside, text)
         return pressure * gradient, stiffness * gradient / h_rms
 
@@ -163,10 +163,10 @@ class Persson(Theory):
 
     def _check_form(self, surface: AnySurface) -> None:
         if not self._is_full and isinstance(surface, MeasuredSurface):
-            raise InputError("the simplified form (20) is of self-affine surfaces: use method='full', or surface.fit()")
+            raise InputError("the simplified form (20) needs self-affine surfaces: use method='full', or surface.fit()")
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] of the theory, whose heights have no end."""
+        """Mean separations [length] covered by the theory, whose heights are unbounded."""
         low = np.zeros(surface.shape)
         return low, np.full_like(low, np.inf)
 

@@ -1,7 +1,7 @@
-"""What a theory is: anything that answers a surface and a mean separation with pressure, area and stiffness.
+"""The interface of theories: pressure, area and stiffness of a surface at mean separations.
 
-A user's object with a `name` and an ``answer(surface, mean_separation)`` is one, too. What a theory does not have in
-closed form (energy, the separation at a given load) follows from its forces.
+A user's object with a `name` and an ``answer(surface, mean_separation)`` is also accepted. Quantities without a closed
+form (energy, the separation at a given load) are computed from the theory's forces.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.differences import integral
 
-LOOKS, FEW_LOOKS = 128, 8  # gaps at which an inversion begins, of one surface and of each of a batch,
-LOOKED_AT = 7.0  # from where to where, of ln u - ln(h_max - u),
-FAR = 12.0  # and up to which u/h_rms where contact has no end
+LOOKS, FEW_LOOKS = 128, 8  # initial gaps of an inversion, for one surface and for each of a batch,
+LOOKED_AT = 7.0  # range of ln u - ln(h_max - u) for these,
+FAR = 12.0  # and largest u/h_rms for theories without last contact
 STEPS = 200
-MISSED = 0.5  # of ln of a value that lies between two numbers u
-SCAN = 49  # compressions at which a law is looked at for a turning point
-SETTLED = 1e-7  # of a logarithm, before the last step, whose miss would be about its square
+MISSED = 0.5  # largest miss of ln of a value between two adjacent floats u
+SCAN = 49  # compressions at which a law is searched for a turning point
+SETTLED = 1e-7  # of a logarithm, before the last step, whose error is about its square
 SETTLED_STEP = 1e-4  # of y, which is large where values hardly change
-SETTLED_BOTH = 1e-14  # of its product with the step before, where slopes are not known
+SETTLED_BOTH = 1e-14  # product with the previous step, where slopes are not known
 FARTHEST = 40.0  # step of y
-DISTINCT = 8.9e-16  # relative, of gaps that rounding leaves distinct
+DISTINCT = 8.9e-16  # smallest relative difference of distinct gaps
 
-# values at mean separations, about -d/du of them, and whether that is exact
+# values at mean separations, approximately their -d/du, and whether this is exact
 Curve = Callable[[FloatArray], tuple[Any, Any, bool]]
 
 
@@ -47,44 +47,44 @@ class TheoryAnswer(NamedTuple):
 
 @runtime_checkable
 class UserTheory(Protocol):
-    """The least that `contact` needs of a theory."""
+    """The minimal interface that `contact` requires of a theory."""
 
     @property
     def name(self) -> str:
-        """What results call it."""
+        """Name of the theory in results."""
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """F/(A0 E*) and A/A0 at mean separations u [length] of the surface's broadcast shape."""
 
 
 class Theory(abc.ABC):
-    """A theory, and what follows from its forces."""
+    """A theory, with quantities derived from its forces."""
 
     name: str
-    variant_name = island_model_name = ""  # what results call its variant of the paper and its island model
-    advice = origin = ""  # one line beside each answer; what its numbers were found of, if not of a shipped file
-    reached = 0.0  # by how much, relatively, a wanted value may be more than the largest
-    ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
+    variant_name = island_model_name = ""  # names of its variant of the paper and its island model in results
+    advice = origin = ""  # one line of advice; origin of its numbers, if not a shipped file
+    reached = 0.0  # relative amount by which a wanted value may exceed the largest
+    ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
 
     @abc.abstractmethod
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Pressure, area and stiffness at mean separations u [length]."""
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """Why a measured surface is not one that the theory is of, or was tested on."""
+        """Reasons why a measured surface violates the theory's assumptions, or differs from those tested."""
         return surface.departures()
 
     def scatter_name(self, surface: AnySurface) -> str:
-        """Under which its distance from boundary elements is stated."""
+        """Name under which its scatter against boundary elements is stored."""
         return self.name
 
     @property
     def elastic(self) -> Theory:
-        """The theory of the elastic contact, where this one goes beyond it."""
+        """The theory of the elastic contact, if this one includes yielding."""
         return self
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
-        """The theory at flat places of a broadcast shape, where it holds arrays of its own."""
+        """The theory at flat indices of a broadcast shape, if it contains arrays."""
         return self
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
@@ -92,12 +92,12 @@ class Theory(abc.ABC):
         return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
 
     def heights(self, surface: AnySurface) -> Any:
-        """Where the Gaussian heights end over h_rms, or a map's own `laws.hardness.BearingCurve`; for a hardness."""
+        """End of the Gaussian heights over h_rms, or a map's own `laws.hardness.BearingCurve`; for a hardness."""
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if self.ends_at_h_max else np.inf
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u."""
-        # needed with a hardness alone
+        # needed with a hardness only
         from mbma_tables.laws import hardness
 
         h_rms, heights = np.asarray(surface.h_rms), self.heights(surface)
@@ -106,27 +106,27 @@ class Theory(abc.ABC):
         return share, slope / h_rms
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] between which "pressure" or "area" falls: full compression and last contact."""
+        """Mean separations [length] between which "pressure" or "area" decreases: full compression and last contact."""
         high = np.asarray(surface.h_max, dtype=float)
         return np.zeros_like(high), high
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separations [length], two at most, at which derivatives of force or area jump; rows of a batch's."""
+        """Mean separations [length], two at most, at which derivatives of force or area jump; as rows for a batch."""
         return np.empty(0)
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
-        """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
+        """Reasons why results lie outside the tested range of the theory, each with a mask."""
         if self.ends_at_h_max:
             return {}
         beyond = mean_separation > np.asarray(surface.h_max)
-        return {"u is above h_max, where the surface has no contact and the theory's heights have no end": beyond}
+        return {"u is above h_max, where the surface has no contact but the theory's heights are unbounded": beyond}
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation of ln of a quantity against simulations, at A/A0 = `area`.
 
         "pressure" at given u, "area" at given F, "stiffness" -dF/du at given F, with a hardness that of the frozen
-        contact. Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN
-        where they are not known, as on surfaces unlike those.
+        contact. Root mean squares of ln(theory/simulation), with the simulations in the calibrated law's file; NaN
+        if not known, as for surfaces unlike those.
         """
         if self.departures(surface):
             return np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
@@ -143,7 +143,7 @@ class Theory(abc.ABC):
     def flow_trust(
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
     ) -> tuple[FloatArray, dict[str, Any]] | None:
-        """Standard deviation of ln of that flow, and reasons against it with their masks."""
+        """Standard deviation of ln of that flow, and reasons why it is not valid, with their masks."""
         return None
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
@@ -163,20 +163,20 @@ class Theory(abc.ABC):
         return None
 
     def looks(self, surface: AnySurface) -> int:
-        """At how many gaps of each surface an inversion begins."""
+        """Number of initial gaps of each surface in an inversion."""
         return LOOKS if surface.shape == () else FEW_LOOKS
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """What inversions work on: unchecked force or area of a surface against mean separations.
+        """Function for inversions: force or area of a surface against mean separation, without checks of arguments.
 
-        With each value, about -d/du of it, NaN where that is not known; and whether it is exact.
+        It returns each value, approximately its -d/du (NaN if not known), and whether this is exact.
         """
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
             found = self.answer(surface, u)
             if quantity == "pressure":
                 return found.pressure, found.stiffness, True
-            # area rises nearly as force does
+            # area increases nearly as force does
             return found.area, found.area * found.stiffness / found.pressure, False
 
         return values
@@ -187,7 +187,7 @@ class Theory(abc.ABC):
         Raises
         ------
         OutOfRangeError
-            Where the branch of first contact does not reach it.
+            If the branch of first contact does not reach it.
         """
         u, missed = self.inverted(surface, quantity, np.asarray(wanted, dtype=float))
         if missed.any():
@@ -196,19 +196,19 @@ class Theory(abc.ABC):
 
     @np.errstate(all="ignore")
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """As `mean_separation_at`, by Newton's method in a bracket, and where rounding of u leaves no such value."""
+        """`mean_separation_at` by Newton's method in a bracket, and a mask where rounding of u excludes the value."""
         first, last = self.interval(surface, quantity)
         end = surface.h_max if self.ends_at_h_max else np.inf
         (goal, ends, low, high), shape = rows(wanted, end, first, last)
         if not self.ends_at_h_max:
-            allowed = f"positive: contact has no end in theory {self.name!r}"
+            allowed = f"positive: there is no last contact in theory {self.name!r}"
             require(quantity, goal.reshape(shape), goal.reshape(shape) != 0, allowed)
         near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
         shares = _shares(self.looks(surface)).reshape(-1, *[1] * len(shape))
         looked = np.asarray(first + (near - first) * shares)
         curve = self.curve(surface, quantity)
         value, steep, exact = curve(looked)
-        # one column of places for all, or one for each
+        # one column of gaps for all entries, or one for each
         seen = np.empty(
             (3, *(shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)))
         )
@@ -234,7 +234,7 @@ class Theory(abc.ABC):
     def _at_end(
         self, surface: AnySurface, quantity: str, goal: FloatArray, first: FloatArray, shape: Any
     ) -> NDArray[np.bool_]:
-        """Which of the wanted values are the largest one; more is refused."""
+        """Mask of wanted values equal to the largest one; an error if they exceed it."""
         largest = np.broadcast_to(getattr(self.answer(surface, first), quantity), shape)
         wanted = goal.reshape(shape)
         out = wanted > largest * (1 + self.reached)
@@ -249,12 +249,12 @@ class Theory(abc.ABC):
 
 @functools.cache
 def _shares(count: int) -> FloatArray:
-    """Places from 1 to 0, closer together at either end."""
+    """Points from 1 to 0, denser at either end."""
     return np.asarray(1 / (1 + np.exp(np.linspace(-LOOKED_AT, LOOKED_AT, count))))
 
 
 def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurface:
-    """The surfaces of a batch, broadcast to `shape`, at flat places."""
+    """The surfaces of a batch, broadcast to `shape`, at flat indices."""
     if surface.shape == ():
         return surface
     chosen = np.asarray(place).astype(np.intp)
@@ -263,7 +263,7 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurfac
 
 
 def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:
-    """The error of entries that were not found."""
+    """The error for entries without a solution."""
     return ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
 
 
@@ -292,17 +292,17 @@ def _middle(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 class Search:
-    """Gaps that are looked for, from values at places in order from last contact on.
+    """The solutions, from values at gaps in order from last contact on.
 
-    These are rows of one column for all, or of one for each. `exact`: `steep`, -dvalue/du, is that of the values; else
-    it is about right, and differences are used. `end` is the last gap with contact, which may be infinite.
+    The values are rows of one column for all entries, or of one for each. `exact`: `steep`, -dvalue/du, is exact; else
+    it is approximate, and differences are used. `end` is the last gap with contact, which may be infinite.
     """
 
     def __init__(
         self, seen: FloatArray, exact: bool, wanted: FloatArray, end: FloatArray, low: FloatArray, high: FloatArray
     ) -> None:
         self.exact, self.wanted, self.end = exact, wanted, end
-        # the branch of first contact: the first place, coming from there, at which enough is reached
+        # the branch of first contact: the first gap from there at which the value is reached
         reached, count = seen[1] >= wanted, seen.shape[1]
         number = np.where(reached.any(axis=0), reached.argmax(axis=0), count) + np.arange(-2, 2)[:, None]
         column = np.arange(wanted.size) if seen.shape[2] == wanted.size else 0
@@ -327,7 +327,7 @@ class Search:
         self.gap = np.where((gap > self.low) & (gap < self.high), gap, _middle(self.low, self.high))
 
     def step(self, left: NDArray[np.intp], value: FloatArray, steep: FloatArray) -> NDArray[np.intp]:
-        """A step of the gaps numbered `left`, to which values belong, by the cubic through these and those before."""
+        """A step of the gaps with indices `left`, by the cubic through their values and the previous ones."""
         u, end, miss = self.gap[left], self.end[left], np.log(value / self.wanted[left])
         here = x, y, rate = _places(u, value, steep, end)
         x0, y0, rate0 = self.before[:, left]

@@ -1,4 +1,4 @@
-"""One map pressed flat by boundary elements, as a theory of that map alone: `theory="simulated"`."""
+"""BEM simulation of one map, as a theory of that map alone: `theory="simulated"`."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ STRAYS = 2.7  # roots of the elements that join between two loads: beyond strays
 # A/A0 of the 65 maps of `python -m generate machined` at which scatter was measured
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
 AREA_OF_FLOW = 0.4
-EVALUATED = 1e-5  # of the curves through the default loads; laws need not be closer to them
+EVALUATED = 1e-5  # error of the curves through the default loads; laws need not be more accurate
 
 
 class BoundaryElements(Theory):
-    """What boundary elements found of one map at a list of loads, and curves between them.
+    """BEM results of one map at a list of loads, and curves between them.
 
     Parameters
     ----------
     surface : MeasuredSurface
-        The map; contacts of no other surface are answered.
+        The map; other surfaces raise an error.
     pressure : array_like, shape (n,)
         Loads over A0 E*, rising, at least four.
     area, mean_separation, energy : array_like, shape (n,)
         A/A0, u [length] and elastic energy over A0 E* [length] at these loads.
     points : float, optional
-        Sampling steps along the shortest wave; below four areas are too large, and answers are not `valid`.
+        Sampling steps per shortest wavelength; below four, areas are too large and results are not `valid`.
     elements : float, optional
         Of the map that do not repeat each other; 1, where the number is not known, leaves `error` to the first bound.
     pressed : Press or Table, optional
         What they are of, from which the flow is known.
     origin : str, optional
-        Of which map, and by what.
+        Description of the map and of the simulation.
     own_loads : bool, optional
         Whether the loads are those of `of`, of which the scatter was measured; else it is NaN, and contacts lighter and
         heavier than the loads are refused.
@@ -63,11 +63,11 @@ class BoundaryElements(Theory):
     (`Continued`), where no answer is `valid`; these curves are the theory, `error` is that of evaluating them, and how
     far they are from contact simulated at a load between is the `scatter`, which was measured on 65 maps.
 
-    Of loads of one's own that is not known, and `error` bounds it: pressure and area rise with compression, and it
-    reaches at most to the values of the two loads beside. Less is stated where two things add up to less: what leaving
-    out one of the four nearest loads changes, and how far the count of touching elements strays from a curve if those
-    that join come in random order, which a map that repeats itself does not obey. At 0.1% contact of a small map that
-    are a few elements, and half of the area is uncertain.
+    For the user's own loads this scatter is not known, and `error` bounds it: pressure and area increase with
+    compression, so they lie between the values of the two neighbouring loads. A smaller bound is the sum of two
+    estimates: the change when one of the four nearest loads is omitted, and the random deviation of the number of
+    elements in contact from a curve if elements join in random order, which they do not in maps that repeat
+    themselves. At 0.1% contact of a small map few elements are in contact, and half of the area is uncertain.
     """
 
     name = "simulated"
@@ -85,7 +85,7 @@ class BoundaryElements(Theory):
     )
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """None: it is of this very map."""
+        """None: the theory is of this map."""
         return ()
 
     def __init__(
@@ -121,15 +121,15 @@ class BoundaryElements(Theory):
     def of(
         cls, surface: AnySurface, loads: Sequence[float] | None = None, tolerance: float | None = None
     ) -> BoundaryElements:
-        """Press the map of a surface from `Surface.from_map`; loads in `common.cache`, or in its `table`, are read.
+        """Simulate the map of a surface from `Surface.from_map`; loads in `common.cache` or in its `table` are reused.
 
         Raises
         ------
         InputError
-            For a surface that was not made from a map, or that was changed so that its map is no longer known.
+            For a surface that was not made from a map, or whose map is not known after a change.
         """
-        if isinstance(surface, MeasuredSurface) and surface.table is not None and loads is None:
-            table = surface.table
+        table = surface.table if isinstance(surface, MeasuredSurface) and cls is BoundaryElements else None
+        if table is not None and loads is None:
             F, A, u, U = table.rows
             return cls(surface, F, A, u, U, table.points, table.elements, table, True, table.origin)
         whole = own_map.map_of(surface)
@@ -165,7 +165,7 @@ class BoundaryElements(Theory):
         tolerance: float | None = None,
         **treatment: Any,
     ) -> BoundaryElements:
-        """Press a map flat by Tamaas (the extra `simulate`): four seconds for 256 x 256 points, one core.
+        """Simulate a map by Tamaas (the extra `simulate`): four seconds for 256 x 256 points, one core.
 
         Parameters
         ----------
@@ -174,8 +174,8 @@ class BoundaryElements(Theory):
             times the points and about five times the time.
         loads : sequence of float, optional
             F/(A0 E* g), g the rms gradient, rising; by default twelve at which the law of the map has areas from 0.07%
-            to 95%, and more where these do not reach from 0.1% to 90% contact. With eight or more sampling steps along
-            the shortest wavelength, those above 6% contact are then pressed on every second step.
+            to 95%, and more if these do not cover 0.1% to 90% contact. With eight or more sampling steps along
+            the shortest wavelength, those above 6% contact then use every second step.
         tolerance : float, optional
             Of the boundary elements, 1e-5 by default.
 
@@ -203,7 +203,7 @@ class BoundaryElements(Theory):
         return cls.of(MeasuredSurface.of(measured_map(treated, None)), loads, tolerance)
 
     def to_netcdf(self, path: os.PathLike[str] | str) -> None:
-        """Write what was simulated, with the spectrum and curves of the surface, as a table that opens without the map.
+        """Write the results, with the spectrum and curves of the surface, as a table that opens without the map.
 
         Raises
         ------
@@ -216,7 +216,7 @@ class BoundaryElements(Theory):
 
     @classmethod
     def from_netcdf(cls, path: os.PathLike[str] | str) -> BoundaryElements:
-        """Open such a table, a `TableFileError` if damaged or edited; for its `.surface` "simulated" is the default."""
+        """Open such a table (`TableFileError` if damaged or edited); for its `.surface` "simulated" is the default."""
         return cls.of(read_surface(path))
 
     def _error(self, u: FloatArray, found: FloatArray) -> FloatArray:
@@ -231,17 +231,17 @@ class BoundaryElements(Theory):
         return np.asarray(np.maximum(above, below).max(axis=0))
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] that are answered."""
+        """Mean separations [length] covered."""
         if self.ends_at_h_max:
             return np.asarray(0.0), np.asarray(surface.h_max, float)
         return np.asarray(self.rows[2, -1]), np.asarray(self.rows[2, 0])
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separations [length] of the first and the last load, where they are no ends."""
+        """Mean separations [length] of the first and the last load, if the curves go beyond them."""
         return self.rows[2, [-1, 0]] if self.ends_at_h_max else np.empty(0)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force, area and stiffness at mean separations u [length] of this map, and no other."""
+        """Force, area and stiffness at mean separations u [length]; an error for surfaces other than this map."""
         u = self._within(surface, mean_separation)
         x = self.fit.log_force(u)
         area, stiffness = self.fit.area(x), self.fit.stiffness(x)
@@ -319,12 +319,12 @@ class BoundaryElements(Theory):
     def flow_trust(
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
     ) -> tuple[FloatArray, dict[str, Any]] | None:
-        """Standard deviation of ln of that flow on maps that were tested, and where an axis may be blocked."""
+        """Standard deviation of ln of that flow on tested maps, and a mask where an axis may be blocked."""
         if self.pressed is None:
             return None
         near = [(mean_separation < last) & (mean_separation > end) for last, end in self.closing]
         reasons = {
-            "leakage: the map may be blocked, which it is at the next simulated load": np.logical_or(*near),
+            "leakage: the map may be blocked, as it is at the next simulated load": np.logical_or(*near),
             f"leakage: A/A0 is above {AREA_OF_FLOW:g}": area > AREA_OF_FLOW,
         }
         return self.scatter(surface, "flow", area), reasons
@@ -334,7 +334,7 @@ class BoundaryElements(Theory):
         return Calibrated().heights(surface)
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons against grids that are too coarse, and contact areas that were not tested."""
+        """Reasons: grids that are too coarse, and contact areas that were not tested."""
         left_out = 0.0 if self.pressed is None else self.pressed.left_out
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         return {
@@ -351,14 +351,14 @@ class BoundaryElements(Theory):
         return np.where(self.own_loads & ~self._beyond(area), found, np.nan)
 
     def _beyond(self, area: FloatArray) -> NDArray[np.bool_]:
-        """Which contacts are lighter or heavier than those simulated."""
+        """Mask of contacts lighter or heavier than those simulated."""
         return np.asarray((area < self.rows[1, 0] * (1 - ROUNDING)) | (area > self.rows[1, -1] * (1 + ROUNDING)))
 
     def _within(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         for name in ("h_rms", "h_max"):
             own, given = float(getattr(self.surface, name)), np.asarray(getattr(surface, name))
             good = np.abs(given - own) <= MATCHED * own
-            require(name, given, good, f"{own:.9g}: boundary elements of one map know that map alone, their .surface")
+            require(name, given, good, f"{own:.9g}: a simulation of one map is for that map only, its .surface")
         shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
         u = np.broadcast_to(np.asarray(mean_separation, float), shape)
         low, high = map(float, self.interval(self.surface))

@@ -1,4 +1,4 @@
-"""Theories of users, and answers of a theory where it has finite ones."""
+"""Theories of users, and results of a theory where they are finite."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer
 
 
 def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-    """A theory's answers at mean separations u, shape (n,), on one surface; NaN where it has no finite force."""
+    """A theory's results at mean separations u, shape (n,), on one surface; NaN where the force is not finite."""
     u = np.asarray(mean_separation, dtype=float)
     places = np.arange(u.size)
     fields = np.full((4, u.size), np.nan)
@@ -36,7 +36,7 @@ class Wrapped(Theory):
     """A user's theory, its stiffness by numerical differentiation."""
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """None: its author decides."""
+        """None: its author is responsible."""
         return ()
 
     def __init__(self, theory: UserTheory) -> None:
@@ -57,7 +57,7 @@ class Wrapped(Theory):
         return TheoryAnswer(pressure, area, -slope[0].reshape(u.shape), np.full(u.shape, np.nan))
 
     def looks(self, surface: AnySurface) -> int:
-        """Few: an answer may take long."""
+        """Few, since each evaluation may take long."""
         return FEW_LOOKS
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:

@@ -1,4 +1,4 @@
-"""Any theory with a hardness: its elastic answer goes through `mbma_tables.laws.hardness`.
+"""Any theory with a hardness: its elastic result is corrected by `mbma_tables.laws.hardness`.
 
 Force at a mean gap is closed between the elastic force and the bearing curve; area is that at equal force, with
 pressures capped at the hardness. u is the mean gap, points that yield flattened.
@@ -23,12 +23,12 @@ from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer
 
 GROUP = "hardness"  # of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "stiffness")
-TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
+TESTED_ETA = 0.025  # smallest p_m/(E* g) that was simulated
 REACHED = 1e-9  # relative, of forces at full compression
-HEAVIEST = 1e6  # F/(A0 E* g) from which on areas are those of full contact
+HEAVIEST = 1e6  # F/(A0 E* g) above which areas are those of full contact
 CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
-MANY = 200  # hardnesses up to which inversions look at as many gaps as without
-MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
+MANY = 200  # most hardnesses for which inversions use as many gaps as without
+MAX_LEVEL = 37.0  # heights over h_rms above which shares underflow
 
 
 class Scatter(NamedTuple):
@@ -40,7 +40,7 @@ class Scatter(NamedTuple):
     weight: dict[str, FloatArray]  # d ln of force and of area by d ln of the elastic one; hardnesses, contact fractions
 
     def _at(self, rows: FloatArray, eta: FloatArray, area: FloatArray) -> FloatArray:
-        """At hardnesses and contact fractions, held constant beyond those simulated."""
+        """Errors at hardnesses and contact fractions; constant beyond those simulated."""
         shape = np.broadcast_shapes(np.shape(eta), np.shape(area))
         with np.errstate(divide="ignore"):
             log_area = np.log(np.broadcast_to(area, shape))
@@ -53,9 +53,9 @@ class Scatter(NamedTuple):
     def standard_deviation(
         self, theory: str, quantity: str, eta: FloatArray, area: FloatArray, elastic: FloatArray
     ) -> FloatArray:
-        """Of ln of the theory over simulation; where not measured, from that of the `elastic` theory and the law's.
+        """Standard deviation of ln(theory/simulation); if not measured, from those of the `elastic` theory and the law.
 
-        NaN where neither is known: how much of an error of stiffness a hardness lets through was not measured.
+        NaN where neither is known; the effect of a hardness on errors of stiffness was not measured.
         """
         row = QUANTITIES.index(quantity)
         own = self.rms.get(theory)
@@ -71,7 +71,7 @@ class Scatter(NamedTuple):
 
 @functools.cache
 def shipped() -> Scatter:
-    """The shipped file's, read once."""
+    """The errors in the shipped file, read once."""
     variables, attributes = shipped_part(GROUP)
     known = zip(str(attributes["theories"]).split(), variables["stated_scatter"], strict=True)
     weights = dict(zip(("area", "pressure"), variables["elastic_weight"], strict=True))
@@ -80,7 +80,7 @@ def shipped() -> Scatter:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Loaded:
-    """A loaded contact that yields: its answer, and what follows from it and from the elastic contact."""
+    """A loaded contact that yields: its result, with quantities derived from it and from the elastic contact."""
 
     u: FloatArray  # [length]
     h_rms: FloatArray
@@ -131,7 +131,7 @@ class Yielding(Theory):
         self._bound: tuple[Any, Any] = None, None
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
-        """With the hardnesses at flat places of a broadcast shape."""
+        """The theory with the hardnesses at flat indices of a broadcast shape."""
         if self.hardness.ndim == 0:
             return self
         return Yielding(self.elastic, np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)])
@@ -161,7 +161,7 @@ class Yielding(Theory):
         pressure, stiffness = closed(u, elastic.pressure, elastic.stiffness)
         if at_force is None:
             needed = (pressure > 0) & ~endless
-            # where nothing yields or touches, a force that the theory is sure to reach
+            # without yielding or contact, a force that the theory certainly reaches
             known = np.minimum(np.where(needed, pressure, elastic.pressure), np.where(needed, HEAVIEST, 1.0) * gradient)
             at_force = np.where(needed, self.elastic.area_at(surface, known), 0.0)
         # both of the elastic errors, force and area at that force, may add up
@@ -182,7 +182,7 @@ class Yielding(Theory):
     def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations [length] of the elastic contact at the forces of this one."""
         pressure = self.curve(surface, "pressure")(mean_separation)[0]
-        # one without end has no gap without force
+        # theories without last contact have force at every gap
         least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
         return np.asarray(self.elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0])
 
@@ -190,16 +190,16 @@ class Yielding(Theory):
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
         low, high = self.elastic.interval(surface, "pressure")
         h_rms = np.asarray(surface.h_rms)
-        # at zero, where a hardness leaves full contact, some theories have no finite force
+        # at u = 0, the full contact with a hardness, some theories have infinite force
         low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
         return low, np.minimum(high, MAX_LEVEL * h_rms)
 
     def looks(self, surface: AnySurface) -> int:
-        """Few at many hardnesses, too."""
+        """Few, also at many hardnesses."""
         return FEW_LOOKS if self.hardness.size > MANY else self.elastic.looks(surface)
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Force without the area, which follows from it."""
+        """Force without the area, which is computed from it."""
         if quantity != "pressure":
             return super().curve(surface, quantity)
         elastic, closed = self.elastic.curve(surface, quantity), self._closed(surface)[1]
@@ -253,8 +253,8 @@ class Yielding(Theory):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against boundary elements with a hardness; "stiffness" is the frozen contact's.
 
-        Those of the calibrated law are measured; others are what the elastic theory's become, and the hardness law's
-        own beside it. NaN where the elastic theory's is not known, and for a stiffness that was not measured.
+        That of the calibrated law is measured; for others that of the elastic theory is propagated and combined with
+        that of the hardness law. NaN if the elastic theory's is not known, and for a stiffness that was not measured.
         """
         eta, elastic = self._eta(surface), self.elastic.scatter(surface, quantity, area)
         return shipped().standard_deviation(self.elastic.scatter_name(surface), quantity, eta, area, elastic)

@@ -1,1 +1,1 @@
-"""Totals over islands."""
+"""Pressure and area of a surface as sums over its islands."""

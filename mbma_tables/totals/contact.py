@@ -1,6 +1,6 @@
 """Total force and area of a surface at a gap: the sum over its contact islands (Eqs. 44-50).
 
-Everything of an island depends on its approach delta alone; the gap enters through the Gaussian weight and
+All properties of an island depend on its approach delta alone; the gap enters through the Gaussian weight and
 the upper limit h_max - d. In units of s and 1/q0,
 
     F/(A0 E* q0 s) = integral_0^((h_max - d)/s) F_hat D_d K1 G d(delta/s),
@@ -13,32 +13,31 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, grouped
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.models import AREA, BOTH, FORCE, AnyModel
+from mbma_tables.models import AnyModel, exact_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.surfaces.variants import Variant
-from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, sums_by_table, totals_of
+from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, Sums, sums_by_table
 from mbma_tables.totals.profile import profile
 
-# surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
+# most surfaces evaluated by profiles, in numpy; of more surfaces, those with enough gaps each for this to cost less
 FEW_SURFACES, MANY_GAPS = 16, 300
 LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Totals:
-    """Force and area of the MBMA model at given separations, its fields those of `Contact`.
+    """Force and area of the MBMA model at given separations, with the fields of `Contact`.
 
-    `error` is of quadrature and islands together, against the island model: for "rigid" spheres that
-    do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
+    `error` bounds that of quadrature and islands, relative to the island model ("rigid" itself is far from
+    elastic islands). Derivatives on a surface given by a spectrum are with respect to the separation only.
     """
 
     pressure: Any
@@ -49,23 +48,12 @@ class Totals:
     area_by: dict[str, Any] | None = None
 
 
-class Sums(NamedTuple):
-    """How islands are summed; options as of `contact`."""
-
-    model: AnyModel
-    variant: Variant
-    rtol: float
-    outside: str = "raise"
-    workers: int = 1
-
-
 def totals_at(
     surface: AnySurface,
     gap: FloatArray,
     how: Sums,
     modulus: Any = 1.0,
     derivatives: bool | str = False,
-    which: int = BOTH,
 ) -> Totals:
     """Force and area at separations d >= -h_max of the surface's broadcast shape; `derivatives` "separation" alone."""
     shape, variant = gap.shape, how.variant
@@ -75,20 +63,19 @@ def totals_at(
     try:
         if isinstance(surface, Surface) and derivatives is True:
             pairs = Pairs.of(surface, depth)
-            columns, error, islands, _ = sums_by_table(how.model, pairs, variant, how.rtol, how.outside, how.workers)
+            columns, error, islands, _ = sums_by_table(how.model, pairs, how, how.outside)
             pressure, area = columns[:, 0, 0], columns[:, 1, 0]
             pressure_by, area_by = _by_parameter(surface, columns.reshape((*shape, *columns.shape[1:])), pairs, stress)
         else:
-            sums, error, islands = _sums(surface, depth, how, which, bool(derivatives))
-            pressure, area = sums[:2]
+            (pressure, area, *slopes, error), islands = _sums(surface, depth, how, bool(derivatives))
             if derivatives:
-                force_slope, area_slope = sums[2:].reshape(2, *shape) / surface.h_rms
+                force_slope, area_slope = (slope.reshape(shape) / surface.h_rms for slope in slopes)
                 pressure_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
     except (ConvergenceError, OutOfRangeError) as fault:
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
         raise
-    # what is nearly nothing has few digits
+    # nearly vanishing values have few digits
     least = np.minimum(pressure, area)
     if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(pressure, area) > 0)).any():
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
@@ -98,92 +85,87 @@ def totals_at(
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
         area = variant.area_of(area)
     return Totals(
-        pressure=(pressure.reshape(shape) * stress)[()] if which != AREA else None,
-        area=area.reshape(shape)[()] if which != FORCE else None,
+        pressure=(pressure.reshape(shape) * stress)[()],
+        area=area.reshape(shape)[()],
         error=error.reshape(shape)[()],
         islands=islands,
-        pressure_by=pressure_by if which != AREA else None,
-        area_by=area_by if which != FORCE else None,
+        pressure_by=pressure_by,
+        area_by=area_by,
     )
 
 
 def _by_profiles(
-    surface: AnySurface, depth: FloatArray, how: Sums, sums: FloatArray, error: FloatArray
-) -> tuple[int, NDArray[np.intp]]:
-    """Fill in sums, perhaps their slopes by the compression, and errors; the islands, and the gaps not answered."""
-    compression, islands = np.asarray(depth / surface.h_rms).ravel(), 0
-    touching = np.flatnonzero(compression > 0)
-    left, groups = [touching[:0]], {0: touching}
-    # what lies outside of the table is solved gap by gap
+    surface: AnySurface, compression: FloatArray, places: NDArray[np.intp], model: AnyModel, how: Sums, rows: FloatArray
+) -> tuple[int, NDArray[np.intp], Exception | None]:
+    """Fill in rows of sums and errors at flat places by profiles of islands; the islands, places left out, and why."""
     shapes: list[Any] = [surface]
-    outside = how.outside
     if isinstance(surface, Surface):
         numbers = np.array([surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms])
-        shapes, outside = list(map(tuple, numbers.reshape(3, -1).T.tolist())), "nan"
+        shapes = list(map(tuple, numbers.reshape(3, -1).T.tolist()))
+    groups = [(0, places)]
     if len(shapes) > 1:
-        number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), depth.shape).ravel()[touching]
-        groups = {k: touching[mine] for k, mine in grouped(number)}
-    for k, places in groups.items():
-        if not places.size:
-            continue
+        number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), compression.shape).ravel()[places]
+        groups = [(k, places[mine]) for k, mine in grouped(number)]
+    islands, left, why, gaps = 0, [places[:0]], None, compression.ravel()
+    # numbers of surfaces, places, and where a profile may end
+    asked: list[tuple[int, Any, float]] = [(k, mine, math.inf) for k, mine in groups if mine.size]
+    while asked:
+        k, mine, last = asked.pop()
         try:
-            kept = profile(shapes[k], how.model, how.variant, QUADRATURE_SHARE * how.rtol, outside)
-        except (ConvergenceError, OutOfRangeError):
-            if not isinstance(surface, Surface):
-                raise
-            left.append(places)
+            kept = profile(shapes[k], model, how.variant, QUADRATURE_SHARE * how.rtol, last=last)
+        except (ConvergenceError, OutOfRangeError) as fault:
+            if last < math.inf or isinstance(model, UniversalModel):
+                left, why = [*left, mine], fault
+            else:
+                # one by one: a model need not have deeper islands than those of the gap
+                asked += [(k, mine[n : n + 1], float(gaps[place])) for n, place in enumerate(mine)]
             continue
-        inside = compression[places] <= kept.end
+        inside = gaps[mine] <= kept.end
         if not inside.all():
-            left.append(places[~inside])
-            places = places[inside]
+            left.append(mine[~inside])
+            mine = mine[inside]
         islands += kept.islands
-        # most often all gaps are of one surface and touch, and slices are faster
-        chosen: Any = slice(None) if places.size == compression.size else places
-        error[chosen] = kept.error
-        sums[:, chosen] = kept.totals(compression[chosen], len(sums) > 2, how.workers)
-    return islands, np.sort(np.concatenate(left))
+        # usually all gaps are of one surface and in contact, and slices are faster
+        chosen: Any = slice(None) if mine.size == gaps.size else mine
+        rows[-1, chosen] = kept.error
+        rows[:-1, chosen] = kept.totals(gaps[chosen], len(rows) > 3, how.workers)
+    return islands, np.sort(np.concatenate(left)), why
 
 
-def _sums(
-    surface: AnySurface, depth: FloatArray, how: Sums, which: int, slopes: bool
-) -> tuple[FloatArray, FloatArray, int]:
-    """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
+def _sums(surface: AnySurface, depth: FloatArray, how: Sums, slopes: bool) -> tuple[FloatArray, int]:
+    """Force, area, perhaps slopes of both by the compression, and their error as rows, and the number of islands.
 
-    By profiles of islands where surfaces are few or have many gaps each, else gap by gap.
+    By profiles of islands; of many surfaces by the universal table gap by gap.
     """
-    size, islands, left = depth.size, 0, np.arange(depth.size)
-    sums, error = np.zeros((4 if slopes else 2, size)), np.zeros(size)
-    few = math.prod(surface.shape) <= max(FEW_SURFACES, size // MANY_GAPS)
-    if not isinstance(surface, Surface) or (isinstance(how.model, UniversalModel) and few):
-        islands, left = _by_profiles(surface, depth, how, sums, error)
-        if not left.size:
-            return sums, error, islands
-    if not isinstance(surface, Surface):
-        sums[:, left] = error[left] = np.nan
-        if how.outside == "raise":
-            raise OutOfRangeError(
-                f"islands of {left.size} of {size} entries lie outside of island model {how.model.name!r}, the first "
-                f"at h_max - d = {depth.ravel()[left[0]]:g}; outside='exact' solves these",
-                np.isin(np.arange(size), left),
-            )
-        return sums, error, islands
-    # gap by gap, with errors for each
-    rest = Pairs.of(surface, depth)
-    rest = rest if left.size == size else rest.some(left)
-    options = how.variant, how.rtol, how.outside
-    try:
-        if slopes:
-            columns, error[left], more, _ = sums_by_table(how.model, rest, *options, how.workers)
-            sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
-        else:
-            sums[0, left], sums[1, left], error[left], more = totals_of(how.model, rest, *options, which, how.workers)
-    except (ConvergenceError, OutOfRangeError) as fault:
-        mask = np.zeros(size, dtype=bool)
-        mask[left] = True if fault.mask is None else fault.mask
-        fault.mask, fault.args = mask, (str(fault).replace(f"of {left.size} entries", f"of {size} entries"),)
-        raise
-    return sums, error, islands + more
+    size, islands, model, why = depth.size, 0, how.model, None
+    compression = np.asarray(depth / surface.h_rms)
+    rows, left = np.zeros((5 if slopes else 3, size)), np.flatnonzero(compression > 0)
+    by_table = isinstance(surface, Surface) and isinstance(model, UniversalModel)
+    if not by_table or math.prod(surface.shape) <= max(FEW_SURFACES, size // MANY_GAPS):
+        islands, left, why = _by_profiles(surface, compression, left, model, how, rows)
+    if by_table and left.size:
+        assert isinstance(surface, Surface)
+        rest, outside = Pairs.of(surface, depth).some(left), "nan" if how.outside == "exact" else how.outside
+        try:
+            found, rows[-1, left], more, missing = sums_by_table(model, rest, how, outside, slopes)
+        except (ConvergenceError, OutOfRangeError) as fault:
+            mask = np.zeros(size, dtype=bool)
+            mask[left] = True if fault.mask is None else fault.mask
+            fault.mask, fault.args = mask, (str(fault).replace(f"of {left.size} entries", f"of {size} entries"),)
+            raise
+        rows[:-1, left] = found[:, :, [0, BY_COMPRESSION] if slopes else [0]].T.reshape(len(rows) - 1, -1)
+        islands, left = islands + more, left[missing]
+    if left.size and how.outside == "exact":
+        more, left, why = _by_profiles(surface, compression, left, exact_model(how.rtol), how, rows)
+        islands += more
+    if left.size and (how.outside != "nan" or isinstance(why, ConvergenceError)):
+        raise type(why or OutOfRangeError(""))(
+            f"islands of {left.size} of {size} entries lie outside of island model {model.name!r}, the first at "
+            f"h_max - d = {depth.ravel()[left[0]]:g}; outside='exact' solves these{f' ({why})' if why else ''}",
+            np.isin(np.arange(size), left),
+        )
+    rows[:, left] = np.nan
+    return rows, islands
 
 
 def _by_parameter(

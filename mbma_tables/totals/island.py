@@ -1,4 +1,4 @@
-"""One contact island, or many: its band, radii, densities, and the force and area that it carries."""
+"""Contact islands: band, radii, densities, force and area."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Island:
     h_d : ndarray
         Roughness above zeta_d (B.3) [length].
     eta : ndarray
-        Share of a summit's contact that finer roughness leaves (39).
+        Reduction factor of a summit's contact area by finer roughness (39).
     X, mu : ndarray
         The two numbers of the island problem (34, 36, 37).
     force, area : ndarray
@@ -53,7 +53,7 @@ class Island:
     error : ndarray
         Bound on the relative error of both.
     variant, island_model : str
-        What made them.
+        Names of what computed them.
     """
 
     delta: Numbers
@@ -75,6 +75,7 @@ class Island:
 
 
 GEOMETRY = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
+SMALLEST_DELTA = 1e-250  # [length], below which quotients underflow
 
 
 def scale_force(g: dict[str, FloatArray]) -> FloatArray:
@@ -107,7 +108,7 @@ def island(
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         The island model, by name or an object, as for `contact`.
     variant : {"reported", "printed", "fitted"} or Variant
-        Which variant of the paper's equations.
+        Variant of the paper's equations.
     E_star : array_like or str
         Effective modulus, perhaps with its unit, "100 GPa"; force is in that unit times length squared.
     rtol : float
@@ -136,6 +137,7 @@ def island(
     modulus = positive_array("E_star", E_star)
     rule = get_variant(variant)
     model = get_model(island_model, rtol, rule)
+    require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
     shape = broadcast_shape(delta=approach, surface=surface.h_rms)
     g, s, q0 = islands_of(surface, np.broadcast_to(approach, shape), rule)
@@ -167,17 +169,17 @@ def islands_of(surface: AnySurface, delta: FloatArray, variant: Variant) -> tupl
 
 
 def check_band(surface: Any, variant: Variant) -> None:
-    """Refuse self-affine surfaces whose band of wavenumbers is no wider than a variant's islands need."""
+    """Reject self-affine surfaces whose band of wavenumbers is too narrow for a variant's islands."""
     largest = np.asarray(surface.zeta_1)
     allowed = f"greater than {variant.floor_u:g}, the variant's floor of zeta_u"
     require("q1/q0", largest, largest > variant.floor_u, allowed)
 
 
 def refuse_bands(model: AnyModel) -> None:
-    """Refuse an island model of self-affine bands alone."""
+    """Reject an island model that supports self-affine bands only."""
     if model.name == "island4d":
         raise InputError(
-            f"island model {model.name!r} holds islands of self-affine surfaces alone: use 'universal' or 'exact', "
+            f"island model {model.name!r} supports islands of self-affine surfaces only: use 'universal' or 'exact', "
             "or surface.fit()"
         )
 
@@ -186,7 +188,7 @@ def _of_labelled(
     surface: AnySurface, delta: Any, island_model: str | AnyModel, variant: str | Variant, E_star: Any, rtol: float
 ) -> Island:
     """`island` of DataArrays, lazily where they are."""
-    # xarray comes in with its own objects
+    # xarray is imported already if its objects are passed
     from mbma_tables.surfaces.labels import apply_to_surface
 
     names = (*GEOMETRY, "force", "area", "error")

@@ -1,8 +1,8 @@
-"""Totals of one surface at any gap from its islands, answered once (Eqs. 44-49).
+"""Totals of one surface at any gap from its islands, evaluated once (Eqs. 44-49).
 
-Everything of an island depends on its approach delta alone; a gap enters through the Gaussian of its height and the
-upper limit h_max - d. So islands are answered once, at Gauss nodes of panels of delta, and summed at some gaps of each
-panel. These sums make polynomials of ln(F) and ln(A), and any other gap costs no more than their values.
+All properties of an island depend on its approach delta alone; a gap enters through the Gaussian of its height and the
+upper limit h_max - d. So islands are evaluated once, at Gauss nodes of panels of delta, and summed at some gaps of each
+panel. Polynomials of ln(F) and ln(A) interpolate these sums; any other gap costs only their evaluation.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 
 NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
 GAPS = 10  # of a panel, at most: a series has 2 GAPS terms
-CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])  # places where polynomials miss most
+CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])  # points where the polynomials' errors are largest
 # of delta, in which force, area, number of islands and Hertz area begin
 POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
 KEPT = 64  # profiles in the cache
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS = 30
 BLOCK = 1 << 14  # gaps between two checks for interrupts
-MOST = 1000  # panels to be answered anew at a time
+MOST = 1000  # panels evaluated together
 
 # of approaches and which of them count: rows of `Panels.fields`, and their error
 Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 
 
 def _rule(n: int, power: int) -> tuple[FloatArray, Any]:
-    """`mbma_panel_rule` of mbma.h, and the places of its nodes and checks."""
+    """`mbma_panel_rule` of mbma.h, and the positions of its nodes and checks."""
     x, weights = np.polynomial.legendre.leggauss(n)
     nodes, gaps = (1 + x) / 2, (n + 4) // 2
     points, terms = chebyshev.chebpts1(gaps), np.eye(2 * gaps)
@@ -74,33 +74,31 @@ def _rule(n: int, power: int) -> tuple[FloatArray, Any]:
 # of the panel from 0, where delta goes with the square of the place, of others, and of narrow ones
 _RULES = [_rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)]
 RULES = np.concatenate([rule for rule, _ in _RULES])
-# shares of panels at which islands are answered, nodes and then CHECKS, and which of them count
+# positions in panels at which islands are evaluated, nodes and then CHECKS, and which of them are used
 SHARES = np.array([shares for _, shares in _RULES])
 COUNTED = SHARES < 1
 
 
 class Panels(NamedTuple):
-    """Panels in order; in the one from 0, weights lack the powers of delta that they begin with."""
+    """Panels in order; in the one from 0, weights are without their leading powers of delta."""
 
     kind: NDArray[np.int64]  # number of the rule
     low: FloatArray
     high: FloatArray
-    fields: (
-        FloatArray  # weights of force, area and so on, shift and rate of heights; (rows + 2, panels, NODES + checks)
-    )
+    fields: FloatArray  # weights of force, area and so on, shift and rate of heights; (rows + 2, panels, nodes, checks)
 
     def some(self, chosen: Any) -> Panels:
-        """Those at these places."""
+        """The panels at these indices."""
         fields = np.ascontiguousarray(self.fields[:, chosen])
         return Panels(self.kind[chosen], self.low[chosen], self.high[chosen], fields)
 
     def joined(self, other: Panels) -> Panels:
-        """These, and after them others."""
+        """These panels, followed by others."""
         kind, low, high = (np.concatenate(pair) for pair in zip(self[:3], other[:3], strict=True))
         return Panels(kind, low, high, np.concatenate([self.fields, other.fields], axis=1))
 
     def missed(self, last: float) -> FloatArray:
-        """Bound on the relative error of each: of what it interpolates, against islands, and of its sums."""
+        """Bound on the relative error of each: of the interpolated islands, and of its sums."""
         error = np.empty(self.low.size)
         core.profile_missed(RULES, *self, len(self.fields) - 2, last, error)
         return error
@@ -130,13 +128,13 @@ class Source(NamedTuple):
     islands: Callable[[FloatArray], dict[str, FloatArray]]  # `geometry.FIELDS`
     h_rms: float  # in their unit of height
     peak: float  # h_max/h_rms
-    layer: float  # where a band leaves the shortest wavelength
+    layer: float  # where a band no longer reaches the shortest wavelength
     at_d: float  # where zeta_d reaches its floor
     breaks: FloatArray  # where anything changes
     jacobian: float  # K1 (47) below at_d
 
     def density(self, g: dict[str, FloatArray], x: FloatArray, height: Any = 0.0) -> FloatArray:
-        """Islands per area and approach (42, 46) in the units of `g`; but for the Gaussian without a height."""
+        """Islands per area and approach (42, 46) in the units of `g`, without the Gaussian factor."""
         K1 = np.where(x < self.at_d, self.jacobian, 1.0)
         return np.asarray(island_density(height, g["D_d"], g["sigma_d"]) * K1)
 
@@ -179,12 +177,12 @@ class Profile:
     # the logarithms of the powers that they begin with
     series: Any
     error: float  # bound on the relative error of totals, of panels and islands together
-    islands: int  # answered for it
+    islands: int  # evaluated for it
     nodes: Nodes  # the islands of the panels
 
     @functools.cached_property
     def end(self) -> float:
-        """The largest compression that it answers."""
+        """The largest compression covered."""
         return float(self.edges[-1]) * (1 + 1e-14)
 
     def totals(self, compression: FloatArray, slopes: bool = False, workers: int = 1) -> FloatArray:
@@ -203,7 +201,7 @@ class Profile:
 
     @functools.cached_property
     def leverage(self) -> float:
-        """What a relative error of islands is worth in slopes over F/l: 1.5 times the largest at some panels' ends.
+        """Error of slopes over F/l per relative error of islands: 1.5 times the largest at some panels' ends.
 
         An error e of f in F = integral of f G up to l changes l dF/dl by at most e (l f G + integral of f |l dG/dl|).
         """
@@ -220,7 +218,7 @@ class Profile:
 
 
 def _edges(source: Source, last: float) -> FloatArray:
-    """Panels that double from the first on, with ends where anything changes, and equal ones above zeta_d's floor."""
+    """Panels of doubling width from the first on, with ends at all breaks, and equal ones above zeta_d's floor."""
     breaks = [place for place in source.breaks.tolist() if place < last]
     first, top = min(source.layer, last, *breaks), min(source.at_d, last)
     doubled, count = math.ceil(math.log2(top / first)), math.ceil((last - top) / WIDEST)
@@ -232,7 +230,7 @@ def _edges(source: Source, last: float) -> FloatArray:
 
 
 class _EndOfTable(Exception):
-    """Islands beyond the approach given are not known."""
+    """Islands beyond the given approach are not covered."""
 
 
 def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
@@ -251,7 +249,7 @@ def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
 
 
 def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, variant: Variant) -> Fields:
-    """The same of a self-affine surface and the universal table, of force and area, in one pass."""
+    """Profile of a self-affine surface by the universal table, force and area in one pass."""
     hurst, zeta_1, peak = shape
 
     def fields(x: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
@@ -285,7 +283,7 @@ def _answered(
 def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Profile:
     """Panels, halved until polynomials through their islands, and those of their sums, are good to `rtol`."""
     low, high, last = edges[:-1], edges[1:], float(edges[-1])
-    # above delta = h_rms/2 it is the Gaussian that bends
+    # above delta = h_rms/2 the curvature is that of the Gaussian
     kind = np.where(high - low <= NARROW * np.minimum(low, 0.5), 2, (low > 0).astype(np.intp))
     islands, worst, known, errors = 0, 0.0, None, edges[:0]
     for _ in range(MAX_ROUNDS):
@@ -293,7 +291,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
         order = np.argsort(np.append(known.low, low)) if known else slice(None)
         known, errors = known.joined(fresh).some(order) if known else fresh, np.append(errors, missed)[order]
         islands, worst = islands + count, max(worst, error)
-        # no nearer than islands themselves are known
+        # not closer than the error of the islands
         limit = max(0.5 * rtol, worst)
         bad = ~(errors <= limit)
         if not bad.any():
@@ -312,6 +310,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
     raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
 
 
+@functools.lru_cache(maxsize=KEPT)
 def _profile(
     surface: tuple[float, float, float] | MeasuredSurface,
     model: AnyModel,
@@ -319,10 +318,11 @@ def _profile(
     rtol: float,
     outside: str = "nan",
     rows: int = 2,
+    last: float = math.inf,
 ) -> Profile:
     """The profile of a surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
 
-    With `outside` not "exact" it ends with a table. Rows three and four are the islands' number and Hertz area.
+    It ends at the compression `last`, or with a table unless `outside` is "exact". Rows 3 and 4: number and Hertz area.
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
@@ -331,14 +331,18 @@ def _profile(
         fields = _fields_by_table(surface, model, variant)
     else:
         fields = _fields(source, model, "exact" if outside == "exact" else "nan", rows)
-    edges = _edges(source, 2 * source.peak)
+    edges = _edges(source, min(2 * source.peak, last))
     # underflow to zero is correct here
     with np.errstate(under="ignore"):
-        try:
-            return _built(source, fields, edges, rtol)
-        except _EndOfTable as fault:
-            end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
+        while True:
+            try:
+                return _built(source, fields, edges, rtol)
+            except _EndOfTable as fault:
+                edges = np.append(edges[edges < fault.args[0] * (1 - 1e-12)], fault.args[0])
 
 
-profile: Callable[..., Profile] = functools.lru_cache(maxsize=KEPT)(_profile)
+def profile(surface: Any, model: Any, *more: Any, **options: Any) -> Profile:
+    """`_profile`, kept of the library's own island models; objects of users may change."""
+    own = type(model).__module__.startswith("mbma_tables.")
+    made: Profile = (_profile if own else _profile.__wrapped__)(surface, model, *more, **options)
+    return made

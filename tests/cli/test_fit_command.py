@@ -1,19 +1,16 @@
 """`mbma fit`, and options of measured maps on the command line and in TOML."""
 
 import json
-import warnings
 
 import numpy as np
 import pytest
-from helpers import random_map, refused, run
+from helpers import random_map, refused, run, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.specimen import read_specimen
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    library = pytest.importorskip("SurfaceTopography")
+library = topographies()
 POINTS, STEP = 64, 0.5
 
 
@@ -79,7 +76,7 @@ def test_the_same_in_toml(map_file, tmp_path):
     assert found.h_rms == pytest.approx(own.h_rms)
     assert found.rms_gradient == pytest.approx(own.rms_gradient)
     toml.write_text('[surface]\nname = "concrete"\noutliers = 10\n')
-    with pytest.raises(InputError, match="outliers: about a measured map"):
+    with pytest.raises(InputError, match="outliers: for a measured map"):
         read_specimen(toml)
 
 
@@ -89,7 +86,7 @@ def test_the_same_in_toml(map_file, tmp_path):
         (["fit", "absent.sur"], "there is no file"),
         (["contact", "--surface", "concrete", "--outliers", "8", "-a", "0.1"], "goes with --map"),
         (["fit", "MAP", "--window", "bay"], "--window must be one of scipy.signal.get_window, got 'bay'"),
-        (["fit", "MAP", "--dx", "1um"], "leave --dx and --dy out (--length-unit ... says what they are in)"),
+        (["fit", "MAP", "--dx", "1um"], "leave --dx and --dy out (--length-unit ... sets their unit)"),
         (["fit", "MAP", "--extrapolate-to", "0.1um"], "--extrapolate-to and --extrapolate-hurst: give both"),
         (["fit", "MAP", "--channel", "7"], "has channels 0 to 0"),
     ],

@@ -18,7 +18,6 @@ def exact(content, kind):
 
 
 def spoilt(one):
-    """An argument as no caller would give it."""
     way = RANDOM.integers(8)
     if isinstance(one, float):
         return RANDOM.choice(ODD)

@@ -16,19 +16,15 @@ MOST_BYTES = 5_000_000  # of an array
 
 
 def functions():
-    """The functions of the core by their names."""
     found = vars(package.core).items()
     return [(name, one) for name, one in found if type(one).__name__ == "builtin_function_or_method"]
 
 
 def copied(given):
-    """Arguments that nothing else changes."""
     return [np.copy(one) if isinstance(one, np.ndarray) else one for one in given]
 
 
 class Call(NamedTuple):
-    """A call of a function of the core."""
-
     name: str
     given: list[Any]  # arguments, arrays as they were before
     returned: int
@@ -51,7 +47,6 @@ class Call(NamedTuple):
 
 
 def recorded(using):
-    """The first calls of every function that something makes."""
     calls = {}
 
     def recording(name, function):

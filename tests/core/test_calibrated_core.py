@@ -7,13 +7,14 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.interpolate import NdBSpline
+from scipy.special import erf
 
-from generate.splines import TAPS
+from mbma_tables import ConvergenceError, InputError, Surface
 from mbma_tables.answers import leakage_table
 from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.core import GENERATIONS, core
-from mbma_tables.laws.calibrated import Spectrum
-from mbma_tables.theories.calibrated_table import FEW, shipped
+from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum
+from mbma_tables.theories.calibrated_table import shipped
 
 PLAIN = importlib.import_module("mbma_tables.core._plain")
 FUSED = [importlib.import_module(f"mbma_tables.core._{name}") for name, least in GENERATIONS.items()
@@ -34,7 +35,6 @@ def batch(n, seed=0, top=12.0):
 
 
 def fill(rows, owner, u, used=core, pieces=None):
-    """Force, area and stiffness."""
     ends, out = np.empty((rows.shape[1], 2)), np.empty((3, u.size))
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     given = *TABLE.core_table, *rows, ends, pieces
@@ -44,7 +44,6 @@ def fill(rows, owner, u, used=core, pieces=None):
 
 
 def separations(rows, owner, force, used=core, pieces=None):
-    """Their inverse."""
     ends, out = np.empty((rows.shape[1], 2)), np.empty(force.size)
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     bad = used.calibrated_separation(*TABLE.core_table, *rows, ends, pieces, owner, force, out)
@@ -53,7 +52,6 @@ def separations(rows, owner, force, used=core, pieces=None):
 
 
 def flow(rows, owner, u, area, pieces=None):
-    """Flow coefficient."""
     return leakage_table._flow((*FLOW.core_table, *rows[:2], None, None, pieces), owner, u, area)
 
 
@@ -77,32 +75,6 @@ def test_erf_within_1e_15(used):
 
 
 class TestSpline:
-    @pytest.mark.parametrize("used", CORES)
-    @pytest.mark.parametrize("number", range(6))
-    def test_weights_at_forty_digits(self, used, number):
-        # one cell, one coefficient: the product of three cardinal B-splines, which is a polynomial of the last place
-        one = np.zeros(6**3 + 2, np.float32)
-        one[36 * number + 6 * 5 + number] = 1.0
-        places = np.linspace(0, 1, 18)
-        numbers = np.array([0.0, 0, 0, 1, 1, 1, 0, 1, 0, 1, 0, 0, 0])
-        out = np.empty((18, 1, 6))
-        bad = used.spline_pieces(one, numbers, np.ones(3, np.int64), places, np.ones(18), None, None, None, out)
-        assert bad == 0
-        with mpmath.workdps(40):
-
-            def exact(u):
-                # by divided differences of truncated powers
-                x = mpmath.mpf(u) + 5 - number
-                terms = ((-1) ** k * mpmath.binomial(6, k) * max(x - k, 0) ** 5 for k in range(7))
-                return mpmath.fsum(terms) / 120
-
-            last = mpmath.mpf(1) / 120
-            assert number == 5 or TAPS[5][number] == pytest.approx(float(exact(0)), rel=2e-16)
-            for u, six in zip(places.tolist(), out[:, 0].tolist(), strict=True):
-                for z in (0.0, 0.3, 1.0):
-                    found = mpmath.polyval([mpmath.mpf(c) for c in six[::-1]], z)
-                    assert abs(found - exact(u) * last * exact(z)) < 2e-16
-
     def test_is_the_tensor_spline_of_scipy(self):
         rows, _ = batch(300, seed=2)
         x = np.random.default_rng(3).uniform(TABLE.first[2], TABLE.last, 300)
@@ -123,8 +95,6 @@ class TestSpline:
 
 
 class TestBits:
-    """An answer is the same, whatever is asked beside it."""
-
     def test_alone_in_a_batch_and_with_pieces(self):
         rows, u = batch(400)
         everyone = np.arange(400)
@@ -143,17 +113,6 @@ class TestBits:
             np.testing.assert_array_equal(fill(one, first, u[n : n + 1])[:, 0], out[:, n])
             np.testing.assert_array_equal(separations(one, first, force[n : n + 1])[0], gaps[n])
             np.testing.assert_array_equal(flow(one, first, u[n : n + 1], area[n : n + 1])[0], k[n])
-
-    def test_the_table_in_python(self):
-        rows, u = batch(FEW + 30)
-        everyone = np.arange(u.size)
-        out, few = TABLE.fill(rows, everyone, u), np.ascontiguousarray(rows[:, :3])
-        many = np.tile(np.arange(3), 4000)
-        np.testing.assert_array_equal(TABLE.fill(few, many, u[many]), out[:, many])
-        force = out[0, :3].clip(1e-9)
-        np.testing.assert_array_equal(
-            TABLE.separations(few, many, force[many]), TABLE.separations(few, np.arange(3), force)[many]
-        )
 
 
 @pytest.mark.parametrize("used", CORES)
@@ -224,23 +183,185 @@ def test_moments_of_self_affine_surfaces(hurst, log_zeta_1):
         assert core.self_affine(*given, *out) == np.isnan(out[0]).sum() == np.isnan(out[1]).sum() >= 1
 
 
-def test_flow_is_its_closed_form():
-    rows, _ = batch(200, seed=9)
-    rng = np.random.default_rng(10)
-    u, area = rng.uniform(0.01, 3, 200), 10.0 ** rng.uniform(-9, math.log10(0.5), 200)
-    c = FLOW.constants
-    with np.errstate(invalid="ignore"):
-        odds = np.log(area / (c.threshold - area))
-    inside = odds.clip(FLOW.first[2], FLOW.last)
-    place = (inside - FLOW.first[2]) / FLOW.step[2]
-    cell = np.where(np.isnan(place), 0, place).astype(int).clip(0, FLOW.cells[2] - 1)
-    six = pieces_of(FLOW, rows)[np.arange(200), cell]
-    value, slope = (
-        np.array([np.polynomial.polynomial.polyval(z, p) for z, p in zip(place - cell, part, strict=True)])
-        for part in (six, six[:, 1:] * np.arange(1, 6) / FLOW.step[2])
-    )
-    value = (value + slope * np.maximum(odds - FLOW.last, 0)) * np.exp(
-        c.obstruction * np.minimum(odds - FLOW.first[2], 0)
-    )
-    expected = np.where(area < c.threshold, u**3 * (1 - 1.5 / (u**2 + 4)) * np.exp(np.minimum(value, 0)), 0.0)
-    np.testing.assert_allclose(flow(rows, np.arange(200), u, area), expected, rtol=1e-12)
+SELF_AFFINE = [(0.8, 64.0), (0.3, 4.0), (0.1, 1e5), (1.0, 1e6), (0.5, 3.1), (0.02, 1e8)]
+ODD = [math.nan, math.inf, -math.inf, -1.0, 0.0, -0.0, 5e-324, 1e-310, 1e308, 1e200]
+FINE = [*np.arange(1, 4) / 4, *0.5 ** np.arange(3, 20, 2)]
+NODE, WEIGHT = np.polynomial.legendre.leggauss(20)
+
+
+def gauss(low, high):
+    """Nodes and weights between the ends of panels, in a last axis."""
+    half = (np.asarray(high) - low)[..., None] / 2
+    return np.asarray(low)[..., None] + half * (1 + NODE), half * WEIGHT
+
+
+def inner(y, weights):
+    """I(y) exp(2 y^2): over v = 2 (y'^2 - y^2); a logarithm of small y."""
+    light, y = np.log(np.maximum(1e-6 / y, 1)), np.maximum(y, 1e-6)
+    v, d_v = gauss(*(np.append(0.0, np.geomspace(1e-16, 45, 50))[k : k + 50] for k in (0, 1)))
+    v, d_v = v.ravel(), d_v.ravel()
+    square = y[..., None] ** 2 + v / 2
+    P = erf(np.sqrt(2 * square))
+    slope = weights[0] + 3 * weights[1] * P**2 + 16 * weights[2] * P**15
+    return ((slope * np.exp(-v) / (4 * square)) @ d_v + weights[0] * light) * math.sqrt(8 / math.pi)
+
+
+def log_separation(q, C, force, law):
+    """ln u + 2 F^2 of power laws between samples, by panels graded towards both ends."""
+    log_q = np.log(q / q[0])
+    last, first = log_q[-1], min(log_q[-1], 1.0)
+    graded = np.append(0.0, first * np.exp(np.arange(-60, 0.5, 1.0))), last - first * 0.5 ** np.arange(13)
+    fine = [log_q[:-1] + np.diff(log_q) * part for part in FINE]
+    edges = np.unique(np.concatenate([log_q, *graded, *fine, np.arange(first, last, 0.5)]))
+    root, d_root = gauss(np.sqrt(edges[:-1]), np.sqrt(edges[1:]))
+    t, d_t = root**2, 2 * root * d_root
+
+    def content(order, x):
+        return np.exp(np.interp(x, log_q, np.log(C)) + (order + 2) * x)
+
+    inside, weight = gauss(np.broadcast_to(edges[:-1, None], t.shape), t)
+    before = np.append(0, np.cumsum((content(2, t) * d_t).sum(axis=1)))
+    m0, m2 = (content(0, t) * d_t).sum(), before[-1]
+    below = (before[:-1, None] + (content(2, inside) * weight).sum(axis=2)) / m2
+    share = np.exp(t) * content(0, t) * d_t / m0 / (4 * math.sqrt(m2 / m0) * np.sqrt(below))
+    found = []
+    for load in force:
+        seen = load**2 * (1 / below - 1) < 40
+        part = inner(load / np.sqrt(below[seen]), law.coefficients) * np.exp(-2 * load**2 * (1 / below[seen] - 1))
+        found.append(math.log(part @ share[seen]))
+    return np.array(found)
+
+
+def self_affine(hurst, zeta_1):
+    return np.array([1.0, zeta_1]), np.array([1.0, zeta_1 ** (-2 - 2 * hurst)])
+
+
+class TestCurve:
+    @pytest.mark.parametrize(("hurst", "zeta_1"), SELF_AFFINE)
+    def test_of_self_affine_surfaces(self, hurst, zeta_1):
+        number = SELF_AFFINE.index((hurst, zeta_1))
+        law = Law(Spectrum.self_affine(hurst, zeta_1), None, [CONSTANTS, YANG_PERSSON, PERSSON][number % 3])
+        log_force = np.concatenate([np.linspace(-50, 2.8, 9), np.random.default_rng(number).uniform(-2, 1, 5)])
+        found, slope = law.separation_persson(np.exp(log_force))
+        expected = log_separation(*self_affine(hurst, zeta_1), np.exp(log_force), law) - 2 * np.exp(2 * log_force)
+        np.testing.assert_allclose(np.log(found), expected, rtol=0, atol=1e-11)
+        step = 1e-4
+        ends = [np.log(law.separation_persson(np.exp(log_force + k * step))[0]) for k in (-2, -1, 1, 2)]
+        rate = (ends[0] - ends[3] + 8 * (ends[2] - ends[1])) / (12 * step)
+        np.testing.assert_allclose(slope / found, rate, rtol=1e-7)
+
+    @pytest.mark.parametrize(("samples", "scatter"), [(2, 0.0), (20, 0.2), (40, 2.0), (80, 0.2)])
+    def test_of_scattered_spectra(self, samples, scatter):
+        random = np.random.default_rng(samples)
+        q = np.sort(np.exp(random.uniform(0, 6, samples)))
+        C = np.minimum(1, q**-3.5) * np.exp(random.normal(0, scatter, samples))
+        law, force = Law(Spectrum.from_samples(q, C)), np.array([1e-9, 0.03, 1.5])
+        found = np.log(law.separation_persson(force)[0]) + 2 * force**2
+        np.testing.assert_allclose(found, log_separation(q, C, force, law), rtol=0, atol=LAW_ERROR / 30)
+
+    @pytest.mark.parametrize("h_max", [None, 0.5, 3.2, 30.0, 1e300])
+    def test_separation_is_the_inverse_of_force(self, h_max):
+        law = Law(Spectrum.self_affine(0.7, 100.0), h_max)
+        u = np.append(10.0 ** np.linspace(-280, -1, 60), np.linspace(0.11, 12, 50))
+        u = u[u < 0.999 * (h_max or np.inf)]
+        force, area, stiffness = law.contact(u)
+        assert np.all(np.diff(force) < 0)
+        assert np.all(np.diff(area) <= 0)
+        np.testing.assert_allclose(law.separation(force), u, rtol=1e-10)
+        np.testing.assert_allclose(area, law.area(force), rtol=1e-14)
+        some = u > 1e-3
+        ends = [law.force(u[some] * (1 + k * 1e-4)) for k in (-2, -1, 1, 2)]
+        rate = (ends[0] - ends[3] + 8 * (ends[2] - ends[1])) / (12e-4 * u[some])
+        np.testing.assert_allclose(stiffness[some], -rate, rtol=1e-8)
+
+    def test_ends(self):
+        law = Law(Spectrum.self_affine(0.7, 100.0), 3.0)
+        assert [row.tolist() for row in law.contact([0.0, 3.0, 4.0])] == [[np.inf, 0, 0], [1, 0, 0], [np.inf, 0, 0]]
+        assert law.separation([1e-300, 20.0, 1e300]) == pytest.approx([3.0, 0.0, 0.0], rel=1e-15, abs=0)
+        # as sharp as what is left of Gaussian tails: the slope of a surface without end
+        assert law.contact(3 - 1e-9)[0] == pytest.approx(1e-9 * law.contact(3 - 1e-9)[2], rel=1e-6)
+
+
+def test_waves_hold_the_moments_of_the_spectrum():
+    for hurst, zeta_1 in SELF_AFFINE:
+        spectrum, alpha, gradient = Spectrum.self_affine(hurst, zeta_1), np.empty(1), np.empty(1)
+        core.self_affine(np.array([hurst]), np.log([zeta_1]), alpha, gradient)
+        assert spectrum.alpha == pytest.approx(alpha[0], rel=1e-13)
+        assert spectrum.gradient == pytest.approx(gradient[0], rel=1e-13)
+        assert spectrum.variance.sum() == pytest.approx(1, rel=1e-14)
+        assert spectrum.variance @ spectrum.x**2 == pytest.approx(gradient[0] ** 2, rel=1e-13)
+        assert np.all(np.diff(spectrum.x) >= 0)
+        assert np.all(np.diff(spectrum.below) >= 0)
+        assert 0 < spectrum.below[0] < 1e-15
+        assert spectrum.below[-1] == pytest.approx(1, rel=1e-4)
+    # a jump, and a gap in which there is nothing
+    q = np.array([1.0, 2.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    C = np.array([1.0, 0.5, 2.0, 1.0, 0.0, 0.7, 0.2])
+    split = Spectrum.from_samples(q, C)
+    assert not ((split.x > 3) & (split.x < 5)).any()
+    surface = Surface.from_spectrum(q, C, h_max=1.0)
+    assert split.gradient == pytest.approx(surface.rms_gradient / surface.h_rms / surface.q0, rel=1e-13)
+    assert split.alpha == pytest.approx(surface.alpha, rel=1e-13)
+
+
+@pytest.mark.parametrize("used", CORES)
+class TestAnyInputOfSpectra:
+    def test_of_forces_and_separations(self, used):
+        x = np.array(ODD)
+        for h_max in (None, 3.0):
+            law = Law(Spectrum.self_affine(0.8, 64.0), h_max)._prepared
+            u, slope, back = np.empty((3, x.size))
+            assert used.spectrum_law_separation(law, x, 0, u, slope) == np.isnan(u).sum() == np.isnan(slope).sum()
+            assert np.isfinite(u).tolist() == (x > 0).tolist()
+            assert u[[1, 8, 9]].tolist() == [0, 0, 0]
+            assert used.spectrum_law_separation(law, x, 1, back, slope) == np.isnan(back).sum() == 5
+            out = np.empty((3, x.size))
+            assert used.spectrum_law_contact(law, x, *out) == np.isnan(out[0]).sum()
+            np.testing.assert_array_equal(out[:, [1, 8, 9]], 0.0)
+            assert np.isinf(out[0]).tolist() == (x <= 0).tolist()
+
+
+def test_what_is_no_spectrum_is_refused():
+    with pytest.raises(InputError, match="no spectrum"):
+        Spectrum.from_samples(np.array([1.0, 2.0]), np.array([1.0, 0.0]))
+    good = Spectrum.self_affine(0.8, 64.0)
+    with pytest.raises(InputError, match="rising"):
+        Law(Spectrum(good.x, good.variance, good.below[::-1].copy(), good.gradient, good.alpha)).force(1.0)
+    # less than nothing is left by this weight
+    with pytest.raises(ConvergenceError, match="no curve"):
+        Law(good, None, CONSTANTS.__class__(weight=-5.0)).force(1.0)
+
+
+CASES = {
+    "exp": np.concatenate([np.linspace(-700, 700, 2001), np.linspace(-1, 1, 501)]),
+    "expm1": np.concatenate([np.linspace(-700, 700, 2001), np.linspace(-2, 2, 1001), np.geomspace(1e-300, 1, 300)]),
+    "log": np.concatenate([np.geomspace(2.3e-308, 1e308, 2001), np.linspace(0.5, 2, 1001), 1 + np.geomspace(1e-15, 1)]),
+    "log1p": np.concatenate(
+        [np.geomspace(1e-300, 1e300, 2001), np.linspace(-0.999, 3, 1001), -np.geomspace(1e-300, 0.9)]
+    ),
+}
+
+
+def of_core(name, x):
+    values = np.asarray(x, float)
+    out = np.empty_like(values)
+    core.elementary(list(CASES).index(name), values, out)
+    return out
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_within_1e_15(name):
+    exact = getattr(mpmath, name)
+    with mpmath.workdps(50):
+        for x, found in zip(CASES[name].tolist(), of_core(name, CASES[name]).tolist(), strict=True):
+            right = exact(mpmath.mpf(x))
+            assert abs(found - right) <= 1e-15 * abs(right), x
+
+
+def test_exponentials_beyond_their_range_are_those_at_its_end():
+    low, least, high, most, none = of_core("exp", [-1e300, -700.0, 1e300, 700.0, np.nan])
+    assert low == least > 0
+    assert high == most < np.inf
+    # NaN is not passed on: an index that is made from it stays inside
+    assert none == least
+    assert of_core("expm1", [-1e300]) == -1

@@ -19,7 +19,6 @@ def run(code, timeout=120):
 
 
 def test_wrong_arguments_are_refused():
-    """Their number, kinds, items, order in memory, and results that cannot be written, of every function."""
     assert int(run([str(pathlib.Path(__file__).with_name("refusals.py"))])) > 1500
 
 

@@ -14,31 +14,20 @@ from mbma_tables.core import GENERATIONS, core
 
 ROOT = pathlib.Path(__file__).parents[2]
 QUICK = [
-    *(
-        "core/test_calibrated_core.py",
-        "islands/test_core_islands.py",
-        "tablefiles/test_splines.py",
-        "test_elementary.py",
-    ),
-    *("test_hardness.py", "totals/test_kernel.py", "totals/test_law_core.py", "totals/test_island_models.py"),
+    "core/test_calibrated_core.py",
+    "islands/test_core_islands.py",
+    "tablefiles/test_splines.py",
+    "test_hardness.py",
 ]
-MORE = ["islands/test_island.py", "models", "test_calibrated.py", "theories/test_yielding.py", "totals/test_contact.py"]
+QUICK += [f"totals/test_{name}.py" for name in ("kernel", "law_core", "island_models")]
+MORE = ["islands/test_geometry.py", "models", "totals/test_contact.py"]
+MORE += ["theories/test_calibrated_theory.py", "theories/test_yielding.py"]
 pytestmark = pytest.mark.slow
 
 
 def passed(tests, **environment):
-    """Quick tests, in one other process."""
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "pytest",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-        *(f"tests/{name}" for name in tests),
-    ]
+    options = ["-P", "-m", "pytest", "-n", "0", "-p", "no:cacheprovider"]
+    command = [sys.executable, *options, *(f"tests/{name}" for name in tests)]
     done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -53,7 +42,6 @@ def test_with_each_generation(generation):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="LD_PRELOAD")
 def test_under_sanitizers(tmp_path):
-    """The plain module, in a copy of the package."""
     package = tmp_path / "mbma_tables"
     shutil.copytree(CORE.parent, package, ignore=shutil.ignore_patterns("__pycache__", "_plain.*"))
     for name in ("docs", "tables"):

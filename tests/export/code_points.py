@@ -4,15 +4,8 @@ import functools
 
 import numpy as np
 
+from mbma_tables.export import conformance
 from mbma_tables.export.c_code import FORM
-from mbma_tables.export.conformance import (
-    calibrated_rows,
-    formula_rows,
-    geometry_rows,
-    phi_rows,
-    status_rows,
-    total_rows,
-)
 from mbma_tables.models import closed_form_certificates
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import get_variant
@@ -21,7 +14,6 @@ POINTS = 10_000
 SURFACES = 60
 SHARES = (1e-4, 0.01, 0.2, 0.5, 0.9, 0.99)  # u/h_max
 GAPS = (-0.9, 0.1, 0.6, 0.97)  # d/h_max
-# what agreement is asked of exported code
 TOLERANCES = {"phi": 1e-13, "slopes": 1e-11, "geometry": 1e-13, "total": 1e-13, "status": 0.0, "formula": 1e-13}
 TOLERANCES |= {"calibrated": 1e-12, "separation": 1e-12}  # whose logarithm is the table's
 # the library states 1e-6; those of the calibrated law are differences in the library
@@ -29,7 +21,6 @@ TOLERANCES |= {"total_by": 1e-12, "calibrated_by": 1e-8}
 
 
 def random_islands():
-    """X and mu over the whole range, ends included."""
     rng = np.random.default_rng(2008)
     axis_X, axis_mu = universal_model().content.axes
     X = rng.uniform(axis_X.low, axis_X.high, POINTS)
@@ -57,7 +48,6 @@ def random_approaches():
 
 
 def random_surfaces():
-    """Surfaces of any size: hurst, q0, q1, h_rms, h_max."""
     rng = np.random.default_rng(48)
     _, hurst, zeta_1 = random_approaches()
     found = []
@@ -69,12 +59,15 @@ def random_surfaces():
 
 @functools.cache
 def points_text(variant="reported"):
-    """The points' file, made once."""
     model, rule = universal_model(), get_variant(variant)
-    lines = [*phi_rows(model, *random_islands()), *status_rows(model), *formula_rows(*random_formula_islands())]
-    lines += geometry_rows(*random_approaches(), rule)
+    lines = [
+        *conformance.phi_rows(model, *random_islands()),
+        *conformance.status_rows(model),
+        *conformance.formula_rows(*random_formula_islands()),
+    ]
+    lines += conformance.geometry_rows(*random_approaches(), rule)
     for surface in random_surfaces():
-        lines += total_rows(surface, surface[4] * np.array(GAPS), rule)
+        lines += conformance.total_rows(surface, surface[4] * np.array(GAPS), rule)
     return "\n".join(lines) + "\n"
 
 
@@ -82,18 +75,16 @@ def points_text(variant="reported"):
 def calibrated_text():
     """Rows of the calibrated law, of the surfaces that its table holds."""
     held = [surface for surface in random_surfaces() if 3.01 < surface[2] / surface[1] < 9.9e4]
-    return "\n".join(line for surface in held for line in calibrated_rows(surface, SHARES, 7.5)) + "\n"
+    return "\n".join(line for surface in held for line in conformance.calibrated_rows(surface, SHARES, 7.5)) + "\n"
 
 
 def write_points(folder, variant="reported"):
-    """The points' file in a folder."""
     path = folder / "many_points.csv"
     path.write_text(points_text(variant) + calibrated_text(), encoding="utf-8")
     return path
 
 
 def assert_equal_to_runtime(replay):
-    """Every row was replayed, and the answers agree as closely as is asked."""
     assert replay.reason == ""
     islands = {"phi": POINTS, "slopes": POINTS, "geometry": POINTS // 10, "status": 10, "formula": POINTS}
     totals, calibrated = 4 * SURFACES, calibrated_text().count("\n") // 3

@@ -15,7 +15,7 @@ from mbma_tables.export.law_code import law_text
 
 POINTS = 10_000
 VALUES, TANGENTS = 1e-13, 1e-11  # what agreement is asked of exported laws
-CONDUCTIVITY = 3.0
+CONDUCTIVITY, KAPPA = 3.0, 1.25
 # h_max is a dyadic number, so that c = (h_max - d)/2 is exact
 ROAD = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="mm")
 ASKED = {
@@ -25,7 +25,6 @@ ASKED = {
     "persson": (ROAD, {"theory": "persson"}),
     # its area turns down without blocking, and its slopes are flat where coefficients are rounded
     "flat": (Surface(0.23, 1.0, 1.5e4, 0.125, 0.1875, unit="mm"), {}),
-    # its force turns down
     "turning": (Surface(0.35, 1.0, 1e4, 0.125, 0.375, unit="mm"), {}),
 }
 
@@ -55,6 +54,14 @@ class Points:
         """Pressures on the branch of first contact, but where pieces meet: they do so within the law's error alone."""
         return self.p[:POINTS][self.c[:POINTS] < self.c_turn]
 
+    def assert_slopes(self, conductance, sheared):
+        """Conductance and tangential stiffness by the unloading stiffness."""
+        law, factor = self.law.unloading
+        slope = factor * np.asarray(law.stiffness(separation=self.law.h_max - 2 * self.c))
+        allowed = 1e-11 * np.maximum(np.abs(slope), 1e-2 * self.p / np.abs(self.c))
+        assert (np.abs(conductance * 13.3 / CONDUCTIVITY - slope) <= allowed).all()
+        assert (np.abs(sheared * KAPPA - slope) <= allowed).all()
+
     def assert_inverse(self, c):
         """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""
         wanted = self.pressures()
@@ -73,7 +80,6 @@ def points(name):
     ends = math.isinf(law.highest)
     near = h - 2 * h * 10 ** rng.uniform(-12, -0.6, POINTS // 2)
     grid = 2.0**-30
-    # where pieces may meet, and beside
     joints = h * np.array([0.5, 0.25, 0.125, 0.75, 0.375, 0.5 + 2.0**-30, 0.5 - 2.0**-30, 1 - 2.0**-9])
     rest = grid * np.floor(rng.uniform(law.lowest, h if ends else law.highest, POINTS // 2) / grid)
     c = (h - np.concatenate([near, rest, h - 2 * joints])) / 2

@@ -1,7 +1,11 @@
 """Exported C, Fortran and JavaScript: what is written and refused, and answers as the runtime's, under sanitizers."""
 
+import copy
+import csv
 import ctypes
+import dataclasses
 import importlib.util
+import io
 import json
 import math
 import pathlib
@@ -15,11 +19,14 @@ import numpy as np
 import pytest
 
 import mbma_tables.core
-from mbma_tables import InputError, __version__
-from mbma_tables.export import CODE, code, conformance
+from mbma_tables import InputError, Surface, __version__
+from mbma_tables.export import CODE, SOLVERS, code, conformance, data, solvers
 from mbma_tables.export.code import SOURCES, Replay, check, read_report, write_code
+from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.text import checked_name
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.variants import Variant
+from mbma_tables.models.universal import UniversalModel
+from mbma_tables.surfaces.variants import Variant, get_variant
 
 
 @pytest.fixture
@@ -43,7 +50,6 @@ def test_every_file_says_what_it_is(target, tmp_path):
             continue
         text = path.read_text(encoding="utf-8")
         assert not re.search("@[A-Z_]+@", text)
-        # the opening comment without its marks
         head = " ".join(word for word in text[:5000].split() if word not in ("*", "!", "#"))
         assert attributes["values_sha256"] in head
         for fact in (path.name, *of_all, *of_tables) if path.suffix != ".csv" else ():
@@ -106,7 +112,6 @@ def test_bad_requests_leave_no_file(arguments, message, tmp_path, monkeypatch):
 
 
 def test_points_of_a_variant_with_high_floors():
-    """A surface below a floor has no islands, and so no points."""
     each = len(conformance.DEPTHS)
     ratios = [surface[2] / surface[1] for surface in conformance.SURFACES]
     for floor in (3.0, 150.0, 500.0):
@@ -143,7 +148,6 @@ def js_folder(tmp_path_factory):
 
 
 def build_and_replay(commands, work, points):
-    """Build the file `selftest` in a folder without a word from the compiler, and replay the points."""
     for command in (*commands, ["./selftest", str(points)]):
         done = subprocess.run(command, cwd=work, capture_output=True, text=True, timeout=300, check=False)
         assert done.stderr == ""
@@ -211,7 +215,6 @@ def test_the_printed_variant(tmp_path):
     write_code("c", tmp_path, variant="printed")
     found = check("c", tmp_path, code_points.write_points(tmp_path, "printed"))
     code_points.assert_equal_to_runtime(found)
-    # and the points of one variant are refused by the code of another
     assert check("c", tmp_path, code_points.write_points(tmp_path, "reported")).failed > code_points.SURFACES
 
 
@@ -224,7 +227,6 @@ def test_nothing_is_allocated_or_kept(c_folder, tmp_path):
     listed = subprocess.run(["nm", *objects], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     kinds = [line.split()[-2:] for line in listed.splitlines() if len(line.split()) > 1]
     outside = {name for kind, name in kinds if kind == "U" and not name.startswith("mbma_")} - {"__stack_chk_fail"}
-    # C's own mathematics and block copies
     mathematics = {"asinh", "cbrt", "copysign", "cos", "exp", "expm1", "fmax", "fmin", "log", "log1p", "pow", "sqrt"}
     assert outside <= {*mathematics, "memcpy", "memset"}
     assert not [name for kind, name in kinds if kind in "BbDdC"]
@@ -249,17 +251,10 @@ def library(c_folder, tmp_path_factory):
 
 def totals(library, surface, gaps, E_star=1.0, rtol=1e-8):
     answers, status = np.empty((gaps.size, 4)), np.empty(gaps.size, dtype=np.int32)
-    library.mbma_totals_of(
-        ctypes.byref(CSurface(*surface)),
-        ctypes.c_size_t(gaps.size),
-        gaps.ctypes.data_as(ctypes.c_void_p),
-        ctypes.c_double(E_star),
-        ctypes.c_double(rtol),
-        answers.ctypes.data_as(ctypes.c_void_p),
-        None,
-        None,
-        status.ctypes.data_as(ctypes.c_void_p),
-    )
+    asked, found, told = (ctypes.c_void_p(array.ctypes.data) for array in (gaps, answers, status))
+    numbers = ctypes.c_double(E_star), ctypes.c_double(rtol)
+    given = ctypes.byref(CSurface(*surface)), ctypes.c_size_t(gaps.size), asked
+    library.mbma_totals_of(*given, *numbers, found, None, None, told)
     return answers, status
 
 
@@ -267,49 +262,23 @@ SOUND = (0.8, 1.0, 100.0, 1.0, 3.0)
 INVALID = b"an argument is not finite, or is outside what the model allows"
 
 
-@pytest.mark.parametrize(
-    ("surface", "gap", "E_star", "rtol", "message"),
-    [
-        *(
-            (wrong, 1.0, 1.0, 1e-8, INVALID)
-            for wrong in (
-                *((hurst, *SOUND[1:]) for hurst in (math.nan, 1.1)),
-                (0.8, 0.0, *SOUND[2:]),
-                *((0.8, 1.0, q1, 1.0, 3.0) for q1 in (3.0, 1e9)),
-                (*SOUND[:4], math.inf),
-            )
-        ),
-        *((SOUND, gap, 1.0, 1e-8, INVALID) for gap in (math.nan, math.inf, -3.1)),
-        (SOUND, 1.0, -1.0, 1e-8, INVALID),
-        *((SOUND, 1.0, 1.0, rtol, INVALID) for rtol in (0.0, math.nan)),
-        ((0.5, 1.0, 1e6, 1.0, 30.0), -30.0, 1.0, 1e-8, b"X is above the range"),
-        ((0.1, 1.0, 1e7, 1.0, 3.0), -3.0, 1.0, 1e-8, b"mu is above the range"),
-    ],
-)
-def test_no_answer_has_a_status_and_nan(library, surface, gap, E_star, rtol, message):
-    answers, status = totals(library, surface, np.array([gap]), E_star, rtol)
-    assert library.mbma_message(int(status[0])) == message
-    assert np.isnan(answers).all()
+def test_no_answer_has_a_status_and_nan(library):
+    good = (*SOUND, 1.0, 1.0, 1e-8)  # and gap, E*, rtol
+    nan, inf = math.nan, math.inf
+    wrong = [(0, nan), (0, 1.1), (1, 0.0), (2, 3.0), (2, 1e9), (4, inf), (5, nan), (5, inf), (5, -3.1), (6, -1.0)]
+    cases = [((*good[:k], value, *good[k + 1 :]), INVALID) for k, value in (*wrong, (7, 0.0), (7, nan))]
+    cases.append(((0.5, 1.0, 1e6, 1.0, 30.0, -30.0, 1.0, 1e-8), b"X is above the range"))
+    cases.append(((0.1, 1.0, 1e7, 1.0, 3.0, -3.0, 1.0, 1e-8), b"mu is above the range"))
+    for (*surface, gap, E_star, rtol), message in cases:
+        answers, status = totals(library, surface, np.array([gap]), E_star, rtol)
+        assert library.mbma_message(int(status[0])) == message
+        assert np.isnan(answers).all()
 
 
 def test_no_contact_from_h_max_on(library):
     answers, status = totals(library, SOUND, np.array([3.0, 3.5]))
     assert not status.any()
     assert not answers.any()
-
-
-@pytest.mark.parametrize(
-    ("call", "more"), [("mbma_total_slopes_of", (1.0, 1e-8)), ("mbma_calibrated_slopes_of", (1.0,))]
-)
-def test_slopes_past_the_ends(call, more, library):
-    """Beyond first contact nothing changes; beyond full compression nothing is said."""
-    for gap, ok, known in ((3.5, True, 0.0), (-3.1, False, math.nan)):
-        answers = np.ones((3, 6))
-        places = (ctypes.c_void_p(row.ctypes.data) for row in answers)
-        status = library[call](ctypes.byref(CSurface(*SOUND)), *map(ctypes.c_double, (gap, *more)), *places)
-        assert (status == 0) == ok
-        assert np.array_equal(answers[1:], np.full((2, 6), known), equal_nan=True)
-        assert np.array_equal(answers[0, :3], np.full(3, known), equal_nan=True)
 
 
 ASK = """
@@ -354,3 +323,101 @@ def test_javascript_checks_its_arguments(js_folder):
     assert {ask for ask, outcome in found.items() if outcome == "TypeError"} == set(TYPE_ERRORS)
     assert {ask for ask, outcome in found.items() if outcome == "INVALID"} == set(INVALIDS)
     assert {ask for ask, outcome in found.items() if outcome == "OK"} == set(VALID)
+
+
+HOSTILE = (
+    "x */ int evil(void); /* \n*INCLUDE, INPUT=evil\r\nsystem('evil') ??/\u2028evil()\x0cevil\x85"
+    "@WASM@ @CLOSED_FORMS@ </script><script>evil()//\x00\\"
+)
+COMMENT_MARKS = {"calculix": "**", "abaqus": "**", "lsdyna": "$", "optistruct": "$", "comsol": "%", "moose": "#"} | {
+    "modelica": "#"
+}
+
+
+@pytest.fixture(scope="module")
+def law():
+    return describe_law(Surface.named("concrete"), 13.3, length_unit="mm", stress_unit="MPa", rows=5)
+
+
+def hostile_law(law):
+    return dataclasses.replace(law, comments=(HOSTILE, *law.comments[1:], HOSTILE), x_unit=HOSTILE, y_unit=HOSTILE)
+
+
+@pytest.mark.parametrize("target", CODE)
+def test_source_code(target, monkeypatch):
+    monkeypatch.setattr(code, "web_assembly", lambda *given: b"wasm")
+    content = copy.copy(universal_model().content)
+    # a certificate's numbers are numbers in any case; the rest is text of the file
+    texts = {name: HOSTILE for name, value in content.attributes.items() if isinstance(value, str)}
+    attributes = content.attributes | texts | {"certificate_points": HOSTILE}
+    model = UniversalModel(dataclasses.replace(content, attributes=attributes))
+    variant = dataclasses.replace(get_variant("reported"), name=HOSTILE)
+
+    def live(texts):
+        return [
+            line
+            for name, text in texts.items()
+            for line in re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).splitlines()
+            if line.strip() and not (line.startswith("!") and name.endswith(".f90"))
+        ]
+
+    found = code.source_texts(target, model, variant)
+    assert any("int evil" in text for text in found.values())
+    assert live(found) == live(code.source_texts(target, universal_model(), get_variant("reported")))
+    assert all(text.isascii() for text in found.values())
+    assert "</script" not in found.get("mbma.mjs", "")
+    points, plain = (
+        [line for line in conformance.points_text(*of).splitlines() if not line.startswith("#")]
+        for of in ((model, variant), (universal_model(), get_variant("reported")))
+    )
+    assert points == plain
+
+
+@pytest.mark.parametrize("target", SOLVERS)
+def test_solver_decks(target, law):
+    def live(text):
+        return [line for line in text.splitlines() if not line.startswith(COMMENT_MARKS[target])]
+
+    write = getattr(solvers, target)
+    assert live(write(hostile_law(law))) == live(write(law))
+
+
+@pytest.mark.parametrize("name", ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81, 3])
+def test_names_of_cards_and_functions(name, law):
+    writers = (solvers.calculix, solvers.abaqus, solvers.modelica, data.matlab_reader)
+    for write in writers:
+        with pytest.raises(InputError, match="a name must be a letter"):
+            write(law, name)
+    assert checked_name("Rough_2", 7) == "Rough_2"
+
+
+def test_matlab_reader(law):
+    lines = data.matlab_reader(hostile_law(law), "law").decode().splitlines()
+    changed = dataclasses.replace(law, comments=(law.comments[0], HOSTILE))
+    hostile = data.matlab_reader(changed, "law").decode().splitlines()
+    assert [line for line in hostile if not line.startswith("%")] == [line for line in lines if line[0] != "%"]
+
+
+@pytest.mark.parametrize("unit", ["mW/(mm, K)", 'a "quoted" unit', "=HYPERLINK(evil)", "µm"])
+def test_csv_cells(unit, law):
+    changed = dataclasses.replace(law, y_unit=unit, comments=(*law.comments, f"in {unit}\n=HYPERLINK(evil)"))
+    lines = data.to_csv(changed).decode().splitlines()
+    head = len(changed.comments)
+    assert all(line.startswith("# ") for line in lines[:head])
+    cells = list(csv.reader(io.StringIO("\n".join(lines[head:]))))
+    assert cells[0] == ["overclosure [mm]", f"pressure [{unit}]"]
+    assert [[float(cell) for cell in row] for row in cells[1:]] == [list(row) for row in zip(law.x, law.y, strict=True)]
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+1", "-1", "@SUM", "\tx"])
+def test_csv_cells_are_no_formulas(name, law):
+    last = data.to_csv(dataclasses.replace(law, x_name=name)).decode().splitlines()[len(law.comments)]
+    assert next(csv.reader([last]))[0] == f"'{name} [mm]"
+
+
+@pytest.mark.parametrize("unit", ["W\n*INCLUDE, INPUT=evil", "W\u2028"])
+@pytest.mark.parametrize("which", ["length_unit", "stress_unit", "conductivity_unit"])
+def test_units_are_printable(which, unit):
+    units = {"length_unit": "mm", "stress_unit": "MPa", "conductivity_unit": "mW/K"} | {which: unit}
+    with pytest.raises(InputError, match=r"is no known unit|is not printable"):
+        describe_law(Surface.named("concrete"), 13.3, quantity="conductance", conductivity=1.0, rows=5, **units)

@@ -13,19 +13,20 @@ import law_points
 import numpy as np
 import pytest
 from law_points import needs, points
-from test_solver_runs import blocks
 
 from mbma_tables import InputError, Surface, contact, contact_law
 from mbma_tables.export import FMUS, solvers
+from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.fmu import fmu
 from mbma_tables.export.law_code import law_files
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.export.onnx import onnx
 
-SIDE, BLOCKS, CONDUCTIVITY = 10.0, 1e6, 50.0  # mm, MPa, mW/(mm K)
+CONDUCTIVITY = 50.0  # mW/(mm K)
+SIDES = {"mm": 10.0, "m": 0.01}
 ROUGH = Surface.named("challenge").to("mm")
 PRESSURES = np.geomspace(0.012, 1.9, 6)  # MPa
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
+LOW, BETWEEN, TOP = range(1, 5), range(5, 13), range(13, 17)  # nodes
 
 
 def heat_law(**options):
@@ -33,52 +34,78 @@ def heat_law(**options):
     return describe_law(ROUGH, "25 MPa", **(asked | options))
 
 
-def calculix(deck, folder):
+def each(nodes, words):
+    return "".join(f"{node}, {words}\n" for node in nodes)
+
+
+def blocks(card, steps, side, stiff, more="", kind="NODE TO SURFACE"):
+    """Two blocks of one element each, so stiff that they do not count; `more` of their material."""
+    corners = [(x, y, z) for z in (0.0, side, side, 2 * side) for x, y in ((0, 0), (side, 0), (side, side), (0, side))]
+    nodes = "".join(f"{k + 1}, {x!r}, {y!r}, {z!r}\n" for k, (x, y, z) in enumerate(corners))
+    return (
+        f"*NODE, NSET=ALL\n{nodes}*NSET, NSET=TOP\n13, 14, 15, 16\n*NSET, NSET=SLAVE\n9, 10, 11, 12\n"
+        "*ELEMENT, TYPE=C3D8, ELSET=LOW\n1, 1, 2, 3, 4, 5, 6, 7, 8\n"
+        "*ELEMENT, TYPE=C3D8, ELSET=UP\n2, 9, 10, 11, 12, 13, 14, 15, 16\n"
+        f"*MATERIAL, NAME=STIFF\n*ELASTIC\n{stiff:.6e}, 0.\n{more}"
+        "*SOLID SECTION, ELSET=LOW, MATERIAL=STIFF\n*SOLID SECTION, ELSET=UP, MATERIAL=STIFF\n"
+        "*SURFACE, NAME=MASTER, TYPE=ELEMENT\n1, S2\n*SURFACE, NAME=SLAVES, TYPE=ELEMENT\n2, S1\n"
+        f"{card}*CONTACT PAIR, INTERACTION=ROUGH, TYPE={kind}\nSLAVES, MASTER\n{steps}"
+    )
+
+
+def pressed(card, compressions, side, stiff, kind="NODE TO SURFACE"):
+    steps = "".join(
+        f"*STEP\n*STATIC\n1., 1.\n*BOUNDARY\n{each(LOW, '1, 3')}{each(TOP, '1, 2')}{each(TOP, f'3, 3, {-c:.12e}')}"
+        f"{each(BETWEEN, '1, 2')}*NODE PRINT, NSET=TOP, TOTALS=ONLY\nRF\n*END STEP\n"
+        for c in compressions
+    )
+    return blocks(card, steps, side, stiff, kind=kind)
+
+
+def heated(card, loads, side, stiff, coupled="*COUPLED"):
+    """A step for each load, a line on the top's nodes, 100 degrees above and 0 below, in steady state."""
+    ends = each(LOW, "1, 3") + each(LOW, "11, 11, 0.") + each([*BETWEEN, *TOP], "1, 2") + each(TOP, "11, 11, 100.")
+    output = "".join(f"*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000\n{what}\n" for what in ("RF", "RFL"))
+    steps = "".join(
+        f"*STEP, INC=1000\n{coupled} TEMPERATURE-DISPLACEMENT, STEADY STATE\n1., 1.\n*BOUNDARY\n{ends}{load}"
+        f"{output}*END STEP\n"
+        for load in loads
+    )
+    steps = f"*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 50.\n{steps}"
+    return blocks(card, steps, side, stiff, f"*CONDUCTIVITY\n{CONDUCTIVITY!r}\n*EXPANSION\n0.\n", "SURFACE TO SURFACE")
+
+
+def heated_and_moved(card, c, p, coupled="*COUPLED"):
+    return heated(card, (each(TOP, f"3, 3, {-down:.9e}") for down in c + 20 * p / 1e6), 10.0, 1e6, coupled)
+
+
+def calculix(deck, folder, side=10.0):
     """What CalculiX says of a deck, and the pressures and heat fluxes at the ends of its steps."""
     (folder / "joint.inp").write_text(deck)
     said = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     rows = [
-        [abs(float(word)) / SIDE**2 for word in line.split()]
+        [abs(float(word)) / side**2 for word in line.split()]
         for line in (folder / "joint.dat").read_text().splitlines()
         if re.fullmatch(r"(\s+-?\d\.\d+E[+-]\d+)+", line)
     ]
     return said, np.array([row[2] for row in rows if len(row) == 3]), np.array([r[0] for r in rows if len(r) == 1])
 
 
-def pressed(card, c, p, coupled="*COUPLED"):
-    """Two blocks pressed by displacements and heated, in one step for each overclosure."""
-    deck = blocks(None, card, [], SIDE, BLOCKS).replace("NODE TO SURFACE", "SURFACE TO SURFACE")
-    deck = deck.replace("*SOLID", f"*CONDUCTIVITY\n{CONDUCTIVITY!r}\n*EXPANSION\n0.\n*SOLID", 1)
-    ends = "".join(f"{node}, 1, 3\n{node}, 11, 11, 0.\n" for node in (1, 2, 3, 4))
-    ends += "".join(f"{node}, 1, 2\n" for node in range(5, 17))
-    ends += "".join(f"{node}, 11, 11, 100.\n" for node in (13, 14, 15, 16))
-    output = "".join(f"*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000\n{what}\n" for what in ("RF", "RFL"))
-    steps = "".join(
-        f"*STEP, INC=1000\n{coupled} TEMPERATURE-DISPLACEMENT, STEADY STATE\n1., 1.\n*BOUNDARY\n{ends}"
-        + "".join(f"{node}, 3, 3, {-down:.9e}\n" for node in (13, 14, 15, 16))
-        + f"{output}*END STEP\n"
-        for down in c + 2 * SIDE * p / BLOCKS
-    )
-    return f"{deck}*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 50.\n{steps}"
-
-
-def conductance(flux):
-    """That of the joint, in series with the blocks."""
-    return 1 / (100 / flux - 2 * SIDE / CONDUCTIVITY)
+def conductance(flux, side=10.0):
+    return 1 / (100 / flux - 2 * side / CONDUCTIVITY)
 
 
 @needs("ccx")
 def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     law = contact_law(ROUGH, E_star="25 MPa")
     card, c = solvers.calculix(heat_law()), law.h_max - law.at_pressure(PRESSURES).mean_separation
-    said, p, flux = calculix(pressed(card, c, PRESSURES), tmp_path)
+    said, p, flux = calculix(heated_and_moved(card, c, PRESSURES), tmp_path)
     assert len(p) == len(flux) == PRESSURES.size, said.stdout[-1000:]
     # the pressure is the law's to what the card says of its closure, and the conductance is of that pressure
     stated = float(re.search(r"within (\d+)% of the law", card.replace("\n**", ""))[1]) / 100
     assert 0.1 < np.abs(np.log(p / PRESSURES)).max() < np.log1p(stated) + 0.06
     expected = CONDUCTIVITY / 25 * law.at_pressure(p).stiffness
     np.testing.assert_allclose(conductance(flux)[:-1], expected[:-1], rtol=1e-2)
-    # beyond the last row it is that of the last
     assert p[-1] > heat_law().x[-1]
     assert conductance(flux)[-1] == pytest.approx(heat_law().y[-1], rel=1e-2)
 
@@ -88,9 +115,8 @@ def test_calculix_uncoupled_is_an_increment_late(tmp_path):
     law = contact_law(ROUGH, E_star="25 MPa")
     pressures = np.repeat([0.1, 0.5, 0.9], 2)
     c = law.h_max - law.at_pressure(pressures).mean_separation
-    _, p, flux = calculix(pressed(solvers.calculix(heat_law()), c, pressures, "*UNCOUPLED"), tmp_path)
+    _, p, flux = calculix(heated_and_moved(solvers.calculix(heat_law()), c, pressures, "*UNCOUPLED"), tmp_path)
     off = conductance(flux) * 25 / CONDUCTIVITY / law.at_pressure(p).stiffness - 1
-    # as the card says: loads must be held for one more increment
     assert (off[::2] < -0.3).all()
     assert np.abs(off[1::2]).max() < 1e-2
     assert "loads must be held for one more" in " ".join(solvers.calculix(heat_law()).replace("**", "").split())
@@ -101,18 +127,12 @@ def test_calculix_uncoupled_is_an_increment_late(tmp_path):
 def test_calculix_does_not_read_tabular_surface_to_surface(rows, tmp_path):
     law = describe_law(ROUGH, "25 MPa", pressures=("10 kPa", "2 MPa"), rows=rows)
     found = contact(ROUGH, pressure=PRESSURES, E_star="25 MPa")
-    deck = blocks(law, solvers.calculix(law), ROUGH.h_max - found.mean_separation, SIDE, 1e9)
-    said, p, _ = calculix(deck.replace("NODE TO SURFACE\nSLAVES", "SURFACE TO SURFACE\nSLAVES"), tmp_path)
+    deck = pressed(solvers.calculix(law), ROUGH.h_max - found.mean_separation, 10.0, 1e9, "SURFACE TO SURFACE")
+    said, p, _ = calculix(deck, tmp_path)
     assert (p < 1e-6).all()
     assert (said.returncode != 0) == (rows == 50)  # of Debian's build, which finds that the stack was overwritten
     text = " ".join(solvers.calculix(law).replace("**", "").split())
     assert "no force at up to 41 rows, without a message, and from 50 rows on it aborts" in text
-
-
-def test_rows_of_conductance_are_where_it_is_used():
-    law = heat_law()
-    assert law.x[:2] == pytest.approx([0, 0.01], rel=1e-2)
-    assert law.largest_error < 3e-3
 
 
 def test_the_exponential_card_states_its_limits():
@@ -196,20 +216,6 @@ def test_types_of_a_law_in_javascript(more):
     assert sorted(typed) == sorted(exported)
 
 
-def test_onnx_states_what_it_takes():
-    runtime, library = pytest.importorskip("onnxruntime"), pytest.importorskip("onnx")
-    file = onnx(law_points.ROAD, "13.3 MPa")
-    session = runtime.InferenceSession(file, providers=["CPUExecutionProvider"])
-    c, law = np.linspace(0, 2.5, 24).reshape(2, 3, 4), points("mbma").law
-    found = session.run(None, {"overclosure": c.ravel()})[0].reshape(c.shape)
-    np.testing.assert_allclose(found, law.pressure(law.h_max - c), rtol=1e-12)
-    for refused in (c, c[0, 0].astype(np.float32)):
-        with pytest.raises(Exception, match=r"Unexpected input data type|Invalid rank"):
-            session.run(None, {"overclosure": refused})
-    said = library.load_from_string(file).graph.doc_string
-    assert "float64 of shape (n,); convert float32 and ravel before" in said
-
-
 @pytest.mark.parametrize(
     "target", ["c-law", "javascript-law", "python-law", "matlab-law", "modelica-law", "fortran-law"]
 )
@@ -235,44 +241,6 @@ def test_units_of_modelica(tmp_path):
     for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
         assert f'type {kind} = Real(unit = "{unit}");' in text
     assert 'output Real y(unit = "mm3");' in text
-
-
-GAPCON = """
-#include <stdio.h>
-void gapcon_();
-int main(void) {
-    double ak[5], d[2] = {0, 0};
-    for (int k = 0; k < 3; k++) {
-        d[1] = 1e3*k + 1e-3;
-        gapcon_(ak, d);
-        printf("%.17g %.17g\\n", ak[0], ak[2]);
-    }
-}
-"""
-
-
-@needs("gcc")
-@pytest.mark.parametrize("target", ["abaqus-gapcon", "calculix-gapcon"])
-def test_gapcon_keeps_its_last_value(target, tmp_path):
-    text = law_points.text(target, "calibrated", name="road", **HEAT)
-    (tmp_path / "road.c").write_text(text)
-    (tmp_path / "ask.c").write_text(GAPCON)
-    subprocess.run(["gcc", "-w", "-O1", "road.c", "ask.c", "-lm", "-o", "ask"], cwd=tmp_path, check=True)
-    done = subprocess.run(["./ask"], cwd=tmp_path, capture_output=True, text=True, check=True)
-    found = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
-    law = points("calibrated").law
-    known = [law.at_pressure(1e-3).stiffness, *2 * [law.stiffness(separation=law.lowest)]]
-    np.testing.assert_allclose(found[:, 0], CONDUCTIVITY / 13.3 * np.array(known), rtol=1e-6)
-    assert (found[1:, 1] == 0).all()
-    assert done.stderr.count("beyond the law's range") == 1
-    if target == "calculix-gapcon":
-        said = " ".join(text.replace("\n *", " ").split())
-        for words in (
-            "TYPE=SURFACE TO SURFACE",
-            "PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR",
-            "-o gapcon.o, ar r ccx_",
-        ):
-            assert words in said
 
 
 @needs("cc")
@@ -334,7 +302,6 @@ def test_a_law_continued_by_its_tangents(theory, pressures):
     for end, side in ((trial.light, 1.0), (trial.heavy, -1.0)):
         beyond = end + side * np.array([1e-9, 0.1, 1e3])
         found, slope = trial.pressure_and_stiffness(beyond)
-        # the value and the slope of the law at its end, and so on
         assert (slope == law.stiffness(end)).all()
         np.testing.assert_allclose(found, law.pressure(end) - law.stiffness(end) * (beyond - end), rtol=1e-13)
         assert not trial.inside(beyond).any()
@@ -368,3 +335,84 @@ def test_newton_in_scikit_fem_from_zero_load():
     assert len(residuals) <= 14
     assert residuals[-2] < 1e-4 * residuals[-3]  # quadratic
     assert "force 8.000000" in said[-1]
+
+
+@needs("ccx")
+@pytest.mark.parametrize(("length", "stress", "theory"), [("mm", "MPa", "mbma"), ("m", "Pa", "calibrated")])
+def test_calculix_feels_the_law(tmp_path, length, stress, theory):
+    surface, E_star = Surface.named("concrete").to(length), {"MPa": 13.3, "Pa": 13.3e6}[stress]
+    top = 0.04 * E_star
+    law = describe_law(surface, E_star, stress_unit=stress, pressures=(1e-5 * top, top), rtol=5e-4, theory=theory)
+    pressures = np.geomspace(1.01e-5, 0.99, 30) * top
+    found = contact(surface, pressure=pressures, E_star=E_star, theory=theory)
+    deck = pressed(solvers.calculix(law), float(surface.h_max) - found.mean_separation, SIDES[length], 1e9 * E_star)
+    said, reached, _ = calculix(deck, tmp_path, SIDES[length])
+    assert len(reached) == 30, said.stdout[-2000:]
+    np.testing.assert_allclose(reached, pressures, rtol=2e-3)
+
+
+@needs("octave-cli")
+def test_octave_looks_up(tmp_path):
+    law = describe_law(Surface.named("asphalt"), 20.0, length_unit="mm", stress_unit="MPa", rows=60)
+    (tmp_path / "law.mat").write_bytes(to_matlab(law))
+    (tmp_path / "law.m").write_bytes(matlab_reader(law, "law"))
+    x = np.random.default_rng(1).uniform(0, law.x[-1], 200)
+    np.savetxt(tmp_path / "x.txt", x, fmt="%.17g")
+    script = "x = load('x.txt'); printf('%.17g\\n', law(x)); s = load('law.mat'); printf('%.17g\\n', s.x, s.y);"
+    said = subprocess.run(
+        ["octave-cli", "--no-init-file", "--eval", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    numbers = np.array(said.stdout.split(), dtype=float)
+    np.testing.assert_allclose(numbers[:200], np.interp(x, law.x, law.y), rtol=1e-12)
+    np.testing.assert_array_equal(numbers[200:], np.concatenate([law.x, law.y]))
+    beyond = subprocess.run(
+        ["octave-cli", "--no-init-file", "--eval", "law(1e3)"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert beyond.returncode != 0
+    assert "x must be in" in beyond.stderr
+
+
+@needs("ncdump")
+def test_ncdump_reads(tmp_path):
+    law = describe_law(Surface.named("asphalt"), 20.0, length_unit="mm", stress_unit="MPa", rows=30)
+    (tmp_path / "law.nc").write_bytes(to_netcdf(law))
+    said = subprocess.run(["ncdump", "-p", "17", "law.nc"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    values = re.search(r"\n pressure = ([^;]*);", said.stdout).group(1)
+    np.testing.assert_array_equal([float(v) for v in values.split(",")], law.y)
+    assert 'pressure:units = "MPa"' in said.stdout
+
+
+@needs("ccx")
+@pytest.mark.parametrize(("length", "stress"), [("mm", "MPa"), ("m", "Pa")], ids=["mm", "SI"])
+def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
+    asked = HEAT | {"conductivity_unit": "W/(m K)", "pressures": ("1 kPa", "2 MPa"), "rows": 20}
+    law = describe_law(ROUGH, "25 MPa", length_unit=length, stress_unit=stress, quantity="conductance", **asked)
+    side, unit = SIDES[length], {"MPa": 1.0, "Pa": 1e6}[stress]
+    pressures, card = unit * np.geomspace(1.1e-3, 1.9, 8), solvers.calculix(law)
+    slope = re.search(r"with the line (\S+) below", card.replace("\n** ", " "))[1]
+    card = re.sub(r"=EXPONENTIAL\n.*\n", f"=LINEAR\n{slope}\n", card)
+    forces = (f"*CLOAD\n{each(TOP, f'3, {-p * side**2 / 4:.9e}')}" for p in pressures)
+    said, _, flux = calculix(heated(card, forces, side, 1e6 * unit), tmp_path, side)
+    assert len(flux) == 8, said.stdout[-2000:]
+    found = contact(ROUGH.to(length), pressure=pressures, E_star=25 * unit)
+    np.testing.assert_allclose(conductance(flux, side), found.stiffness * CONDUCTIVITY / (25 * unit), rtol=1e-2)
+
+
+@needs("Rscript")
+def test_r_reads(tmp_path):
+    law = describe_law(Surface.named("asphalt"), 20.0, stress_unit="MPa", rows=30)
+    (tmp_path / "law.csv").write_bytes(to_csv(law))
+    (tmp_path / "law.nc").write_bytes(to_netcdf(law))
+    script = """
+    rows <- read.csv("law.csv", comment.char = "#", check.names = FALSE)
+    cat(names(rows), sep = "|"); cat("\n"); cat(sprintf("%.17g", rows[[1]]), sprintf("%.17g", rows[[2]])); cat("\n")
+    if (requireNamespace("ncdf4", quietly = TRUE)) {
+      file <- ncdf4::nc_open("law.nc")
+      cat(sprintf("%.17g", c(ncdf4::ncvar_get(file, "overclosure"), ncdf4::ncvar_get(file, "pressure"))))
+    }
+    """
+    said = subprocess.run(["Rscript", "-e", script], cwd=tmp_path, capture_output=True, text=True, check=True)
+    names, *tables = said.stdout.strip().splitlines()
+    assert names == "overclosure [mm]|pressure [MPa]"
+    for table in tables:
+        np.testing.assert_array_equal(np.array(table.split(), dtype=float), np.concatenate([law.x, law.y]))

@@ -5,15 +5,16 @@ import zipfile
 
 import numpy as np
 import pytest
-from law_points import ASKED, CONDUCTIVITY, needs, points
+from law_points import ASKED, CONDUCTIVITY, KAPPA, needs, points
 
 from mbma_tables import InputError
 from mbma_tables.export import FMUS
 from mbma_tables.export.fmu import STANDARDS, fmu
 
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
-QUANTITIES = ["pressure", "tangent", "area", "energy", "conductance", "leakage"]
-MORE = HEAT | {"leakage": True}
+QUANTITIES = ["pressure", "tangent", "area", "energy", "conductance", "tangential_stiffness", "leakage"]
+SLOPES = QUANTITIES[4:6]
+MORE = HEAT | {"kappa": KAPPA, "leakage": True}
 KINDS = ("ModelExchange", "CoSimulation")
 REFUSED = r"failed with status 3 \(error\)"  # as FMPy says it
 
@@ -24,7 +25,6 @@ def made(target, law, **options):
 
 
 def built(target, name, folder):
-    """The FMU in a folder, without problems and with its binary."""
     validation, build = pytest.importorskip("fmpy.validation"), pytest.importorskip("fmpy.build")
     (folder / "build").mkdir()
     (folder / "road.fmu").write_bytes(made(target, name, **MORE))
@@ -37,7 +37,6 @@ def built(target, name, folder):
 
 
 def simulated(path, kind, c, logger=None):
-    """Answers at overclosures, one a second."""
     times = np.arange(c.size, dtype=float)
     given = np.array(list(zip(times, c, strict=True)), [("time", float), ("overclosure", float)])
     fixed = {"stop_time": times[-1], "solver": "Euler", "step_size": 1.0, "output_interval": 1.0}
@@ -48,7 +47,7 @@ def simulated(path, kind, c, logger=None):
 @pytest.mark.slow
 @needs("cmake", "gcc")
 @pytest.mark.parametrize("target", FMUS)
-@pytest.mark.parametrize("name", ["mbma", "calibrated", "persson", "turning"])
+@pytest.mark.parametrize("name", ["mbma", "calibrated", "persson", "turning", "hardened"])
 def test_simulation(target, name, tmp_path):
     path, known = built(target, name, tmp_path), points(name)
     for kind in KINDS:
@@ -56,8 +55,8 @@ def test_simulation(target, name, tmp_path):
         # co-simulation answers after a step, by the input before it
         answers = found[: known.c.size] if kind == "ModelExchange" else found[1:]
         assert (answers["overclosure"] == known.c).all()
-        known.assert_equal(*(answers[quantity] for quantity in QUANTITIES if quantity != "conductance"))
-        np.testing.assert_allclose(answers["conductance"], CONDUCTIVITY / 13.3 * answers["tangent"], rtol=1e-15)
+        known.assert_equal(*(answers[quantity] for quantity in QUANTITIES if quantity not in SLOPES))
+        known.assert_slopes(*(answers[quantity] for quantity in SLOPES))
         said = []
         with pytest.raises(Exception, match=REFUSED):
             simulated(path, kind, np.array([0.0, 1e9, 1e9]), lambda *words, said=said: said.append(words[-1]))
@@ -84,26 +83,25 @@ def test_directional_derivatives(target, name, tmp_path):
 
     def slopes(c):
         put([1], [c])
-        return list(model.getDirectionalDerivative([2, 3, 4, 5, 6, 7], [1], [2.0]))
+        return list(model.getDirectionalDerivative([2, 3, 4, 5, 6, 7, 8], [1], [2.0]))
 
     far = (known.c > 1e-3) & (known.c < 0.97 * known.law.h_max)
     c = known.c[far]
-    by_p, by_tangent, by_area, by_energy, by_conductance, by_leakage = np.array([slopes(x) for x in c]).T / 2
+    by_p, by_tangent, by_area, by_energy, by_conductance, by_shear, by_leakage = np.array([slopes(x) for x in c]).T / 2
     assert np.abs(by_p - known.tangent[far]).max() <= 1e-11 * np.abs(known.tangent[far]).max()
     np.testing.assert_allclose(by_energy, known.p[far], rtol=1e-13)
     np.testing.assert_allclose(by_conductance, CONDUCTIVITY / 13.3 * by_tangent, rtol=1e-15)
+    np.testing.assert_allclose(by_shear, by_tangent / KAPPA, rtol=1e-15)
     # those of area, tangent and leakage by differences of the library's law, but where a piece of it ends
-    beside = [known.law.h_max - 2 * c * (1 + by) for by in (1e-5, -1e-5)]
-    (above, below), flows = (
-        (known.law.values(separation=d) for d in beside),
-        [np.asarray(known.law.leakage(separation=d)) for d in beside],
-    )
-    for slope, difference, size in (
-        (by_area, above.area - below.area, known.area),
-        (by_tangent, above.stiffness - below.stiffness, known.tangent),
-        (by_leakage, flows[0] - flows[1], known.leakage + 1e-3),  # its slope is steep where contact percolates
-    ):
-        error = np.abs(slope - difference / (2e-5 * c)) * c / np.abs(size[far])
+    ends = []
+    for by in (1e-5, -1e-5):
+        d = known.law.h_max - 2 * c * (1 + by)
+        found = known.law.values(separation=d)
+        ends.append((found.area, found.stiffness, np.asarray(known.law.leakage(separation=d))))
+    # the slope of leakage is steep where contact percolates
+    sizes = known.area, known.tangent, known.leakage + 1e-3
+    for slope, above, below, size in zip((by_area, by_tangent, by_leakage), *ends, sizes, strict=True):
+        error = np.abs(slope - (above - below) / (2e-5 * c)) * c / np.abs(size[far])
         assert np.quantile(error, 0.99) < 1e-5
     with pytest.raises(Exception, match=REFUSED):
         model.getDirectionalDerivative([2], [2], [1.0])
@@ -148,7 +146,6 @@ def test_the_same_law_is_the_same_file():
         ("fmu4", "mbma", {}, "target must be one of"),
         ("fmu", "mbma", {"name": "1 x"}, "a name must be a letter"),
         ("fmu", "mbma", {"conductivity_unit": "W"}, "conductance needs conductivity"),
-        ("fmu", "hardened", HEAT, "leave conductivity or hardness out"),
     ],
 )
 def test_requests_that_are_refused(target, law, options, match):

@@ -7,11 +7,12 @@ import sys
 
 import numpy as np
 import pytest
+from helpers import refusals
 
 from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.export import DATA, SOLVERS, chords, data, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
-from mbma_tables.export.solvers import calculix, exponential, optistruct
+from mbma_tables.export.solvers import calculix, optistruct
 from mbma_tables.surfaces.variants import PRINTED
 from mbma_tables.theories import THEORIES
 from mbma_tables.totals.conductance import conductance
@@ -31,7 +32,6 @@ def law_of(surface=CONCRETE, **changed):
 )
 def test_rows_of_any_theory(theory):
     law = law_of(theory=theory, rows=50)
-    # up to full compression too
     near = CONCRETE.h_max - np.geomspace(max(CONCRETE.h_max - law.x[-1], 1e-9), 0.5, 500)[1:]
     x = np.append(np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500), near)
     model = contact(CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory).pressure
@@ -57,7 +57,6 @@ def test_rows_rise_from_first_contact(surface):
 
 @pytest.mark.parametrize("pressures", [(1, 500), (1, 550), None])
 def test_the_header_says_from_where_a_law_is_valid(pressures):
-    """Ends of validity are roots of the theory's area, whatever rows are asked for, and not points looked at."""
     surface = Surface.from_roughness(hurst=0.8, h_max=3.5e-3, Rq=1e-3, longest=0.1, shortest=2e-3, unit="mm")
     law = describe_law(surface, 115e3, stress_unit="MPa", theory="calibrated", rows=40, pressures=pressures)
     root = contact(surface, area=1e-3, E_star=115e3, theory="calibrated").pressure
@@ -82,7 +81,6 @@ def test_the_header_says_up_to_where_a_law_is_valid():
 def test_the_stated_error_and_better_than_even_rows(name, rows):
     surface = Surface.named(name).to("mm")
     law = law_of(surface, rows=rows)
-    # points of our own, through the totals
     x = np.random.default_rng(rows).uniform(0, law.x[-1], 2000)
     gaps = np.maximum(surface.h_max - 2 * x, -surface.h_max)
     model = contact(surface, separation=gaps, E_star=13.3, rtol=1e-9).pressure
@@ -162,22 +160,6 @@ def test_text_holds_the_rows(target, rows):
         assert word in text
 
 
-def test_calculix_writes_what_it_reads_rightly():
-    law = law_of()
-    assert "TYPE=NODE TO SURFACE" in calculix(law)
-    assert "with SURFACE TO SURFACE 2.20 reads TABULAR into arrays that are too short" in calculix(law)
-
-
-def test_exponential_is_persson_for_light_loads():
-    from mbma_tables import theories
-
-    text = exponential(CONCRETE, 13.3, stress_unit="MPa")
-    c0, p0 = numbers(text.splitlines()[-1])
-    for u in (0.5, 1.0):
-        p = p0 * np.exp((CONCRETE.h_max - u) / (c0 / np.log(100)))
-        assert p == pytest.approx(13.3 * theories.Persson("simplified").answer(CONCRETE, u).pressure, rel=1e-8, abs=0)
-
-
 @pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])
 def test_a_missing_package_is_named(target, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
@@ -185,99 +167,76 @@ def test_a_missing_package_is_named(target, package, monkeypatch):
         getattr(data, f"to_{target}")(law_of())
 
 
-@pytest.mark.parametrize("target", DATA)
-def test_data_come_back(target, tmp_path):
-    law = law_of()
-    path = tmp_path / "law"
-    path.write_bytes(getattr(data, f"to_{target}")(law))
+def data_of(target, path):
+    """Rows of a file by another program, and what it holds of the unit of y and of the error, if it does."""
     if target == "csv":
         assert "\noverclosure [mm],pressure [MPa]\n" in path.read_text()
-        found = np.array(parse(target, path.read_text())).T
-    elif target == "json":
+        return *np.array(parse(target, path.read_text())).T, "MPa", None
+    if target == "json":
         content = json.loads(path.read_text())
-        found = np.array(list(content["columns"].values()))
-        assert content["largest_error"] == law.largest_error
-    elif target == "matlab":
-        from scipy.io import loadmat
-
-        held = loadmat(path, appendmat=False)
-        found = np.stack([held["x"][:, 0], held["y"][:, 0]])
-        assert held["y_unit"].item() == "MPa"
-        assert held["largest_error"].item() == law.largest_error
-    elif target == "netcdf":
-        import xarray as xr
-
-        with xr.open_dataset(path, engine="netcdf4") as held:
-            found = np.stack([held.overclosure.values, held.pressure.values])
-            assert held.pressure.attrs["units"] == "MPa"
+        return *content["columns"].values(), content["y_unit"], content["largest_error"]
+    if target == "matlab":
+        held = pytest.importorskip("scipy.io").loadmat(path, appendmat=False)
+        return held["x"][:, 0], held["y"][:, 0], held["y_unit"].item(), held["largest_error"].item()
+    if target == "netcdf":
+        with pytest.importorskip("xarray").open_dataset(path, engine="netcdf4") as held:
             # CF 1.11, section 2.5.1
             assert all("_FillValue" not in variable.encoding for variable in held.variables.values())
-    elif target == "hdf5":
-        h5py = pytest.importorskip("h5py")
-        with h5py.File(path) as held:
-            found = np.stack([held["overclosure"][:], held["pressure"][:]])
-            assert held["pressure"].attrs["units"] == "MPa"
-    else:
-        parquet = pytest.importorskip("pyarrow.parquet")
-        held = parquet.read_table(io.BytesIO(path.read_bytes()))
-        found = np.stack([held["overclosure"].to_numpy(), held["pressure"].to_numpy()])
-        assert json.loads(held.schema.metadata[b"y_unit"]) == "MPa"
-    np.testing.assert_array_equal(found, np.stack([law.x, law.y]))
+            return held.overclosure.values, held.pressure.values, held.pressure.attrs["units"], None
+    if target == "hdf5":
+        with pytest.importorskip("h5py").File(path) as held:
+            return held["overclosure"][:], held["pressure"][:], held["pressure"].attrs["units"], None
+    held = pytest.importorskip("pyarrow.parquet").read_table(io.BytesIO(path.read_bytes()))
+    unit = json.loads(held.schema.metadata[b"y_unit"])
+    return held["overclosure"].to_numpy(), held["pressure"].to_numpy(), unit, None
 
 
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"length_unit": ""}, "no known unit of length"),
-        ({"stress_unit": None}, "stress_unit is missing"),
-        ({"rows": 2}, "rows"),
-        ({"rows": 10**6}, "rows"),
-        ({"rows": 10, "rtol": 1e-3}, "both given"),
-        ({"rows": None, "rtol": 1e-9}, "rtol"),
-        ({"largest_overclosure": 2.0}, "largest_overclosure must be in"),
-        ({"largest_overclosure": 0.0}, "largest_overclosure must be in"),
-        ({"largest_overclosure": [0.1, 0.2]}, "largest_overclosure must be one number"),
-        ({"pressures": ("1 kPa",)}, "pressures must be two rising numbers"),
-        ({"pressures": "1:2"}, "pressures must be two rising numbers"),
-        ({"pressures": 5}, "pressures must be two rising numbers"),
-        (HEAT | {"conductivity_unit": 3}, "conductivity_unit is not printable"),
-        ({"quantity": "stiffness"}, "quantity must be one of"),
-        ({"quantity": "conductance"}, "conductance needs"),
-        ({"variant": "other"}, "variant"),
-        ({"theory": "other"}, "theory must be one of"),
-        ({"theory": "persson", "variant": "printed"}, "options of theory 'mbma'"),
-        ({"surface": Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)}, "not of a batch"),
-        ({"pressures": (1e-5, 0.1), "largest_overclosure": 0.5}, "largest_overclosure and pressures are both given"),
-        (
-            {"surface": Surface(0.8, 1.0, 100.0, 1.0, 1.5), "theory": "persson", "pressures": (1e-12, 1e-9)},
-            r"pressures must reach above \S+ MPa, that at c = 0, where rows begin",
-        ),
-    ],
+@pytest.mark.parametrize("target", DATA)
+def test_data_come_back(target, tmp_path):
+    law, path = law_of(), tmp_path / "law"
+    path.write_bytes(getattr(data, f"to_{target}")(law))
+    x, y, unit, error = data_of(target, path)
+    np.testing.assert_array_equal([x, y], [law.x, law.y])
+    assert unit == "MPa"
+    assert error in (None, law.largest_error)
+
+
+test_refused = refusals(
+    lambda changed: law_of(**changed),
+    ({"length_unit": ""}, "no known unit of length"),
+    ({"stress_unit": None}, "stress_unit is missing"),
+    ({"rows": 2}, "rows"),
+    ({"rows": 10, "rtol": 1e-3}, "both given"),
+    ({"rows": None, "rtol": 1e-9}, "rtol"),
+    ({"largest_overclosure": 2.0}, "largest_overclosure must be in"),
+    ({"largest_overclosure": [0.1, 0.2]}, "largest_overclosure must be one number"),
+    ({"pressures": ("1 kPa",)}, "pressures must be two rising numbers"),
+    ({"pressures": "1:2"}, "pressures must be two rising numbers"),
+    (HEAT | {"conductivity_unit": 3}, "conductivity_unit is not printable"),
+    ({"quantity": "stiffness"}, "quantity must be one of"),
+    ({"quantity": "conductance"}, "conductance needs"),
+    ({"surface": Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)}, "not of a batch"),
+    ({"pressures": (1e-5, 0.1), "largest_overclosure": 0.5}, "largest_overclosure and pressures are both given"),
+    (
+        {"surface": Surface(0.8, 1.0, 100.0, 1.0, 1.5), "theory": "persson", "pressures": (1e-12, 1e-9)},
+        r"pressures must reach above \S+ MPa, that at c = 0, where rows begin",
+    ),
 )
-def test_refused(changed, said):
-    with pytest.raises(InputError, match=said):
-        law_of(**changed)
 
 
-@pytest.mark.parametrize(
-    ("target", "changed", "options", "said"),
-    [
-        ("calculix", {"rows": 201}, {}, "holds 200 rows of pressure"),
-        ("calculix", HEAT | {"rows": 21}, {}, "holds 20 rows of conductance"),
-        ("calculix", {"surface": Surface.named("yang-persson"), "length_unit": "m"}, {}, "closer than 1e-10 m"),
-        ("optistruct", HEAT, {}, "takes pressure against overclosure here, got conductance against pressure"),
-        *((name, LEAKAGE | {"rows": 50}, {}, "takes pressure against overclosure") for name in SOLVERS[:2]),
-        *(
-            (target, {}, {name: number}, f"{name} must be a whole number in")
-            for target, name in (("lsdyna", "curve"), ("optistruct", "contact"), ("optistruct", "table"))
-            for number in (0, 10**8, 1.5, "x")
-        ),
-    ],
+test_what_a_solver_does_not_take = refusals(
+    lambda target, changed, options: getattr(solvers, target)(law_of(**changed), **options),
+    ("calculix", {"rows": 201}, {}, "holds 200 rows of pressure"),
+    ("calculix", HEAT | {"rows": 21}, {}, "holds 20 rows of conductance"),
+    ("calculix", {"surface": Surface.named("yang-persson"), "length_unit": "m"}, {}, "closer than 1e-10 m"),
+    ("optistruct", HEAT, {}, "takes pressure against overclosure here, got conductance against pressure"),
+    *((name, LEAKAGE | {"rows": 50}, {}, "takes pressure against overclosure") for name in SOLVERS[:2]),
+    *(
+        (target, {}, {name: number}, f"{name} must be a whole number in")
+        for target, name in (("lsdyna", "curve"), ("optistruct", "contact"), ("optistruct", "table"))
+        for number in (0, 10**8, 1.5, "x")
+    ),
 )
-def test_what_a_solver_does_not_take(target, changed, options, said):
-    law = law_of(**changed)
-    with pytest.raises(InputError, match=said):
-        getattr(solvers, target)(law, **options)
 
 
 def test_rows_without_a_last_contact_begin_with_one_step():
@@ -309,7 +268,6 @@ def test_rows_of_leakage_without_a_block():
 @pytest.mark.parametrize("quantity", ["pressure", "conductance"])
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_light_loads_are_within_the_error_too(theory, quantity):
-    """Until now rows were within their error above a thousandth of the largest value, 94% off two decades below."""
     heat = HEAT if quantity == "conductance" else {}
     law = law_of(rows=None, rtol=1e-2, pressures=("10 Pa", 0.1), theory=theory, **heat)
     pressure = np.geomspace(1.001e-5, 0.0999, 400)
@@ -327,7 +285,6 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
 @pytest.mark.parametrize("largest", [0.1, 0.1234567890123])
 @pytest.mark.parametrize("choice", [{"rows": 20}, {"rows": 33, "evenly": True}, {"rows": None, "rtol": 3e-3}])
 def test_rows_reach_the_largest_pressure(target, largest, choice):
-    """A solver that keeps the last pressure beyond the last row carries the largest load, at its overclosure."""
     law = law_of(theory="calibrated", pressures=(1e-4, largest), **choice)
     c, p = np.array(parse(target, data.to_csv(law).decode() if target == "csv" else getattr(solvers, target)(law))).T
     assert p[-1] >= largest

@@ -15,7 +15,7 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAININ
 from generate.boundary_elements.run import SOLVERS, boundary_elements, run
 from generate.boundary_elements.solve import Contact, simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.pages.page import ROOT
+from generate.files import ROOT
 from mbma_tables.laws.bearing_curve import FRACTIONS, bearing
 
 pytest.importorskip("tamaas")

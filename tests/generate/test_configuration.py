@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from generate.__main__ import main
 from generate.tables.commands import TABLES
-from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, load
+from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, TARGETS, load
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.surfaces.variants import VARIANTS
@@ -40,7 +40,8 @@ UNIVERSAL = [
     ("[axes.X]\nlwo = 1e-3", "[axes.X]: unknown key 'lwo'; known are low, high"),
     ("[axes]\nX = [1, 2]", "[axes.X] must be a table of low, high, got [1, 2]"),
     ("kind = 'island4d'", "kind must be 'universal', got 'island4d'"),
-    ("target = 1e-12", "target must be a number in [1e-11, 0.1], got 1e-12"),
+    ("target = 1e-12", "target must be a number in [1e-11, 0.0003], got 1e-12"),
+    ("target = 1e-3", "target must be a number in [1e-11, 0.0003], got 0.001"),
     ("max_nodes = 1e5", "max_nodes must be a whole number in"),
     ("certificate_points = 99", "certificate_points must be a whole number in [100, "),
     ("variant = 'rubbed'", "variant must be one of ['fitted', 'printed', 'reported']"),
@@ -92,8 +93,8 @@ LIMITS_OF = {"universal": ("X", "mu"), "island4d": ("X", "spread", "sphere", "hu
 @pytest.mark.parametrize("kind", LIMITS_OF)
 def test_a_target_alone_is_a_configuration(kind):
     shipped = load(kind)
-    loose, tight = load(kind, target=1e-3), load(kind, target=shipped.target / 3)
-    assert loose.target == 1e-3
+    loose, tight = load(kind, target=TARGETS[kind][1]), load(kind, target=shipped.target / 3)
+    assert loose.target == TARGETS[kind][1]
     assert {axis.start for axis in loose.axes.values()} == {MIN_NODES}
     assert tight.axes == shipped.axes
     assert load(kind, target=1e-6).target == 1e-6

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from generate.pages import distances
+from generate import distances
 from mbma_tables import Surface, contact
 from mbma_tables.common.files import shipped_file
 from mbma_tables.theories import Persson

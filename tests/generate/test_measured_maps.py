@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from generate import distances
 from generate.boundary_elements.studies import LARGEST, measured_maps, middle
-from generate.pages import distances
 from mbma_tables import Surface, contact
 from mbma_tables.surfaces.maps import prepared
 from mbma_tables.surfaces.surface import MeasuredSurface

@@ -2,13 +2,18 @@
 
 import itertools
 import math
+import warnings
 
+import mpmath as mp
 import numpy as np
 import pytest
+import scipy.special
 
+from mbma_tables import InputError
 from mbma_tables.core import core
 from mbma_tables.islands.greenwood_tripp import COARSE_NODES
-from mbma_tables.islands.spectral import basis
+from mbma_tables.islands.height_integrals import ORDERS, height_integral
+from mbma_tables.islands.spectral import basis, gauss_legendre
 
 OK, UNRESOLVED, INVALID = 0, 4, 5
 
@@ -51,7 +56,6 @@ def test_extremes_end_with_finite_answers_or_a_status():
     assert (phi[good] >= 0).all()
     assert np.isnan(phi[~good]).all()
     assert np.isnan(profiles[:, ~good]).all()
-    # a sphere that roughness hardly lifts is the rigid one
     still = good & (mu < 1e-200) & (np.abs(X) < 1e6)
     expected = np.empty((2, np.count_nonzero(still)))
     for row, twice_n in zip(expected, (5, 4), strict=True):
@@ -66,3 +70,106 @@ def test_a_tolerance_that_cannot_be_met_ends(rtol):
     phi, _, status, _ = solve([-3.0, 2.0, 8.0], [1e-3, 1.0, 1e4], 16, rtol=rtol)
     assert np.isin(status, [OK, UNRESOLVED]).all()
     assert (np.isnan(phi).all(axis=1) == (status != OK)).all()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 16, 33, 128, 385])
+def test_gauss_rule_to_its_ends(n):
+    nodes, weights = gauss_legendre(n)
+    # 1 - x rounded to eps moves P_{n-1} by n eps/2, and the weight by n eps; twice that again for the recurrence
+    allowed = 4 * max(n, 4) * np.finfo(float).eps
+    with mp.workdps(40):
+        for k in sorted({0, min(1, n - 1), n // 4, n // 2, n - 1}):
+            x = 2 * mp.mpf(float(nodes[k])) - 1
+            for _ in range(4):
+                value, previous = mp.legendre(n, x), mp.legendre(n - 1, x)
+                x -= value * (x * x - 1) / (n * (x * value - previous))
+            weight = (1 - x * x) / (n * mp.legendre(n - 1, x)) ** 2
+            assert abs(mp.mpf(float(nodes[k])) / ((1 + x) / 2) - 1) <= 1e-15
+            assert abs(mp.mpf(float(weights[k])) / weight - 1) <= allowed
+    assert nodes.size == n
+    assert (np.diff(nodes) > 0).all()
+
+
+@pytest.mark.parametrize("n", [12, 40])
+def test_uniform_pressure_displaces_the_known_volume(n):
+    # w = (4/pi) E(rho/a), whose mean over the disc is 16/(3 pi)
+    b = basis(n)
+    assert b.root_weights @ b.operator @ b.root_weights == pytest.approx(16 / (3 * math.pi), rel=1e-14, abs=0)
+
+
+def test_smooth_pressure_displaces_as_hankel_transforms_say():
+    # p = exp(-s^2 rho^2): w(rho) = (sqrt(pi)/s) exp(-z) I_0(z), z = s^2 rho^2/2
+    b = basis(48)
+    squared = 36.0
+    p = np.exp(-squared * b.v)
+    w = b.operator @ (p * b.root_weights) / b.root_weights
+    known = math.sqrt(math.pi / squared) * scipy.special.ive(0, squared * b.v / 2)
+    assert np.abs(w / known - 1).max() <= 1e-13
+
+
+@pytest.mark.parametrize("n", [16, 64, 192])
+def test_operator_is_symmetric_and_positive(n):
+    b = basis(n)
+    assert np.array_equal(b.operator, b.operator.T)
+    assert np.linalg.eigvalsh(b.operator).min() > 0
+    assert np.abs(b.modes @ b.modes.T - np.eye(n)).max() <= 1e-12
+
+
+EDGES = [-8.0, -6.0, -4.0, -2.0, 0.0, 1.0, 4.0]  # where the pieces meet
+
+
+def reference(n: float, x: float) -> mp.mpf:
+    with mp.workdps(40):
+        order, at = mp.mpf(n), mp.mpf(float(x))
+        scale = mp.gamma(order + 1) / mp.sqrt(2 * mp.pi)
+        return scale * mp.exp(-at * at / 4) * mp.pcfu(order + mp.mpf(1) / 2, at)
+
+
+def relative_errors(n: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
+    with mp.workdps(40):
+        return np.array([float(abs(mp.mpf(float(v)) / reference(n, a) - 1)) for a, v in zip(x, values, strict=True)])
+
+
+def test_reference_is_the_integral():
+    for n, x in ((0.5, -3.0), (1.5, 0.7), (2.5, 6.0)):
+        with mp.workdps(30):
+            direct = mp.quad(
+                lambda z, n=n, x=x: (z - x) ** n * mp.npdf(z), [x, x + 1, x + 3, x + 8, x + 20], maxdegree=10
+            )
+            assert abs(direct / reference(n, x) - 1) < 1e-15
+
+
+@pytest.mark.parametrize("n", ORDERS)
+def test_accuracy_and_independence_of_neighbours(n):
+    rng = np.random.default_rng(round(2 * n))
+    edges = [*EDGES, *np.nextafter(EDGES, -np.inf), *np.nextafter(EDGES, np.inf)]
+    near = np.concatenate([-(10 ** rng.uniform(0, 6, 120)), rng.uniform(-9, 10, 250), edges, [-1e6, 10.0]])
+    for x, allowed in ((near, 1e-13), (np.append(rng.uniform(10, 37, 150), 37.0), 5e-13)):
+        found = height_integral(n, x)
+        assert relative_errors(n, x, found).max() <= allowed
+        np.testing.assert_array_equal(found, [height_integral(n, at) for at in x])
+        np.testing.assert_array_equal(found[1::3], height_integral(n, x[1::3]))
+
+
+@pytest.mark.parametrize("n", ORDERS)
+def test_smooth_underflow(n):
+    x = np.linspace(37, 45, 4001)
+    with warnings.catch_warnings(), np.errstate(all="raise"):
+        warnings.simplefilter("error")
+        values = height_integral(n, x)
+        far = height_integral(n, [math.nextafter(40, 41), 1e3, 1e8, 1e300])
+    assert (np.diff(values) <= 0).all()
+    assert (values[x <= 38] > 0).all()
+    assert (values[x > 40] == 0).all()
+    assert (far == 0).all()
+    # a subnormal number is right to half of the smallest one, beside its own rounding
+    subnormal = x[(values < 2.3e-308) & (x < 39)][::40]
+    for at, value in zip(subnormal, height_integral(n, subnormal), strict=True):
+        true = reference(n, at)
+        assert abs(mp.mpf(float(value)) - true) <= 5e-13 * true + 2 * mp.mpf(5e-324)
+
+
+@pytest.mark.parametrize("n", [0, 3, 0.7, -0.5, math.nan])
+def test_unknown_order(n):
+    with pytest.raises(InputError, match="n must be one of"):
+        height_integral(n, 0.0)

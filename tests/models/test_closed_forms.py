@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp, island
-from mbma_tables.models import AREA, FORCE, closed_forms
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp
+from mbma_tables.models import closed_forms
 from mbma_tables.models.closed_forms import FUNCTIONS, RANGES, TOTALS, FormulaModel, closed_totals
 
 CERTIFICATES, RESULTS = closed_forms.CERTIFICATES, closed_forms.RESULTS
@@ -92,17 +92,6 @@ def test_totals_by_the_island_model_are_within_one_percent():
         assert (error <= found.error).all()
 
 
-def test_one_function_alone():
-    model = FormulaModel()
-    islands = {"X": np.array([1.0, 5.0]), "mu": np.array([0.1, 10.0])}
-    both = model.of_islands(islands)
-    force, area = model.of_islands(islands, which=FORCE), model.of_islands(islands, which=AREA)
-    np.testing.assert_array_equal(force.phi_F, both.phi_F)
-    np.testing.assert_array_equal(area.phi_A, both.phi_A)
-    assert np.isnan([force.phi_A, area.phi_F]).all()
-    assert (force.error < both.error).all()
-
-
 def test_outside_the_range():
     model = FormulaModel()
     X, mu = np.array([1.0, 30.0, 2.0]), np.array([0.0, 1.0, 3e3])
@@ -130,14 +119,6 @@ def test_outside_the_range():
 def test_bad_arguments(form, X, mu, outside):
     with pytest.raises(InputError):
         FormulaModel(form).answer(X, mu, outside=outside)
-
-
-def test_scalars_are_answered_as_arrays_are():
-    one, many = FormulaModel().answer(1.0, 1.0), FormulaModel().answer([1.0], [1.0])
-    assert (one.phi_F, one.phi_A, one.error) == (many.phi_F[0], many.phi_A[0], many.error[0])
-    surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
-    assert island(surface, 0.5, island_model="formula").force == island(surface, [0.5], island_model="formula").force[0]
-    assert np.ndim(closed_totals(surface, 0.3).pressure) == 0
 
 
 def test_units_and_shapes_of_closed_totals():

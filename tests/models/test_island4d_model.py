@@ -1,7 +1,5 @@
 """`Island4dModel` against islands by geometry and solver, at every edge and beyond its axes; its derivatives."""
 
-import math
-
 import numpy as np
 import pytest
 from small_tables import small_table
@@ -19,55 +17,6 @@ from mbma_tables.totals.island import scale_area, scale_force
 @pytest.fixture(scope="module")
 def small():
     return Island4dModel(small_table(ISLAND4D))
-
-
-def test_the_shipped_table_over_the_whole_box():
-    model = open_table("island4d")
-    rng = np.random.default_rng(31)
-    hurst = rng.uniform(0.3, 1.0, 600)
-    zeta_d = SPHERE_FLOOR * 10 ** rng.uniform(0, 4, 600)
-    zeta_u = zeta_d * (1 + 10 ** rng.uniform(-12, math.log10(2499), 600))
-    X = rng.uniform(0.501, 25.9, 600)
-    sigma = to_axes(np.ones(600), zeta_d, zeta_u, hurst, REPORTED).sigma
-    delta = (X * sigma + 1) * zeta_d**-hurst
-    place = to_axes(delta, zeta_d, zeta_u, hurst, REPORTED)
-    # where X cannot be had from delta to six digits there is nothing to compare
-    kept = (np.abs(place.X / X - 1) < 1e-6) & (place.X > 0.5) & (place.X < 26)
-    assert kept.sum() > 400
-    solved = greenwood_tripp.solve(place.X[kept], place.mu[kept], rtol=1e-11)
-    found_F, found_A, bound = model.lookup(*(a[kept] for a in (delta, zeta_d, zeta_u, hurst)))
-    error_F = np.abs(found_F / (place.force[kept] * solved.phi_F) - 1)
-    error_A = np.abs(found_A / (place.area[kept] * solved.phi_A) - 1)
-    assert np.maximum(error_F, error_A).max() < 1e-3
-    assert np.mean(np.maximum(error_F, error_A) <= bound) > 0.995
-
-
-def inside(small, count, seed):
-    """Raw numbers of islands inside the small table, and their X."""
-    rng = np.random.default_rng(seed)
-    X_axis, spread_axis, _, hurst_axis = small.content.axes
-    hurst = rng.uniform(hurst_axis.low, hurst_axis.high, count)
-    zeta_d = SPHERE_FLOOR * 10 ** rng.uniform(0, 2, count)
-    zeta_u = zeta_d * (1 + 10 ** rng.uniform(-3, np.log10(0.99 * spread_axis.high), count))
-    X = rng.uniform(X_axis.low + 0.01, X_axis.high - 0.01, count)
-    sigma = to_axes(np.ones(count), zeta_d, zeta_u, hurst, REPORTED).sigma
-    return (X * sigma + 1) * zeta_d**-hurst, zeta_d, zeta_u, hurst
-
-
-def test_broadcasting_scalars_and_input(small):
-    raw = inside(small, 6, 33)
-    one = small.lookup(*(float(a[0]) for a in raw))
-    assert all(np.ndim(x) == 0 for x in one)
-    many = small.lookup(*raw)
-    np.testing.assert_array_equal([x[0] for x in many], list(one))
-    grid = small.lookup(np.array([[1.5], [1.6], [1.7]]), 2.0, [20.0, 21.0], 0.7)
-    assert all(x.shape == (3, 2) for x in grid)
-    np.testing.assert_array_equal([x[2, 1] for x in grid], list(small.lookup(1.7, 2.0, 21.0, 0.7)))
-    copies = [a.copy() for a in raw]
-    for a in raw:
-        a.setflags(write=False)
-    small.lookup(*raw)
-    np.testing.assert_array_equal(raw, copies)
 
 
 def test_edges_to_the_last_bit(small):
@@ -225,15 +174,3 @@ def test_narrow_bands(power):
             (high, most), (low, least) = moved
             # a hundredth, squared
             assert own[end] / hat == pytest.approx((most - least) / (high - low), rel=3e-4, abs=0)
-
-
-def test_islands_outside_warn_of_nothing():
-    raw, _ = narrow_island(1e-3)
-    deep = [np.concatenate([field, field]) for field in raw]
-    # X = -9, which the axis cannot even place
-    deep[0][1] = ZETA_D**-HURST - 3 * (raw[0][0] - ZETA_D**-HURST)
-    found = open_table("island4d").lookup(*deep, outside="nan", derivatives=True)
-    alone = open_table("island4d").lookup(*raw, derivatives=True)
-    for name, values in found.F_by.items():
-        assert values[0] == alone.F_by[name][0]
-        assert np.isnan(values[1])

@@ -1,6 +1,7 @@
 """`UniversalModel` against the solver within its stated error, its slopes, every edge, one bit pattern."""
 
 import dataclasses
+import json
 import math
 
 import numpy as np
@@ -12,10 +13,11 @@ from small_tables import small_table
 from generate.tables.writing import write_table
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models.tables import open_table, universal_model
+from mbma_tables.models.tables import open_table, shipped, universal_model, verify
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.variants import REPORTED
-from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, UNIVERSAL
+from mbma_tables.surfaces.variants import REPORTED, get_variant
+from mbma_tables.tablefiles.netcdf import digest_json, read_table
+from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +26,6 @@ def small():
 
 
 def largest(found, solved):
-    """Of the relative errors of force and area."""
     return np.maximum(np.abs(found.phi_F / solved.phi_F - 1), np.abs(found.phi_A / solved.phi_A - 1))
 
 
@@ -94,19 +95,7 @@ def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
     assert open_table(path).content.attributes["history"] == "another"
 
 
-@pytest.mark.parametrize("shape", [(2, 3), (1, 2, 2)])
-def test_marks_have_the_shape_of_the_arguments(small, shape):
-    last = np.zeros(shape, dtype=bool)
-    last.flat[-1] = True
-    for bad in (np.nan, np.inf, -np.inf, 1e9, -1e9):
-        for given in ((np.where(last, bad, 0.0), np.ones(shape)), (np.zeros(shape), np.where(last, bad, 1.0))):
-            with pytest.raises(OutOfRangeError) as caught:
-                small.answer(*given)
-            np.testing.assert_array_equal(caught.value.mask, last)
-
-
 def scattered(count, seed, low=1e-8):
-    """Fresh points over the table: X even, mu even in its logarithm."""
     X_axis, mu_axis = universal_model().content.axes
     rng = np.random.default_rng(seed)
     X = rng.uniform(X_axis.low, X_axis.high, count)
@@ -188,3 +177,53 @@ def test_where_arguments_lie():
             method([0.0, 50.0], 1.0)
         with pytest.raises(InputError, match="do not broadcast"):
             method([0.0, 1.0], [1.0, 2.0, 3.0])
+
+
+LARGEST_BYTES = {UNIVERSAL: 2e6, ISLAND4D: 16e6}
+LARGEST_ERROR = {UNIVERSAL: 1e-9, ISLAND4D: 1e-3}
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def table(request):
+    return read_table(shipped(request.param), request.param)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_installed_solver_answers_the_conformance_points(kind):
+    verdict = verify(shipped(kind), kind)
+    assert verdict.points == 64
+    assert verdict.solver_error < 1e-11
+
+
+def test_the_configuration_is_what_its_hash_says(table):
+    variant = get_variant(table.attributes["variant"]).recorded if table.kind == ISLAND4D else []
+    configuration = json.loads(table.attributes["configuration"])
+    assert digest_json([configuration, variant]) == table.attributes["configuration_sha256"]
+    assert configuration["kind"] == table.kind
+
+
+def test_small_enough(table):
+    assert shipped(table.kind).stat().st_size <= LARGEST_BYTES[table.kind]
+
+
+def test_accurate_enough_on_held_out_points(table):
+    attributes = table.attributes
+    assert attributes["certificate_points"] >= 5000
+    for function in "FA":
+        typical, rare, largest = (attributes[f"{what}_error_{function}"] for what in ("median", "p99", "largest"))
+        assert 0 < typical <= rare <= largest <= LARGEST_ERROR[table.kind]
+        assert attributes[f"visited_largest_error_{function}"] <= largest
+    if table.kind == ISLAND4D:
+        assert attributes["visited_p99_error_F"] <= 3e-4
+        assert attributes["visited_p99_error_A"] <= 3e-4
+
+
+def test_the_error_field_covers_the_certificate(table):
+    assert (table.local_error > 0).all()
+    for number, function in enumerate("FA"):
+        assert table.local_error[..., number].max() >= table.attributes[f"largest_error_{function}"]
+
+
+def test_conformance_points(table):
+    assert all(values.size >= 32 for values in table.conformance.values())
+    assert 0 < table.conformance["tolerance"].max() < 1e-6

@@ -1,14 +1,23 @@
 """Mistakes in scene files: one message each, that says what to write instead."""
 
+import dataclasses
 import json
+import math
 import pathlib
+import re
 
+import numpy as np
 import pytest
 
-from mbma_tables import Scene
+from mbma_tables import Scene, Surface, contact
 from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.files import shipped_file
+from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
 from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
+from mbma_tables.scenes.scene import advice
 from mbma_tables.scenes.specimen import schema
+from mbma_tables.surfaces.variants import get_variant
+from mbma_tables.theories import THEORIES
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 
@@ -20,44 +29,30 @@ def scene(more="", surface='name = "concrete"', effects='on = ["pressure"]', at=
     return text + more if more.startswith("[") else f"{more}\n{text}"
 
 
-MISTAKES = {
-    "unknown table": (scene("[efects]\non = []\n"), "did you mean 'effects'"),
-    "unknown key": (scene(surface='nme = "concrete"'), "did you mean 'name'"),
-    "unknown key of prescribed": (scene(at="separation = 1"), "did you mean 'separations'"),
-    "unknown key of accuracy": (scene("[accuracy]\nrtoll = 1e-3"), "did you mean 'rtol'"),
-    "unknown key of material": (scene("[material]\nE = 3.0"), "did you mean 'E[12]'"),
-    "key of another table": (scene("[material]\nhardness = 3.0"), r"it belongs to \[yield\]"),
-    "unknown effect": (scene(effects='on = ["presure"]'), "did you mean 'pressure'"),
-    "unknown refinement": (scene(effects='on = ["pressure"]\noff = ["subscale"]'), "subscale_area"),
-    "unknown surface": (scene(surface='name = "concret"'), "there are yang-persson"),
-    "unknown variant": (scene('variant = "printd"'), "did you mean 'printed'"),
-    "unknown theory": (
-        scene('[comparison]\ntheories = ["person"]', effects='on = ["comparison"]'),
-        "did you mean 'persson'",
-    ),
-    "no surface": (scene(surface=None), "'surface' is a required property"),
-    "empty surface": (scene(surface=""), "a surface needs hurst"),
-    "half a surface": (scene(surface="hurst = 0.8\nq0 = 1.0"), "a surface needs hurst, q0, q1"),
-    "name and numbers": (scene(surface='name = "concrete"\nhurst = 0.8'), "leave one of them out"),
-    "name and map": (scene(surface='name = "concrete"\nmap = "a.nc"'), "one of name, map, psd or numbers"),
-    "missing map": (scene(surface='map = "none.nc"'), "is not a file; paths are relative"),
-    "missing psd": (scene(surface='psd = "none.txt"\nh_max = 1.0'), "is not a file"),
-    "convention without psd": (scene(surface='name = "concrete"\nconvention = "paper"'), "give psd"),
-    "another length unit": (scene(surface='name = "concrete"\nlength_unit = "MPa"'), "no known unit of length"),
-    "hurst above one": (
-        scene(surface="hurst = 1.8\nq0 = 1.0\nzeta_1 = 50\nh_rms = 0.1\nh_max = 0.3"),
-        r"hurst must be in \(0, 1\]",
-    ),
-    "no effects": (scene(effects=None), "'effects' is a required property"),
-    "empty effects": (scene(effects="on = []"), "effects.on: .* should be non-empty"),
-    "only refinements": (scene(effects='on = ["finite_height"]'), "needs at least one of pressure"),
-    "on and off": (
-        scene(effects='on = ["area", "subscale_area"]\noff = ["subscale_area"]'),
-        "leave it in one of the two lists",
-    ),
-    "off of an output": (scene(effects='on = ["pressure"]\noff = ["area"]'), "did you mean|known are"),
-    "energy of no end": (scene(effects='on = ["energy"]\noff = ["finite_height"]'), "leave finite_height on"),
-    "rigid profile": (
+MISTAKES = [
+    (scene("[efects]\non = []\n"), "did you mean 'effects'"),
+    (scene(surface='nme = "concrete"'), "did you mean 'name'"),
+    (scene(at="separation = 1"), "did you mean 'separations'"),
+    (scene("[material]\nhardness = 3.0"), r"it belongs to \[yield\]"),
+    (scene(effects='on = ["presure"]'), "did you mean 'pressure'"),
+    (scene(effects='on = ["pressure"]\noff = ["subscale"]'), "subscale_area"),
+    (scene(surface='name = "concret"'), "there are yang-persson"),
+    (scene('variant = "printd"'), "did you mean 'printed'"),
+    (scene('[comparison]\ntheories = ["person"]', effects='on = ["comparison"]'), "did you mean 'persson'"),
+    (scene(surface=None), "'surface' is a required property"),
+    (scene(surface="hurst = 0.8\nq0 = 1.0"), "a surface needs hurst, q0, q1"),
+    (scene(surface='name = "concrete"\nhurst = 0.8'), "leave one of them out"),
+    (scene(surface='name = "concrete"\nmap = "a.nc"'), "one of name, map, psd or numbers"),
+    (scene(surface='map = "none.nc"'), "is not a file; paths are relative"),
+    (scene(surface='name = "concrete"\nconvention = "paper"'), "give psd"),
+    (scene(surface='name = "concrete"\nlength_unit = "MPa"'), "no known unit of length"),
+    (scene(effects=None), "'effects' is a required property"),
+    (scene(effects="on = []"), "effects.on: .* should be non-empty"),
+    (scene(effects='on = ["finite_height"]'), "needs at least one of pressure"),
+    (scene(effects='on = ["area", "subscale_area"]\noff = ["subscale_area"]'), "leave it in one of the two lists"),
+    (scene(effects='on = ["pressure"]\noff = ["area"]'), "did you mean|known are"),
+    (scene(effects='on = ["energy"]\noff = ["finite_height"]'), "leave finite_height on"),
+    (
         scene(
             "[pressure_profile]\ndeltas = [0.1]",
             effects='on = ["pressure_profile"]\noff = ["sphere_deformation"]',
@@ -65,48 +60,29 @@ MISTAKES = {
         ),
         "leave sphere_deformation on",
     ),
-    "effects as text": (scene(effects='on = "pressure"'), "effects.on: 'pressure' is not of type 'array'"),
-    "nothing prescribed": (scene(at=None), "give one of separations"),
-    "unknown theory of the scene": (scene('theory = "persons"'), "did you mean 'persson'"),
-    "areas over h_rms": (scene(at="areas = [0.01]\nover_h_rms = true"), "areas have none"),
-    "variant of another theory": (
-        scene('theory = "persson"\nvariant = "printed"'),
-        "variant: of theory 'mbma', not of 'persson'",
-    ),
-    "empty prescribed": (scene(at=""), "give one of separations, mean_separations"),
-    "pressure and separation": (scene(at="separations = [0.5]\npressures = [0.1]"), "prescribe one of"),
-    "below the model's end": (scene(at="separations = [-2.0]"), "at least -h_max"),
-    "negative mean separation": (scene(at="mean_separations = [-0.1]"), "at least 0"),
-    "negative pressure": (scene(at="pressures = [-1.0]"), "at least 0"),
-    "pressure over h_rms": (scene(at="pressures = [0.01]\nover_h_rms = true"), "leave it out"),
-    "pressure without an end": (
+    (scene(at=None), "give one of separations"),
+    (scene('theory = "persons"'), "did you mean 'persson'"),
+    (scene('theory = "persson"\nvariant = "printed"'), "variant: of theory 'mbma', not of 'persson'"),
+    (scene(at="separations = [0.5]\npressures = [0.1]"), "prescribe one of"),
+    (scene(at="separations = [-2.0]"), "at least -h_max"),
+    (scene(at="pressures = [0.01]\nover_h_rms = true"), "leave it out"),
+    (
         scene(effects='on = ["pressure"]\noff = ["finite_height"]', at="pressures = [0.01]"),
         "leave finite_height on, or give separations",
     ),
-    "text for a number": (
-        scene(at='separations = ["a"]'),
-        "separations must be a number, or one with its unit, got 'a'",
-    ),
-    "not finite": (scene(at="separations = [nan]"), "must be finite"),
-    "impossible tolerance": (scene("[accuracy]\nrtol = 1e-14"), "rtol: 1e-14 is less than the minimum of 1e-10"),
-    "loose tolerance": (scene("[accuracy]\nrtol = 2.0"), "2.0 is greater than the maximum of 0.1"),
-    "tolerance and time": (scene("[accuracy]\nrtol = 1e-3\nseconds = 1.0"), "one of them"),
-    "no time": (scene("[accuracy]\nseconds = 0.0"), "0.0 is less than or equal to the minimum of 0"),
-    "half a material": (scene("[material]\nE1 = 3.0"), "all of E1, nu1, E2, nu2"),
-    "negative modulus": (scene("[material]\nE_star = -3.0"), "E_star must be positive"),
-    "conductance alone": (scene(effects='on = ["conductance"]'), "needs conductivities"),
-    "conductance off": (scene("[conductance]\nk1 = 1.0\nk2 = 1.0"), "add it to the effects"),
-    "profile alone": (scene(effects='on = ["pressure_profile"]', at=None), "needs deltas"),
-    "comparison alone": (scene(effects='on = ["comparison"]'), "needs theories"),
-    "statistics off": (scene("[island_statistics]\npoints = 5"), "add it to on"),
-    "table as text": (
-        scene('surface = "concrete"', surface=None),
-        r"surface: 'concrete' is not of type 'object'; write \[surface\]",
-    ),
-    "a number beyond doubles": (scene(at=f"separations = [{10**400}]"), "must be real numbers"),
-    "lists without end": (scene(at="separations = " + "[" * 100_000), "is not a TOML file"),
-    "no toml": ("[surface\n", "is not a TOML file"),
-}
+    (scene(at='separations = ["a"]'), "separations must be a number, or one with its unit, got 'a'"),
+    (scene("[accuracy]\nrtol = 1e-14"), "rtol: 1e-14 is less than the minimum of 1e-10"),
+    (scene("[accuracy]\nrtol = 1e-3\nseconds = 1.0"), "one of them"),
+    (scene("[accuracy]\nseconds = 0.0"), "0.0 is less than or equal to the minimum of 0"),
+    (scene("[material]\nE1 = 3.0"), "all of E1, nu1, E2, nu2"),
+    (scene(effects='on = ["conductance"]'), "needs conductivities"),
+    (scene("[conductance]\nk1 = 1.0\nk2 = 1.0"), "add it to the effects"),
+    (scene(effects='on = ["pressure_profile"]', at=None), "needs deltas"),
+    (scene('surface = "concrete"', surface=None), r"surface: 'concrete' is not of type 'object'; write \[surface\]"),
+    (scene(at=f"separations = [{10**400}]"), "must be real numbers"),
+    (scene(at="separations = " + "[" * 100_000), "is not a TOML file"),
+    ("[surface\n", "is not a TOML file"),
+]
 
 
 def write(folder, text):
@@ -115,29 +91,24 @@ def write(folder, text):
     return path
 
 
-@pytest.mark.parametrize("kind", MISTAKES)
-def test_each_mistake_has_a_message_that_says_what_to_write_instead(kind, tmp_path):
-    text, words = MISTAKES[kind]
+@pytest.mark.parametrize(("text", "words"), MISTAKES, ids=[words for _, words in MISTAKES])
+def test_each_mistake_has_a_message_that_says_what_to_write_instead(text, words, tmp_path):
     path = write(tmp_path, text)
     with pytest.raises(InputError, match=words) as fault:
         Scene.from_toml(path)
     message = str(fault.value)
     assert message.startswith(str(path))
-    assert "\n" not in message.strip() or kind == "no toml"
+    assert "\n" not in message.strip() or "TOML" in message
 
 
-PLANNED = {
-    "time too short": (scene("[accuracy]\nseconds = 1e-8"), "the cheapest plan takes"),
-    "too tight for a law": (scene("[accuracy]\nrtol = 1e-10", effects='on = ["energy"]'), "at best"),
-    "unreachable pressure": (scene(at="pressures = [1e6]"), "where the branch ends"),
-}
-
-
-@pytest.mark.parametrize("kind", PLANNED)
-def test_what_only_a_plan_or_a_run_can_know(kind, tmp_path):
-    text, words = PLANNED[kind]
-    with pytest.raises(MbmaError, match=words):
-        Scene.from_toml(write(tmp_path, text)).run()
+def test_what_only_a_plan_or_a_run_can_know(tmp_path):
+    for text, words in (
+        (scene("[accuracy]\nseconds = 1e-8"), "the cheapest plan takes"),
+        (scene("[accuracy]\nrtol = 1e-10", effects='on = ["energy"]'), "at best"),
+        (scene(at="pressures = [1e6]"), "where the branch ends"),
+    ):
+        with pytest.raises(MbmaError, match=words):
+            Scene.from_toml(write(tmp_path, text)).run()
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -167,3 +138,100 @@ def test_a_psd_file(tmp_path):
     (tmp_path / "psd.txt").write_text("# q C\n")
     with pytest.raises(InputError, match="must hold two columns"):
         Scene.from_toml(path)
+
+
+HEADER = ",".join(Row._fields)
+SOME = f"""# a comment
+{HEADER}
+unit,seconds,both,,0.002,
+universal,gap rtol=1e-02,both,1e-9,4,50
+universal,gap rtol=1e-06,both,1e-9,16,60
+universal,gap rtol=1e-06,pressure,1e-9,10,60
+universal,call,both,,3,
+"""
+
+
+def read(tmp_path, text):
+    path = tmp_path / "cost.csv"
+    path.write_text(text, encoding="utf-8")
+    return read_costs(path)
+
+
+@pytest.mark.parametrize(
+    ("asked", "cost"),
+    [
+        (("universal", "gap", 1e-2), 4),
+        # the loosest measured tolerance that meets the one asked for, beyond all of them the tightest
+        (("universal", "gap", 1e-1), 4),
+        (("universal", "gap", 1e-4), 16),
+        (("universal", "gap", 1e-9), 16),
+        (("universal", "gap", 1e-6, "pressure"), 10),
+        (("universal", "gap", 1e-6, "area"), 16),
+        (("universal", "call", 1e-6), 3),
+        (("universal", "law", 1e-6), math.nan),
+    ],
+)
+def test_costs_are_those_of_the_measured_row(tmp_path, asked, cost):
+    assert read(tmp_path, SOME).of(*asked) == pytest.approx(0.002 * cost, rel=1e-12, abs=0, nan_ok=True)
+
+
+def test_shipped_costs_have_what_plans_need():
+    costs, calls = shipped_costs(), ("gap", "call", "import", "law")
+    needed = dict.fromkeys(("exact", "universal", "rigid"), calls) | {"law": ("lookup", "invert")}
+    needed |= dict.fromkeys(THEORIES[1:], ("gap", "call", "invert", "energy", "law"))
+    needed |= {"exact": (*calls, "profile"), "scene": ("call",), "island4d": ("gap",)}
+    for name, whats in needed.items():
+        for what in whats:
+            assert 0 < costs.of(name, what, 1e-4, "pressure") < 10, (name, what)
+    errors = [row.error for row in costs.rows if row.island_model == "universal" and row.what == "gap"]
+    assert 0 < max(errors) <= 1e-8
+    assert costs.of("exact", "gap", 1e-8) > 3 * costs.of("universal", "gap", 1e-8)
+    assert read_costs(shipped_file("cost.csv")) == costs
+
+
+SURFACE = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=3.3)
+
+
+def stated(theory, quantity, area):
+    found = contact(SURFACE, area=area, theory=theory)
+    return found.stiffness_scatter if quantity == "stiffness" else found.scatter
+
+
+@pytest.mark.parametrize(
+    ("effects", "prescribed", "name", "quantity"),
+    [
+        (["stiffness"], {"areas": [0.05]}, "stiffness", "stiffness"),
+        (["area"], {"areas": [0.05]}, "gap", "force"),
+        (["area", "energy"], {"areas": [0.02, 0.05, 0.9]}, "gap", "force"),
+        (["pressure"], {"mean_separations": [1.0, 4.0]}, "pressure", "force"),
+    ],
+)
+def test_it_tells_what_the_shipped_file_states(effects, prescribed, name, quantity):
+    text = Scene(SURFACE, effects=effects, **prescribed).explain()
+    (line,) = re.findall("advice: .*", text)
+    found = re.search(r"for (\w+) theory '(\w+)' .* elements, (\S+)% instead of (.+) at (\S+)% contact, in", line)
+    assert found.group(1, 2) == (name, "calibrated")
+    area = float(found[5]) / 100
+    if "areas" in prescribed:
+        assert area == 0.05
+    assert float(found[3]) / 100 == pytest.approx(stated("calibrated", quantity, area), rel=0.02)
+    other = re.fullmatch(r"a factor (\S+)", found[4])
+    own = np.log(float(other[1])) if other else float(found[4].rstrip("%")) / 100
+    assert own == pytest.approx(stated("mbma", quantity, area), rel=0.1)
+
+
+def test_what_else_is_advised_and_where_there_is_nothing_to_say():
+    said = advice(Scene(SURFACE, effects=["conductance"], conductivities=(1.0, 1.0), pressures=[1e-4]))
+    assert "for conductance theory 'calibrated' is nearer" in said
+    assert said.count("\n") == 1
+    own = dataclasses.replace(get_variant("printed"), name="own", beta=0.3)
+    said = advice(Scene(SURFACE, effects=["stiffness"], areas=[1e-4], variant=own))
+    assert "instead of an unknown distance at 0.01% contact" in said
+    assert "not tested there: A/A0 is below" in said
+    quiet = [
+        Scene(SURFACE, theory="persson", pressures=[1e-4]),
+        Scene(SURFACE, effects=["area"], mean_separations=[1.0]),
+        Scene(SURFACE, effects=["pressure"], mean_separations=[4.0]),
+        Scene(SURFACE, effects=["pressure_profile"], deltas=[0.1]),
+    ]
+    assert [advice(scene) for scene in quiet] == [""] * 4

@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from helpers import Springs
+from helpers import Springs, refusals
 
-from mbma_tables import InputError, Scene, Surface, contact, contact_law
-from mbma_tables.theories import THEORIES, Persson
+from mbma_tables import InputError, Scene, Surface, contact
+from mbma_tables.theories import THEORIES
 from mbma_tables.totals.conductance import conductance, mean_conductivity
 
 CONCRETE = Surface.named("concrete")
@@ -64,12 +64,10 @@ def test_a_budget_needs_a_measured_cost():
 @each
 def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
     u = np.linspace(0.3, 1.0, 200_000)
-    # a law states the error of its worst gap
     own = contact(CONCRETE, mean_separation=[0.5, 0.99 * CONCRETE.h_max], theory=theory).error.max()
     rtol = max(1e-5, 3 * own)
     some = slice(None, None, 3700)
     truth = contact(CONCRETE, mean_separation=u[some], E_star=MODULUS, theory=theory)
-    # between the two counts the measured costs decide
     for asked, by_law, seen in ((u, True, some), (u[some], False, slice(None))):
         scene = scene_of(theory, mean_separations=asked, rtol=rtol)
         (step,) = scene.plan().steps
@@ -80,14 +78,6 @@ def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
     # slopes are asked of the theory itself, or of MBMA's law, which bounds them
     slopes = scene_of(theory, effects=("stiffness",), mean_separations=u[some], rtol=rtol).run()
     assert slopes["stiffness"].values == pytest.approx(truth.stiffness, rel=1e-5)
-
-
-def test_areas_that_mbma_reaches_within_the_bound_stated():
-    law = contact_law(CONCRETE, rtol=1e-9, E_star=MODULUS)
-    areas = law.area(separation=np.array([0.9, 0.5, 0.0, -1.0]))
-    found = scene_of("mbma", areas=areas, rtol=1e-6).run()
-    truth = law.pressure(separation=law.separation(area=areas))
-    assert np.abs(found["pressure"].values / truth - 1).max() <= found.attrs["error"] <= 1e-6
 
 
 @each
@@ -111,35 +101,18 @@ def test_validity_is_an_effect(theory):
     assert "valid" not in scene_of(theory, mean_separations=u).run()
 
 
-@pytest.mark.parametrize(
-    ("more", "match"),
-    [
-        ({"theory": "person"}, "no theory is named 'person'; did you mean 'persson'"),
-        ({"island_model": "exact"}, "island_model: of theory 'mbma', not of 'persson'"),
-        ({"variant": "printed"}, "variant: of theory 'mbma'"),
-        ({"without": ("sphere_deformation",)}, "without: of theory 'mbma'"),
-        ({"effects": ("island_statistics",)}, "effect 'island_statistics': of theory 'mbma'"),
-        ({"effects": ("comparison",), "theories": ("persson",)}, "by theory 'persson' itself"),
-        ({"areas": [0.1]}, "prescribe one of separations, mean_separations, pressures, areas"),
-        ({"separations": None, "areas": [-0.1]}, "areas must be at least 0"),
-        ({"theory": 3}, "theory must be one of"),
-    ],
+test_what_is_refused = refusals(
+    lambda more: scene_of(**({"theory": "persson", "separations": [0.5]} | more)).run(),
+    ({"theory": "person"}, "no theory is named 'person'; did you mean 'persson'"),
+    ({"island_model": "exact"}, "island_model: of theory 'mbma', not of 'persson'"),
+    ({"variant": "printed"}, "variant: of theory 'mbma'"),
+    ({"without": ("sphere_deformation",)}, "without: of theory 'mbma'"),
+    ({"effects": ("island_statistics",)}, "effect 'island_statistics': of theory 'mbma'"),
+    ({"effects": ("comparison",), "theories": ("persson",)}, "by theory 'persson' itself"),
+    ({"areas": [0.1]}, "prescribe one of separations, mean_separations, pressures, areas"),
+    ({"separations": None, "areas": [-0.1]}, "areas must be at least 0"),
+    ({"theory": 3}, "theory must be one of"),
 )
-def test_what_is_refused(more, match):
-    with pytest.raises(InputError, match=match):
-        scene_of(**({"theory": "persson", "separations": [0.5]} | more)).run()
-
-
-def test_a_file_and_an_object_ask_the_same():
-    content = {
-        "theory": "persson",
-        "surface": {"name": "concrete"},
-        "effects": {"on": ["pressure", "area"]},
-        "prescribed": {"areas": [0.01, 0.1]},
-    }
-    by_file, by_object = Scene.from_mapping(content).run(), scene_of(Persson(), E_star=1.0, areas=[0.01, 0.1]).run()
-    assert by_file["pressure"].values.tolist() == by_object["pressure"].values.tolist()
-    assert by_file["area"].values == pytest.approx([0.01, 0.1], rel=1e-9)
 
 
 def test_energies_of_many_gaps_reach_beyond_a_law():
@@ -168,19 +141,10 @@ def test_a_scene_yields_as_contact_does(theory):
         assert found[name].values == pytest.approx(getattr(known, name), rel=1e-6), name
     assert found.attrs["psi"] == pytest.approx(known.psi)
     assert found.stiffness.values == pytest.approx(known.stiffness, rel=1e-6)
-    # not by the loading curve's slope
     own = conductance(known.unloading_stiffness, mean_conductivity(16.0, 167.0), 100e3)
     assert found.conductance.values == pytest.approx(own, rel=1e-6)
     assert found.separation_scatter.values == pytest.approx(known.separation_scatter, rel=1e-6)
     assert (found.conductance.values > 1.05 * conductance(known.stiffness, mean_conductivity(16.0, 167.0), 100e3)).all()
-
-
-def test_what_a_yielding_scene_costs_is_stated():
-    prices = [
-        Scene(**PRESSED, effects=["area", *more], theory="calibrated", **given).plan().steps[0].seconds
-        for more, given in (([], {}), (["yield"], {"hardness": 1500.0}))
-    ]
-    assert 2 * prices[0] <= prices[1] <= 3 * prices[0]
 
 
 @pytest.mark.parametrize("cap", [{}, {"hardness": 1500.0}], ids=["elastic", "yield"])
@@ -216,20 +180,15 @@ def test_a_file_may_call_for_it():
     assert found.conductance.values == pytest.approx([1e6 * known.conductance(16.0, 167.0)], rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("more", "match"),
-    [
-        ({"effects": ["area", "yield"]}, "effect 'yield' needs hardness"),
-        ({"hardness": 1500.0}, "hardness given and effect 'yield' is off"),
-        ({"effects": ["energy", "yield"], "hardness": 1500.0}, "'energy' is of elastic contacts"),
-        ({"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]}, "is of elastic contacts"),
-        ({"effects": ["area", "yield"], "hardness": 20.0}, "pressures must be at most the hardness"),
-        ({"effects": ["area", "yield"], "hardness": -1.0}, "hardness must be a number in"),
-    ],
+test_what_contradicts = refusals(
+    lambda more: Scene(**PRESSED, **more),
+    ({"effects": ["area", "yield"]}, "effect 'yield' needs hardness"),
+    ({"hardness": 1500.0}, "hardness given and effect 'yield' is off"),
+    ({"effects": ["energy", "yield"], "hardness": 1500.0}, "'energy' is for elastic contacts"),
+    ({"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]}, "is for elastic contacts"),
+    ({"effects": ["area", "yield"], "hardness": 20.0}, "pressures must be at most the hardness"),
+    ({"effects": ["area", "yield"], "hardness": -1.0}, "hardness must be a number in"),
 )
-def test_what_contradicts(more, match):
-    with pytest.raises(InputError, match=match):
-        Scene(**PRESSED, **more)
 
 
 def test_older_conductances_beside():

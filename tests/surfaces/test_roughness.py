@@ -1,15 +1,18 @@
 """Numbers of a drawing: back from a surface's own numbers, against a simulated profile, and what is refused."""
 
+import dataclasses
 import json
 import math
+import pickle
 
 import numpy as np
 import pytest
-from helpers import refused, run
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from helpers import refusals, refused, run
 
-from mbma_tables import InputError, OutOfRangeError, Surface
+from generate.boundary_elements.surfaces import Recipe, heights
+from mbma_tables import InputError, OutOfRangeError, Surface, contact
+from mbma_tables.scenes.specimen import from_numbers
+from mbma_tables.surfaces.extremes import highest_point
 
 SURFACE = Surface(0.75, 0.02, 5.0, 0.6, 2.1, unit="um")
 
@@ -58,17 +61,6 @@ def test_numbers_lead_back_to_their_surface(names):
     assert all(":" in line or "h_max" in line or "Hurst" in line for line in record["assumed"])
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.floats(0.05, 1.0), st.floats(0.6, 7.5), st.floats(-9, 9), st.sampled_from(["longest", "shortest", "Sds"]))
-def test_any_surface_comes_back(hurst, decades, size, third):
-    surface = Surface(hurst, 10.0**-size, 10.0 ** (decades - size), 10.0**size, 3 * 10.0**size)
-    numbers = {name: drawn_from(surface)[name] for name in ("hurst", "Rq", "Sdq", third, "h_max")}
-    found = Surface.from_roughness(**numbers)
-    # a slope says little of q1 at H = 1, and of q0 at H = 0
-    for name in ("m0", "m2", "m4") if third == "Sds" else ("m0", "m2"):
-        assert getattr(found, name) == pytest.approx(getattr(surface, name), rel=1e-9)
-
-
 def test_arrays_and_units():
     found = Surface.from_roughness(
         Ra="400 nm", Rdq=[0.05, 0.1], longest="0.25 mm", hurst=0.8, h_max="1.8 um", unit="um"
@@ -101,39 +93,28 @@ def test_a_simulated_profile_has_these_numbers():
 GOOD = {"Rq": 0.6, "Rdq": 0.2, "longest": 300.0, "hurst": 0.8, "h_max": 2.0}
 
 
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"Ra": 0.5}, "the height of roughness: give one of Rq, Ra, Sq, Sa; got Rq and Ra"),
-        ({"Rq": None}, "got none"),
-        ({"hurst": None}, "hurst is missing: a drawing does not tell it"),
-        ({"h_max": None}, r"the highest point, .* 3 to 4.5 times the rms height.*: give one of h_max, Sp"),
-        ({"h_max": 0.5}, "h_max must be above the rms height"),
-        (
-            {"Rdq": None, "longest": "2 um", "shortest": "0.1 mm", "Rq": "1 um", "h_max": "3 um"},
-            r"longest \[um\] .* 100, got 2",
-        ),
-        ({"Sdq": 0.3}, "the slope of roughness: give one of"),
-        ({"longest": None}, "the band of wavelengths needs a slope"),
-        ({"Rdq": None}, "the band of wavelengths needs a slope"),
-        ({"Rdq": None, "Sds": 0.01}, "the band of wavelengths needs a slope"),
-        ({"shortest": 2.0}, "got Rdq and longest and shortest"),
-        ({"Rdq": 1e-3}, "Rdq must be between .* for a band of 3 < q1/q0 < 1e8"),
-        ({"Rdq": None, "Rsm": 1e4}, "Rsm must be between"),
-        ({"Rdq": -0.1}, "Rdq must be positive"),
-        ({"hurst": 1.2}, r"hurst must be in \(0, 1\]"),
-        ({"h_max": "2 um"}, "without a unit beside numbers in um"),
-        ({"longest": None, "shortest": 400.0}, "Rdq must be between"),
-        ({"longest": None, "Sds": 1e-12}, "alpha = m0 m4/m2"),
-    ],
+test_numbers_that_are_refused = refusals(
+    lambda changed: Surface.from_roughness(**(GOOD | changed)),
+    ({"Ra": 0.5}, "the height of roughness: give one of Rq, Ra, Sq, Sa; got Rq and Ra"),
+    ({"hurst": None}, "hurst is missing: a drawing does not tell it"),
+    ({"h_max": None}, r"the highest point, .* 3 to 4.5 times the rms height.*: give one of h_max, Sp"),
+    ({"h_max": 0.5}, "h_max must be above the rms height"),
+    (
+        {"Rdq": None, "longest": "2 um", "shortest": "0.1 mm", "Rq": "1 um", "h_max": "3 um"},
+        r"longest \[um\] .* 100, got 2",
+    ),
+    ({"Sdq": 0.3}, "the slope of roughness: give one of"),
+    ({"Rdq": None}, "the band of wavelengths needs a slope"),
+    ({"shortest": 2.0}, "got Rdq and longest and shortest"),
+    ({"Rdq": 1e-3}, "Rdq must be between .* for a band of 3 < q1/q0 < 1e8"),
+    ({"Rdq": None, "Rsm": 1e4}, "Rsm must be between"),
+    ({"h_max": "2 um"}, "without a unit beside numbers in um"),
+    ({"longest": None, "shortest": 400.0}, "Rdq must be between"),
+    ({"longest": None, "Sds": 1e-12}, "alpha = m0 m4/m2"),
 )
-def test_numbers_that_are_refused(changed, said):
-    with pytest.raises(InputError, match=said):
-        Surface.from_roughness(**(GOOD | changed))
 
 
 def test_the_range_named_is_the_range():
-    """Just inside the slopes that the message names there is a surface, just outside there is none."""
     with pytest.raises(OutOfRangeError) as caught:
         Surface.from_roughness(**(GOOD | {"Rdq": 1e-3}))
     low, high = (float(word) for word in str(caught.value).split("between ")[1].split(",")[0].split(" and "))
@@ -157,3 +138,95 @@ def test_on_the_command_line_and_in_toml(tmp_path):
         assert answer["units"]["separation"] == "um"
     assert run("contact", *options, "-d", "1").count("\nassumed: ") == 6
     assert "q0 beside numbers of a drawing" in refused("contact", *options, "--q0", "1/mm", "-d", "1")
+
+
+NUMBERS = {"hurst": 0.8, "q0": 0.025, "q1": 3.0, "h_rms": 1.0, "unit": "um"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "hurst", "zeta_1", "waves"),
+    [("self_affine", 0.8, 4, 8), ("self_affine", 0.8, 32, 1), ("self_affine", 0.5, 8, 4), ("plateau", 0.8, 4, 8)],
+)
+def test_medians_and_spread_are_those_of_simulated_surfaces(kind, hurst, zeta_1, waves):
+    tops, slopes = [], []
+    for seed in range(48):
+        z = heights(Recipe(kind, hurst, zeta_1, waves, 500 + seed, 256))
+        tops.append(z.max())
+        wavenumber = 2 * np.pi * np.fft.fftfreq(256, 1 / 256)
+        slopes.append(np.mean(np.fft.ifft(1j * wavenumber[:, None] * np.fft.fft(z, axis=0), axis=0).real ** 2))
+    known = highest_point(1.0, np.mean(slopes), 1.0, [0.16, 0.5, 0.84])
+    assert np.median(tops) == pytest.approx(known[1], rel=0.04)
+    assert np.quantile(tops, [0.16, 0.84]) == pytest.approx(known[[0, 2]], abs=0.3)
+
+
+def test_every_constructor_takes_the_area():
+    made = Surface(**NUMBERS, nominal_area="4 cm^2")
+    assert made.h_max == pytest.approx(float(highest_point(1.0, made.m2, 4e8)), rel=1e-15)
+    assert made.provenance[-1]["from"] < made.h_max < made.provenance[-1]["to"]
+    assert Surface(**NUMBERS, nominal_area=[4e8, 1e6]).h_max[0] == made.h_max
+    drawn = Surface.from_roughness(
+        Rq="1 um", longest=f"{2 * np.pi / 0.025!r} um", shortest=f"{2 * np.pi / 3.0!r} um", hurst=0.8,
+        nominal_area="4 cm^2",
+    )  # fmt: skip
+    moments = {name: getattr(made, name) for name in ("hurst", "m0", "m2", "m4")}
+    spectrum = np.geomspace(0.025, 3.0, 200)
+    others = [
+        drawn,
+        Surface.from_moments(**moments, nominal_area=4e8),
+        Surface.from_spectrum(spectrum, made.power_spectrum(spectrum), nominal_area=4e8),
+        made.sampled(),
+        pickle.loads(pickle.dumps(made)),
+        dataclasses.replace(made),
+        made.to("mm").to("um"),
+    ]
+    for other in others:
+        assert float(other.h_max) == pytest.approx(made.h_max, rel=1e-6)
+    fitted = Surface.from_spectrum(
+        spectrum, made.power_spectrum(spectrum), nominal_area=4e8, model="self-affine", band=(0.025, 3.0)
+    )
+    assert float(fitted.h_max) == pytest.approx(made.h_max, rel=1e-3)
+    line = np.random.default_rng(3).standard_normal(400).cumsum()[:400]
+    short, long = (Surface.from_profile(line, dx=1.0, nominal_area=area) for area in (1e5, 1e8))
+    assert short.h_max < long.h_max == pytest.approx(float(highest_point(long.h_rms, long.m2, 1e8)))
+    # two faces alike: sqrt(2) times as high
+    both = made.combined(made, "4 cm^2")
+    assert both.h_max == pytest.approx(2**0.5 * made.h_max, rel=1e-3)
+
+
+def test_files_and_options_take_the_area():
+    made = Surface(**NUMBERS, nominal_area="4 cm^2")
+    five = {"hurst": 0.8, "q0": "0.025/um", "q1": "3/um", "h_rms": "1 um", "nominal_area": "400 mm^2"}
+    moments = {"hurst": 0.8, "m0": "1 um^2", "m2": float(made.m2), "m4": f"{made.m4} 1/um^2", "nominal_area": "4 cm^2"}
+    drawn = {"hurst": 0.8, "Rq": "1 um", "longest": f"{2 * np.pi / 0.025} um", "shortest": f"{2 * np.pi / 3} um"}
+    for given in (five, moments, drawn | {"nominal_area": "4e8 um^2"}):
+        assert float(from_numbers(given).surface.h_max) == pytest.approx(made.h_max, rel=1e-6)
+    with pytest.raises(InputError, match="h_max or nominal_area"):
+        from_numbers({"hurst": 0.8, "nominal_area": "4 cm^2"})
+
+
+def test_areas_that_are_refused():
+    for given, message in (
+        ({"h_max": 3.0, "nominal_area": 1e6}, "both given"),
+        ({}, "h_max is missing"),
+        ({"nominal_area": "4 cm"}, "must be like"),
+    ):
+        with pytest.raises(InputError, match=message):
+            Surface(**NUMBERS, **given)
+    for area in (0.0, -1.0, np.nan, np.inf, 100.0):
+        with pytest.raises(OutOfRangeError, match="nominal_area"):
+            Surface(**NUMBERS, nominal_area=area)
+    xr = pytest.importorskip("xarray")
+    with pytest.raises(InputError, match="DataArrays"):
+        Surface(**NUMBERS | {"h_rms": xr.DataArray([1.0, 2.0], dims="case")}, nominal_area=1e6)
+
+
+def test_beyond_the_heights_simulated_nothing_changes():
+    """Why h_max up to 8 h_rms counts as tested: above 5.5 h_rms it does not matter from 0.1% contact on."""
+    for hurst, zeta_1 in ((0.2, 4.0), (0.8, 16.0), (1.0, 128.0)):
+        near, far = (
+            contact(Surface(hurst, 0.001, 0.001 * zeta_1, 1.0, h_max), area=[1e-3, 1e-2, 0.1], theory="calibrated")
+            for h_max in (5.5, 8.0)
+        )
+        for name, rtol in {"pressure": 1e-6, "mean_separation": 2e-4, "stiffness": 2e-3}.items():
+            np.testing.assert_allclose(getattr(far, name), getattr(near, name), rtol=rtol)
+        assert far.valid.all()

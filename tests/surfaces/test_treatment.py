@@ -1,19 +1,17 @@
 """What is done to a measurement before its spectrum is taken, and what is said of it."""
 
 import math
-import warnings
 
 import numpy as np
 import pytest
+from helpers import refusals, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.measurements import read_measurement
 from mbma_tables.surfaces.treatment import Treatment, treat
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    library = pytest.importorskip("SurfaceTopography")
+library = topographies()
 
 # of numpy, to that library, when a test calls it
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -77,11 +75,6 @@ class TestHoles:
             treated(np.full((40, 40), np.nan))
         assert np.isfinite(treated(holed, fill="harmonic").heights).all()
 
-    def test_masked_is_undefined(self):
-        masked = np.ma.masked_greater(MAP, np.quantile(MAP, 0.99))
-        nan = np.where(masked.mask, np.nan, MAP)
-        np.testing.assert_array_equal(treated(masked).heights, treated(nan).heights)
-
 
 class TestOutliers:
     def test_a_bad_pixel_goes_and_little_else(self):
@@ -126,19 +119,16 @@ class TestCutoff:
         other = library.UniformLineScan(MAP[3] - MAP[3].mean(), SIDE, periodic=True).shortcut(cutoff_wavelength=3.0)
         np.testing.assert_allclose(cut.heights, other.heights(), atol=1e-12)
 
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
+    test_refused = staticmethod(
+        refusals(
+            lambda options: treated(periodic=True, **options),
             ({"short_cutoff": 5.0, "long_cutoff": 4.0}, "long_cutoff must be larger"),
             ({"short_cutoff": 1e9}, "leaves no wavelength"),
             ({"short_cutoff": -1.0}, "short_cutoff must be a number"),
             ({"outliers": math.nan}, "outliers must be finite"),
             ({"fill": "zero"}, "fill must be one of harmonic"),
-        ],
+        )
     )
-    def test_refused(self, options, message):
-        with pytest.raises(InputError, match=message):
-            treated(periodic=True, **options)
 
 
 class TestReliability:
@@ -151,9 +141,6 @@ class TestReliability:
         entry = next(e for e in found.provenance if e["step"] == "reliability")
         assert entry["wavelength"] == pytest.approx(limit)
         assert found.waves[1] == pytest.approx(2 * np.pi / limit)
-
-    def test_a_fine_tip_can(self):
-        assert "follows every wavelength" in told(treated(tip_radius=1e-3), "reliability")
 
     def test_what_the_file_says_counts_unless_told_otherwise(self):
         info = {"instrument": {"parameters": {"resolution": {"value": 2000.0, "unit": "nm"}}}}

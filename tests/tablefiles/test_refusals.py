@@ -7,7 +7,7 @@ from functools import partial
 import netCDF4
 import numpy as np
 import pytest
-from fuzzing import spoilt
+from helpers import spoilt
 from small_tables import copied, edited, seal, small_table, unseal
 
 from mbma_tables.common.errors import TableFileError
@@ -46,14 +46,14 @@ def test_almost_nothing_left(length, sources, tmp_path):
 
 
 def edits(content):
-    """Every edit of one thing that netCDF tools can make, each with its name."""
+    """Edits of one thing as netCDF tools make them: values, names and attributes, some of each."""
     with netCDF4.Dataset("table", memory=unseal(content)) as dataset:
-        shapes = {name: variable.shape for name, variable in dataset.variables.items()}
         owners = {"": dataset, **dataset.variables}
         attributes = [(name, key) for name, owner in owners.items() for key in owner.ncattrs()]
 
     def change(dataset, name, place):
-        dataset[name][place] = np.nextafter(float(dataset[name][place]), np.inf)
+        at = (place,) * dataset[name].ndim
+        dataset[name][at] = np.nextafter(float(dataset[name][at]), np.inf)
 
     def swap(dataset, first, second):
         for old, new in ((first, "between"), (second, first), ("between", second)):
@@ -62,24 +62,16 @@ def edits(content):
     def edit(dataset, name, key, way):
         owner = dataset[name] if name else dataset
         value = owner.getncattr(key)
-        if way == 0:
-            owner.setncattr(key, value + "x" if isinstance(value, str) else value + 1)
-        elif way == 1:
-            owner.delncattr(key)
-        elif way == 2:
-            owner.renameAttribute(key, "other")
-        else:
-            owner.setncattr(key, [1.5, 2.5])
+        change = owner.setncattr, owner.renameAttribute, lambda key, _: owner.delncattr(key)
+        change[way](key, "other" if way else value + "x" if isinstance(value, str) else [1.5, 2.5])
 
-    for name, shape in shapes.items():
-        for place in ((0,) * len(shape), tuple(n - 1 for n in shape)):
-            yield partial(change, name=name, place=place)
+    for name in list(owners)[1:]:
+        yield from (partial(change, name=name, place=place) for place in (0, -1))
         yield lambda d, name=name: d.renameVariable(name, "other")
         if name.endswith("_F"):
             yield partial(swap, first=name, second=f"{name[:-1]}A")
     for number, (name, key) in enumerate(attributes):
-        for way in (0, 1 + number % 3):
-            yield partial(edit, name=name, key=key, way=way)
+        yield partial(edit, name=name, key=key, way=number % 3)
     yield lambda d: d.setncattr("other", 1)
     yield lambda d: d["error_F"].setncattr("scale_factor", 2.0)
     yield lambda d: d.createVariable("other", "f8", ("X",))
@@ -91,7 +83,7 @@ def test_edits_under_a_right_checksum(sources, tmp_path):
     for done, edit in enumerate(edits(sources[kind])):
         path = edited(tmp_path / f"{kind}.nc", sources[kind], edit)
         assert refused(path, kind if done % 2 else None), edit
-    assert done > 150
+    assert done > 100
 
 
 def test_variables_left_out_or_in_another_type(sources, tmp_path):
@@ -157,8 +149,6 @@ def test_a_file_larger_than_any_table(tmp_path):
 
 
 def rehashed(path, source, edit):
-    """At `path` the table file `source` after `edit(dataset)`, with right hashes and checksum."""
-
     def both(dataset):
         edit(dataset)
         dataset.setncattr("attributes_sha256", attributes_digest(dataset))
@@ -217,7 +207,6 @@ def changed(content, name, values):
 
 
 def with_edges(content, **changes):
-    """With the edges of cells changed."""
     labels = dict(content.auxiliary)
     for name, change in changes.items():
         over, values, text = labels[name]

@@ -1,19 +1,23 @@
 """Spline coefficients and their evaluation against scipy, polynomials, and arithmetic at 50 digits."""
 
-import mpmath
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from generate.splines import coefficients, padding
+from generate.tables.writing import error_cells
 from mbma_tables.core import core
 from mbma_tables.models.island4d import at_places
+from mbma_tables.tablefiles.schema import Axis, error_cell
 
 SHAPE = (8, 7, 6, 5)
 
 
 def node_values(shape, seed=1):
-    """Smooth values and noise, two components."""
     rng = np.random.default_rng(seed)
     grid = np.meshgrid(*(np.linspace(0, 2, n) for n in shape), indexing="ij")
     smooth = np.stack([np.sin(sum(grid)), np.exp(-grid[0] * grid[1])], axis=-1)
@@ -21,7 +25,6 @@ def node_values(shape, seed=1):
 
 
 def by_scipy(values, degree, axes):
-    """The not-a-knot tensor spline of scipy."""
     knots = []
     for axis in range(axes):
         one = make_interp_spline(np.arange(values.shape[axis]), values, k=degree, axis=axis)
@@ -69,41 +72,6 @@ def test_one_axis_against_scipy_and_more_components(degree, nodes):
     np.testing.assert_allclose(BSpline(knots, coefs, degree)(places), expected, rtol=1e-11, atol=1e-11)
 
 
-def basis(number, u, cell):
-    """The cubic B-spline and its derivative as the core has them, from a table that is it along each axis in turn."""
-    for axis in range(4):
-        shape = [7, 7, 7, 7]
-        coefs = np.ones((*shape, 2))
-        one = np.zeros(7)
-        one[cell + number] = 1.0
-        coefs *= one.reshape([7 if k == axis else 1 for k in range(4)] + [1])
-        place = np.full(4, 2.0)
-        place[axis] = cell + u
-        out = at_places(coefs, place[:, None], slopes=True)[..., 0]
-        np.testing.assert_array_equal(out[0], out[1])
-        # the others sum to 1, to rounding
-        yield out[0, 0], out[0, 1 + axis]
-
-
-def by_truncated_powers(degree, number, u, order=0):
-    """The cardinal B-spline by divided differences of truncated powers."""
-    x = u + degree - number
-    terms = (
-        (-1) ** k * mpmath.binomial(degree + 1, k) * max(x - k, mpmath.mpf(0)) ** (degree - order)
-        for k in range(degree + 2)
-    )
-    return mpmath.fsum(terms) / mpmath.factorial(degree - order)
-
-
-def test_cubic_weights_at_fifty_digits():
-    with mpmath.workdps(50):
-        for number in range(4):
-            for u in (k / 16 for k in range(16)):
-                for value, slope in basis(number, u, 2):
-                    assert abs(value - by_truncated_powers(3, number, mpmath.mpf(u))) < 4e-16
-                    assert abs(slope - by_truncated_powers(3, number, mpmath.mpf(u), 1)) < 8e-16
-
-
 def test_the_last_node_belongs_to_the_table():
     values = node_values(SHAPE)
     coefs, last = coefficients(values, 3, 4), np.array([[n - 1.0] for n in SHAPE])
@@ -131,3 +99,52 @@ def test_no_place_leaves_memory(slopes):
         assert core.spline4(places, coefs, nodes, slopes, out) == len(HOSTILE)
         assert np.isnan(out[:, : len(HOSTILE)]).all()
         assert np.isfinite(out[:, len(HOSTILE) :]).all()
+
+
+@st.composite
+def axes(draw):
+    transform = draw(st.sampled_from(["linear", "log"]))
+    offset = draw(st.floats(0, 20))
+    if transform == "log":
+        first = 10 ** draw(st.floats(-9, 2))
+        low = first - offset
+        high = first * (1 + 10 ** draw(st.floats(-1, 12))) - offset
+    else:
+        low = draw(st.floats(-50, 50))
+        high = low + 10 ** draw(st.floats(-2, 4))
+    return Axis("x", "a coordinate", transform, offset, low, high, draw(st.integers(2, 400)))
+
+
+@given(axes(), st.floats(0, 1))
+def test_positions_and_coordinates_are_inverse_and_as_the_formula_says(axis, share):
+    last = axis.nodes - 1
+    # rounding of t, and of x, counted in steps
+    rounding = max(abs(axis.start), abs(axis.start + last * axis.step)) / axis.step + axis.nodes
+    assert (axis.coordinate(0), axis.coordinate(last)) == (axis.values[0], axis.values[-1]) == (axis.low, axis.high)
+    assert axis.values.shape == (axis.nodes,)
+    assert (np.diff(axis.values) > 0).all()
+    assert axis.position(axis.low) == 0
+    assert abs(axis.position(axis.high) - last) <= 8e-16 * (rounding - 1)
+    position = share * last
+    x = axis.coordinate(position)
+    assert axis.low <= x <= axis.high or 0 < position < last
+    scale = 1 / (x + axis.offset) if axis.transform == "log" else 1.0
+    of_x = (abs(x) + axis.offset) * scale / axis.step
+    assert abs(axis.position(x) - position) <= 1e-15 * (rounding + of_x)
+    name, _, right = axis.formula().partition(" = ")
+    assert name == "position"
+    stated = eval(right, {"__builtins__": {}}, {"log": math.log, "x": float(x)})
+    assert abs(stated - axis.position(x)) <= 1e-15 * rounding
+
+
+@given(axes(), st.floats(0, 1))
+def test_error_cells_cover_the_axis_evenly(axis, share):
+    cells = error_cells(axis)
+    assert 1 <= cells <= 32
+    position = share * (axis.nodes - 1)
+    cell = int(error_cell(axis, cells, position))
+    width = (axis.nodes - 1) / cells
+    assert cell == cells - 1 or position < (cell + 1) * width * (1 + 1e-12)
+    assert position >= cell * width * (1 - 1e-12)
+    assert error_cell(axis, cells, 0.0) == 0
+    assert error_cell(axis, cells, axis.nodes - 1.0) == cells - 1

@@ -30,7 +30,6 @@ def test_pressures_gaps_and_contact_fit_each_other(surface):
     assert data.gap.mean() == pytest.approx(float(found.mean_separation), rel=0.01)
     # points in contact are more than the area, whose perimeter is corrected
     assert float(found.area) < data.contact.mean() < 1.3 * float(found.area)
-    # heights that touch stand out
     assert data.heights.values[data.contact.values].mean() > data.heights.values.std() / 2
     assert repr(pressed).startswith("ContactMap(points 64 x 64, pressure 0.02")
 

@@ -77,15 +77,6 @@ class TestCorrected:
         assert contact(surface, area=0.1, theory="corrected").leakage.x > 0
 
 
-def test_a_scene_presses_the_map():
-    surface = Surface.from_map(heights(Part("honed", 1, 64)), 1.0, periodic=True, unit="um")
-    scene = Scene(surface, pressures=[0.01, 0.02], effects=["pressure", "area"], theory="simulated", rtol=0.1)
-    found = scene.run()
-    direct = contact(surface, pressure=[0.01, 0.02], theory="simulated")
-    np.testing.assert_allclose(found.area, direct.area)
-    assert found.attrs["theory"] == "simulated"
-
-
 class TestDefaultTheory:
     """Of a map: corrected, where that is possible within seconds."""
 
@@ -103,7 +94,6 @@ class TestDefaultTheory:
         assert found.area[0] == 0
         assert found.valid.tolist() == [True, False, True, True, False]
         assert contact(surface, separation=2 * float(surface.h_max)).pressure == 0
-        # changed surfaces have no map that is known
         assert contact(surface.combined(surface), pressure=0.01).theory == "calibrated"
         assert theory_name(surface, None, variant="printed") == "mbma"
 

@@ -2,15 +2,13 @@
 
 import functools
 import math
-import pickle
 
 import numpy as np
 import pytest
-import xarray as xr
 from helpers import Springs, with_slopes
 from scipy.integrate import quad
 
-from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.theories import THEORIES, GreenwoodWilliamson, Mbma, Persson, get_theory
 
 SURFACE = Surface(hurst=0.8, q0=0.2, q1=20.0, h_rms=1.5, h_max=4.8)
@@ -156,37 +154,6 @@ def test_softening_of_mbma_is_where_its_stiffness_is_largest(surface):
     assert sides[1] > max(sides[0], sides[2])
 
 
-def test_mbma_by_object_and_by_mean_separation():
-    law = contact_law(SURFACE, rtol=1e-6, island_model="rigid", variant="printed")
-    same, d = contact_law(SURFACE, rtol=1e-6, theory=Mbma("rigid", "printed")), np.array([0.5, 2.0])
-    pressure = law.pressure(separation=d)
-    assert pressure.tolist() == same.pressure(separation=d).tolist() == law.pressure((law.h_max + d) / 2).tolist()
-    point = law.at_pressure(pressure)
-    assert point.pressure.tolist() == pressure.tolist()
-    assert point.mean_pressure == pytest.approx(pressure / law.area(separation=d), rel=1e-9)
-    assert point.separation == pytest.approx(d, rel=1e-12)
-    assert point.stiffness == pytest.approx(law.stiffness(separation=d), rel=1e-9)
-    with pytest.raises(InputError, match="one of them"):
-        law.pressure(0.5, separation=1.0)
-
-
-@each
-def test_forms_of_input_and_a_pickle(theory):
-    law = law_of(theory)
-    expected = law.pressure(separation=1.0)
-    assert np.shape(expected) == ()
-    assert law(separation=1.0) == law.pressure((law.h_max + 1.0) / 2) == expected
-    assert law.pressure(separation=[[1.0], [2.0]]).shape == (2, 1)
-    labelled = law.area(xr.DataArray([2.0, 3.0], dims="gap", coords={"gap": [1, 2]}))
-    assert labelled.dims == ("gap",)
-    assert labelled.values.tolist() == law.area([2.0, 3.0]).tolist()
-    gap = law.separation(pressure=law.pressure(separation=xr.DataArray([1.0], dims="gap")))
-    assert gap.values == pytest.approx([1.0], rel=1e-10)
-    back = pickle.loads(pickle.dumps(law))
-    assert isinstance(back, ContactLaw)
-    assert back.energy(separation=[0.0, 1.0]).tolist() == law.energy(separation=[0.0, 1.0]).tolist()
-
-
 def test_a_law_is_the_contact():
     for name in THEORIES:
         law = contact_law(SURFACE, E_star=MODULUS, theory=name)
@@ -202,8 +169,6 @@ def test_a_law_is_the_contact():
 
 
 class Noisy(Cones):
-    """A theory whose forces carry noise."""
-
     def answer(self, surface, u):
         force, area = super().answer(surface, u)
         return force * (1 + 1e-5 * np.sin(1e9 * np.asarray(u))), area
@@ -235,31 +200,6 @@ def test_what_is_no_law(asked, match):
 
 
 BATCH = Surface(hurst=[0.3, 0.7, 0.9], q0=1.0, q1=[1000.0, 60.0, 216.0], h_rms=1.0, h_max=[3.0, 3.0, 3.5])
-SHARES = np.array([0.3, 0.5, 0.8])  # of u over h_max
-ALL = [Mbma(), Persson(), Persson("simplified"), GreenwoodWilliamson()]
-each_object = pytest.mark.parametrize("theory", ALL, ids=lambda t: f"{t.name}-{getattr(t, 'method', '')}")
-
-
-@each_object
-def test_stiffness_is_the_slope_of_force(theory):
-    u = SHARES * SURFACE.h_max
-    step = 1e-4 * u
-    # Richardson's two central differences: error of order step^4
-    coarse, fine = (
-        (theory.answer(SURFACE, u - h).pressure - theory.answer(SURFACE, u + h).pressure) / (2 * h)
-        for h in (step, step / 2)
-    )
-    assert theory.answer(SURFACE, u).stiffness == pytest.approx((4 * fine - coarse) / 3, rel=1e-5)
-
-
-def test_mbma_inverts_and_integrates_as_its_law_does():
-    law, theory, u = contact_law(SURFACE), Mbma(), SHARES * SURFACE.h_max
-    loads = law.pressure(u)
-    assert theory.answer(SURFACE, u).stiffness == pytest.approx(law.stiffness(u), rel=1e-5)
-    assert theory.energy(SURFACE, u) == pytest.approx(law.energy(u), rel=1e-7)
-    assert theory.mean_separation_at(SURFACE, "pressure", loads) == pytest.approx(u, rel=1e-7)
-    with pytest.raises(OutOfRangeError, match="'mbma' reaches"):
-        theory.mean_separation_at(SURFACE, "pressure", np.array(1.0))
 
 
 def test_mbma_ends_where_its_force_turns():
@@ -268,16 +208,6 @@ def test_mbma_ends_where_its_force_turns():
     assert law.turning_point is not None
     assert low[0] == pytest.approx((3.0 + law.turning_point) / 2, abs=1e-5)
     assert (low[1:] == 0).all()
-
-
-def test_softening_is_the_maximum_of_stiffness():
-    found = Mbma().softening(BATCH)
-    fine = np.linspace(0.01, 0.999, 1500)[:, None]
-    stiffness = Mbma().answer(BATCH, fine * BATCH.h_max).stiffness
-    # the first maximum from first contact on
-    rising = np.diff(stiffness[::-1], axis=0) > 0
-    first = 1500 - 1 - np.argmin(rising, axis=0)
-    assert found == pytest.approx(fine[first, 0] * BATCH.h_max, abs=3e-3)
 
 
 def test_a_users_own_object_is_a_theory():

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import fresh, random_map
+from helpers import fresh, random_map, refusals
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -24,7 +24,6 @@ REFERENCE = pathlib.Path(__file__).parents[2] / "docs" / "data" / "leakage.csv"
 
 
 def k_of(found):
-    """K over h_rms^3."""
     return found.K / np.asarray(found._contact._source.surface.h_rms) ** 3
 
 
@@ -84,15 +83,6 @@ def test_falls_with_load_on_10000_random_cases():
     assert np.all(light.blocked <= heavy.blocked)
 
 
-def test_scale_and_units_on_1000():
-    rng = np.random.default_rng(4)
-    batch, area, scale = surfaces(rng, 1000), rng.uniform(1e-4, 0.39, 1000), np.exp(rng.uniform(-9, 9, 1000))
-    larger = Surface(batch.hurst, batch.q0 / scale, batch.q1 / scale, batch.h_rms * scale, batch.h_max * scale)
-    one, other = (asked(s, area=area) for s in (batch, larger))
-    for own, expected in ((k_of(other), k_of(one)), (other.K, one.K * scale**3), (other.scatter, one.scatter)):
-        np.testing.assert_allclose(own, expected, rtol=1e-8)
-
-
 @settings(max_examples=15, deadline=None)
 @given(st.floats(0.1, 1), st.floats(3.1, 9e4), st.floats(1e-5, 0.3))
 def test_table_is_the_medium(hurst, zeta_1, area):
@@ -149,13 +139,16 @@ class TestRates:
             found.gas("1.8e-5 Pa s", "2 bar", "1 bar", "2 mm", 0.1 * float(np.cbrt(found.K[0])))
         assert np.asarray(caught.value.mask).tolist() == [False, True]
 
-    @pytest.mark.parametrize(
-        ("viscosity", "drop", "width", "words"),
-        [(0, 1, 1, "viscosity"), (1, np.nan, 1, "pressure_drop"), (1, 1, -1, "width"), ("1e-3 Pa", 1, 1, "Pa s")],
+    test_bad_numbers = staticmethod(
+        refusals(
+            lambda *given: asked(area=0.1).liquid(*given),
+            (0, 1, 1, "viscosity"),
+            (1, np.nan, 1, "pressure_drop"),
+            (1, 1, -1, "width"),
+            ("1e-3 Pa", 1, 1, "Pa s"),
+            error=(InputError, OutOfRangeError),
+        )
     )
-    def test_bad_numbers(self, viscosity, drop, width, words):
-        with pytest.raises((InputError, OutOfRangeError), match=words):
-            asked(area=0.1).liquid(viscosity, drop, width)
 
 
 def open_gaps(law, shares):

@@ -6,16 +6,13 @@ import pathlib
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from helpers import fresh, refused, run
+from helpers import refused, run
 from scipy.special import erf
 
 from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
 from mbma_tables.common import cache
 from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
-from mbma_tables.export import CODE, DATA, LAWS, SOLVERS
-from mbma_tables.export.targets import targets
 from mbma_tables.laws import boundary_elements, pressing
 from mbma_tables.laws.energy_spline import Continued
 from mbma_tables.theories import BoundaryElements, own_map
@@ -70,9 +67,7 @@ def test_laws_scenes_and_other_units(surface, own):
     # all lengths twice as large, along the plane and across: nothing changes but these; heights alone: slopes
     steep = contact(own.resized(2.0, 1.0), pressure=0.02)
     assert (steep.area, steep.energy) == (pytest.approx(one.area), pytest.approx(4 * one.energy))
-    # a cut takes the simulation away
     assert contact(own.between(float(own.q0), float(own.q1) / 1.5), pressure=0.01).theory == "calibrated"
-    # a simulation knows one surface
     assert sensitivity(own, pressure=0.01).slopes["heights"]["area"] < -0.5
 
 
@@ -164,40 +159,6 @@ def test_on_the_command_line(tmp_path):
     assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
     assert "leave --dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
     assert "not the map" in refused("fit", table)
-
-
-@pytest.mark.parametrize("target", [t for t in targets() if t not in CODE and " " not in t])
-def test_every_target_of_laws(target, file, tmp_path):
-    out = tmp_path / {"matlab": "own.mat", "onnx": "own.onnx"}.get(target, "own.txt")
-    words = ["export", target, "--map", str(file), "--E-star", "1 GPa", "--out", str(out)]
-    heat = ["--conductivity", "0.05", "--conductivity-unit", "W/(mm K)"] if "gapcon" in target else []
-    from mbma_tables.cli import main
-
-    result = CliRunner().invoke(main, words + heat)
-    if result.exit_code and "pip install" in result.stderr:
-        pytest.skip(result.stderr)
-    assert result.exit_code == 0, result.stderr
-    assert out.stat().st_size > 500
-    if target in (*SOLVERS, *LAWS, *DATA) and target not in ("matlab", "netcdf", "hdf5", "parquet", "json"):
-        text = " ".join(out.read_text().split())
-        assert "theory 'simulated'" in text
-        assert "SHA-256" in text
-
-
-def test_an_exported_law_is_the_law(own, file, tmp_path):
-    module = tmp_path / "own_law.py"
-    run("export", "python-law", "--map", file, "--E-star", "1 GPa", "--out", module)
-    law = contact_law(own, E_star="1 GPa")
-    c = np.geomspace(1e-3, 0.99, 50) * law.h_max
-    found = fresh(
-        "import importlib.util as i, json, sys, numpy as np\n"
-        "spec = i.spec_from_file_location('own_law', sys.argv[1]); m = i.module_from_spec(spec)\n"
-        "spec.loader.exec_module(m)\n"
-        "print(json.dumps(np.asarray(m.pressure(np.array(json.loads(sys.argv[2])))).tolist()))",
-        str(module),
-        json.dumps(c.tolist()),
-    )
-    np.testing.assert_allclose(found, law.pressure(law.h_max - c), rtol=1e-12)
 
 
 class TestBeyondTheLoads:
@@ -299,7 +260,6 @@ class TestCache:
             os.utime(place / f"{name}.npz", (used, used))
         assert cache.trim(2 * (place / "old.npz").stat().st_size) == 1
         assert [path.stem for path, _ in cache.files()] == ["middle", "new"]
-        # what is read is new again
         assert cache.load("middle", values=(1000,)) is not None
         assert cache.load("middle", values=(999,)) is None
         assert [path.stem for path, _ in cache.files()] == ["new", "middle"]
@@ -324,8 +284,6 @@ class TestCache:
 
 
 class TestLargeMaps:
-    """Maps of too many points, here of more than 32 x 32."""
-
     @pytest.fixture(autouse=True)
     def few(self, monkeypatch):
         monkeypatch.setattr(own_map, "MOST_POINTS", 32 * 32)

@@ -11,23 +11,16 @@ import pytest
 from catalogue import LEVEL, OWN
 from helpers import SCALE, difference_weights, with_slopes
 
-from generate.tables.island4d import from_axes
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, height_integral, island
 from mbma_tables.core import core
-from mbma_tables.islands.four_numbers import band_fields, to_axes
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.law.block import CENTRE, RATE
-from mbma_tables.models import answer_islands
-from mbma_tables.models.closed_form_certificates import RANGES
-from mbma_tables.models.closed_forms import FormulaModel
-from mbma_tables.models.island4d import RAW
-from mbma_tables.models.tables import open_table, universal_model
+from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.spectrum import band_moment
-from mbma_tables.surfaces.variants import REPORTED, VARIANTS, get_variant
+from mbma_tables.surfaces.variants import VARIANTS, get_variant
 from mbma_tables.totals.island_sum import kinks
 
 STEP = 1e-9
-WIDE = 1e-6
 EPS = np.finfo(float).eps
 INPUTS = ("hurst", "q0", "q1", "h_rms", "h_max", "separation")
 SOLVER_RTOL = 1e-10
@@ -114,40 +107,6 @@ def test_totals_do_not_jump(variant, which, island_model, rtol, count):
         assert (off <= one.error + other.error + np.abs(high - low) + rounded)[some].all()
 
 
-def own_motion(answer, name):
-    """How far an island model's answer moves over a step by itself: by differences a thousand steps wide."""
-    centre = getattr(answer(0.0), name)
-    return np.max([np.abs(getattr(answer(end), name) / centre - 1) for end in (-WIDE, WIDE)], axis=0) * STEP / WIDE
-
-
-@pytest.mark.parametrize("which", ["delta", "hurst", "q0", "q1", "h_rms", "E_star"])
-@pytest.mark.parametrize(
-    ("island_model", "rtol"), [("universal", 1e-8), ("exact", 1e-10), ("rigid", 1e-8), ("island4d", 1e-3)]
-)
-def test_islands_do_not_jump(which, island_model, rtol):
-    count = 90 * SCALE
-    rng = np.random.default_rng([9, len(which), len(island_model)])
-    hurst, zeta_1, _ = surfaces(rng, count)
-    hurst = np.clip(hurst, 0.31, 1 - 2 * WIDE)
-    approach = 10 ** rng.uniform(-9, 0.5, count)
-    for start, kink in enumerate(kinks(hurst, zeta_1, REPORTED)):
-        approach[start::3] = kink[start::3]
-    numbers = {"hurst": hurst, "q0": np.full(count, 2.0), "q1": 2 * zeta_1, "h_rms": np.full(count, 0.3)}
-    # the four-parameter table ends a little above what surfaces visit
-    numbers |= {"delta": 0.3 * np.minimum(approach, 9.0), "E_star": np.full(count, 7.0)}
-
-    def answer(share):
-        own = moved_by(numbers, which, share)
-        surface = Surface(own["hurst"], own["q0"], own["q1"], own["h_rms"], 9.0)
-        return island(surface, own["delta"], island_model=island_model, rtol=rtol, E_star=own["E_star"])
-
-    one, other = answer(-STEP / 2), answer(STEP / 2)
-    for name in ("force", "area", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "eta", "X", "mu"):
-        stated = one.error + other.error if name in ("pressure", "area") else 1e-12
-        off = np.abs(getattr(other, name) / getattr(one, name) - 1)
-        assert (off <= stated + 2 * own_motion(answer, name)).all(), name
-
-
 def level_changes(rng, count, rtol):
     """X and mu where the solver goes over to more nodes: by X in the first half, by mu in the other."""
     digits = -math.log10(rtol)
@@ -217,7 +176,6 @@ def test_the_solver_does_not_jump(which):
 
 
 def test_the_solver_joins_the_rigid_sphere():
-    """Where the deformation is left out altogether."""
     X = np.random.default_rng(11).uniform(-20, 38, 200 * SCALE)
     squared = np.empty(X.size)
     assert core.island_extents(X, np.zeros(X.size), 0.03 * SOLVER_RTOL, squared) == 0
@@ -228,21 +186,6 @@ def test_the_solver_joins_the_rigid_sphere():
     assert (other.iterations > 0).all()
     assert (apart(one.phi_F, other.phi_F, 2 * STEP) <= one.error + other.error).all()
     assert (apart(one.phi_A, other.phi_A, 0) <= one.error + other.error).all()
-
-
-@pytest.mark.parametrize("which", ["X", "mu"])
-@pytest.mark.parametrize("form", ["standard", "pocket", "long"])
-def test_the_closed_forms_do_not_jump(form, which):
-    """And where the solver takes over from them."""
-    model, rng = FormulaModel(form), np.random.default_rng(12)
-    count = 120 * SCALE
-    (X_low, X_high), (_, mu_high) = (RANGES[form][name] for name in ("X", "mu"))
-    X, mu = rng.uniform(X_low, X_high, count), 10 ** rng.uniform(-9, math.log10(mu_high), count)
-    if which == "X":
-        X[::6], X[1::6] = max(X_low, 1e-3), X_high
-    else:
-        mu[::3] = mu_high
-    islands_apart(lambda X, mu: model.answer(X, mu, outside="exact"), X, mu, which, room=1)
 
 
 @pytest.mark.parametrize("side", ["X low", "X high", "mu high"])
@@ -262,70 +205,8 @@ def test_the_solver_takes_over_from_the_universal_table(side):
         assert (apart(getattr(one, name), getattr(other, name), moved) <= one.error + other.error + 1e-13).all()
 
 
-def raw_numbers(rng, count):
-    """The paper's four numbers of islands of the four-parameter table: random, at ends of its axes, at its nodes."""
-    X_axis, spread_axis, sphere_axis, hurst_axis = open_table("island4d").content.axes
-    hurst, sphere = rng.uniform(hurst_axis.low, hurst_axis.high - 1e-6, count), rng.uniform(1e-6, 1, count)
-    spread, X = 10 ** rng.uniform(-3, math.log10(2499), count), rng.uniform(X_axis.low, X_axis.high, count)
-    hurst[::5] = rng.choice(hurst_axis.values[:-1], hurst[::5].size)
-    sphere[1::5], X[2::5], X[3::5] = 1.0, X_axis.low, X_axis.high
-    inner = (axis.values[1:-1] for axis in (hurst_axis, sphere_axis, X_axis))
-    for numbers, nodes in zip((hurst, sphere, X), inner, strict=True):
-        numbers[-count // 4 :] = rng.choice(nodes, count // 4)
-    nodes = spread_axis.values[(spread_axis.values > 1e-3) & (spread_axis.values < 2400)]
-    spread[-count // 4 :] = rng.choice(nodes, count // 4)
-    zeta_d = from_axes(sphere, hurst)
-    sigma = to_axes(np.ones(count), zeta_d, zeta_d * (1 + spread), hurst, REPORTED).sigma
-    raw = (X * sigma + 1) * zeta_d**-hurst, zeta_d, zeta_d * (1 + spread), hurst
-    return dict(zip(RAW, raw, strict=True))
-
-
-@pytest.mark.parametrize("which", RAW)
-def test_the_four_parameter_table_does_not_jump(which):
-    """And where the solver takes over from it, at the ends of its axes."""
-    model, raw = open_table("island4d"), raw_numbers(np.random.default_rng(14), 260 * SCALE)
-    below, above = (raw | {which: raw[which] * (1 + sign * STEP / 2)} for sign in (-1, 1))
-    one, other = (model.lookup(**side, outside="exact") for side in (below, above))
-    slopes = [model.lookup(**side, outside="nan", derivatives=True) for side in (below, above)]
-    place = to_axes(*raw.values(), REPORTED)
-    rounded = EPS * (1 / place.spread + 4 * (1 + place.X) / place.sigma)
-    for hat, by in (("F_hat", "F_by"), ("A_hat", "A_by")):
-        steps = [getattr(s, by)[which] / getattr(s, hat) * STEP * raw[which] for s in slopes]
-        # slopes over values, at nodes too
-        close = PROMISED + 100 * STEP / np.minimum(place.spread, place.sigma)
-        apart_by = np.abs(steps[1] - steps[0]) / STEP
-        assert (~(apart_by > close * np.maximum(1, np.abs(steps[0]) / STEP))).all()
-        moved = np.where(np.isnan(steps[0]), steps[1], steps[0])
-        assert np.isfinite(moved).all()
-        off = apart(getattr(one, hat), getattr(other, hat), moved)
-        assert (off <= one.error + other.error + rounded + 0.1 * np.abs(moved)).all()
-    crossed = np.isnan(slopes[0].F_hat) != np.isnan(slopes[1].F_hat)
-    assert crossed.any()
-
-
-def test_the_four_parameter_table_joins_its_expansion():
-    count, model = 200 * SCALE, open_table("island4d")
-    rng = np.random.default_rng(15)
-    X_axis, spread_axis, _, hurst_axis = model.content.axes
-    hurst = rng.uniform(hurst_axis.low, hurst_axis.high, count)
-    zeta_d, X = from_axes(rng.uniform(0.01, 1, count), hurst) * (1 + 1e-9), rng.uniform(X_axis.low, X_axis.high, count)
-    found = []
-    for sign in (-1, 1):
-        spread = spread_axis.low * (1 + sign * STEP) * np.ones(count)
-        mu = band_fields(spread, (1.25 / zeta_d) ** (4 - 2 * hurst), hurst, REPORTED)[0]
-        fields = {"X": X, "width": np.log1p(spread), "zeta_d": zeta_d, "hurst": hurst, "mu": mu}
-        answer = answer_islands(model, fields)
-        found.append((answer.phi_F / mu, answer.phi_A, answer.error))
-    (force, area, error), (next_force, next_area, next_error) = found
-    assert (np.abs(next_force / force - 1) <= error + next_error).all()
-    assert (np.abs(next_area / area - 1) <= error + next_error).all()
-    # of a first-order effect of mu = 1e-9, far less is left than the table's error elsewhere
-    assert np.abs(np.concatenate([next_force / force, next_area / area]) - 1).max() < 1e-9
-
-
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9])
 def test_laws_do_not_jump_at_their_breaks(rtol):
-    """Values of two pieces differ by their errors, slopes by theirs, but for the model's jump."""
     rng = np.random.default_rng(16)
     for _ in range(4 * SCALE):
         variant = sorted(VARIANTS)[rng.integers(2)]
@@ -373,7 +254,6 @@ def one_sided(function, at, step):
 
 
 def fields_of(name, hurst, zeta_1, rule):
-    """One of `FIELDS` as a function of the approach."""
     return lambda approach: geometry(
         approach, *(np.broadcast_to(a[:, None], approach.shape).copy() for a in (hurst, zeta_1)), rule
     )[name]
@@ -381,7 +261,6 @@ def fields_of(name, hurst, zeta_1, rule):
 
 @pytest.mark.parametrize("rule", EVERY, ids=lambda rule: rule.name)
 def test_numbers_of_islands(rule):
-    """At both kinks and at random approaches, which are moved away from kinks."""
     rng = np.random.default_rng(1)
     hurst, zeta_1, _ = smooth_surfaces(rng, 80 * SCALE)
     at_kinks, elsewhere = kinks(hurst, zeta_1, rule), 10 ** rng.uniform(-9, 1.3, hurst.size)
@@ -398,7 +277,6 @@ def test_numbers_of_islands(rule):
 
 
 def changed(numbers, which, value):
-    """Numbers as columns, with one of them replaced by rows of values."""
     own = {name: np.broadcast_to(given[:, None], value.shape) for name, given in numbers.items()}
     return own | {which: value}
 

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
+from generate.pages.film import PATIR_CHENG, published
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, flow_factors
 from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.laws.film import factors
 from mbma_tables.laws.reynolds import flow_and_couette
+from mbma_tables.theories import BoundaryElements
 
 BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
-# phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978, Table 1
-PATIR_CHENG = {1 / 9: (1.48, 0.42), 1 / 6: (1.38, 0.42), 1 / 3: (1.18, 0.42), 1: (0.90, 0.56), 3: (0.225, 1.5),
-               6: (0.520, 1.5), 9: (0.870, 1.5)}  # fmt: skip
 
 
 def test_wide_gaps_have_the_known_expansion():
@@ -27,7 +26,6 @@ def test_wide_gaps_have_the_known_expansion():
 
 
 def test_ridges_are_the_averages_of_one_dimension():
-    """Across ridges the mean of 1/h^3 and of 1/h^2 count, along them the mean of h^3 and h."""
     h = 1 + 0.5 * np.sin(np.linspace(0, 2 * np.pi, 64, endpoint=False))
     K, couette = flow_and_couette(np.repeat(h[:, None], 3, 1))
     np.testing.assert_allclose(K, [1 / np.mean(h**-3.0), np.mean(h**3)])
@@ -37,12 +35,10 @@ def test_ridges_are_the_averages_of_one_dimension():
 @pytest.mark.parametrize("gamma", PATIR_CHENG)
 def test_published_curves(gamma):
     """Fits to simulations of 20 x 20 points; within 8% of theirs from h = 3 h_rms on."""
-    C, r = PATIR_CHENG[gamma]
     H = np.array([3.0, 4.0, 6.0])
-    known = 1 + C * H**-r if gamma > 1 else 1 - C * np.exp(-r * H)
     peklenik = min(max(gamma, 1 / 8.5), 8.5)
     found = flow_factors(Surface(0.8, 0.05, 1.5, 1.0, 2.9), H, peklenik=peklenik).phi_x
-    np.testing.assert_allclose(found, known, rtol=0.08)
+    np.testing.assert_allclose(found, published(gamma, H), rtol=0.08)
 
 
 def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
@@ -75,12 +71,77 @@ def test_isotropic_factors_are_those_of_the_leakage():
     assert found.valid.all()
 
 
+def test_factors_are_continuous_at_first_contact():
+    h_max = float(BEARING.h_max)
+    found = flow_factors(BEARING, h_max * np.array([1 - 1e-9, 1 + 1e-9]), peklenik=3)
+    assert found.area[0] > found.area[1] == 0
+    for name in ("phi_x", "phi_y", "shear_x", "shear_y"):
+        np.testing.assert_allclose(*getattr(found, name), rtol=1e-5, err_msg=name)
+
+
 def test_a_lay_turned_by_a_right_angle():
     u = np.linspace(0.6, 4, 9)
     one, other = (flow_factors(BEARING, u, peklenik=gamma) for gamma in (3.0, 1 / 3))
     np.testing.assert_allclose(one.phi_x, other.phi_y, rtol=1e-9)
     np.testing.assert_allclose(one.shear_y, other.shear_x, rtol=1e-9)
     assert (one.phi_x > one.phi_y).all()
+
+
+@pytest.fixture(scope="module")
+def own_map():
+    """A map of 96 x 96 points, and its factors by its own simulation at 60 gaps."""
+    pytest.importorskip("tamaas")
+    rng, n = np.random.default_rng(8), 96
+    q = np.hypot(*np.meshgrid(*2 * [np.fft.fftfreq(n)], indexing="ij"))
+    z = np.fft.ifft2(np.where((q > 1 / 34) & (q < 1 / 6), np.fft.fft2(rng.standard_normal((n, n))), 0)).real
+    face = Surface.from_map(z / z.std(), dx=1.0, periodic=True, detrend="mean")
+    return face, flow_factors(face, np.geomspace(0.6, 10, 60), theory="simulated")
+
+
+@pytest.mark.slow
+def test_factors_of_a_simulated_map_are_those_of_its_gaps(own_map):
+    """Between their knots too; reynoldsflow solves the same gaps where it is installed."""
+    face, film = own_map
+    try:
+        from reynoldsflow import transport
+    except ImportError:
+        transport = None
+    z = face.map.heights - face.map.heights.mean()
+    for k in (8, 17, 26, 35, 44, 53):
+        u = film.mean_separation[k]
+        found = contact(face, mean_separation=u, theory="simulated")
+        gap = u - z if u > z.max() else found.map().gap
+        assert gap.mean() == pytest.approx(u, rel=0.01)
+        K, couette = flow_and_couette(gap, gap.shape)
+        phi, shear = [film.phi_x[k], film.phi_y[k]], [film.shear_x[k], film.shear_y[k]]
+        deep = found.area > 0.05
+        np.testing.assert_allclose(phi, K / gap.mean() ** 3, rtol=0.2 if deep else 0.02)
+        np.testing.assert_allclose(shear, gap.mean() - couette, rtol=0.02)
+        assert np.all(np.abs(np.log(phi / (K / gap.mean() ** 3))) < 3 * film.scatter[k] + 0.01)
+        if transport is not None:
+            for axis, values in enumerate((gap, gap.T)):
+                kept, _, flux = transport.solve_fluid_problem(values, "scipy-spsolve", boundary_mode="periodic")
+                theirs, _ = transport.compute_total_flux(kept, flux, len(gap), "periodic")
+                assert K[axis] == pytest.approx(theirs, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_simulated_map_continued_by_its_images_and_what_is_refused(own_map):
+    face, film = own_map
+    assert film.pressure[-1] == 0 < film.pressure[0]
+    alone = flow_factors(face, film.mean_separation[50:], theory="simulated")
+    np.testing.assert_allclose(alone.phi_x, film.phi_x[50:], rtol=2e-3)
+    u = 4.0
+    whole = Surface.from_map(face.map.heights, dx=1.0, periodic=False, detrend="mean")
+    z = whole.map.heights - whole.map.heights.mean()
+    K, couette = flow_and_couette(u - np.block([[z, z[:, ::-1]], [z[::-1], z[::-1, ::-1]]]), (192, 192))
+    found = flow_factors(whole, [u], theory="simulated")
+    np.testing.assert_allclose([found.phi_x[0], found.phi_y[0]], K / u**3, rtol=1e-4)
+    np.testing.assert_allclose([found.shear_x[0], found.shear_y[0]], (u - couette) / whole.h_rms, rtol=1e-4)
+    with pytest.raises(InputError, match="peklenik"):
+        flow_factors(face, 1.0, theory=BoundaryElements.of(face), peklenik=2.0)
+    with pytest.raises(InputError, match="height map"):
+        flow_factors(BEARING, 1.0, theory="simulated")
 
 
 def test_units_and_what_is_refused(tmp_path):

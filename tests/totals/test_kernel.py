@@ -1,13 +1,10 @@
-"""Totals in the core, and the batch quadrature: rules, islands, unlike integrals, failure, independence of order."""
+"""Totals in the core: islands, failure, kinks, independence of order, stated errors."""
 
 import math
 
 import numpy as np
 import pytest
-from catalogue import LEVEL, OWN
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from numpy.polynomial import legendre
+from catalogue import LEVEL
 
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
@@ -16,24 +13,7 @@ from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
 from mbma_tables.totals import island_sum
-from mbma_tables.totals.island_sum import Pairs, integrate, kinks, totals_of
-
-
-@pytest.mark.parametrize("points", [21, 31])
-def test_the_rules_by_their_degrees(points):
-    """2 n + 1 Kronrod points are exact up to degree 3 n + 1, n Gauss points up to 2 n - 1, and not beyond."""
-    nodes, kronrod, gauss = np.empty((3, points))
-    assert core.kronrod(points, nodes, kronrod, gauss) == OK
-    n = points // 2
-    np.testing.assert_allclose(nodes[1::2], legendre.leggauss(n)[0], rtol=0, atol=2e-16)
-    np.testing.assert_allclose(gauss[1::2], legendre.leggauss(n)[1], rtol=1e-14)
-    assert (gauss[::2] == 0).all()
-    for degree in range(0, 3 * n + 6, 2):
-        integral = 2.0 if degree == 0 else 0.0
-        # Legendre polynomials show every digit, powers do not
-        shape = legendre.legval(nodes, [0] * degree + [1])
-        assert (abs(kronrod @ shape - integral) < 1e-14) == (degree <= 3 * n + 1)
-        assert (abs(gauss @ shape - integral) < 1e-14) == (degree <= 2 * n - 1)
+from mbma_tables.totals.island_sum import Pairs, Sums, sums_by_table
 
 
 @pytest.mark.parametrize("variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name)
@@ -57,7 +37,6 @@ def test_islands_are_those_of_geometry(variant):
 
 
 def totals(hurst, zeta_1, compression, peak, rtol=1e-9, slopes=0):
-    """Totals, error and status straight from the core."""
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak)))
     numbers, count = [np.ascontiguousarray(array) for array in arrays], arrays[0].size
     out, error, status = np.empty((count, 2, 5 if slopes else 1)), np.empty(count), np.empty(count, np.uint8)
@@ -85,7 +64,6 @@ def test_no_number_crashes_and_none_that_is_wrong_is_answered(slopes):
 
 
 def test_what_cannot_be_resolved_is_said(monkeypatch):
-    """A tolerance below rounding ends in a status, never in a number that looks right."""
     assert totals(0.8, 216.0, 4.0, 3.0)[2][0] == OK
     out, error, status = totals(0.8, 216.0, 4.0, 3.0, rtol=1e-30)
     assert status[0] == UNRESOLVED
@@ -119,75 +97,6 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
         assert phi[-1].tobytes() == phi[0].tobytes()
 
 
-@pytest.mark.parametrize("variant", [REPORTED, OWN], ids=lambda variant: variant.name)
-def test_kinks_are_where_geometry_reaches_its_floors(variant):
-    rng = np.random.default_rng(6)
-    hurst, zeta_1 = rng.uniform(0.1, 1, 200), 3.51 * 10 ** rng.uniform(0, 7, 200)
-    for kink, name, floor in zip(
-        kinks(hurst, zeta_1, variant), ("zeta_d", "zeta_u"), (variant.floor_d, variant.floor_u), strict=True
-    ):
-        before, beyond = (geometry(kink * (1 + sign * 1e-9), hurst, zeta_1, variant)[name] for sign in (-1, 1))
-        assert (before > floor).all()
-        assert (beyond == floor).all()
-
-
-def integrals(function, low, high, rtol=1e-10, owner=None):
-    """Integrate one-component `function(owner, x)`."""
-    low, high = np.atleast_1d(np.asarray(low, float)), np.atleast_1d(np.asarray(high, float))
-    owners = np.arange(low.size) if owner is None else np.asarray(owner)
-    return integrate(lambda who, x: function(who[:, None], x)[..., None], owners, low, high, owners.max() + 1, rtol)
-
-
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-10, 1e-13])
-def test_each_integral_to_its_own_size(rtol):
-    # integral of scale exp(-(x/width)^2) over [-1, 1]
-    width = np.array([1.0, 1e-1, 1e-3, 1e-4])
-    scale = np.array([1e-200, 1.0, 1e100, 1e-20])
-    found = integrals(lambda who, x: scale[who] * np.exp(-((x / width[who]) ** 2)), -np.ones(4), np.ones(4), rtol)
-    known = scale * math.sqrt(math.pi) * width * [math.erf(1 / w) for w in width]
-    error = np.abs(found.value[:, 0] / known - 1)
-    assert (error <= np.maximum(found.error[:, 0], 4e-15)).all()
-    assert found.error.max() <= rtol
-
-
-@settings(deadline=None)
-@given(power=st.floats(-0.5, 8), high=st.floats(1e-8, 1e8))
-def test_end_point_powers(power, high):
-    found = integrals(lambda who, x: x**power, 0.0, high, 1e-8)
-    known = high ** (power + 1) / (power + 1)
-    assert abs(found.value[0, 0] / known - 1) <= 1e-8
-
-
-def test_several_intervals_of_one_owner_and_none():
-    found = integrate(
-        lambda who, x: np.stack([x, x**2], axis=-1),
-        np.array([0, 2, 0]),
-        np.array([0.0, 0.0, 1.0]),
-        np.array([1.0, 3.0, 2.0]),
-        3,
-        1e-12,
-    )
-    assert found.value == pytest.approx(np.array([[2.0, 8 / 3], [0, 0], [4.5, 9.0]]), rel=1e-14, abs=0)
-    assert (found.error[1] == 0).all()
-
-
-def test_failure_says_which():
-    with pytest.raises(ConvergenceError, match="1 of 3") as caught:
-        integrals(lambda who, x: np.where(who == 1, x**-1.0, x), np.zeros(3), np.ones(3))
-    assert caught.value.mask.tolist() == [False, True, False]
-
-
-def test_the_estimate_is_of_the_kronrod_sum():
-    """Not of the Gauss sum, which is far worse: where that one alone misses the tolerance, nothing is halved."""
-    x, weights = np.polynomial.legendre.leggauss(10)
-    true, gauss = 4 + 0.4 * math.sin(5), weights @ (2 + np.cos(5 * x))
-    rtol = abs(gauss / true - 1) / 5
-    ends = np.array([-1.0]), np.array([1.0])
-    found = integrate(lambda _, points: 2 + np.cos(5 * points)[..., None], np.array([0]), *ends, 1, rtol)
-    assert found.evaluations == 21
-    assert abs(found.value[0, 0] / true - 1) <= found.error[0, 0] <= rtol
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
 def test_stated_errors_of_totals(name):
@@ -196,9 +105,11 @@ def test_stated_errors_of_totals(name):
     low, high = (0.1, np.log(max(3.1, 1.01 * variant.floor_u)), 2.5, 0), (1, np.log(1e4), 5.5, 1)
     hurst, log_zeta, peak, share = rng.uniform(low, high, (count, 4)).T
     surface = Surface(hurst, np.ones(count), np.exp(log_zeta), np.ones(count), peak)
-    pairs = Pairs.of(surface, 2 * peak * share**1.5)
-    found, known = (totals_of(get_model("universal", 1e-8, variant), pairs, variant, rtol) for rtol in (1e-8, 1e-12))
+    pairs, model = Pairs.of(surface, 2 * peak * share**1.5), get_model("universal", 1e-8, variant)
+    (found, error, *_), (known, *_) = (
+        sums_by_table(model, pairs, Sums(model, variant, rtol), "raise", slopes=False) for rtol in (1e-8, 1e-12)
+    )
     with np.errstate(invalid="ignore"):
-        off = [np.nan_to_num(np.abs(a / b - 1)) for a, b in ((found.force, known.force), (found.area, known.area))]
-    assert (np.max(off, axis=0) <= found.error).all()
-    assert found.error.max() <= 1e-8
+        off = np.nan_to_num(np.abs(found / known - 1))
+    assert (off.max(axis=(1, 2)) <= error).all()
+    assert error.max() <= 1e-8

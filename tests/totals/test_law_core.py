@@ -11,7 +11,6 @@ import xarray as xr
 from mbma_tables import OutOfRangeError, Surface, contact_law
 from mbma_tables.core import core
 from mbma_tables.law.block import AREA, EXPONENT, FORCE, HEAD, HIGH, MINUS_ROWS, QUANTITIES, RECORDS
-from mbma_tables.laws.effective_medium import wide_gap
 
 SURFACES = {
     "mbma": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {}),
@@ -122,13 +121,6 @@ def test_values_that_no_gap_has_are_nan_and_counted(name, which):
             assert law.separation(**{QUANTITIES[which]: tiny}) == law.h_max
 
 
-@pytest.mark.parametrize("name", ["mbma", "calibrated"])
-def test_leakage_apart(name):
-    law = law_of(name)
-    mean = law.h_max * np.array([1.0 + 1e-12, 1.5, 20.0, 1e6])
-    np.testing.assert_allclose(law.leakage(mean), mean**3 * wide_gap(mean / 0.7), rtol=1e-15)
-
-
 def test_broken_blocks_are_refused():
     law = law_of("calibrated")
     out, d = np.empty(1), np.zeros(1)
@@ -164,21 +156,6 @@ def test_questions_that_are_none():
             ask(v=1.0)
         with pytest.raises(TypeError, match="unexpected keyword argument 'mean_separation'"):
             ask(1.0, mean_separation=1.0)
-
-
-@pytest.mark.parametrize("name", SURFACES)
-def test_generations_of_processors_have_the_same_bits(name, generations):
-    law = law_of(name)
-    d, inverse = gaps_of(law), law._inverse_block("pressure")
-    force = law.pressure(separation=d[d > 0])
-    values, gaps = filled(law, d)[1], [getattr(law.at_pressure(force), n) for n in ("separation", "area", "stiffness")]
-    for k, other in enumerate(generations):
-        out, found = np.empty((5, d.size)), np.empty((3, force.size))
-        assert other.law_fill(d, law.block, *out) == other.law_invert(force, law.block, inverse, FORCE, *found) == 0
-        if k == 0 and core.__name__.endswith("_plain"):  # without fused operations bits are others
-            values, gaps = out, found
-        np.testing.assert_array_equal(out, values)
-        np.testing.assert_array_equal(found, gaps)
 
 
 def test_a_law_is_answered_without_leaving_anything():

@@ -59,7 +59,6 @@ def test_laws_answer_as_contacts_do(theory):
     for slid in ("10 nm", ["0.05 um", "0.1 um"]):
         np.testing.assert_allclose(two.shear(slid), one.shear(slid), rtol=1e-4)
     np.testing.assert_allclose(two.energy_loss("1 MPa"), one.energy_loss("1 MPa"), rtol=1e-4)
-    # it begins with full stick
     assert one.shear(1e-5) / 1e-5 == pytest.approx(one.stiffness, rel=1e-3)
     # a cycle loses less than one that slips freely, and more than none
     assert 0 < one.energy_loss("1 MPa") < 4e-3 * one.displacement("1 MPa")
@@ -153,6 +152,5 @@ def test_a_lay_is_stiffer_across():
 
 
 def test_two_unlike_bodies_with_a_lay():
-    """Their compliances add; bodies alike are one."""
     c = lambda nu: 0.2 + 0.1 * nu  # noqa: E731
     assert tangential_ratio((0.3, 0.3), (210.0, 70.0), c) == pytest.approx(tangential_ratio(0.3, share=c))

@@ -1,0 +1,336 @@
+"""``python -m generate audit``: search for wrong bounds, for untested answers that are `valid`, and for bad failures.
+
+README and docs/guarantees.md quote the counts.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import reprlib
+import signal
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import Any, NamedTuple
+
+import click
+import hypothesis
+import numpy as np
+from hypothesis import strategies as st
+
+from generate.files import ROOT, evidence
+from generate.pages import page
+from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
+from mbma_tables.laws.calibrated import self_affine_law
+
+LONGEST = 10.0  # seconds of one request
+GAPS = 20  # of one surface
+ROUNDED = 4 * np.finfo(float).eps  # of a mean separation
+FORMATS = "{} | {:,} | {:,} | {} | {:.2g}"
+SMALLEST = 1e-290  # beyond, values lose digits to underflow
+
+
+class Found(NamedTuple):
+    """What one check found: numbers of its answers, its worst answer, and the input that gives it."""
+
+    what: str
+    answers: int
+    refused: int
+    beyond: int
+    worst: float
+    where: str
+
+
+class Hang(BaseException):
+    """A request took longer than `LONGEST`; no handler of the library catches it."""
+
+
+def _hang(number: int, frame: FrameType | None) -> None:
+    raise Hang(f"longer than {LONGEST:g} s")
+
+
+def surface_of(hurst: float, log_zeta: float, height: float) -> Surface:
+    """A surface with q0 = h_rms = 1."""
+    return Surface(hurst, 1.0, float(np.exp(log_zeta)), 1.0, height)
+
+
+def miss(found: Any, reference: Any, allowed: Any) -> np.ndarray:
+    """Distances of pressures and areas from their references, over what is allowed."""
+    ratios = []
+    for value, other in zip(found, reference, strict=True):
+        seen = np.abs(other) > SMALLEST
+        ratios.append(np.abs(value[seen] / other[seen] - 1) / np.broadcast_to(allowed, seen.shape)[seen])
+    return np.concatenate(ratios)
+
+
+def mbma(surface: Surface, u: np.ndarray, rtol: float) -> np.ndarray:
+    """MBMA by its table against every island solved."""
+    found = contact(surface, mean_separation=u, rtol=rtol, theory="mbma")
+    exact = contact(surface, mean_separation=u, rtol=1e-10, theory="mbma", island_model="exact")
+    return miss((found.pressure, found.area), (exact.pressure, exact.area), found.error + exact.error)
+
+
+def calibrated(surface: Surface, u: np.ndarray, rtol: float) -> np.ndarray:
+    """The calibrated law's table against its own quadrature."""
+    found = contact(surface, mean_separation=u, theory="calibrated")
+    pressure, area, _ = self_affine_law(surface.hurst, surface.zeta_1, surface.h_max).contact(u)
+    exact = pressure * surface.rms_gradient, area
+    return miss((found.pressure, found.area), exact, found.error)
+
+
+def law(theory: str, hardness: float = np.inf) -> Callable[..., np.ndarray]:
+    """A law against the theory that it was made of."""
+
+    def ratio(surface: Surface, u: np.ndarray, rtol: float) -> np.ndarray:
+        made = contact_law(surface, theory, rtol=max(rtol, 1e-8), hardness=hardness)
+        gaps = u[(u > (made.lowest + surface.h_max) / 2) & (surface.h_max - u > 1e-6 * surface.h_max)]
+        found = contact(surface, mean_separation=gaps, theory=theory, hardness=hardness)
+        return miss((made.pressure(gaps), made.area(gaps)), (found.pressure, found.area), made.error + found.error)
+
+    return ratio
+
+
+def inverse(theory: str, hardness: float = np.inf) -> Callable[..., np.ndarray]:
+    """A pressure through the separation at which it acts; what rounding of that separation changes is allowed."""
+
+    def ratio(surface: Surface, u: np.ndarray, rtol: float) -> np.ndarray:
+        given = {"theory": theory, "hardness": hardness}
+        asked = np.asarray(contact(surface, mean_separation=u, **given).pressure)  # type: ignore[arg-type]
+        asked = asked[(asked > SMALLEST) & np.isfinite(asked)]
+        back = contact(surface, pressure=asked, **given)  # type: ignore[arg-type]
+        again = contact(surface, mean_separation=back.mean_separation, **given)  # type: ignore[arg-type]
+        rounding = ROUNDED * (1 + back.mean_separation * np.abs(again.stiffness) / asked)
+        return miss((again.pressure,), (asked,), back.error + again.error + rounding)
+
+    return ratio
+
+
+BOUNDS: dict[str, tuple[Callable[..., np.ndarray], int]] = {
+    "`error` of MBMA, against exact islands": (mbma, 900),
+    "`error` of the calibrated law, against its quadrature": (calibrated, 2400),
+    "`error` of laws of MBMA": (law("mbma"), 600),
+    "`error` of laws of the calibrated theory": (law("calibrated"), 600),
+    "`error` of calibrated laws with a hardness": (law("calibrated", 0.02), 360),
+    "`error` of laws of Persson's theory": (law("persson"), 360),
+    "inverses of MBMA": (inverse("mbma"), 900),
+    "inverses of the calibrated theory": (inverse("calibrated"), 1800),
+    "inverses of the calibrated theory with a hardness": (inverse("calibrated", 0.02), 600),
+    "inverses of Persson's theory": (inverse("persson"), 360),
+}
+
+
+def bound(what: str, seed: int, scale: float) -> Found:
+    """Search for surfaces, gaps and tolerances at which an answer is farthest from its reference."""
+    ratio, examples = BOUNDS[what]
+    count = refused = beyond = 0
+    worst, where = 0.0, ""
+
+    @hypothesis.seed(seed)
+    @hypothesis.settings(
+        max_examples=max(int(scale * examples), 1),
+        deadline=None,
+        database=None,
+        phases=[hypothesis.Phase.generate, hypothesis.Phase.target],
+        suppress_health_check=list(hypothesis.HealthCheck),
+    )
+    @hypothesis.given(
+        hurst=st.floats(0.05, 1.0),
+        log_zeta=st.floats(np.log(3.1), np.log(1e5)),
+        height=st.floats(1.0, 32.0),
+        nearest=st.floats(-7.0, -0.5),
+        digits=st.floats(3.0, 9.0),
+    )
+    def search(hurst: float, log_zeta: float, height: float, nearest: float, digits: float) -> None:
+        nonlocal count, refused, beyond, worst, where
+        surface = surface_of(hurst, log_zeta, height)
+        u = surface.h_max * (1 - np.geomspace(10**nearest, 0.999, GAPS))
+        try:
+            ratios = np.atleast_1d(ratio(surface, u, 10**-digits))
+        except MbmaError:
+            refused += 1
+            return
+        if not ratios.size:
+            return
+        largest = float(np.max(np.where(np.isnan(ratios), np.inf, ratios)))
+        count += ratios.size
+        beyond += int((~(ratios <= 1)).sum())
+        if largest > worst:
+            worst, where = largest, f"{surface!r}, nearest={nearest:.4g}, digits={digits:.3g}"
+        hypothesis.target(min(np.log(max(largest, 1e-12)), 50.0))
+
+    search()
+    return Found(what, count, refused, beyond, worst, where)
+
+
+def validity(seed: int, scale: float) -> Found:
+    """Answers that are `valid` outside the ranges of the simulated surfaces in docs/data, or without a scatter."""
+    rng, tested_ones = np.random.default_rng(seed), [one for one in evidence() if one.kind == "self_affine"]
+    hursts, zetas = ([float(one.node[place]) for one in tested_ones] for place in (1, 2))
+    areas = np.concatenate([one.area for one in tested_ones])
+    area = float(areas[areas > 0].min()), float(areas.max())
+    ends = {"hurst": (min(hursts), max(hursts)), "zeta_1": (min(zetas), max(zetas))}
+    count = beyond = 0
+    where = ""
+    for _ in range(int(1000 * scale)):
+        surface = surface_of(rng.uniform(0.02, 1.0), rng.uniform(np.log(3.1), np.log(1e4)), rng.uniform(1.0, 20.0))
+        theory = ("calibrated", "mbma", "persson")[rng.integers(3)]
+        u = surface.h_max * (1 - np.geomspace(1e-6, 0.99, GAPS))
+        try:
+            found: Any = contact(surface, mean_separation=u, theory=theory)
+        except MbmaError:
+            continue
+        tested = (found.area >= area[0]) & (found.area <= area[1])
+        tested &= all(
+            low * (1 - 1e-9) <= getattr(surface, name) <= high * (1 + 1e-9) for name, (low, high) in ends.items()
+        )
+        spread = np.isfinite(found.area_scatter) & np.isfinite(found.scatter)
+        wrong = np.asarray(found.valid) & (found.pressure > 0) & ~(tested & spread)
+        count, beyond = count + wrong.size, beyond + int(wrong.sum())
+        where = where or (f"{theory}: {surface!r}, A/A0 = {found.area[wrong][0]:.3g}" if wrong.any() else "")
+    return Found("`valid` outside the simulated ranges", count, 0, beyond, float(beyond), where)
+
+
+NATURAL: list[Any] = [0.3, 1.0, 2, [0.5, 1.0], np.array([[0.2], [0.9]]), "1 um", "0.5 mm", "10 MPa", ["1 um", "2 um"]]
+NUMBERS: list[Any] = [
+    0, -1.0, 1e-300, 5e-324, 1e300, 10**400, np.nan, np.inf, -np.inf, True, None, "", "1e400 MPa", "-3 um", "5 parsec",
+    "concrete", b"1", [], ["1 um", 2.0], ["1 um", "2 mm"], {}, object(), range(3), lambda: 1, "9" * 5000, 1 + 1j,
+    np.array([]), np.array([0.3, np.nan]), np.array(["a"]), np.ones((2, 3)),
+    np.ma.masked_array([1.0, 2.0], [False, True]), np.array([1 + 1j]), np.datetime64("2020-01-01"),
+    Surface(0.8, 1.0, 100.0, 1.0, 3.0),
+]  # fmt: skip
+SURFACES: list[Any] = [
+    Surface(0.8, 1.0, 100.0, 1.0, 3.0), Surface(0.5, 0.01, 2.0, 1.0, 3.5, unit="um"), Surface.named("concrete"),
+    Surface([0.2, 0.8], 1.0, 50.0, 1.0, [3.0, 4.0]), "concrete", None, 3.0, [1, 2],
+]  # fmt: skip
+METALS = ["steel 4140 hard", ("steel 4140 hard", "aluminium 6061 hard"), "unobtainium", ("steel 4140 hard",), 3, None]
+KNOWN = ("separation", "mean_separation", "pressure", "area")
+OPTIONS: dict[str, list[Any]] = {
+    "theory": ["mbma", "calibrated", "persson", "greenwood_williamson", "none", 3, None],
+    "hardness": [*NUMBERS, "200 HV", "58 HRC", "2 GPa", 0.02],
+    "materials": METALS,
+    "E_star": [1.0, "100 GPa", "2 MPa", *NUMBERS],
+    "rtol": [1e-6, 1e-3, *NUMBERS],
+    "derivatives": [True, False, "no"],
+    "island_model": ["universal", "formula", "rigid", "exact", "none", 1],
+    "variant": ["reported", "printed", "fitted", "none"],
+    "outside": ["raise", "exact", "nan", "clamp"],
+}
+METHODS = ("pressure", "area", "stiffness", "energy", "at_pressure", "pressure_and_stiffness", "slope_error")
+CALLS: dict[str, Callable[..., Any]] = {
+    "contact": contact,
+    "law": lambda method, value, *given, **options: getattr(contact_law(*given, **options), method)(value),
+    "surface": Surface,
+    "sensitivity": sensitivity,
+    "flow_factors": flow_factors,
+    "island": island,
+    "joint": lambda asked, *parts, **options: Joint(*parts, **options).at_pressure(asked).conductance(),
+}
+PART = {"Rq": "0.4 um", "longest": "100 um", "shortest": "2 um", "hurst": 0.8}
+
+
+def requests(rng: np.random.Generator) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """Requests with natural, odd and impossible arguments, without end."""
+
+    def one(values: list[Any]) -> Any:
+        return values[rng.integers(len(values))]
+
+    def number() -> Any:
+        return one(NATURAL if rng.random() < 0.7 else NUMBERS)
+
+    def some(table: dict[str, list[Any]], share: float) -> dict[str, Any]:
+        return {name: one(values) for name, values in table.items() if rng.random() < share}
+
+    def surface() -> Any:
+        return SURFACES[rng.integers(3)] if rng.random() < 0.8 else one(SURFACES)
+
+    def answer(name: str, *given: Any, **options: Any) -> tuple[str, Callable[[], Any]]:
+        shown = [*map(reprlib.repr, given), *(f"{key}={reprlib.repr(value)}" for key, value in options.items())]
+        return f"{name}({', '.join(shown)})", functools.partial(CALLS[name], *given, **options)
+
+    few = {name: OPTIONS[name] for name in ("rtol", "hardness", "E_star", "materials")}
+    bare = {name: OPTIONS[name] for name in ("rtol", "E_star", "variant")}
+    while True:
+        known = {one(list(KNOWN)): number()}
+        yield answer("contact", surface(), **some(OPTIONS, 0.12), **known)
+        yield answer("law", one(list(METHODS)), number(), surface(), one(OPTIONS["theory"][:4]), **some(few, 0.15))
+        yield answer("surface", *(one(NUMBERS) if rng.random() < 0.3 else x for x in (0.8, 1.0, 100.0, 1.0, 3.0)))
+        yield answer("sensitivity", surface(), **known)
+        yield answer("flow_factors", surface(), number())
+        yield answer("island", surface(), number(), **some(bare, 0.15))
+        part = one([PART, PART | {one(list(PART)): number()}])
+        area = one(["4 cm^2", "1 mm^2", number()])
+        yield answer("joint", one(["10 MPa", number()]), part, PART, materials=one(METALS), nominal_area=area)
+
+
+def failures(seed: int, scale: float) -> list[Found]:
+    """Warnings, untyped errors, values that are not finite, and requests of more than 10 s."""
+    count = refused = 0
+    bad: dict[str, list[str]] = {"a warning": [], "an error of no type": [], f"more than {LONGEST:g} s": []}
+    longest, slowest = 0.0, ""
+    before = signal.signal(signal.SIGALRM, _hang)
+    try:
+        for given, call in itertools.islice(requests(np.random.default_rng(seed)), int(14000 * scale)):
+            start = time.perf_counter()
+            fault: tuple[str, BaseException] | None = None
+            signal.setitimer(signal.ITIMER_REAL, LONGEST)
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("error")
+                    call()
+            except MbmaError:
+                refused += 1
+            except Warning as warning:
+                fault = ("a warning", warning)
+            except Hang as hang:
+                fault = (f"more than {LONGEST:g} s", hang)
+            except Exception as error:
+                fault = ("an error of no type", error)
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+            count, taken = count + 1, time.perf_counter() - start
+            if fault:
+                bad[fault[0]].append(f"{given}: {type(fault[1]).__name__}: {fault[1]!s:.200}")
+            if taken > longest:
+                longest, slowest = taken, given
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    found = [
+        Found(f"random requests: {what}", count, refused, len(all_), len(all_), "\n  ".join(all_))
+        for what, all_ in bad.items()
+    ]
+    return [
+        *found[:-1],
+        found[-1]._replace(worst=longest, where=found[-1].where or f"longest {longest:.2g} s: {slowest}"),
+    ]
+
+
+@click.command()
+@click.option("--seed", type=int, default=1, show_default=True, help="Of the random numbers.")
+@click.option("--scale", type=float, default=1.0, show_default=True, help="Factor of the numbers of examples.")
+@click.option("--only", default="", help="Checks whose names contain this text.")
+@click.option("--write", is_flag=True, help="Write the counts to docs/guarantees.md.")
+def audit(seed: int, scale: float, only: str, write: bool) -> None:
+    """Search for answers beyond their stated error, untested answers that are valid, warnings, errors and hangs."""
+    checks: list[tuple[str, Callable[[], list[Found]]]] = [
+        *((what, lambda what=what: [bound(what, seed, scale)]) for what in BOUNDS),
+        ("valid", lambda: [validity(seed, scale)]),
+        ("requests", lambda: failures(seed, scale)),
+    ]
+    rows = []
+    for name, check in checks:
+        if only in name:
+            for found in check():
+                rows.append(found)
+                click.echo(f"{found.what:58}{found.answers:8}{found.refused:7}{found.beyond:7}{found.worst:10.3g}")
+                if found.beyond or found.worst > 0.9:
+                    click.echo(f"  {found.where}")
+    if write:
+        block = f"```\npython -m generate audit --seed {seed} --scale {scale:g} --write\n```\n\n"
+        header = "search | answers | refused | beyond | largest"
+        page.write(
+            "guarantees", {"audit": block + page.table(header, (found[:-1] for found in rows), FORMATS)}, {}, ROOT
+        )
+    if any(found.beyond for found in rows):
+        raise SystemExit(1)

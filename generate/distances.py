@@ -1,0 +1,184 @@
+"""Deviations of theories from simulated contacts: every theory on every data set.
+
+Deviations are ln(theory/simulation) of three quantities: area at equal force, force at equal mean separation, stiffness
+at equal force. They are model errors: the theories are solved to 1e-6 or better, except for the map's law.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
+from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve
+from generate.calibrated import errors
+from generate.calibrated_file import QUANTITIES, rms
+from generate.files import DATA, evidence, read_csv
+from mbma_tables import theories
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
+from mbma_tables.laws.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
+from mbma_tables.laws.map_curves import MAP_CONSTANTS
+from mbma_tables.surfaces.variants import REPORTED, Variant
+
+LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
+COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
+MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
+ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps
+# file, zeta_1, rms gradient and h_max of sets that nothing was fitted to
+OLDER = {
+    "bem": ("bem_hurst0.8_zeta64.csv", 64.0, 1.0, 3.3973),
+    "gfmd": ("gfmd_hurst0.8_zeta100.csv", 100.0, 0.2766, 3.4),
+    "challenge": ("challenge.csv", 200.0, 1.0, 3.45),
+}
+
+
+def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[Case], Any]:
+    return _theory(theories.Mbma(island_model, variant, 1e-6, "nan" if island_model == "universal" else "raise"))
+
+
+def _theory(theory: theories.Theory) -> Callable[[Case], Any]:
+    return lambda one: TheoryCurve(theory, one)
+
+
+def _map(one: Case) -> Any:
+    if not one.curves:
+        raise MbmaError("no map")
+    return one.map_law(CONSTANTS, MAP_CONSTANTS)
+
+
+THEORIES: dict[str, Callable[[Case], Any]] = {
+    "MBMA reported": _mbma("reported"),
+    "MBMA printed": _mbma("printed"),
+    "MBMA fitted": _mbma("fitted"),
+    "MBMA cover": _mbma(COVER),
+    "calibrated": lambda one: one.law(CONSTANTS),
+    "calibrated, map": _map,
+    "Persson": lambda one: Law(one.spectrum, None, YANG_PERSSON),
+    "Persson simplified": _theory(theories.Persson("simplified")),
+    "G-W": _theory(theories.GreenwoodWilliamson()),
+}
+HUES = dict(zip(THEORIES, ("C0", "C1", "C9", "C4", "k", "0.5", "C3", "C6", "C2"), strict=True))
+ISLAND_MODELS = {name: _mbma("reported", name) for name in ("formula", "rigid")}
+
+
+@dataclasses.dataclass(frozen=True)
+class DataSet:
+    """Simulated surfaces of one kind, and the theories that were fitted to them."""
+
+    title: str
+    seen: Sequence[Case]
+    fitted: tuple[str, ...] = ()
+
+
+def distances(seen: Sequence[Case], theory: Callable[[Case], Any]) -> dict[str, FloatArray]:
+    """ln(theory/simulation) at every load of every surface, NaN where the theory does not reach it."""
+    parts = {name: [np.full(one.force.shape, np.nan) for one in seen] for name in QUANTITIES}
+    for number, one in enumerate(seen):
+        with np.errstate(all="ignore"):
+            try:
+                curve = theory(one)
+                reached = np.isfinite(curve.separation(one.force))
+            except (MbmaError, ValueError):
+                continue
+            for name, values in parts.items():
+                known = np.isfinite(one.u) & (reached | (name == "force"))
+                if known.sum() > (2 if name == "stiffness" else 0):
+                    values[number][known] = errors(one.at(known), curve, name)
+    return {name: np.concatenate(values) for name, values in parts.items()}
+
+
+def held_out() -> list[Case]:
+    """Self-affine surfaces of two or more longest waves a side that no fit saw."""
+    return [one for one in evidence() if one.kind == "self_affine" and one.gaussian and one.split != TRAINING]
+
+
+def _simulated(kind: str, rows: Any, h_max: float, spectrum: Spectrum | None = None, **more: Any) -> Case:
+    """A surface of a file of numbers: rows of F/(A0 E* g), A/A0 and u/h_rms; of a self-affine one H and zeta_1."""
+    hurst, zeta_1 = more.pop("hurst", 0.8), more.pop("zeta_1", 0.0)
+    spectrum = spectrum or Spectrum.self_affine(hurst, zeta_1)
+    force, area, u = (np.asarray(row, dtype=float) for row in rows)
+    return Case(kind, "", (kind, hurst, zeta_1, 0, 0.0), MIN_WAVES, 0, spectrum, spectrum, h_max, more, force, area, u)
+
+
+def earlier() -> list[Case]:
+    """The 105 surfaces of docs/data/boundary_elements.csv, to which the variant `fitted` was fitted."""
+    keys, found = ["hurst", "L_over_lambda0", "zeta_1", "seed", "n"], []
+    for (hurst, _, zeta_1, *_), own in read_csv("boundary_elements.csv").groupby(keys):
+        rows = [own[name] for name in ("force", "area", "u_over_h_rms")]
+        h_max = float(own["h_max_over_h_rms"].iloc[0])
+        found.append(_simulated("self_affine", rows, h_max, hurst=float(hurst), zeta_1=float(zeta_1)))
+    return found
+
+
+def older(name: str, top: float | None = None) -> Case:
+    """One of `OLDER`, with another h_max/h_rms where it is given."""
+    file, zeta_1, gradient, h_max = OLDER[name]
+    h_max = top or h_max
+    table = read_csv(file)
+    rows = [table["force"] / gradient, table["area"], table["mean_separation_over_h_rms"]]
+    if name != "challenge":
+        return _simulated("self_affine", rows, h_max, zeta_1=zeta_1)
+    # a plateau from a fifth of the roll-off wavenumber
+    edges = np.geomspace(0.2, zeta_1, 4001)
+    middle = np.sqrt(edges[1:] * edges[:-1])
+    shares = np.minimum(middle**2, middle**-1.6) * np.diff(np.log(edges))
+    return _simulated("plateau", rows, h_max, Spectrum.from_shares(middle, shares))
+
+
+def rolloff(number: int) -> Case:
+    """A surface with a plateau by its map's own spectrum."""
+    force, area, _, u = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",").T[:4]
+    own = read_csv("rolloff_spectra.csv").query("map == @number")
+    spectrum, h_rms = Spectrum.from_shares(*own[["q", "variance"]].to_numpy().T), np.sqrt(own["variance"].sum())
+    # wavenumbers over h_rms: their unit cancels
+    rows = [force / (spectrum.gradient * h_rms), area, u / h_rms]
+    return _simulated("plateau", rows, ROLLOFF[number] / h_rms, spectrum)
+
+
+def measured(name: str) -> Case:
+    """A measured map as `python -m generate measured_maps` kept it."""
+    with np.load(DATA / f"measured_{name}.npz", allow_pickle=False) as content:
+        one = dict(content)
+    share, seen = one["band_variance"], (one["area"] > 0) & (one["area"] < MAX_AREA)
+    curves = {key: one[key].astype(float) for key in ("mean_height", "top_gradient", "tension_force", "tension")}
+    spectrum = Spectrum.from_shares(one["band_q"][share > 0], share[share > 0])
+    rows = [one[key][seen] for key in ("force", "area", "mean_separation")]
+    return _simulated("measured", rows, float(one["h_max"]), spectrum, anisotropy=float(one["anisotropy"]), **curves)
+
+
+def data_sets() -> dict[str, DataSet]:
+    """All data sets, by name."""
+
+    def chosen(kinds: Sequence[str], splits: Sequence[str], low: int = MIN_WAVES, high: int = 99) -> list[Case]:
+        return [one for one in evidence() if one.kind in kinds and one.split in splits and low <= one.waves <= high]
+
+    tested, plain = (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM), ("self_affine",)
+    transformed = ("peaks", "valleys", "worn", "patchy")
+    return {
+        "spectra": DataSet("new spectra", chosen(plain, (HELD_OUT_SPECTRUM,))),
+        "surfaces": DataSet("new surfaces of fitted spectra", chosen(plain, (HELD_OUT_SURFACE,))),
+        "training": DataSet("the training set", chosen(plain, (TRAINING,)), ("calibrated", "calibrated, map")),
+        "one": DataSet("one longest wave a side", chosen(plain, (TRAINING, *tested), 1, 1)),
+        "plateau": DataSet("with plateau or instrument's filter", chosen(("plateau", "filtered"), tested)),
+        "stretched": DataSet("stretched", chosen(("stretched",), tested)),
+        "transformed": DataSet("heights transformed", chosen(transformed, tested)),
+        "earlier": DataSet("105 earlier surfaces", earlier(), ("MBMA fitted",)),
+        "bem": DataSet("an older set, mean of 4", [older("bem")]),
+        "gfmd": DataSet("molecular dynamics", [older("gfmd")]),
+        **{f"gfmd {top}": DataSet(f"the same, h_max {top} h_rms", [older("gfmd", top)]) for top in (3, 4)},
+        "challenge": DataSet("contact challenge", [older("challenge")]),
+        "rolloff": DataSet("two with plateau, by spectrum", [rolloff(0), rolloff(1)]),
+        **{name: DataSet(title, [measured(name)]) for name, title in MEASURED.items()},
+    }
+
+
+def summed_up(seen: Sequence[Case], found: FloatArray, low: float = LOW, high: float = HIGH) -> tuple[float, float]:
+    """Root mean square of distances at contacts from `low` to `high`, and the share of these that is reached."""
+    area = np.concatenate([one.area for one in seen])
+    values = found[(area >= low) & (area <= high)]
+    known = values[np.isfinite(values)]
+    return (rms(known), known.size / values.size) if known.size else (np.nan, 0.0)

@@ -1,0 +1,108 @@
+"""docs/lubrication.md and docs/rough_bodies.md: flow factors and published fits, rough spheres and simulation."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from generate.files import read_csv
+from generate.pages.page import Measured, panels, table
+from generate.rough_spheres import FILE, RADIUS, heights
+from mbma_tables import Surface, flow_factors, rough_contact
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.law.rough_body import CELLS, mean_wavelength
+
+# C and r of phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978, Table 1
+PATIR_CHENG = {1 / 9: (1.48, 0.42), 1 / 6: (1.38, 0.42), 1 / 3: (1.18, 0.42), 1.0: (0.90, 0.56), 3.0: (0.225, 1.5),
+               6.0: (0.520, 1.5), 9.0: (0.870, 1.5)}  # fmt: skip
+FIRST, LAST = 3.0, 6.0  # u/h_rms between which fits are compared: where there is no contact, and where they end
+SMOOTH = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=1.0, h_max=2.9)
+WIDTHS = (1.0, 2.0, 3.0, 4.5, 7.0, 20.0)  # of the contact over the mean wavelength
+FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
+
+
+def published(gamma: float, H: FloatArray) -> FloatArray:
+    """Patir and Cheng's fit of phi_x at gaps over h_rms."""
+    C, r = PATIR_CHENG[gamma]
+    return 1 + C * H**-r if gamma > 1 else 1 - C * np.exp(-r * H)
+
+
+def lubrication() -> Measured:
+    """Largest distance from the published fits, and the curves of both."""
+    H, rows = np.linspace(FIRST, LAST, 61), []
+    figure, (left, right) = panels(1, 2, (10, 4))
+    u = np.geomspace(0.5, 10, 120)
+    for number, gamma in enumerate(PATIR_CHENG):
+        peklenik = min(max(gamma, 1 / 8.5), 8.5)
+        known, found = published(gamma, H), flow_factors(SMOOTH, H, peklenik=peklenik).phi_x
+        name = f"{gamma:g}" if gamma >= 1 else f"1/{1 / gamma:g}"
+        off = np.log(found / known)
+        rows.append([name, np.sqrt(np.mean(off**2)), off[np.abs(off).argmax()]])
+        film = flow_factors(SMOOTH, u, peklenik=peklenik)
+        left.semilogx(u, film.phi_x, color=f"C{number}", label=name)
+        left.semilogx(H, known, "o", ms=2, markevery=5, color=f"C{number}")
+        right.semilogx(u, film.shear_x, color=f"C{number}")
+    left.set(xlabel="u/h_rms", ylabel="phi_x (points: Patir and Cheng 1978)", ylim=(0, 2))
+    right.set(xlabel="u/h_rms", ylabel="phi_s")
+    left.legend(title="gamma", fontsize="small")
+    parts = {"published": table("gamma | root mean square of ln ratio | largest", rows, "{} | {:.3f} | {:+.3f}")}
+    return parts, {"docs/figures/lubrication.svg": figure}
+
+
+def spheres() -> dict[str, FloatArray]:
+    """Every simulated contact of docs/data/rough_spheres.csv, and the library's at the same approach and force."""
+    found: dict[str, list[Any]] = {
+        name: [] for name in ("width", "off", "force", "area", "mean_radius", "scatter", "valid")
+    }
+    for (hurst, longest, h_rms, seed), rows in read_csv(FILE.name).groupby(["hurst", "longest", "h_rms", "seed"]):
+        face = Surface.from_map(heights(hurst, longest, h_rms, int(seed)), 1.0, periodic=True)
+        force, approach, area, radius = (rows[n].to_numpy() for n in ("force", "approach", "area", "mean_radius"))
+        same, pushed = rough_contact(face, RADIUS, force=force), rough_contact(face, RADIUS, approach=approach)
+        p, r = same.pressure, same.position
+        mean = np.trapezoid(p * r**2, r) / np.trapezoid(p * r, r)
+        found["width"] += list(np.asarray(2 * same.contact_radius) / mean_wavelength(face))
+        found["off"] += list((same.approach - approach) / h_rms)
+        found["force"] += list(np.log(pushed.force / force))
+        found["area"] += list(np.log(same.area / area))
+        found["mean_radius"] += list(np.log(mean / radius))
+        found["scatter"] += list(np.asarray(pushed.scatter))
+        found["valid"] += list(pushed.valid)
+    return {name: np.array(values) for name, values in found.items()}
+
+
+def rough_bodies() -> Measured:
+    """Distances from boundary elements by the width of the contact, and the curves of one ball."""
+    seen, rows = spheres(), []
+    for low, high in itertools.pairwise(WIDTHS):
+        mine = (seen["width"] >= low) & (seen["width"] < high)
+        off = seen["off"][mine]
+        cells = [f"{low:g} to {high:g}", int(mine.sum()), (off.mean(), off.std(), np.abs(off).max())]
+        cells += [(v.mean(), v.std()) for v in (seen[name][mine] for name in ("force", "area", "mean_radius"))]
+        valid = mine & (seen["valid"] > 0)
+        within = [np.mean(np.abs(seen["force"] / seen["scatter"])[valid] < k) for k in (1, 2)]
+        rows.append([*cells, f"{within[0]:.0%}, {within[1]:.0%} of {valid.sum()}"])
+    header = "width over mean wavelength | contacts | approach [h_rms]: mean, sd, largest | ln F at the approach | "
+    header += "ln A at the force | ln mean radius | valid: within 1, 2 sd"
+    forms = "{} | {} | {:+.2f}, {:.2f}, {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f}"
+    figure, axes = panels(1, 3, (13, 4))
+    ball = rough_contact(
+        FACE, "5 mm", force=[f"{10.0**k} N" for k in (-1, 0, 1, 2)], E_star="110 GPa", theory="calibrated"
+    )
+    for r, p, force in zip(ball.position, ball.pressure, np.asarray(ball.force), strict=True):
+        axes[0].semilogy(r, 1e3 * p, label=f"{force:.3g} N")
+    axes[0].set(xlabel="distance from the middle [um]", ylabel="mean pressure [MPa]", ylim=(1, None))
+    law = ball.law(1e-3)
+    x = np.linspace(law.first, 4, 200)[1:]
+    axes[1].semilogy(x, law.force(x), label="rough")
+    smooth = 4 / 3 * 110e-3 * np.sqrt(5e3) * np.maximum(x, 0) ** 1.5  # N, of um and GPa
+    axes[1].semilogy(x[x > 0], smooth[x > 0], "--", label="smooth (Hertz)")
+    axes[1].set(xlabel="approach [um]", ylabel="force [N]", ylim=(1e-4, 200))
+    axes[2].semilogx(seen["width"], seen["off"], ".", label="boundary elements")
+    n = np.geomspace(1, 12, 50)
+    axes[2].fill_between(n, -CELLS[0] / n ** CELLS[1], CELLS[0] / n ** CELLS[1], alpha=0.2, label="stated, 1 sd")
+    axes[2].set(xlabel="width of contact over mean wavelength", ylabel="difference of approach [h_rms]")
+    for one in axes:
+        one.legend(fontsize="small")
+    return {"spheres": table(header, rows, forms)}, {"docs/figures/rough_bodies.svg": figure}

@@ -1,0 +1,72 @@
+"""Boundary elements of rough spheres on a flat: ``python -m generate.rough_spheres``, two minutes on one core.
+
+Gaussian roughness on spheres of radius `RADIUS` against a rigid flat, on a half-space that is not periodic (Tamaas with
+the convolution of DC-FFT), E* = 1, lengths in sampling steps. Their rows go into docs/data/rough_spheres.csv.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import os
+from collections.abc import Iterator
+
+import click
+import numpy as np
+
+from generate.files import DATA
+from generate.machined.makers import rough
+from mbma_tables.common.arguments import FloatArray, needed
+from mbma_tables.common.files import write_file
+from mbma_tables.laws.boundary_elements import CORRECTION
+
+POINTS, SHORTEST, RADIUS, TOLERANCE = 320, 6.0, 3000.0, 1e-5
+HURSTS, LONGEST, HEIGHTS, EACH, FIRST_SEED = (0.5, 0.8), (24.0, 48.0), (0.1, 0.3, 1.0), 2, 71
+SMOOTH_RADII = (10.0, 20.0, 35.0, 60.0)  # of Hertz's contact at the loads
+FILE = DATA / "rough_spheres.csv"
+COLUMNS = ("hurst", "longest", "h_rms", "seed", "force", "approach", "area", "mean_radius")
+
+
+def heights(hurst: float, longest: float, h_rms: float, seed: int) -> FloatArray:
+    """A periodic map of mean zero."""
+    z = rough(np.random.default_rng(seed), POINTS, longest, SHORTEST, hurst)
+    return np.asarray((z - z.mean()) * (h_rms / z.std()))
+
+
+def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
+    """Force over E*, approach, real area, and the mean distance from the axis, weighted by pressure."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    tamaas = needed("tamaas", "simulate")
+    tamaas.set_log_level(tamaas.LogLevel.error)
+    x = np.arange(POINTS) - (POINTS - 1) / 2
+    r = np.hypot(x[:, None], x)
+    body = np.ascontiguousarray(z - r**2 / (2 * RADIUS))
+    model = tamaas.ModelFactory.createModel(tamaas.model_type.basic_2d, [float(POINTS)] * 2, [POINTS] * 2)
+    model.E, model.nu = 1.0, 0.0
+    tamaas.ModelFactory.registerNonPeriodic(model, "dcfft")
+    solver = tamaas.PolonskyKeerRey(model, body, TOLERANCE)
+    solver.setIntegralOperator("dcfft")
+    solver.max_iter = 5000
+    moved = np.zeros_like(body)
+    for a in SMOOTH_RADII:
+        force = 4 / 3 * a**3 / RADIUS
+        if not solver.solve(force / body.size) <= TOLERANCE:
+            raise RuntimeError(f"boundary elements of h_rms = {z.std():g} do not converge at the force {force:g}")
+        pressure = np.asarray(model.traction)
+        model.operators["dcfft"](pressure, moved)
+        touching = pressure > 0
+        edges = sum(np.count_nonzero(touching != np.roll(touching, 1, axis)) for axis in (0, 1))
+        approach, area = (moved - body)[touching].mean(), touching.sum() - CORRECTION * edges
+        yield force, float(approach), float(area), float(np.mean(pressure * r) / pressure.mean())
+
+
+if __name__ == "__main__":
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for seed, design in enumerate(itertools.product(HURSTS, LONGEST, HEIGHTS, range(EACH)), FIRST_SEED):
+        for row in simulated(heights(*design[:-1], seed)):
+            writer.writerow([*design[:-1], seed, *(f"{value:.7g}" for value in row)])
+    write_file(FILE, text.getvalue().encode())
+    click.echo(FILE)

@@ -1,0 +1,294 @@
+"""An exported law: the law of one surface with its units, and the header of all files written from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+from collections.abc import Iterator
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from typing import Any
+
+import numpy as np
+
+from mbma_tables import __version__
+from mbma_tables.answers.contact import chosen_theory, contact
+from mbma_tables.answers.result import Contact
+from mbma_tables.common.arguments import FloatArray, Numbers, number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import shipped_file
+from mbma_tables.common.units import Units, factor, in_unit, resolve
+from mbma_tables.law.force_law import ForceLaw
+from mbma_tables.law.law import ContactLaw
+from mbma_tables.law.leakage import LeakageLaw
+from mbma_tables.law.make import contact_law
+from mbma_tables.law.rough_body import pressed
+from mbma_tables.materials import ELASTIC_PSI, hardness_in
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.variants import Variant
+from mbma_tables.theories import calibrated_table
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.protocol import Theory, UserTheory
+
+LAW_RTOL = 1e-8
+LOOKED_AT = 200  # compressions at which validity and scatter are looked at
+SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
+ROUNDS, PARTS = 4, 32  # of the search for an end of validity between two of them
+OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a surface given by a spectrum
+
+
+@dataclasses.dataclass(frozen=True)
+class ExportedLaw:
+    """One surface's law, whose units are known."""
+
+    surface: AnySurface  # in the units of the law
+    law: ContactLaw
+    theory: Theory  # what the law was made from, without the hardness
+    modulus: float  # E*
+    hardness: float  # infinite where the contact is elastic
+    length: str  # unit of length,
+    stress: str  # and of stress
+    made_by: tuple[str, ...] = ()  # header lines with the command that writes the file again
+    direction: str | float | None = None  # of a simulated map's leakage
+
+    @property
+    def units(self) -> Units:
+        """Both units."""
+        return Units(self.length, self.stress)
+
+    @functools.cached_property
+    def leakage(self) -> LeakageLaw:
+        """The law's leakage, in its direction."""
+        return self.law.leakage if self.direction is None else self.law.leakage.along(self.direction)
+
+    def answer(self, u: FloatArray) -> Contact:
+        """The theory itself at mean separations."""
+        return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
+
+    def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
+        """Lines of a file's header: contents, range, error, validity up to `end`, and with `leakage` those of flow."""
+        law, stress = self.law, self.stress
+        model = f"MBMA model, variant {law.variant!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
+        gradient = self.modulus * float(self.surface.rms_gradient)
+        plastic = f"elastic: within 5% in area for hardnesses from {gradient / ELASTIC_PSI:.4g} {stress} on"
+        if self.hardness < np.inf:
+            plastic = (
+                f"hardness = {self.hardness:.10g} {stress}, plasticity index {gradient / self.hardness:.3g}: "
+                "loading only, not for unloading, which is stiffer"
+            )
+        return (
+            f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
+            what,
+            *self._of_surface(),
+            f"E* = {self.modulus:.10g} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
+            "pressure is force over nominal area;",
+            "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
+            "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
+            f"range: {range_}",
+            *more,
+            f"the law is within {law.error:.1e} of its theory, in pressure and area",
+            plastic,
+            *self._validity(end, leakage),
+            *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
+        )
+
+    def _of_surface(self) -> Iterator[str]:
+        names = self.surface.parameters or OWN_NUMBERS
+        numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
+        yield f"surface: {numbers}; lengths in {self.length}"
+        yield from filter(None, [self.surface.resolution, self.theory.origin])
+
+    def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
+        """Lines on the valid range of the law, its scatter against simulations, and the origin of its numbers."""
+        law, stress_unit = self.law, self.stress
+        # small overclosures by their logarithm, larger ones evenly
+        small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
+        u = law.h_max - end * np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
+        found = self.answer(u)
+        pressure = np.asarray(law.pressure(u))
+        reasons = (found.leakage if leakage else found).reasons
+        lines = [line for reason, bad in reasons.items() for line in self._not_valid(reason, u, bad, leakage)]
+        if law.softening is not None:
+            lines.append(
+                f"softening: stiffness falls with compression from c = {law.h_max - law.softening:.4g}, "
+                f"p = {float(law.pressure(law.softening)):.4g} {stress_unit} on, which no simulation shows"
+            )
+        if law.highest < np.inf:
+            lines.append(f"no last contact: pressure is {float(law.pressure(law.h_max)):.4g} {stress_unit} at c = 0")
+        spread = self._spread("one standard deviation of ln p at a given c", found.scatter, pressure)
+        lines.append(f"scatter of simulations about the theory, {spread}")
+        if leakage:
+            lines += self._of_leakage(found.leakage.scatter, pressure)
+        return (*lines, *self._hashes())
+
+    def _hashes(self) -> Iterator[str]:
+        """Lines on the table that the theory uses, and on a surface not given by five numbers."""
+        if isinstance(self.theory, Mbma):
+            from mbma_tables.models.tables import universal_model
+
+            yield f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}"
+        elif self.theory.name == "calibrated":
+            yield f"table: {calibrated_table.NAME} {shipped_file(calibrated_table.NAME).read_bytes()[-65:-49].decode()}"
+        if isinstance(self.surface, MeasuredSurface):
+            values = hashlib.sha256(np.stack([self.surface.q, self.surface.C]).tobytes())
+            yield f"spectrum: values {values.hexdigest()[:16]}"
+
+    def _not_valid(self, reason: str, u: FloatArray, bad: Any, leakage: bool) -> list[str]:
+        """Ranges of pressure in which a reason applies, by the outermost valid pressures, rounded outward."""
+        lines = []
+        steps = np.flatnonzero(np.diff(bad)) + 1
+        for first, last in zip(np.append(0, steps), np.append(steps, bad.size), strict=True):
+            if not bad[first]:
+                continue
+            begin = None if first == 0 else self._last_valid(reason, u[first - 1], u[first], leakage)
+            end = None if last == bad.size else self._last_valid(reason, u[last], u[last - 1], leakage)
+            low = "" if begin is None else outward(begin, ROUND_FLOOR)
+            high = "" if end is None else outward(end, ROUND_CEILING)
+            where = f"from p = {low} to {high}" if low and high else f"above p = {low}" if low else f"below p = {high}"
+            where = f"{where} {self.stress}" if low or high else "at any pressure of the range"
+            lines.append(f"not valid {where}: {reason}")
+        return lines
+
+    def _last_valid(self, reason: str, good: float, bad: float, leakage: bool) -> float:
+        """Pressure at the last mean separation where a reason does not apply, by bisection between two separations."""
+        for _ in range(ROUNDS):
+            u = np.linspace(good, bad, PARTS + 1)
+            found = self.answer(u[1:-1])
+            mask = (found.leakage if leakage else found).reasons.get(reason, np.zeros(PARTS - 1, bool))
+            k = 1 + int(np.argmax(np.append(mask, True)))
+            good, bad = u[k - 1], u[k]
+        return float(self.law.pressure(good))
+
+    def _spread(self, what: str, scatter: Numbers, pressure: FloatArray) -> str:
+        """A scatter at five pressures where it is known."""
+        sizes, pressure = np.asarray(scatter)[SMALL:], pressure[SMALL:]
+        known = np.flatnonzero(np.isfinite(sizes))
+        places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
+        listed = ", ".join(f"{sizes[k]:.2g} at {pressure[k]:.3g}" for k in places)
+        return f"{what}: {listed} {self.stress}" if listed else "not known"
+
+    def _of_leakage(self, scatter: Numbers, pressure: FloatArray) -> tuple[str, ...]:
+        """Lines on leakage."""
+        blocked, least = self.leakage.blocked_at, "never blocked"
+        if blocked > -np.inf:
+            c = (self.law.h_max - blocked) / 2
+            load = float(self.law.pressure(separation=blocked))
+            least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
+        way = "" if self.law.gaps is None else f", direction {self.direction or 'both, their geometric mean'}"
+        return (
+            f"leakage is the flow coefficient K [{self.length}^3] of the gaps{way}: flow per length of seal is "
+            f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "
+            f"{1e-3 * factor('Pa', self.stress, 'stress'):.4g} {self.stress} s",
+            least,
+            f"K is within {self.leakage.error:.1e} of that at the law's area",
+            "scatter of K from simulation to simulation, "
+            + self._spread("one standard deviation of ln K", scatter, pressure),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class ExportedForce(ExportedLaw):
+    """The force of a rough sphere or cylinder in place of a pressure, its unit in place of that of stress."""
+
+    _: dataclasses.KW_ONLY
+    force: ForceLaw
+
+    def answer(self, u: FloatArray) -> Any:
+        """The contacts themselves at approaches that are left to the largest one."""
+        return pressed(self.force.body, self.law.h_max + self.force.first - u)
+
+    def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
+        """See `ExportedLaw`; a body has no leakage."""
+        body, law = self.force.body, self.law
+        return (
+            f"Force law of a rough {body.name} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
+            what,
+            f"here pressure is the force [{self.stress}], and A/A0 the real area [{body.units['area']}]",
+            *self._of_surface(),
+            f"E* = {self.modulus:.10g} {body.units['pressure']}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
+            f"overclosure c = approach - ({self.force.first:.10g}), zero at first contact; approach is zero where the",
+            "mean planes of the faces touch",
+            f"range: {range_}",
+            *more,
+            f"the law is within {law.error:.1e} of its theory, in force and area",
+            *(
+                []
+                if np.isinf(self.hardness)
+                else [f"hardness = {self.hardness:.10g} {body.units['pressure']}: loading"]
+            ),
+            *self._validity(end, leakage),
+            *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
+        )
+
+
+def outward(value: float, rounding: str) -> str:
+    """Four digits of a number, rounded in the given direction.
+
+    Examples
+    --------
+    >>> outward(13.2231, ROUND_CEILING), outward(13.2231, ROUND_FLOOR)
+    ('13.23', '13.22')
+    """
+    return f"{float(Context(prec=4, rounding=rounding).create_decimal(value)):.4g}"
+
+
+def exported_law(
+    surface: AnySurface | ForceLaw,
+    E_star: float | str = 1.0,
+    length_unit: str | None = None,
+    stress_unit: str | None = None,
+    variant: str | Variant = "reported",
+    theory: str | Theory | UserTheory | None = None,
+    hardness: float | str = np.inf,
+    made_by: tuple[str, ...] = (),
+    direction: str | float | None = None,
+) -> ExportedLaw:
+    """The law of one surface in known units; a batch of surfaces and missing units are refused."""
+    if isinstance(surface, ForceLaw):
+        if E_star != 1.0 or hardness != np.inf or any((length_unit, stress_unit, theory)) or variant != "reported":
+            raise InputError("a force law has its modulus, hardness, units and theory: give no others")
+        return _exported_force(surface, made_by)
+    one: AnySurface = in_unit(surface, length_unit)
+    plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
+    length, stress = _known("length_unit", one.unit), _known("stress_unit", stress_unit)
+    if one.shape != ():
+        raise InputError("a contact law is of one surface, not of a batch")
+    modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
+    cap = hardness_in(Units(length, stress), hardness)
+    own = chosen_theory(one, theory, variant=variant)
+    law = contact_law(one, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
+    law = dataclasses.replace(law, units=Units(length, stress))
+    return ExportedLaw(one, law, own, modulus, float(cap), length, stress, made_by, direction)
+
+
+def _exported_force(force: ForceLaw, made_by: tuple[str, ...]) -> ExportedForce:
+    """The force law of a body in known units."""
+    body, layer = force.body, force.body.law
+    length = _known("length_unit", body.surface.unit)
+    _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
+    numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
+    return ExportedForce(body.surface, force.law, body.theory, *numbers, force=force)
+
+
+def _known(name: str, unit: str | None) -> str:
+    if unit is None:
+        sample = {"length_unit": "'0.8 um'", "stress_unit": "E_star = '115 GPa'"}[name]
+        raise InputError(f"{name} is missing: give it, or numbers with units, like {sample}")
+    return unit
+
+
+def checked_kappa(kappa: Any) -> float:
+    """Normal over tangential stiffness."""
+    return number_in("kappa", kappa, 0.5, 2.0)
+
+
+def checked_conductivity(conductivity: float | None, unit: str | None) -> tuple[float, str]:
+    """k_s = 2 k1 k2/(k1 + k2) and its unit, both needed for a conductance."""
+    if conductivity is None:
+        raise InputError("conductance needs conductivity, which is missing: k_s = 2 k1 k2/(k1 + k2)")
+    if not unit:
+        raise InputError("conductance needs conductivity_unit, which is missing: that of k_s, such as 'W/(m K)'")
+    if not isinstance(unit, str) or not unit.isprintable():
+        raise InputError(f"conductivity_unit is not printable: {unit!r}")
+    return number_in("conductivity", conductivity, 1e-300, 1e300), unit

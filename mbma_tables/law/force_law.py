@@ -1,0 +1,172 @@
+"""Force of a rough sphere or cylinder against its approach, its units, and as polynomials."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import types
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import SIZES, Units, factor, unit_of
+from mbma_tables.law.half_space import FLAT, HalfSpace
+from mbma_tables.law.law import ContactLaw
+from mbma_tables.law.make import theory_law
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.protocol import Theory, TheoryAnswer
+
+RTOL = 1e-7  # of the force of one contact
+LIGHT = 1e-9  # of the largest force, from which on laws without a last contact begin
+NEWTONS = {"uN": 1e-6, "mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6}
+_FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N)\s*(?:/\s*(\w+))?\s*")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Body(HalfSpace):
+    """What is pressed, and units of quantities: forces over E* times `newtons` are in the unit of force."""
+
+    surface: AnySurface
+    theory: Theory
+    units: dict[str, str]
+    newtons: float
+
+    @property
+    def first(self) -> float:
+        """Approach of first contact, or from which on a law without one is covered."""
+        return -self.ends[1]
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
+
+    def smooth_approach(self, force: FloatArray) -> FloatArray:
+        """Hertz's approach at a force over E*."""
+        if not self.plane:
+            return np.asarray((0.75 * force / math.sqrt(self.radius)) ** (2 / 3))
+        a = np.sqrt(4 * self.radius * force / math.pi)
+        return np.asarray(force / math.pi * (2 * np.log(2 * self.reference / a) + 1))
+
+    def approach_at(self, force: float) -> float:
+        """Approach at a force over E*: between those of the smooth body, and of one larger by h_max."""
+        from scipy.optimize import brentq
+
+        smooth, (thin, wide) = float(self.smooth_approach(np.asarray(force))), self.ends
+
+        def miss(approach: float) -> float:
+            found = self.solved(approach, RTOL)
+            return math.log(self.integral(found, found.p) / force)
+
+        low, high = smooth - wide * (1 - 1e-9), smooth - thin + 2 * FLAT * wide
+        # no layer is thinner than its law allows: there may be no such force
+        if miss(high) < 0:
+            self.quantities(self.solved(high, RTOL))
+        return float(brentq(miss, low, high, xtol=1e-12 * wide, rtol=1e-12))
+
+
+def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
+    """Units by quantity, and what one stress times areas is in that of force."""
+    length, force, newtons = unit_of("approach", units), unit_of("energy" if plane else "island_force", units), 1.0
+    if units.length is not None and units.stress in SIZES["stress"]:
+        force, per = ("N/mm", 1e-3) if plane else ("N", 1.0)
+        newtons = per * factor(units.stress, "Pa", "stress") * factor(units.length, "m", power=1 if plane else 2)
+    known = {"force": force, "stiffness": f"{force}/{length}", "area": length if plane else f"{length}^2"}
+    known |= dict.fromkeys(("approach", "contact_radius", "position", "mean_separation"), length)
+    return known | {"pressure": unit_of("pressure", units)}, newtons
+
+
+def forces(given: Any, body: Body, length: str | None) -> Any:
+    """Forces in the unit of results, of numbers and of texts such as "10 N"."""
+    if isinstance(given, list | tuple):
+        return [forces(value, body, length) for value in given]
+    if not isinstance(given, str):
+        return given
+    found, unit = _FORCE.fullmatch(given), body.units["force"]
+    if found is None or (found[3] is None) == body.plane or unit not in ("N", "N/mm"):
+        known = "the units of surface and E_star are known" if unit not in ("N", "N/mm") else "it"
+        raise InputError(f"force must be a number or, where {known} is, like '10 {unit}', got {given!r}")
+    return float(found[1]) * NEWTONS[found[2]] * (1.0 if found[3] is None else factor("mm", found[3]))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ForceLaw:
+    """Force of a rough sphere or cylinder against its approach, made by `RoughContact.law`.
+
+    Approaches are numbers in the surface's unit or texts, "0.8 um"; zero force below `first`. `export.law_text` writes
+    it as source code.
+
+    Attributes
+    ----------
+    law : ContactLaw
+        The same in the layout of contact laws: "pressure" is force and "area" real area, against the approach that is
+        left to the largest one. Its `error` bounds the relative error of both.
+    first : float
+        Approach of first contact; of a layer without one, at a thousand-millionth of the largest force [length].
+    """
+
+    law: ContactLaw
+    first: float
+    body: Body
+
+    def force(self, approach: ArrayLike | str) -> Numbers:
+        """F; of a cylinder per length."""
+        return self.law.pressure(self._left(approach))
+
+    def stiffness(self, approach: ArrayLike | str) -> Numbers:
+        """dF/d(approach)."""
+        return self.law.stiffness(self._left(approach))
+
+    def area(self, approach: ArrayLike | str) -> Numbers:
+        """Real contact area; of a cylinder per length."""
+        return self.law.area(self._left(approach))
+
+    def energy(self, approach: ArrayLike | str) -> Numbers:
+        """Work of loading, the integral of F over the approach."""
+        return self.law.energy(self._left(approach))
+
+    def approach(self, force: Any) -> Numbers:
+        """Approach at a force."""
+        found: FloatArray = self.law.at_pressure(forces(force, self.body, self.law.units.length)).mean_separation
+        return self.law.h_max + self.first - found
+
+    def _left(self, approach: ArrayLike | str) -> FloatArray:
+        return self.law.h_max + self.first - finite_array("approach", self.law.units.number("approach", approach))
+
+
+class _Pressed(Theory):
+    """The contacts of a body as a theory of the approach that is left up to a largest one."""
+
+    def __init__(self, body: Body, top: float, rtol: float) -> None:
+        self.name, self.ends_at_h_max = body.law.theory, body.touches
+        self._body, self._top, self._rtol = body, top, rtol
+
+    def answer(self, surface: Any, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force over E*, real area and stiffness."""
+        approaches = self._top - np.asarray(mean_separation, float)
+        found = [self._body.solved(approach, self._rtol) for approach in map(float, approaches.ravel())]
+        rows = np.array([(*self._body.quantities(at), at.error + self._body.law.error) for at in found])
+        force, stiffness, area, error = (part.reshape(approaches.shape) for part in rows.T)
+        return TheoryAnswer(force, area, stiffness, error)
+
+    def energy(self, surface: Any, mean_separation: FloatArray) -> FloatArray:
+        """Beyond the lightest load, where force is an exponential."""
+        found = self.answer(surface, mean_separation)
+        return np.asarray(found.pressure**2 / found.stiffness)
+
+
+def force_law(body: Body, top: float, rtol: float) -> ForceLaw:
+    """Force against approach up to `top`."""
+    first = body.first
+    if not body.touches:
+        largest = body.solved(top, RTOL)
+        first = body.approach_at(LIGHT * body.integral(largest, largest.p))
+    # in place of a surface: first contact is where so much of the approach is left
+    span: Any = types.SimpleNamespace(h_max=top - first)
+    facts = {"surface": span, "E_star": body.law.E_star * body.newtons, "units": Units(body.law.units.length)}
+    law = theory_law(span, _Pressed(body, top, 0.01 * rtol), rtol, facts)
+    return ForceLaw(dataclasses.replace(law, surface=None), first, body)

@@ -1,0 +1,146 @@
+"""Contact of a sphere or a cylinder with an elastic half-space whose surface layer is a contact law.
+
+With the approach delta, counted from where the smooth bodies would touch, and the layer's mean separation u(r) ::
+
+    u = r^2/(2 R) - delta + w,    p = law(u),    w the displacement of the half-space under p
+
+which is the problem of J. A. Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153) with the law of any theory in
+place of their asperities. Newton's unknown is w at the nodes of `islands.spectral`. A fully compressed layer is
+rigid. Force and pressure are over E* here, and those of a cylinder are per length.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from mbma_tables.common.arguments import FloatArray, finite_array, require
+from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.islands.spectral import Basis, basis, plane_basis
+from mbma_tables.law.law import ContactLaw
+
+NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn
+STEPS, SETTLED = 100, 1e-12  # of Newton's method, and the last one over the lengths that add up
+EDGE = 1e-10  # of the largest pressure: beyond it there is no contact
+JUMPS = 0.05  # of a law's error, which its polynomials may differ by where they meet: forces need not be closer
+PLACES = 4  # times the nodes, at which the edge is looked for
+FLAT = 0.01  # of h_max, by which a layer that is pressed flat may be thinner than its law allows
+
+
+class Solved(NamedTuple):
+    """Solution at one approach: radius of the loaded area, and values at the nodes of a basis of that radius."""
+
+    radius: float
+    basis: Basis
+    u: FloatArray
+    p: FloatArray  # over E*
+    jacobian: FloatArray  # of u by its load
+    error: float  # relative change of force with the number of nodes
+
+    def raised(self, dp: FloatArray) -> FloatArray:
+        """Change of the pressures where those of the layer change by `dp` at given gaps."""
+        root = self.basis.root_weights
+        return np.asarray(np.linalg.solve(self.jacobian.T, dp * root)) / root
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class HalfSpace:
+    """The problem: law of the layer, radius R [length], whether it is a cylinder, and its reference [length]."""
+
+    law: ContactLaw
+    radius: float
+    plane: bool
+    reference: float
+
+    @functools.cached_property
+    def ends(self) -> tuple[float, float]:
+        """Mean separations of the law: at full compression or at the maximum of pressure, and at the end of contact."""
+        law = self.law
+        low = law.lowest if law.turning_point is None else law.turning_point
+        return (law.h_max + low) / 2, (law.h_max + min(law.highest, law.h_max if self.touches else np.inf)) / 2
+
+    @property
+    def touches(self) -> bool:
+        """Whether the law has a last contact."""
+        return math.isinf(self.law.highest)
+
+    def layer(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Pressure over E* and -dp/du; zero beyond last contact, the tangent beyond the heaviest load."""
+        low, high = self.ends
+        held = np.clip(u, low, high)
+        p, k = self.law.pressure_and_stiffness(held)
+        apart = u > high
+        return np.where(apart, 0.0, p + k * (held - u)) / self.law.E_star, np.where(apart, 0.0, k) / self.law.E_star
+
+    def integral(self, at: Solved, values: FloatArray) -> float:
+        """Over the contact, of a cylinder per length."""
+        shares = np.asarray(at.basis.root_weights) ** 2
+        return float(np.sum(shares * values)) * (2 * at.radius if self.plane else math.pi * at.radius**2)
+
+    def between(self, at: Solved, values: FloatArray, t: FloatArray) -> FloatArray:
+        """Values at the nodes, at radii of t times that of the contact, t up to 1."""
+        degrees = np.arange(len(values)) * (2 if self.plane else 1)
+        series = np.zeros(degrees[-1] + 1)
+        series[degrees] = at.basis.modes @ (values * at.basis.root_weights) * np.sqrt(2 * degrees + 1)
+        return np.asarray(legendre.legval(t if self.plane else 2 * t**2 - 1, series))
+
+    def _newton(self, approach: float, radius: float, nodes: int) -> Solved:
+        known = plane_basis(nodes) if self.plane else basis(nodes)
+        root, operator = known.root_weights, radius * known.operator
+        if self.plane:
+            operator = operator + 4 / math.pi * radius * math.log(self.reference / radius) * np.outer(root, root)
+        rigid = known.v * radius**2 / (2 * self.radius) - approach
+        w, scale = np.zeros(nodes), abs(approach) + float(np.abs(rigid).max())
+        for _ in range(STEPS):
+            p, k = self.layer(rigid + w / root)
+            jacobian = np.eye(nodes) + operator * k
+            step = np.linalg.solve(jacobian, operator @ (p * root) - w)
+            w = w + step
+            if np.abs(step / root).max() <= SETTLED * scale:
+                break
+        else:
+            raise ConvergenceError(f"the half-space at the approach {approach:.6g} is not found in {STEPS} steps")
+        u = rigid + w / root
+        return Solved(radius, known, u, self.layer(u)[0], jacobian, math.inf)
+
+    def solved(self, approach: float, rtol: float) -> Solved:
+        """The contact at an approach, with a relative change of force up to `rtol` at the last number of nodes.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        found = self._newton(approach, math.sqrt(2 * self.radius * (approach + self.ends[1])), NODES[0])
+        for nodes in NODES:
+            t = np.linspace(0, 1, PLACES * nodes + 1)
+            p = self.layer(self.between(found, found.u, t))[0]
+            edge = t[min(int(np.flatnonzero(p > EDGE * p.max())[-1]) + 1, len(t) - 1)]
+            before, found = self.integral(found, found.p), self._newton(approach, found.radius * edge, nodes)
+            error = abs(before / self.integral(found, found.p) - 1)
+            if error <= max(rtol, JUMPS * self.law.error):
+                break
+        if not error <= max(rtol, self.law.error):
+            raise ConvergenceError(
+                f"the force at the approach {approach:.6g} is found to {error:.1g} by {nodes} nodes, not to {rtol:g}"
+            )
+        return found._replace(error=error)
+
+    def quantities(self, at: Solved) -> tuple[float, float, float]:
+        """Force over E*, its derivative by the approach over E*, and the real area.
+
+        Raises
+        ------
+        OutOfRangeError
+            If the law ends below the pressure in the middle.
+        """
+        middle, low = finite_array("mean_separation", at.u.min()), self.ends[0]
+        allowed = f"at least {low:.6g}, where the law of {self.law.theory!r} ends"
+        require("mean_separation in the middle", middle, middle >= low - FLAT * self.law.h_max, allowed)
+        stiffness = at.raised(self.layer(at.u)[1])
+        area: Any = self.law.area(np.clip(at.u, *self.ends))
+        return self.integral(at, at.p), self.integral(at, stiffness), self.integral(at, np.where(at.p > 0, area, 0.0))

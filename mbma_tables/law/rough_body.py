@@ -1,0 +1,311 @@
+"""A rough sphere or cylinder on a flat: force against approach, and the profile of the mean pressure."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.answers.contact import chosen_theory, contact
+from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, hinted, nearest, number_in, require
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import new_figure
+from mbma_tables.islands.spectral import basis
+from mbma_tables.law.force_law import RTOL, Body, ForceLaw, force_law, forces, units_of
+from mbma_tables.law.half_space import HalfSpace, Solved
+from mbma_tables.law.law import ContactLaw
+from mbma_tables.law.make import contact_law
+from mbma_tables.laws.calibrated import Spectrum, spectrum_of
+from mbma_tables.materials import Metal, Pair
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.protocol import Theory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHAPES = ("sphere", "cylinder")
+JOHNSON = 2 / math.e  # reference over R: approaches are Johnson's (5.57) in Hertz's contact
+LAYER_RTOL = 1e-8  # of the layer's law, as far as its theory allows
+ROUNDING = 1e-9  # of h_max, by which a law goes beyond the largest approach
+MOMENTS = 128  # nodes of the effective radius
+POINTS = 101  # of a profile
+COUNTED = 0.1  # share of the force above which a reason against the layer's law counts
+# c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the width of the contact over the
+# mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate.rough_spheres`
+CELLS, NARROWEST = (0.62, 0.8), 1.5
+WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RoughContact(Displayed):
+    """A rough sphere or cylinder on a flat, made by `rough_contact`; arrays of the shape of the loads.
+
+    Attributes
+    ----------
+    approach : ndarray
+        Approach of the bodies from the contact of their mean planes [length]; negative if only peaks are in contact.
+    force : ndarray
+        F, N where units are known; of a cylinder F per length, N/mm.
+    stiffness : ndarray
+        dF/d(approach).
+    area : ndarray
+        Real contact area [length^2]; of a cylinder per length.
+    contact_radius : ndarray
+        3 pi/4 times the mean of r weighted by p dr [length], which is Hertz's radius in his contact (Greenwood, Tripp
+        1967).
+    position, pressure, mean_separation : ndarray, shape (..., 101)
+        Profiles: distance from the middle up to the last contact [length], mean pressure [stress], u [length].
+    error : ndarray
+        Estimate of the relative numerical error of the force, with that of the layer's law.
+    scatter : ndarray
+        Standard deviation of ln F at the approach: of the layer's model uncertainty, and from place to place on the
+        faces, whose mean plane below a narrow contact is uncertain.
+    valid : ndarray
+        Whether the layer's law was tested for such contacts, where nine tenths of the force are, and the contact is
+        wider than 1.5 mean wavelengths, and narrower than a tenth of R.
+    reasons : dict
+        Reasons why not `valid`, each with a mask.
+    layer : ContactLaw
+        The law of the surface.
+    units : dict
+        Of the quantities.
+    """
+
+    approach: Numbers
+    force: Numbers
+    stiffness: Numbers
+    area: Numbers
+    contact_radius: Numbers
+    position: FloatArray
+    pressure: FloatArray
+    mean_separation: FloatArray
+    error: Numbers
+    scatter: Numbers
+    valid: Any
+    reasons: dict[str, Any]
+    layer: ContactLaw
+    units: dict[str, str]
+    _body: Body
+
+    def law(self, rtol: float = 1e-5) -> ForceLaw:
+        """Force against approach from first contact to the largest approach of these, as polynomials.
+
+        Parameters
+        ----------
+        rtol : float
+            Of the polynomials, in [1e-6, 0.1]: at 1e-5 some 400 contacts are solved.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, rough_contact
+        >>> face = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
+        >>> ball = rough_contact(face, "5 mm", approach=["1.5 um"], E_star="110 GPa").law(rtol=1e-3)
+        >>> f"{ball.force('1 um'):.4g} N, {ball.stiffness('1 um'):.3g} N/um, {ball.approach('10 N'):.4g} um"
+        '21.74 N, 18.3 N/um, 0.2727 um'
+        """
+        return force_law(
+            self._body, float(np.max(self.approach)) + ROUNDING * self.layer.h_max, number_in("rtol", rtol, 1e-6, 0.1)
+        )
+
+    def _facts(self) -> dict[str, str]:
+        names = ("approach", "force", "stiffness", "area", "contact_radius", "valid")
+        facts = {"body": self._body.name}
+        facts |= {name: shown(getattr(self, name), self.units.get(name, "1")) for name in names}
+        return facts | {"theory": self.layer.theory, "surface": repr(self._body.surface)}
+
+    def _variables(self) -> dict[str, Variable]:
+        meanings = {
+            "approach": "approach beyond touching mean planes",
+            "force": "normal force",
+            "stiffness": "derivative of force by approach",
+            "area": "real contact area",
+            "contact_radius": "effective contact radius",
+            "position": "distance from the middle",
+            "pressure": "mean pressure",
+            "mean_separation": "mean separation of the deformed faces",
+            "error": "estimate of the relative numerical error of force",
+            "scatter": "standard deviation of ln F at the approach from place to place and simulation to simulation",
+            "valid": "whether the law was tested for such contacts",
+        }
+        loads = ("load",) * np.ndim(self.approach)
+        return {
+            name: Variable(value := getattr(self, name), self.units.get(name, "1"), text,
+                           loads + ("place",) * (np.ndim(value) - len(loads)))
+            for name, text in meanings.items()
+        }  # fmt: skip
+
+    def _figure(self) -> Figure:
+        figure, units = new_figure(10, 4), self.units
+        profile, curve = figure.subplots(1, 2)
+        rows = [np.reshape(part, (-1, POINTS)) for part in (self.position, self.pressure)]
+        force, approach = np.ravel(self.force), np.ravel(self.approach)
+        order = np.argsort(approach)
+        for k in order[np.unique(np.linspace(0, len(order) - 1, 5).astype(int))]:
+            profile.plot(rows[0][k], rows[1][k], label=f"{force[k]:.3g} {units['force']}")
+        profile.set(xlabel=f"distance from the middle [{units['position']}]", ylabel=f"pressure [{units['pressure']}]")
+        curve.plot(approach[order], force[order], marker=".", label="rough")
+        smooth = self._body.smooth_approach(force / (self.layer.E_star * self._body.newtons))
+        curve.plot(smooth[order], force[order], "--", label="smooth (Hertz)")
+        curve.set(xlabel=f"approach [{units['approach']}]", ylabel=f"force [{units['force']}]", yscale="log")
+        for axes in (profile, curve):
+            axes.legend()
+            axes.grid(True, alpha=0.3)
+        return figure
+
+
+@hinted
+def rough_contact(
+    surface: AnySurface,
+    radius: float | str,
+    *,
+    shape: str = "sphere",
+    approach: ArrayLike | None = None,
+    force: Any = None,
+    reference: float | str | None = None,
+    theory: str | Theory | None = None,
+    E_star: float | str = 1.0,
+    hardness: float | str | None = None,
+    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
+) -> RoughContact:
+    """Press a rough sphere or cylinder on a flat: an elastic half-space behind the layer of a contact law.
+
+    Roughness is a layer whose mean pressure is that of the law at the local mean separation (Greenwood and Tripp 1967),
+    so contacts must be wide against its longest wavelength. As roughness vanishes, the contact is Hertz's.
+
+    Parameters
+    ----------
+    surface : Surface
+        Roughness of both faces together (`combined`).
+    radius : float or str
+        R [length]; of two curved bodies 1/R = 1/R1 + 1/R2.
+    shape : {"sphere", "cylinder"}
+        A cylinder is long, in plane strain.
+    approach, force : array_like or str
+        One of them, in one dimension at most: the approach [length], or F: numbers, "10 N", or "5 N/mm" of a cylinder.
+    reference : float or str, optional
+        Of a cylinder the distance along the face [length] at which it does not move; by default 2 R/e, so that Hertz's
+        approach is that of a cylinder's axis (K. L. Johnson, Contact Mechanics, 1985, Eq. 5.57).
+    theory, E_star, hardness, materials : optional
+        As for `contact`. With a hardness roughness yields and the bodies do not: of loading alone.
+
+    Returns
+    -------
+    RoughContact
+
+    Raises
+    ------
+    InputError, OutOfRangeError, ConvergenceError
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, rough_contact
+    >>> face = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
+    >>> found = rough_contact(face, "5 mm", force=["1 N", "100 N"], E_star="110 GPa", theory="calibrated")
+    >>> print(found.approach.round(3), found.contact_radius.round(1), found.units["force"])
+    [-0.605  4.211] [ 64.1 157.8] N
+    >>> print((1000 * found.pressure[:, 0]).round(), "MPa in the middle")
+    [ 132. 1974.] MPa in the middle
+    """
+    if shape not in SHAPES:
+        raise InputError(f"shape must be one of {SHAPES}, got {shape!r}{nearest(str(shape), SHAPES)}")
+    law = contact_law(surface, theory, rtol=LAYER_RTOL, E_star=E_star, hardness=hardness, materials=materials)
+    units, plane, largest = law.units, shape == "cylinder", 1e30 * law.h_max
+    R = number_in("radius", units.number("radius", radius), law.h_max, largest)
+    fixed = JOHNSON * R if reference is None else units.number("reference", reference)
+    if not plane and reference is not None:
+        raise InputError("reference is of a cylinder: leave it out")
+    own = chosen_theory(surface, theory)
+    fixed = number_in("reference", fixed, 1e-30 * R, largest)
+    body = Body(law, R, plane, fixed, surface, own, *units_of(units, plane))
+    if (approach is None) == (force is None):
+        raise InputError("give approach or force, one of them")
+    if force is None:
+        wanted = finite_array("approach", units.number("approach", approach))
+        require("approach", wanted, wanted > body.first, f"above {body.first:.6g}, below which bodies are apart")
+    else:
+        given = finite_array("force", forces(force, body, units.length))
+        require("force", given, given > 0, "positive")
+        scale = law.E_star * body.newtons
+        wanted = np.reshape([body.approach_at(value / scale) for value in given.ravel()], given.shape)
+    if wanted.ndim > 1:
+        raise InputError(f"approach or force must be one number or a list, got shape {wanted.shape}")
+    return pressed(body, wanted)
+
+
+def pressed(body: Body, wanted: FloatArray) -> RoughContact:
+    """The contacts at some approaches [length]."""
+    rows, profiles = [], []
+    reasons: dict[str, list[bool]] = {}
+    scale = body.law.E_star * body.newtons
+    for k, approach in enumerate(map(float, wanted.ravel())):
+        found = body.solved(approach, RTOL)
+        force, stiffness, area = body.quantities(found)
+        a = _effective(body, found)
+        scatter, against = _trust(body, found, force)
+        width = 2 * a / mean_wavelength(body.surface)
+        # the mean plane below the contact: that of a cell
+        scatter = math.hypot(scatter, CELLS[0] / width ** CELLS[1] * float(body.surface.h_rms) * stiffness / force)
+        if width < NARROWEST:
+            against.append(f"the contact is narrower than {NARROWEST:g} mean wavelengths")
+        for text in against:
+            reasons.setdefault(text, [False] * wanted.size)[k] = True
+        t = np.linspace(0, 1, POINTS)
+        p, u = (body.between(found, values, t) for values in (found.p, found.u))
+        rows.append((scale * force, scale * stiffness, area, a, found.error, scatter))
+        profiles.append((found.radius * t, np.maximum(p, 0) * body.law.E_star, u))
+    F, stiffness, area, a, error, scatter = (part.reshape(wanted.shape)[()] for part in np.array(rows).T)
+    position, pressure, u = np.array(profiles).swapaxes(0, 1).reshape(3, *wanted.shape, POINTS)
+    masks = {text: np.reshape(mask, wanted.shape) for text, mask in reasons.items()}
+    masks |= {"the contact is wider than a tenth of the radius": a > WIDEST * body.radius}
+    masks = {text: mask for text, mask in masks.items() if np.any(mask)}
+    valid = ~np.logical_or.reduce([np.zeros(wanted.shape, bool), *masks.values()])
+    return RoughContact(
+        wanted[()],
+        F,
+        stiffness,
+        area,
+        a,
+        position,
+        pressure,
+        u,
+        error + body.law.error,
+        scatter,
+        valid,
+        masks,
+        body.law,
+        body.units,
+        body,
+    )
+
+
+def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
+    """Standard deviation of ln F by that of the law, alike at all places, and reasons against the law."""
+    law, ends = body.law, body.ends
+    u = np.clip(found.u, *ends)
+    known = contact(body.surface, mean_separation=u, theory=body.theory, E_star=law.E_star, hardness=law.hardness)
+    spread = np.nan_to_num(known.scatter, nan=0.0)
+    scatter = body.integral(found, found.raised(spread * found.p)) / force
+    if body.integral(found, found.p * np.isnan(known.scatter)) > COUNTED * force:
+        scatter = math.nan
+    shares = {text: body.integral(found, found.p * mask) / force for text, mask in known.reasons.items()}
+    return scatter, [text for text, share in shares.items() if share > COUNTED]
+
+
+def mean_wavelength(surface: Any) -> float:
+    """2 pi over the mean wavenumber, weighted by height variance [length]."""
+    known = getattr(surface, "q", None) is not None
+    spectrum = spectrum_of(surface) if known else Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
+    steep = float(surface.rms_gradient) / float(surface.h_rms) / spectrum.gradient
+    return 2 * math.pi / (steep * float(np.sum(spectrum.variance * spectrum.x)))
+
+
+def _effective(body: HalfSpace, found: Solved) -> float:
+    """3 pi/4 times the mean of r weighted by p dr."""
+    rule = basis(MOMENTS)
+    p = rule.root_weights**2 * body.between(found, found.p, rule.v)
+    return float(0.75 * math.pi * found.radius * np.sum(p * rule.v) / np.sum(p))

@@ -1,0 +1,310 @@
+"""Films, apertures and conductances in the words of other codes: read back by their formulas, GetDP run."""
+
+import dataclasses
+import json
+import re
+import subprocess
+import xml.etree.ElementTree
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from law_points import needs
+
+from mbma_tables import InputError, Surface, contact_law, flow_factors
+from mbma_tables.cli import main
+from mbma_tables.export import DATA, data, fields, solvers
+from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.targets import targets
+
+BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
+SI = {"length_unit": "m", "stress_unit": "Pa"}
+HEAT = {"quantity": "conductance", "conductivity": 50.0, "conductivity_unit": "W/(m K)"}
+RANGE = {"pressures": ("1 MPa", "0.5 GPa")}
+FILM = {"quantity": "film", "peklenik": 3.0}
+APERTURE = {"quantity": "hydraulic_aperture", "theory": "calibrated"}
+
+
+def rows_of(**changed):
+    return describe_law(BEARING, "110 GPa", **(SI | changed))
+
+
+def pressed(numbers, u, E_star):
+    """MBDyn's `GreenwoodTrippCM::ContactPressureTpl`, in the words of its source."""
+    sigma, eta, beta = numbers["sigma"], numbers["eta"], numbers["beta"]
+    K = 16 * np.sqrt(2) / 15 * np.pi * (eta * beta * sigma) ** 2 * np.sqrt(sigma / beta)
+    k, H, H0 = 4.4086e-5 * K * E_star, u / sigma - numbers["delta"] / sigma, numbers["H0"]
+    a0, a1 = (4 - H0) ** 6.804, -6.804 * (4 - H0) ** 5.804
+    return np.where(H > 4, 0.0, k * np.where(H >= H0, np.maximum(4 - H, 0) ** 6.804, a0 + a1 * (H - H0)))
+
+
+def test_rows_of_a_film_are_the_flow_factors():
+    film = rows_of(**FILM)
+    assert (film.x.size, film.quantity) == (200, "film")
+    assert film.x[[0, -1]] == pytest.approx([1e-7, 5e-6], rel=1e-8)
+    own = flow_factors(BEARING, film.x * 1e6, E_star="110 GPa", peklenik=3)
+    for name, (values, unit) in list(film.columns.items())[1:-1]:
+        scale = 1e9 if unit == "Pa" else 1
+        np.testing.assert_allclose(values, scale * np.asarray(getattr(own, name)), rtol=1e-6, err_msg=name)
+    law = contact_law(BEARING, "calibrated", E_star="110 GPa")
+    inner = film.x < 1.5e-6
+    np.testing.assert_allclose(film.more["stiffness"][0][inner], 1e15 * law.stiffness(film.x[inner] * 1e6), rtol=2e-4)
+
+
+@pytest.mark.parametrize("rows", [25, 200])
+def test_the_stated_error_of_a_film_is_its_largest(rows):
+    film = rows_of(**FILM, rows=rows)
+    u = np.random.default_rng(3).uniform(film.x[0], film.x[-1], 2000)
+    own = flow_factors(BEARING, u * 1e6, E_star="110 GPa", peklenik=3)
+    off = []
+    for name in ("phi_x", "phi_y", "shear_x", "shear_y", "pressure"):
+        value = np.asarray(getattr(own, name)) * (1e9 if name == "pressure" else 1)
+        kept = own.valid & (value > (film.floor if name == "pressure" else 0))
+        off.append(np.abs(np.interp(u, film.x, film.columns[name][0]) / np.where(kept, value, 1) - 1)[kept].max())
+    assert 0.5 * film.largest_error < max(off) < 2.5 * film.largest_error
+
+
+def test_mbdyn_finds_its_own_numbers_again():
+    film = rows_of(**FILM)
+    made = {"sigma": 5e-7, "eta": 0.05 / (5e-7 * 2e-6), "beta": 2e-6, "delta": 4e-7, "H0": -100.0}
+    own = dataclasses.replace(film, more=dict(film.more) | {"pressure": (pressed(made, film.x, 1.1e11), "Pa")})
+    numbers, _, misfit = fields.greenwood_tripp(own)
+    assert np.abs(misfit).max() < 1e-6
+    assert [numbers[key] for key in ("eta", "beta", "delta")] == pytest.approx(
+        [made[key] for key in ("eta", "beta", "delta")], rel=1e-5
+    )
+
+
+@pytest.mark.parametrize("pressures", [None, ("1 MPa", "50 MPa")])
+def test_mbdyn_reads_the_pressure_within_the_stated_misfit(pressures):
+    film = rows_of(**FILM, pressures=pressures)
+    text = fields.mbdyn(film, name="joint")
+    numbers = {key: float(value) for key, value in re.findall(r"^set: real joint_(\w+) = (\S+);$", text, re.M)}
+    low, high, unit = re.search(r"fitted from p = (\S+) to (\S+) (\w+),", text.replace("\n# ", " ")).groups()
+    root, most = map(float, re.search(r"is (\S+) root mean\s(?:# )?square,\s(?:# )?(\S+) at", text).groups())
+    u, p = film.x, film.more["pressure"][0]
+    kept = (p >= float(low) * 0.999) & (p <= float(high) * 1.001)
+    off = np.log(pressed(numbers, u[kept], numbers["E"]) / p[kept])
+    assert unit == "Pa"
+    assert [np.sqrt(np.mean(off**2)), np.abs(off).max()] == pytest.approx([root, most], rel=0.06)
+    assert most < 0.2
+    # E1 = E2 = 2 E*, nu = 0 have the modulus E*; continuous slope below H0
+    assert numbers["E"] == 1.1e11
+    below = pressed(numbers, u[kept][0] * np.array([0.97, 1 - 1e-9, 1 + 1e-9, 1.03]), numbers["E"])
+    assert (np.diff(below) < 0).all()
+    # Mindlin's ratio of nu = 0.3 about the law's stiffness over pressure
+    slip = film.more["stiffness"][0][kept] / p[kept] * 2 * (1 - 0.3) / (2 - 0.3)
+    assert slip.min() < numbers["sigma0"] < slip.max()
+    assert numbers["Rq"] * np.sqrt(2) == pytest.approx(5e-7)
+    assert numbers["lambdax"] == 3
+    # the order in which its parser asks for keywords
+    order = ("flow factors", "lambdax", "lambdaz", "contact model", "E1", "nu1", "E2", "nu2", "unit system", "standard")
+    order += ("asperity density", "asperity curvature", "asperity mean height", "linearize", "friction model", "micro")
+    deck = text[text.index("# in the element") :]
+    places = [deck.index(word) for word in order]
+    assert places == sorted(places)
+
+
+def test_geos_takes_the_tables():
+    law = rows_of(**APERTURE, **RANGE)
+    text = fields.geos(law)
+    root = xml.etree.ElementTree.fromstring(text)
+    held = {
+        found.get("name"): [
+            np.array([float(word) for word in found.get(axis).strip("{} ").split(",")])
+            for axis in ("coordinates", "values")
+        ]
+        for found in root.iter("TableFunction")
+    }
+    own = contact_law(BEARING, "calibrated", E_star="110 GPa")
+    aperture = lambda u: np.cbrt(np.asarray(own.leakage(u * 1e6))) * 1e-6  # noqa: E731
+    # `validateApertureTable`: ends at zero with a slope below 1; coordinates rise
+    jump, w = held["rough_byJump"]
+    assert jump[-1] == 0
+    assert (w[-1] - w[-2]) / (jump[-1] - jump[-2]) < 1
+    assert all((np.diff(x) > 0).all() for x, _ in held.values())
+    at = np.linspace(jump[0], 0, 500)
+    off = np.interp(at, jump, w) / aperture(1.75e-6 + at) - 1
+    assert np.abs(off).max() < law.largest_error
+    # against stress, above the least pressure
+    stress, u = held["rough_aperture"]
+    p = np.geomspace(1e6, 0.499e9, 500)
+    exact = np.asarray(own.at_pressure(p * 1e-9).mean_separation) * 1e-6
+    assert np.abs(np.interp(p, stress, u) / exact - 1).max() < 2 * law.largest_error
+    assert np.abs(np.interp(p, *held["rough_hydraulicAperture"]) / aperture(exact) - 1).max() < 1.05 * law.largest_error
+    x, slope = held["rough_derivative"]
+    inner = np.asarray(own.at_pressure(x[1:-1] * 1e-9 * np.array([[1.001], [0.999]])).mean_separation) * 1e-6
+    np.testing.assert_allclose(slope[1:-1], (aperture(inner[0]) - aperture(inner[1])) / (0.002 * x[1:-1]), rtol=1e-5)
+    bandis = next(root.iter("BartonBandis"))
+    w0, reference = (float(bandis.get(key)) for key in ("referenceAperture", "referenceNormalStress"))
+    kept = law.x >= law.x[1]
+    misfit = np.log(w0 / (1 + 9 * law.x[kept] / reference) / law.y[kept])
+    assert f"is {misfit.std():.2g} root mean square, {np.abs(misfit).max():.2g} at most" in text
+    assert next(root.iter("HydraulicApertureTable")).get("apertureTableName") == "rough_byJump"
+
+
+@pytest.mark.parametrize("options", [FILM, HEAT | RANGE, APERTURE | RANGE, {"rows": 30}])
+def test_moose_takes_functions(options):
+    law = rows_of(**options)
+    text = fields.moose_function(law, name="f")
+    blocks = re.findall(
+        r"^  \[f_(\w+)\]\n    type = PiecewiseLinear\n    x = '(.*)'\n    y = '(.*)'\n  \[\]$", text, re.M
+    )
+    assert [name for name, *_ in blocks] == list(law.columns)[1:]
+    for name, x, y in blocks:
+        np.testing.assert_allclose(np.array(x.split(), float), law.x, rtol=1e-9)
+        np.testing.assert_allclose(np.array(y.split(), float), law.columns[name][0], rtol=1e-9)
+
+
+def test_lethe_conducts_within_the_stated_misfit():
+    law = rows_of(**HEAT, **RANGE)
+    text = fields.lethe(law)
+    set_ = {key: float(value) for key, value in re.findall(r"set ([\w ]+) = (\S+)", text)}
+    # two faces: squares add up, the harmonic mean of the hardness; calculate_microcontact_resistance times its area
+    sigma, slope, H = (
+        np.hypot(set_["surface roughness particles"], set_["surface roughness wall"]),
+        np.hypot(set_["surface slope particles"], set_["surface slope wall"]),
+        2 / (1 / set_["microhardness particles"] + 1 / set_["microhardness wall"]),
+    )
+    peak = law.x[1:]
+    # of Hertz's pressure up to the peak the mean of h is h(peak)/(1 + 0.96/2)
+    conductance = (1 + 0.96 / 2) * 50.0 * slope / (1.184 * sigma) * (peak / H) ** 0.96
+    stated = float(re.search(r"\^0.96 is within (\S+) of", text).group(1))
+    assert np.expm1(np.abs(np.log(conductance / law.y[1:])).max()) == pytest.approx(stated, rel=0.05)
+    assert sigma == pytest.approx(5e-7)
+    assert slope == pytest.approx(np.sqrt(2 / np.pi) * float(BEARING.rms_gradient) / np.sqrt(2), rel=1e-6)
+
+
+GETDP = """
+Include "law.pro";
+Group { D = Region[1]; }
+FunctionSpace { { Name S; Type Form0; BasisFunction { { Name s; NameOfCoef c; Function BF_Node; Support D;
+  Entity NodesOf[All]; } } } }
+Jacobian { { Name J; Case { { Region All; Jacobian Vol; } } } }
+Integration { { Name I; Case { { Type Gauss; Case { { GeoElement Line; NumberOfPoints 1; } } } } } }
+Formulation { { Name F; Type FemEquation; Quantity { { Name v; Type Local; NameOfSpace S; } }
+  Equation { Galerkin { [ Dof{v}, {v} ]; In D; Jacobian J; Integration I; } } } }
+Resolution { { Name R; System { { Name A; NameOfFormulation F; } } Operation { PRINTS } } }
+"""
+MESH = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n2\n1 0 0 0\n2 1 0 0\n$EndNodes\n$Elements\n1\n1 1 2 1 1 1 2\n"
+
+
+@needs("getdp")
+@pytest.mark.parametrize("options", [FILM, HEAT | RANGE])
+def test_getdp_interpolates(options, tmp_path):
+    law = rows_of(**options)
+    (tmp_path / "law.pro").write_text(fields.getdp(law))
+    (tmp_path / "a.msh").write_text(f"{MESH}$EndElements\n")
+    x = np.linspace(law.x[0], law.x[-1], 7)
+    names = list(law.columns)[1:]
+    asked = "".join(
+        f"Print[{{{', '.join(f'rough_{name}[{value:.12g}]' for value in x[:-1])}}}, Format "
+        f'"{name} {" ".join(["%.12g"] * 6)}"];\n'
+        for name in names
+    )
+    (tmp_path / "a.pro").write_text(GETDP.replace("PRINTS", asked))
+    ran = subprocess.run(
+        ["getdp", "a.pro", "-msh", "a.msh", "-solve", "R"], cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
+    for name in names:
+        found = re.search(rf"^{name} (.*)$", ran.stdout, re.M)
+        assert found, ran.stdout + ran.stderr
+        expected = np.interp(x[:-1], law.x, law.columns[name][0])
+        np.testing.assert_allclose(np.array(found[1].split(), float), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", DATA)
+def test_data_of_a_film_come_back(name, tmp_path):
+    film = rows_of(**FILM)
+    path = tmp_path / "film"
+    path.write_bytes(getattr(data, f"to_{name}")(film))
+    if name == "json":
+        again = data.from_json(path.read_bytes())
+        assert again.facts == film.facts
+        found = {key: values for key, (values, _) in again.columns.items()}
+    elif name == "csv":
+        lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+        assert lines[0].startswith("mean_separation [m],phi_x [1],")
+        found = dict(zip(film.columns, np.array([line.split(",") for line in lines[1:]], float).T, strict=True))
+    elif name == "matlab":
+        from scipy.io import loadmat
+
+        held = loadmat(path, appendmat=False)
+        found = {key: held[{"mean_separation": "x", "phi_x": "y"}.get(key, key)][:, 0] for key in film.columns}
+    elif name == "netcdf":
+        import xarray as xr
+
+        with xr.open_dataset(path, engine="netcdf4") as held:
+            assert held.pressure.attrs["units"] == "Pa"
+            found = {key: held[key].values for key in film.columns}
+    elif name == "hdf5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path) as held:
+            found = {key: held[key][:] for key in film.columns}
+    else:
+        held = pytest.importorskip("pyarrow.parquet").read_table(path)
+        assert json.loads(held.schema.metadata[b"units"])["pressure"] == "Pa"
+        found = {key: held[key].to_numpy() for key in film.columns}
+    for key, (values, _) in film.columns.items():
+        np.testing.assert_array_equal(found[key], values, err_msg=key)
+
+
+@pytest.mark.parametrize("name", ["comsol", "moose", "modelica"])
+def test_columns_of_a_film(name):
+    film = rows_of(**FILM)
+    lines = [line for line in getattr(solvers, name)(film).splitlines() if line[0] in "0123456789"]
+    np.testing.assert_allclose(
+        np.array([line.split() for line in lines], float), np.stack([v for v, _ in film.columns.values()], 1), rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "ends"),
+    [
+        (("mbdyn", "--peklenik", "2"), "set: real rough_lambdax = 2;"),
+        (("geos", "--theory", "calibrated", "--pressures", "1kPa:1MPa"), '<BartonBandis name="rough_fitted"'),
+        (("moose-function", "--quantity", "film", "--rows", "9"), "[rough_phi_x]"),
+        (("csv", "--quantity", "film", "--peklenik", "2"), "mean_separation [mm],phi_x [1]"),
+        (
+            ("lethe", "--conductivity", "2", "--conductivity-unit", "W/(m K)", "--pressures", "1kPa:1MPa"),
+            "microhardness",
+        ),
+    ],
+)
+def test_the_command_writes_them_again(words, ends, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner()
+    asked = ["export", *words, "--surface", "concrete", "--E-star", "13.3MPa", "--out", "made.txt"]
+    ran = run.invoke(main, asked)
+    assert ran.exit_code == 0, ran.output
+    text = (tmp_path / "made.txt").read_text()
+    assert ends in text
+    assert ("lengths in m\n" in text.replace(" -->", "")) == (targets()[words[0]].units is not None)
+    assert ("E* = 13300000 Pa" in text) == (targets()[words[0]].units is not None)
+    (tmp_path / "made.txt").write_text(text[:-50])
+    ran = run.invoke(main, ["export", "--again", "made.txt"])
+    assert ran.exit_code == 0, ran.output
+    assert (tmp_path / "made.txt").read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda: fields.mbdyn(rows_of()), "MBDyn takes film against mean_separation here, got pressure against"),
+        (lambda: fields.geos(rows_of(**FILM)), "GEOS takes hydraulic_aperture against pressure here, got phi_x"),
+        (lambda: fields.mbdyn(rows_of(**FILM, length_unit="um")), "MBDyn is written in m and Pa, got um and Pa"),
+        (lambda: fields.mbdyn(rows_of(**FILM), name="a b"), "a name must be a letter"),
+        (
+            lambda: fields.mbdyn(rows_of(**FILM, pressures=("3 GPa", "4 GPa"))),
+            r"needs 3 rows at pressures with A/A0 <=",
+        ),
+        (lambda: rows_of(**FILM, rtol=1e-3), "rtol and largest_overclosure are not of a film"),
+        (lambda: rows_of(**FILM, rows=2), "rows must be a whole number in"),
+        (lambda: rows_of(peklenik=2.0), "peklenik belongs to quantity='film'"),
+        (lambda: rows_of(quantity="film", peklenik=20.0), "peklenik"),
+        (lambda: solvers.lsdyna(rows_of(**FILM)), "LS-DYNA takes pressure against overclosure"),
+    ],
+)
+def test_refused(ask, said):
+    with pytest.raises(InputError, match=said):
+        ask()
