@@ -9,11 +9,11 @@ from __future__ import annotations
 import click
 import numpy as np
 
+from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables import Surface, flow_factors
 from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.effective_medium import wide_gap
 from mbma_tables.laws.film import factors
 from mbma_tables.laws.reynolds import flow_and_couette
