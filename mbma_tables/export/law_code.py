@@ -129,7 +129,7 @@ class AskedLaw(NamedTuple):
     flow: FlowNumbers | None
     slopes: dict[str, float]  # ratios of functions to the slope of a law,
     sloped: ContactLaw  # of the contact without a hardness
-    more: dict[str, str]  # units of what was asked of `MORE`
+    more: dict[str, str]  # units of the requested quantities of `MORE`
     said: tuple[str, ...]
 
 

@@ -243,7 +243,7 @@ def _table(
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
     if slope := quantity in ("conductance", "tangential_stiffness"):
-        # between no contact and the smallest pressure that counts there is one row alone, that of zero
+        # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or law.highest < np.inf)
