@@ -78,9 +78,9 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
     from mbma_tables.models.tables import verify
 
     if holds_own(table):
-        from mbma_tables.theories.own_table import verify_own
+        from mbma_tables.theories import BoundaryElements
 
-        loads, error = verify_own(table)
+        loads, error = BoundaryElements.verify(table)
         found: dict[str, Any] = {"path": table, "kind": OWN, "points": loads, "table_error": error}
         return found, f"{table}: hashes match; {loads} simulated loads: curves within {error:.1e}"
     v = verify(*_place(table))

@@ -31,7 +31,6 @@ NUMBERS = {
 }
 # parts of the surface, by the names of their fields; `band` of a spectrum is for the map's own grid
 PARTS: dict[str, Any] = {"heights": Heights, "bearing": Bearing, "bands": RadialSpectrum}
-FAITHFUL = 1e-6  # relative, of curves at the loads they go through
 POWERS = {
     **dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), "{length}"),
     **{"q": "1/{length}", "q2_mean_inverse": "{length}^2", "variance": "{length}^2", "curvature": "1/{length}^2"},
@@ -108,21 +107,6 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
         raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {ADVICE}") from None
-
-
-def verify_own(path: os.PathLike[str] | str) -> tuple[int, float]:
-    """Number of loads of such a file, and by how much its curves miss their pressures and areas, relatively.
-
-    A `TableFileError` where that is more than `FAITHFUL`.
-    """
-    from mbma_tables.theories.simulated import BoundaryElements
-
-    theory = BoundaryElements.of(read_surface(path))
-    found = theory.answer(theory.surface, theory.rows[2])
-    missed = float(np.abs(np.array(found[:2]) / theory.rows[:2] - 1).max())
-    if not missed <= FAITHFUL:
-        raise TableFileError(f"{path}: its curves miss its simulated loads by {missed:.1e}; {ADVICE}")
-    return theory.rows.shape[1], missed
 
 
 def _plain(value: Any) -> Any:
