@@ -321,6 +321,11 @@ def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, ar
     many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
     far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
     found = {many: area > LARGEST_AREA, far: large} if own is None else dict(own[1])
+    if own is None and isinstance(surface, MeasuredSurface) and surface.bearing is not None:
+        of_map = (
+            "leakage: channels and walls of a map are not in its isotropic spectrum: theory='simulated' has its flow"
+        )
+        found[of_map] = np.ones(np.shape(area), bool)
     if _simulated(theory) is not theory:
         found["leakage: yielded contacts leak several times more"] = np.ones(np.shape(area), bool)
     if isinstance(theory.elastic, Mbma):
