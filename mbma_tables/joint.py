@@ -200,8 +200,7 @@ class Joint(Displayed):
         name : str, optional
             Of the surface interaction, or what functions begin with.
         heat : bool
-        <<<<<<< HEAD
-            Whether conductance of the solid spots is written, too.
+            Whether the conductance of the solid spots is also written.
         friction_pressure : float or str, optional
             Where the one tangential stiffness of a friction card holds; else at the geometric mean of `pressures`.
 
@@ -210,9 +209,6 @@ class Joint(Displayed):
         str or bytes
             The first file of the target, bytes of an FMU. Solvers have a friction card where the joint has a
             coefficient of friction, functions the tangential stiffness.
-        =======
-            Whether the conductance of the solid spots is also written.
-        >>>>>>> refs/heads/prose
 
         Examples
         --------

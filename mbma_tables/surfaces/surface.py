@@ -336,9 +336,10 @@ class MeasuredSurface(SpectralSurface):
 
         Examples
         --------
+        >>> import numpy as np
         >>> from mbma_tables import Surface
-        >>> q = [0.2 * 1.03**k for k in range(188)]
-        >>> face = Surface.from_spectrum(q, [0.01 * min(1, k**-3.6) for k in q], h_max=1.1)  # flat up to q = 1
+        >>> q = np.geomspace(0.2, 50, 60)
+        >>> face = Surface.from_spectrum(q, 0.01 * np.maximum(q, 1) ** -3.6, h_max=1.1)  # flat up to q = 1
         >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
         H = 0.80 from q = 1.00
         """
