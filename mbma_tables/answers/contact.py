@@ -145,7 +145,7 @@ def contact(
     ...     materials=("steel 4140 hard", "aluminium 6061 hard"),
     ... )
     >>> f"{joint.area:.2%}, {joint.yielded:.0%} of it yields; {joint.conductance():.2g} W/(m^2 K)"
-    '1.05%, 100% of it yields; 1e+05 W/(m^2 K)'
+    '1.05%, 100% of it yields; 1.1e+05 W/(m^2 K)'
     >>> joint = contact(Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa")
     >>> f"{joint.mean_separation:.3e} {joint.units['separation']}, {joint.stiffness:.1f} {joint.units['stiffness']}"
     '1.642e-03 mm, 471.9 MPa/mm'
