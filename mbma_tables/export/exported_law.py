@@ -212,11 +212,7 @@ class ExportedForce(ExportedLaw):
             f"range: {range_}",
             *more,
             f"the law is within {law.error:.1e} of its theory, in force and area",
-            *(
-                []
-                if np.isinf(self.hardness)
-                else [f"hardness = {self.hardness:.10g} {body.units['pressure']}: loading"]
-            ),
+            *([f"hardness = {self.hardness:.10g} {body.units['pressure']}: loading"] if self.hardness < np.inf else []),
             *self._validity(end, leakage),
             *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
         )

@@ -265,22 +265,9 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     masks = {text: mask for text, mask in masks.items() if np.any(mask)}
     valid = ~np.logical_or.reduce([np.zeros(wanted.shape, bool), *masks.values()])
     return RoughContact(
-        wanted[()],
-        F,
-        stiffness,
-        area,
-        a,
-        position,
-        pressure,
-        u,
-        error + body.law.error,
-        scatter,
-        valid,
-        masks,
-        body.law,
-        body.units,
-        body,
-    )
+        wanted[()], F, stiffness, area, a, position, pressure, u, error + body.law.error, scatter, valid, masks,
+        body.law, body.units, body,
+    )  # fmt: skip
 
 
 def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
