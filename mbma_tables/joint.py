@@ -87,10 +87,10 @@ class Joint(Displayed):
     >>> joint = Joint(ground, milled, materials=metals, nominal_area="4 cm^2")
     >>> found = joint.at_pressure("10 MPa")
     >>> f"{found.area:.2%}, {found.conductance():.3g} W/(m^2 K), {found.tangential().stiffness:.3g} GPa/um"
-    '1.17%, 3.99e+04 W/(m^2 K), 0.0273 GPa/um'
+    '1.17%, 3.96e+04 W/(m^2 K), 0.0271 GPa/um'
     >>> table = joint.table(["10 MPa", "50 MPa"])
     >>> [f"{value:.3g}" for value in table["total_conductance"].values]
-    ['5.75e+04', '2.08e+05']
+    ['5.72e+04', '2.07e+05']
     """
 
     part_a: Part
@@ -200,8 +200,7 @@ class Joint(Displayed):
         name : str, optional
             Of the surface interaction, or what functions begin with.
         heat : bool
-        <<<<<<< HEAD
-            Whether conductance of the solid spots is written, too.
+            Whether the conductance of the solid spots is also written.
         friction_pressure : float or str, optional
             Where the one tangential stiffness of a friction card holds; else at the geometric mean of `pressures`.
 
@@ -210,9 +209,6 @@ class Joint(Displayed):
         str or bytes
             The first file of the target, bytes of an FMU. Solvers have a friction card where the joint has a
             coefficient of friction, functions the tangential stiffness.
-        =======
-            Whether the conductance of the solid spots is also written.
-        >>>>>>> refs/heads/prose
 
         Examples
         --------

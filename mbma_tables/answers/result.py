@@ -50,17 +50,10 @@ class Contact(Interface, Displayed):
         d, between the rigid plane and the mid-plane [length].
     mean_separation : ndarray
         u = (h_max + d)/2 (50) [length].
-    <<<<<<< HEAD
     pressure : ndarray
         F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
     area : ndarray
         A/A0. MBMA does not end at 1 under full compression, and this is not clamped.
-    =======
-    pressure : ndarray or None
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not requested.
-    area : ndarray or None
-        A/A0, None where not requested. In MBMA it differs from 1 at full compression; it is not clamped.
-    >>>>>>> refs/heads/prose
     error : ndarray
         Bound on the relative numerical error of both against the theory (for "mbma" against its island model),
         NaN where not known. The deviation of the theory from simulation is given separately, as `scatter`.

@@ -141,7 +141,7 @@ def sensitivity(
     'stiffness 0.0885 to 0.094 GPa/um'
     >>> found = sensitivity(ground, pressure="10 MPa", materials="steel 1020", theory="calibrated")
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
-    'conductance goes like hardness^-0.69'
+    'conductance goes like hardness^-0.68'
     """
     named = theory_name(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
     # a simulation is of one surface only

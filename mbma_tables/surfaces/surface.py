@@ -322,8 +322,7 @@ class MeasuredSurface(SpectralSurface):
         Parameters
         ----------
         band : tuple of float, optional
-            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
-            and left out.
+            (q0, q1) to fit and to take as a plain power law; else without a roll-off below and a departure above.
 
         Returns
         -------
@@ -337,8 +336,10 @@ class MeasuredSurface(SpectralSurface):
 
         Examples
         --------
-        >>> from mbma_tables import Surface  # the spectrum is flat up to q = 1
-        >>> face = Surface.from_spectrum([0.2, 1, 50], [0.01, 0.01, 7.6e-9], h_max=1.1)
+        >>> import numpy as np
+        >>> from mbma_tables import Surface
+        >>> q = np.geomspace(0.2, 50, 60)
+        >>> face = Surface.from_spectrum(q, 0.01 * np.maximum(q, 1) ** -3.6, h_max=1.1)  # flat up to q = 1
         >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
         H = 0.80 from q = 1.00
         """
