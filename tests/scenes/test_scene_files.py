@@ -146,7 +146,6 @@ SOME = f"""# a comment
 unit,seconds,both,,0.002,
 universal,gap rtol=1e-02,both,1e-9,4,50
 universal,gap rtol=1e-06,both,1e-9,16,60
-universal,gap rtol=1e-06,pressure,1e-9,10,60
 universal,call,both,,3,
 """
 
@@ -165,8 +164,6 @@ def read(tmp_path, text):
         (("universal", "gap", 1e-1), 4),
         (("universal", "gap", 1e-4), 16),
         (("universal", "gap", 1e-9), 16),
-        (("universal", "gap", 1e-6, "pressure"), 10),
-        (("universal", "gap", 1e-6, "area"), 16),
         (("universal", "call", 1e-6), 3),
         (("universal", "law", 1e-6), math.nan),
     ],
@@ -182,7 +179,7 @@ def test_shipped_costs_have_what_plans_need():
     needed |= {"exact": (*calls, "profile"), "scene": ("call",), "island4d": ("gap",)}
     for name, whats in needed.items():
         for what in whats:
-            assert 0 < costs.of(name, what, 1e-4, "pressure") < 10, (name, what)
+            assert 0 < costs.of(name, what, 1e-4) < 10, (name, what)
     errors = [row.error for row in costs.rows if row.island_model == "universal" and row.what == "gap"]
     assert 0 < max(errors) <= 1e-8
     assert costs.of("exact", "gap", 1e-8) > 3 * costs.of("universal", "gap", 1e-8)
