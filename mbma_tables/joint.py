@@ -200,7 +200,7 @@ class Joint(Displayed):
         name : str, optional
             Of the surface interaction, or what functions begin with.
         heat : bool
-            Whether conductance of the solid spots is written, too.
+            Whether the conductance of the solid spots is also written.
         friction_pressure : float or str, optional
             Where the one tangential stiffness of a friction card holds; else at the geometric mean of `pressures`.
 

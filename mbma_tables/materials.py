@@ -278,10 +278,8 @@ def microhardness(surface: Any, c1: float | str, c2: float) -> str:
     ----------
     surface : Surface
         With its unit of length.
-    c1 : float or str
-        Vickers hardness of an indent of 1 um, with its unit or in GPa.
-    c2 : float
-        Size index, in (-1, 0]: d ln hardness by d ln of the indent's size.
+    c1, c2 : float
+        Vickers hardness of an indent of 1 um, with its unit or in GPa, and size index in (-1, 0].
 
     Examples
     --------

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.differentiate import derivative
 
-from generate.boundary_elements.capped import CappedContact, project
 from generate.boundary_elements.surfaces import Recipe, heights
+from generate.boundary_elements.tamaas_contact import Contact as Elastic
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws import hardness
 from mbma_tables.laws.bearing_curve import bearing
-from mbma_tables.laws.boundary_elements import Contact as Elastic
+from mbma_tables.laws.boundary_elements import Contact, project
 from mbma_tables.theories.calibrated_table import shipped_part
 
 
@@ -116,7 +116,7 @@ def test_projection_is_the_nearest_allowed_field():
 def test_capped_boundary_elements(recipe):
     unscaled = heights(recipe)
     surface = unscaled / bearing(unscaled, recipe.sizes).gradient
-    elastic, capped = (CappedContact(surface, recipe.sizes, cap) for cap in (np.inf, 0.2))
+    elastic, capped = (Contact(surface, recipe.sizes, hardness=cap) for cap in (np.inf, 0.2))
     for force in (0.01, 0.1):
         free, held = elastic.press(force), capped.press(force)
         other = Elastic(surface, recipe.sizes).press(force)

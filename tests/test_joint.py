@@ -1,6 +1,7 @@
 """`Joint`: one description of two parts, the same numbers as the single calls, and no more work than they."""
 
 import ctypes
+import dataclasses
 import pathlib
 import runpy
 import shutil
@@ -10,9 +11,10 @@ import numpy as np
 import pytest
 from helpers import random_map
 
-from mbma_tables import InputError, Joint, Surface, contact
+from mbma_tables import InputError, Joint, Surface, contact, contact_law
 from mbma_tables.cli import main
 from mbma_tables.export import targets
+from mbma_tables.export.law_code import law_text
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.theories.calibrated import Calibrated
 
@@ -192,3 +194,22 @@ def test_parts_with_a_lay_have_a_direction():
     ]
     slopes = [float(card.split("*FRICTION\n")[1].splitlines()[0].split(",")[1]) for card in cards]
     np.testing.assert_allclose(slopes, 1e6 * np.array(stiff), rtol=1e-3)
+
+
+def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
+    answer, calls = Calibrated.answer, []
+    monkeypatch.setattr(Calibrated, "answer", lambda *given: calls.append(1) or answer(*given))
+    contact(joint.surface, pressure="10 MPa", materials=METALS, theory="calibrated")
+    plain = len(calls)
+    joint.at_pressure("10 MPa")
+    assert len(calls) == 2 * plain
+    # a law as code makes the elastic one for an unloading stiffness alone
+    made = []
+    law = contact_law(joint.surface, E_star=1.0, theory="calibrated", hardness=0.05)
+    monkeypatch.setattr("mbma_tables.export.exported_law.contact_law", lambda *given, **options: law)
+    law = dataclasses.replace(law, elastic=lambda: made.append(1) or contact_law(joint.surface, theory="calibrated"))
+    given = {"length_unit": "um", "stress_unit": "GPa", "theory": "calibrated", "hardness": 0.05}
+    law_text("c-law", joint.surface, 1.0, **given)
+    assert not made
+    law_text("c-law", joint.surface, 1.0, kappa=1.2, **given)
+    assert made

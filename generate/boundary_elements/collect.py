@@ -78,8 +78,8 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") 
     engine = ", ".join(sorted({str(content["engine"]) for content in found}))
     source = f"{engine}: conjugate gradients of Polonsky and Keer, force control, tolerance {TOLERANCE:g}"
     if kind == "hardness":
-        method = "generate.boundary_elements.capped: projected conjugate gradients"
-        source = f"{method}, force control, tolerance {capped.TOLERANCE:g}"
+        method = "mbma_tables.laws.boundary_elements: projected conjugate gradients"
+        source = f"{method}, force control, tolerance {TOLERANCE:g}"
     made_by = {"engine": engine, "numpy": ", ".join(sorted({str(content["numpy"]) for content in found}))}
     data.attrs = {
         "Conventions": "CF-1.11",

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from generate.boundary_elements.surfaces import Recipe, heights
+from generate.boundary_elements.tamaas_contact import Contact as Contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.laws.bearing_curve import (
@@ -22,7 +23,6 @@ from mbma_tables.laws.bearing_curve import (
     wavevectors,
 )
 from mbma_tables.laws.boundary_elements import LOADS as LOADS
-from mbma_tables.laws.boundary_elements import Contact as Contact
 
 # beyond LOADS, where heavy tails of the gradient keep gaps open
 HIGHER_LOADS = (1.5, 2.1, 3.0)

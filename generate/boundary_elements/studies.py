@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
-from generate.boundary_elements.capped import CappedContact, load_at
+from generate.boundary_elements.capped import load_at
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
 from generate.boundary_elements.solve import LOADS, Contact, prepared, pressed
 from generate.boundary_elements.surfaces import Recipe, heights
@@ -23,11 +23,11 @@ from generate.calibrated_file import rms
 from generate.timing import fixed_work
 from mbma_tables import Surface, contact
 from mbma_tables.common.files import write_file
+from mbma_tables.laws import boundary_elements
 from mbma_tables.laws.bearing_curve import bearing
 from mbma_tables.laws.gas import mean_inverse
 from mbma_tables.surfaces.maps import prepared as treated_map
-from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.theories.own_map import continued
+from mbma_tables.surfaces.treatment import Treated, mirrored
 
 DATA = pathlib.Path("docs/data")
 CHOSEN = ((0.3, 12.0), (0.9, 12.0))  # H and zeta_1 of held-out spectra, their first surfaces
@@ -128,7 +128,8 @@ def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
     """Simulate measured maps for docs/fidelity.md, read by SurfaceTopography: a few minutes each."""
     for path in maps:
         treated = middle(treated_map(path, {"periodic": False}))
-        surface, sizes = continued(treated)
+        surface = mirrored(treated.heights - treated.heights.mean())
+        sizes = surface.shape[0] * treated.steps[0], surface.shape[1] * treated.steps[1]
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
         found = pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi)
@@ -149,7 +150,7 @@ def gap_errors(kind: str) -> pd.DataFrame:
         surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
         h_rms = float(surface.std())
         like = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, h_rms, known["h_max"] * h_rms)
-        solved = CappedContact(surface, recipe.sizes, eta)
+        solved = boundary_elements.Contact(surface, recipe.sizes, hardness=eta)
         for load in (load_at(area, eta) for area in AREAS):
             row: dict[str, Any] = {"area": solved.press(load)["area"], "waves": recipe.waves}
             assert solved.pressure is not None

@@ -17,13 +17,19 @@ from generate.boundary_elements.collect import collect
 from generate.boundary_elements.design import Task
 from generate.boundary_elements.run import run
 from generate.boundary_elements.solve import simulate_to
+from generate.machined.hardness import ETA, WAYS, yielded
 from generate.machined.makers import FAMILIES, Part
-from generate.machined.solve import APART, answered, solved, surface_of
+from generate.machined.solve import answered, solved, surface_of
 from generate.provenance import source_digest, versions
 
 NUMBERS = 5  # parts of each family
+LARGE, SMOOTHEST = (
+    512,
+    2,
+)  # points a side of one more of each family, and its number: of the longest shortest wavelength
+EVERY = 3  # part that is pressed with a hardness, too
 FORMS = ("calibrated", "corrected", "simulated")
-MODULES = ("generate.machined.makers", "generate.machined.solve", "mbma_tables.laws.boundary_elements")
+MODULES = ("generate.machined.makers", "generate.machined.solve", "generate.boundary_elements.tamaas_contact")
 TARGET = pathlib.Path("docs/data/machined.nc")
 MEANINGS = {
     "pressure": "F/(A0 E*)",
@@ -37,16 +43,29 @@ MEANINGS = {
     "area_scatter": "of ln A at equal F",
     "stiffness_scatter": "of ln of the stiffness at equal F",
     "flow_scatter": "of ln of the flow coefficient",
-    **{f"{name}_by_law": f"what the law differs by, as an error of {name}" for name in APART},
-    **{f"{name}_by_quarter": f"what the quarter grid differs by, likewise of {name}" for name in APART},
     "valid": "1 where the contact is stated to be like those tested",
     "flow_valid": "1 where its flow is",
 }
 
+HARD = {
+    "pressure": "F/(A0 E*) of contacts with a hardness eta E* g",
+    "stiffness": "-dF/du over A0 E* of their loading",
+    "area": "A/A0, by way: boundary elements at a tolerance of 1e-6, the theory simulated, the law of hardness on it",
+    "mean_separation": "u, the mean gap",
+    "yielded": "share of the contact area at the hardness",
+    "unloading_stiffness": "-dF/du over A0 E* of the frozen contact",
+}
+
 
 def parts() -> list[Part]:
-    """Every part, families in turn, so that stopping early leaves a balanced set."""
-    return [Part(family, number) for number in range(NUMBERS) for family in FAMILIES]
+    """Every part, families in turn, so that stopping early leaves a balanced set; large ones of all but one."""
+    large = [Part(family, SMOOTHEST, LARGE) for family in FAMILIES if family != "milled"]
+    return [Part(family, number) for number in range(NUMBERS) for family in FAMILIES] + large
+
+
+def yielding_parts() -> list[Part]:
+    """Those that are pressed with a hardness."""
+    return parts()[: NUMBERS * len(FAMILIES) : EVERY]
 
 
 def answers(part: Part, form: str, folder: pathlib.Path) -> dict[str, Any]:
@@ -66,6 +85,12 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
         for name in (name for name in MEANINGS if name in read[0]):
             attributes = {"long_name": MEANINGS[name], "units": "1"}
             data[prefix + name] = (("surface", "load"), np.array([one[name] for one in read]), attributes)
+    hard = {p.name: dict(np.load(folder / "hardness" / f"{p.name}.npz")) for p in yielding_parts() if p in have}
+    data = data.assign_coords(yielding=[*hard], eta=list(ETA), way=list(WAYS))
+    for name, meaning in HARD.items():
+        values: Any = np.array([one[f"hard_{name}"] for one in hard.values()])
+        over = ("yielding", "way", "eta", "hard_load") if values.ndim == 4 else ("yielding", "eta", "hard_load")
+        data[f"hard_{name}"] = over, values, {"long_name": meaning, "units": "1"}
     surfaces = [surface_of(part)[1] for part in have]
     for name, values in {
         "shortest": [part.shortest for part in have],
@@ -95,7 +120,7 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 @click.option("--out", type=click.Path(path_type=pathlib.Path), default=TARGET, show_default=True)
 def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
-    """Press maps of machined surfaces by boundary elements (Tamaas): half an hour on one core.
+    """Press maps of machined surfaces by boundary elements (Tamaas): an hour on one core.
 
     Stopped and called again, it goes on where it was. Answers of theories are kept in folders of their own: remove
     these to ask a changed library again.
@@ -105,7 +130,9 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     tasks: list[Any] = [Task(cast(Any, part), "") for part in parts()]
     solvers: dict[str, Callable[[Part], dict[str, Any]]] = {"": solved}
     solvers |= {form: functools.partial(answers, form=form, folder=folder) for form in FORMS}
+    hard: list[Any] = [Task(cast(Any, part), "") for part in yielding_parts()]
     with executor(workers, None) as pool:
+        run(hard, folder / "hardness", pool, functools.partial(simulate_to, solve=cast(Any, yielded)))
         for form, solve in solvers.items():
             run(tasks, folder / form, pool, functools.partial(simulate_to, solve=cast(Any, solve)))
     click.echo(f"{out}: {collect(gathered(folder), out)} of {len(tasks)} surfaces")

@@ -2,12 +2,10 @@
 
 Each form states a standard deviation with a few constants, the same for all maps::
 
-    simulated    one for each contact area of the truth
-    corrected    root of a^2 + (b D1)^2 + (c D2)^2, D1 by the law, D2 by the quarter grid; of flow as simulated
-    calibrated   root of s^2 + c^2, s that of Gaussian maps, one c for maps that are valid and one for others
+    simulated, corrected   one for each contact area of the truth
+    calibrated             root of s^2 + c^2, s that of Gaussian maps, one c for maps that are valid and one for others
 
-They are the likeliest for errors that are distributed as Student's t with four degrees of freedom, times what makes
-them cover 70% of errors once and 94.5% twice. `left_out` states for each family what the others give.
+They cover 70% of errors once and 94.5% twice. `left_out` states for each family what the others give.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import minimize
 
 from generate.machined.errors import errors, seen
 from generate.machined.makers import FAMILIES
@@ -24,33 +21,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.theories.calibrated import MAP_SCATTER
 
 ONCE, TWICE = 0.70, 0.945
-FREEDOM = 4.0  # of Student's distribution, whose tails are heavy
-GUESS = (0.02, 0.5, 0.5)
 
 
 def reached(ratio: FloatArray) -> float:
     """Factor of stated standard deviations after which they cover as many errors as they should."""
     return float(max(np.quantile(ratio, ONCE), np.quantile(ratio, TWICE) / 2))
-
-
-def corrected(data: xr.Dataset, quantity: str, rows: Any) -> FloatArray:
-    """a, b and c, fitted to surfaces of these numbers."""
-    error, kept = valid_errors(data, "corrected", quantity)
-    error, square = error[rows][kept[rows]], apart(data, quantity)[:, rows][:, kept[rows][..., 0]] ** 2
-
-    def unlikely(logs: FloatArray) -> float:
-        variance = np.exp(2 * logs) @ square
-        tails = (FREEDOM + 1) / 2 * np.log1p(error**2 / variance / FREEDOM)
-        return float(np.mean(np.log(variance) / 2 + tails))
-
-    found = np.exp(minimize(unlikely, np.log(GUESS), method="Nelder-Mead", options={"maxiter": 4000}).x)
-    return np.asarray(found * reached(np.abs(error) / np.sqrt(found**2 @ square)))
-
-
-def apart(data: xr.Dataset, quantity: str) -> FloatArray:
-    """1, D1 and D2, shape (3, surfaces, loads)."""
-    parts = [data[f"corrected_{quantity}_by_{other}"].values for other in ("law", "quarter")]
-    return np.stack([np.ones_like(parts[0]), *parts])
 
 
 def valid_errors(data: xr.Dataset, form: str, quantity: str) -> tuple[FloatArray, Any]:
@@ -95,9 +70,6 @@ def scatter(data: xr.Dataset, form: str, quantity: str, rows: Any) -> FloatArray
         valid, other = calibrated(data, quantity, rows)
         added = np.where(data.calibrated_valid.values > 0.5, valid, other)
         return np.asarray(np.hypot(of_gaussian(data, quantity), added))
-    if form == "corrected" and quantity != "flow":
-        constants = corrected(data, quantity, np.flatnonzero(rows))
-        return np.asarray(np.sqrt(np.einsum("i,ijk->jk", constants**2, apart(data, quantity) ** 2)))
     return np.broadcast_to(by_area(data, form, quantity, np.flatnonzero(rows)), data.area.shape)
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 import click
 import numpy as np
 
+from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import GRADIENT, finished, rough
+from mbma_tables import Surface, flow_factors
 from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.effective_medium import wide_gap
 from mbma_tables.laws.film import factors
 from mbma_tables.laws.reynolds import flow_and_couette
@@ -25,7 +26,7 @@ AREAS = ((0.0, 0.0), (1e-9, 0.01), (0.01, 0.03), (0.05, 0.1), (0.15, 0.22))
 
 
 def rows() -> FloatArray:
-    """Columns: lay, gamma, u/h_rms, A/A0, phi along and across, phi_s along and across; shape (8, n)."""
+    """Columns: lay, gamma, u/h_rms, A/A0, phi and phi_s along and across, phi by `flow_factors`; shape (10, n)."""
     found = []
     k = np.meshgrid(*2 * [np.fft.fftfreq(POINTS)], indexing="ij")
     squared = k[0] ** 2 + k[1] ** 2
@@ -38,15 +39,17 @@ def rows() -> FloatArray:
         solved = Contact(z, (POINTS, POINTS), 1e-5)
         gaps = [(0.0, share * z.max() - z) for share in ABOVE]
         gaps += [(solved.press(load * GRADIENT)["area"], solved.gap) for load in LOADS]
-        for area, gap in gaps:
+        quick = flow_factors(Surface.from_map(z, 1.0, periodic=True), [gap.mean() for _, gap in gaps])
+        for (area, gap), phi in zip(gaps, np.stack([quick.phi_x, quick.phi_y], axis=1), strict=True):
             u = gap.mean()
             K, couette = flow_and_couette(gap, (POINTS, POINTS))
-            found.append((lay, gamma, u / h_rms, area, *K / u**3, *(u - couette) / h_rms))
+            found.append((lay, gamma, u / h_rms, area, *K / u**3, *(u - couette) / h_rms, *phi))
     return np.array(found).T
 
 
 if __name__ == "__main__":
     lay, gamma, u, area, *simulated = rows()
+    whole = np.array(simulated[4:])
     ratio, shear = factors(u, area, gamma, shipped_flow().constants)
     plain = wide_gap(u)
     click.echo("ln(medium/simulation), root mean square and largest; of phi before contact, in contact its lay alone")
@@ -58,10 +61,12 @@ if __name__ == "__main__":
             own = ratio[:, mine] if high == 0 else ratio[:, mine] / np.sqrt(ratio[0, mine] * ratio[1, mine])
             with np.errstate(divide="ignore", invalid="ignore"):
                 off = np.log(own * known / np.array(simulated[:2])[:, mine])
-                slid = np.log(shear[:, mine] / np.array(simulated[2:])[:, mine])
-            off = off[np.isfinite(off)]
+                total = np.log(whole[:, mine] / np.array(simulated[:2])[:, mine])
+                slid = np.log(shear[:, mine] / np.array(simulated[2:4])[:, mine])
+            off, total = off[np.isfinite(off)], total[np.isfinite(total)]
             click.echo(
                 f"A {low:g} to {high:g}, lay {stretch:g}: phi {np.sqrt(np.mean(off**2)):.3f} {np.abs(off).max():.3f}, "
+                f"whole phi of the map {np.sqrt(np.mean(total**2)):.3f} {np.abs(total).max():.3f}, "
                 f"phi_s {np.sqrt(np.mean(slid**2)):.3f} {np.abs(slid).max():.3f}, u {u[mine].min():.2f} to "
                 f"{u[mine].max():.2f}, phi near {alike:.2f}"
             )

@@ -10,17 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import Part, heights
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.reynolds import flow_conductance
-from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
 
 AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)  # of the quick law, which never refuses them
-APART = ("area", "pressure", "stiffness")  # whose errors the law and the quarter grid tell
 STEP = 1.03  # of pressure, of the stiffness
 OPEN = 0.45  # A/A0 up to which flow is solved
 
@@ -53,8 +51,6 @@ def answered(part: Part, theory: str, truth: dict[str, Any]) -> dict[str, Any]:
     _, surface = surface_of(part)
     names = ["area", "mean_separation", "stiffness", "flow_x", "flow_y"]
     names += [f"{name}_scatter" for name in ("pressure", "area", "stiffness", "flow")] + ["valid", "flow_valid"]
-    own: Any = of_map(theory, surface) if theory == "corrected" else None
-    names += [f"{name}_by_{other}" for name in APART for other in ("law", "quarter")] if own is not None else []
     rows = np.full((len(names), truth["pressure"].size), np.nan)
     for k, pressure in enumerate(map(float, truth["pressure"])):
         try:
@@ -65,6 +61,5 @@ def answered(part: Part, theory: str, truth: dict[str, Any]) -> dict[str, Any]:
         stiffness = pressure * (STEP - 1) / (found.mean_separation - beside.mean_separation)
         leakage = found.leakage
         of_it = (found.scatter, found.area_scatter, found.stiffness_scatter, leakage.scatter, found.valid)
-        apart = [d for name in APART for d in own.apart(name, found.area)] if own is not None else []
-        rows[:, k] = found.area, found.mean_separation, stiffness, leakage.x, leakage.y, *of_it, leakage.valid, *apart
+        rows[:, k] = found.area, found.mean_separation, stiffness, leakage.x, leakage.y, *of_it, leakage.valid
     return dict(zip(names, rows, strict=True))

@@ -13,10 +13,10 @@ import click
 import numpy as np
 from scipy.optimize import least_squares
 
+from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.bearing_curve import bearing
-from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.lay import CONSTANTS, stress_shares
 
 POINTS, SHORTEST, LONGEST = 256, 8.0, 64.0

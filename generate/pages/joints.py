@@ -59,5 +59,4 @@ def measure() -> Measured:
     for waves in sorted({recipe.waves for recipe in recipes()}):
         right.plot([], [], ".", color=f"C{int(np.log2(waves))}", label=str(waves))
     right.legend(fontsize=7)
-    figure.tight_layout()
     return parts, {"docs/figures/joints.svg": figure}

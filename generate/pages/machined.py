@@ -15,6 +15,7 @@ from generate.machined.makers import FAMILIES, Part, heights
 from generate.pages.page import Measured, panels, table
 from mbma_tables.common.arguments import FloatArray
 
+NAMES = {"simulated": "simulation", "law": "law of hardness on the simulated elastic contact"}
 SHOWN, THINNED = 1, 6  # number of the map that is drawn of each family, and of its points one in so many
 
 
@@ -37,6 +38,27 @@ def _left_out(data: xr.Dataset, form: str) -> str:
     rows = [[name, *(_shares(column[name]) for column in pooled)] for name in pooled[0]]
     rows = [row for row in rows if any(row[1:])]
     return table("family | area | pressure | stiffness | flow", rows)
+
+
+def _yielding(data: xr.Dataset) -> str:
+    """Errors of simulation and of the law with a hardness: median and 90% quantile, of all maps."""
+    found = {
+        name: data[f"hard_{name}"].values for name in ("area", "mean_separation", "yielded", "unloading_stiffness")
+    }
+    lines = []
+    for k, eta in enumerate(data.eta.values):
+        for way, name in enumerate(data.way.values[1:], 1):
+            own = {key: (values[:, way, k], values[:, 0, k]) for key, values in found.items()}
+            slope = data.hard_stiffness.values[:, k] / data.hard_pressure.values[:, k]
+            errors_of = [
+                np.log(own["area"][0] / own["area"][1]),
+                (own["mean_separation"][0] - own["mean_separation"][1]) * slope,
+                own["yielded"][0] - own["yielded"][1],
+                np.log(own["unloading_stiffness"][0] / own["unloading_stiffness"][1]),
+            ]
+            cells = ["{:.3f}, {:.3f}".format(*np.quantile(np.abs(error), (0.5, 0.9))) for error in errors_of]
+            lines.append([f"{eta:g}", NAMES[str(name)], *cells])
+    return table("p_m/(E* g) | by | ln A | ln F at equal u | yielded share | ln unloading stiffness", lines)
 
 
 def _shares(ratio: FloatArray) -> str:
@@ -85,5 +107,6 @@ def measure() -> Measured:
             lines.append([form, name, *(f"{a:.2f}, {b:.2f} ({n})" if n else "" for a, b, n in found)])
     parts = {form: _by_family(data, form) for form in FORMS}
     parts |= {f"left_out_{form}": _left_out(data, form) for form in FORMS}
+    parts["yielding"] = _yielding(data)
     parts["coverage"] = table("theory | entries | area | pressure | stiffness | flow", lines)
     return parts, {"docs/figures/machined.svg": _figure(data)}

@@ -24,9 +24,8 @@ from mbma_tables.common.files import write_file
 from mbma_tables.laws.boundary_elements import LOADS
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories import BoundaryElements, get_theory
-from mbma_tables.theories.own_map import continued
 from mbma_tables.theories.protocol import Theory
 from mbma_tables.theories.wrapped import answer_where_finite
 
@@ -83,7 +82,7 @@ def read_rows() -> dict[str, FloatArray]:
 
 def refined(treated: Treated) -> FloatArray:
     """Light loads of a map on twice as many points along each side, by Fourier interpolation: ten minutes."""
-    values, _ = continued(treated)
+    values = mirrored(treated.heights - treated.heights.mean())
     for axis, count in enumerate(values.shape):
         values = resample(values, 2 * count, axis=axis)
     steps = [step / 2 for step in treated.steps]

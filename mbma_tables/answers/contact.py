@@ -78,8 +78,8 @@ def contact(
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
         `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or
-        where an option of MBMA is given; "corrected" for one given by a map, where Tamaas is installed (the extra
-        `maps`), and "calibrated" otherwise.
+        where an option of MBMA is given; "corrected" for one given by a map of at most
+        2^18 points whose wavelengths are resolved, and "calibrated" otherwise.
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1), or a
         text that `mbma_tables.materials.hardness` reads: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
@@ -210,10 +210,10 @@ def _contact(
     value, E_star = spread(asked, shape), spread(modulus, shape)
     theory: Any = source.theory
     if source.yields:
-        # imports scipy, which takes long
-        from mbma_tables.theories.yielding import Yielding
+        # what it needs of scipy takes long to import
+        from mbma_tables.theories.saturated import with_hardness
 
-        theory = Yielding(theory, cap / modulus)
+        theory = with_hardness(theory, cap / modulus)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
     held = by if by in QUANTITIES else None
     by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}

@@ -15,7 +15,7 @@ from mbma_tables.common.progress import shown as progress
 from mbma_tables.common.units import Units, unit_of
 from mbma_tables.laws.boundary_elements import Contact as Simulation
 from mbma_tables.laws.pressing import TOLERANCE
-from mbma_tables.theories.own_map import continued, map_of
+from mbma_tables.theories.own_map import map_of, sides
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,20 +87,20 @@ class ContactMap(Displayed):
 def contact_map(found: Any) -> ContactMap:
     """Simulation of a contact's map at the contact's pressure; see `Contact.map`."""
     source, pressure = found._source, np.asarray(found.pressure, float)
-    if pressure.ndim or np.ndim(source.E_star) or source.yields:
-        raise InputError("a map shows one elastic contact: give one pressure, one modulus and no hardness")
+    if pressure.ndim or np.ndim(source.E_star) or np.ndim(source.hardness):
+        raise InputError("a map is of one contact: give one pressure, one modulus and one hardness")
     surface: Any = source.surface
     whole = map_of(surface)
     modulus, force = float(source.E_star), float(pressure) / float(source.E_star)
     if not 0 < force < np.inf:
         raise InputError(f"a map needs a pressure above 0, got {float(pressure):g}")
-    values, sizes = continued(whole)
-    # scaled to an rms gradient of one and heights of order one
+    values, sizes = whole.heights - whole.heights.mean(), sides(whole)
+    # of rms gradient one, heights of order one
     scale, gradient = float(np.abs(values).max()), float(surface.bearing.gradient)
     stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
-    engine = Simulation(values / scale, stretched, TOLERANCE)
+    cap = float(source.hardness) / modulus / gradient
+    engine = Simulation(values / scale, stretched, TOLERANCE, cap, not whole.periodic)
     with progress("boundary elements"):
         engine.press(force / gradient)
-    own = tuple(slice(count) for count in whole.heights.shape)
-    fields = modulus * gradient * engine.traction[own], scale * engine.gap[own], values[own]
+    fields = modulus * gradient * engine.traction, scale * engine.gap, values
     return ContactMap(*fields, whole.steps, source.units)

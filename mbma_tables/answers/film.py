@@ -171,7 +171,7 @@ def flow_factors(
     >>> bearing = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
     >>> film = flow_factors(bearing, ["1 um", "1.5 um", "3 um"], peklenik=3, E_star="110 GPa")
     >>> print(film.phi_x.round(2), film.phi_y.round(2), film.shear_y.round(2))
-    [1.03 1.06 1.02] [0.51 0.7  0.9 ] [0.8  0.69 0.37]
+    [1.05 1.06 1.02] [0.5 0.7 0.9] [0.84 0.68 0.37]
     """
     one: Any = surface
     theory = "calibrated" if theory is None else theory

@@ -37,6 +37,7 @@ MEANINGS = {
     "K": "flow coefficient",
     "x": "flow coefficient along the first axis",
     "y": "flow coefficient along the second axis",
+    "xy": "flow coefficient of flow along one axis by pressure along the other",
     "hydraulic_aperture": "K^(1/3)",
     "flow_factor": "K over the cube of the mean separation",
     "scatter": "standard deviation of ln K from simulation to simulation",
@@ -62,11 +63,14 @@ class Leakage(Displayed):
     x, y : ndarray
         Flow coefficient along the first and the second axis of the map [length^3]: its own with `theory="simulated"`,
         whose gaps are solved for flow, else that of isotropic roughness, `K`.
+    xy : ndarray
+        Flow per width along one axis by a pressure gradient along the other [length^3]; 0 where isotropic.
     """
 
     K: Numbers
     x: Numbers
     y: Numbers
+    xy: Numbers
     _contact: Any = dataclasses.field(repr=False)
 
     def _facts(self) -> dict[str, str]:
@@ -74,7 +78,7 @@ class Leakage(Displayed):
         return {"theory": self._contact.theory, **known}
 
     def _variables(self) -> dict[str, Variable]:
-        units = dict.fromkeys(("x", "y"), self.units["K"]) | self.units
+        units = dict.fromkeys(("x", "y", "xy"), self.units["K"]) | self.units
         return {n: Variable(getattr(self, n), units.get(n, "1"), meaning) for n, meaning in MEANINGS.items()}
 
     def _origin(self) -> Any:
@@ -91,6 +95,21 @@ class Leakage(Displayed):
     def blocked(self) -> Any:
         """Whether the contact percolates, A/A0 at or above about 0.41; any remaining flow is not modelled."""
         return self.K == 0
+
+    def along(self, direction: ArrayLike | str) -> Any:
+        """Flow coefficient of a long seal whose width is along "x", "y" or degrees from x [length^3].
+
+        K_x cos^2 + K_y sin^2 + 2 K_xy sin cos: pressure falls along the width alone.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> found = contact(seal, area=0.1, E_star="10 MPa", theory="calibrated").leakage
+        >>> bool(abs(found.along(30.0) / found.K - 1) < 1e-12)
+        True
+        """
+        return along(direction, self.x, self.y, self.xy)
 
     @property
     def hydraulic_aperture(self) -> Numbers:
@@ -110,7 +129,7 @@ class Leakage(Displayed):
         """
 
         def stated(by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> FloatArray:
-            own = by.elastic.flow_trust(surface, u, area)
+            own = _simulated(by).flow_trust(surface, u, area)
             if own is not None:
                 return own[0]
             stated = shipped_flow().standard_deviation(by.elastic.name, area)
@@ -245,14 +264,37 @@ def leakage_of(contact: Any) -> Leakage:
     """The leakage of a contact."""
 
     def answer(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
-        own, volume = theory.elastic.flow(surface, u), np.asarray(surface.h_rms) ** 3
+        own, volume = _simulated(theory).flow(surface, u), np.asarray(surface.h_rms) ** 3
         if own is not None:
-            return np.sqrt(own[0]) * np.sqrt(own[1]), own[0], own[1]
+            return np.sqrt(own[0]) * np.sqrt(own[1]), *own
         K = flow(surface, u, share) * volume
-        return K, K, K
+        return K, K, K, np.zeros_like(K)
 
-    K, x, y = contact._source.map(answer, contact, 3, {"area": contact.area})
-    return Leakage(K, x, y, contact)
+    K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact.area})
+    return Leakage(K, x, y, xy, contact)
+
+
+def _simulated(theory: Theory) -> Theory:
+    """What the flow is of: of yielded gaps where these are simulated, else of the elastic contact's."""
+    return theory if type(theory).flow_trust is not Theory.flow_trust else theory.elastic
+
+
+def degrees(direction: ArrayLike | str) -> FloatArray:
+    """Degrees from the first axis of "x", "y" or numbers."""
+    if isinstance(direction, str):
+        try:
+            direction = float({"x": "0", "y": "90"}.get(direction, direction))
+        except ValueError:
+            raise InputError(f"direction must be 'x', 'y' or degrees from x, got {direction!r}") from None
+    return finite_array("direction", direction)
+
+
+def along(direction: ArrayLike | str, x: Any, y: Any, xy: Any) -> Any:
+    """Flow coefficient in a direction, "x", "y" or degrees from x."""
+    angle = np.deg2rad(degrees(direction))
+    # zero across the axes, which may be blocked
+    cos, sin = np.round([np.cos(angle), np.sin(angle)], 15)
+    return x * cos**2 + y * sin**2 + 2 * xy * sin * cos
 
 
 def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
@@ -274,12 +316,12 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
 
 def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
     """Reasons why the flow is not valid, in addition to those for the contact."""
-    own = theory.elastic.flow_trust(surface, u, area)
+    own = _simulated(theory).flow_trust(surface, u, area)
     large = np.broadcast_to(np.asarray(surface.zeta_1) > SIMULATED, np.shape(area))
     many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
     far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
     found = {many: area > LARGEST_AREA, far: large} if own is None else dict(own[1])
-    if theory.elastic is not theory:
+    if _simulated(theory) is not theory:
         found["leakage: yielded contacts leak several times more"] = np.ones(np.shape(area), bool)
     if isinstance(theory.elastic, Mbma):
         found["leakage: the mean separation of 'mbma' is wrong by factors"] = np.ones(np.shape(area), bool)

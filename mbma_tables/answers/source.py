@@ -76,10 +76,10 @@ class Source:
         """The theory, with the hardness where there is one."""
         if not self.yields:
             return self.theory
-        from mbma_tables.theories.yielding import Yielding
+        from mbma_tables.theories.saturated import with_hardness
 
         broadcast_shape(E_star=E_star, hardness=hardness)
-        return Yielding(self.theory, checked_hardness(hardness) / E_star)
+        return with_hardness(self.theory, checked_hardness(hardness) / E_star)
 
     def map(
         self,

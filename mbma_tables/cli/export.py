@@ -74,6 +74,7 @@ class _Export(click.Command):
 @click.option("--friction", type=float, help="Coefficient for friction cards, whose stiffness before slip needs --nu.")
 @options.quantity_option("--friction-pressure", help="At which that stiffness holds; else amid --pressures.")
 @click.option("--leakage", is_flag=True, help="Flow coefficient of the gaps: rows of it alone, laws as code with it.")
+@click.option("--direction", metavar="x|y|DEGREES", help="Of leakage of a map; else the mean of both axes.")
 @click.option("--quantity", type=click.Choice([*AGAINST]), help="Of the rows; by default that which TARGET takes.")
 @click.option("--peklenik", type=float, help="Of a film: length of the roughness along x over that along y.")
 @click.option(
@@ -104,6 +105,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     kind = targets().get(special) or targets()[target]
     _refuse_unused(kind, given)
     given.pop("exponential", None)
+    if "direction" in given and "leakage" not in given:
+        raise InputError("--direction is of leakage: add --leakage or leave it out")
     if target in group("CODE"):
         _export_code(target, out, values["variant"], "check" in given)
         return

@@ -257,7 +257,7 @@ _MODEL_OPTIONS = (
 theory_option = _option(
     "theory",
     "Theory; only mbma has an island model, variant and rtol. Default: mbma for numbers, else calibrated, of maps "
-    "corrected where Tamaas is installed.",
+    "corrected.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
 # for islands, which only MBMA has

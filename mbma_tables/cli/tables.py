@@ -12,6 +12,8 @@ import click
 from mbma_tables.cli.options import json_option
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
+from mbma_tables.tablefiles.own import KIND as OWN
+from mbma_tables.tablefiles.own import holds_own
 from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL, TableContent
 
 
@@ -60,11 +62,41 @@ def list_command(as_json: bool) -> None:
     _show({"tables": rows}, lines, as_json)
 
 
+def _show_own(path: str, as_json: bool) -> None:
+    """Variables and attributes of a table of a user's own surface."""
+    from mbma_tables.tablefiles.own import read_own
+
+    values, attributes = read_own(path)
+    ends = {name: [float(array.min()), float(array.max())] for name, array in values.items()}
+    lines = [f"variable {name}: {values[name].size} numbers, {low:g} to {high:g}" for name, (low, high) in ends.items()]
+    lines += [f"{name}: {value}" for name, value in attributes.items()]
+    _show({"variables": ends, "attributes": attributes}, lines, as_json)
+
+
+def _verified(table: str) -> tuple[dict[str, Any], str]:
+    """What a check of a table found, and a line of it."""
+    from mbma_tables.models.tables import verify
+
+    if holds_own(table):
+        from mbma_tables.theories.own_table import verify_own
+
+        loads, error = verify_own(table)
+        found: dict[str, Any] = {"path": table, "kind": OWN, "points": loads, "table_error": error}
+        return found, f"{table}: hashes match; {loads} simulated loads: curves within {error:.1e}"
+    v = verify(*_place(table))
+    solver = f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"
+    text = f"{v.path}: hashes match; {v.points} conformance points: table within {v.table_error:.1e}, exact solver "
+    return v._asdict(), text + solver
+
+
 @tables_group.command("info")
 @click.argument("table")
 @json_option("lines")
 def info_command(table: str, as_json: bool) -> None:
-    """Axes and attributes of TABLE (a kind or a file)."""
+    """Axes or variables, and attributes, of TABLE (a kind or a file)."""
+    if holds_own(table):
+        _show_own(table, as_json)
+        return
     content = _read(table)
     axes = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
     # the universal table has cells, not nodes
@@ -81,14 +113,8 @@ def info_command(table: str, as_json: bool) -> None:
 def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     """Check hashes and conformance points of TABLES (kinds or files; all shipped ones if none is named).
 
-    The conformance points are evaluated by the table and by the exact solver, and compared with the stored results.
+    The conformance points are answered by the table and by the exact solver, and compared with the stored answers; of
+    a table of your own surface the simulated loads are.
     """
-    from mbma_tables.models.tables import verify
-
-    verdicts = [verify(*_place(table)) for table in tables or KINDS]
-    lines = [
-        f"{v.path}: hashes match; {v.points} conformance points: table within {v.table_error:.1e}, exact solver "
-        + (f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit")
-        for v in verdicts
-    ]
-    _show({"tables": [v._asdict() for v in verdicts]}, lines, as_json)
+    verdicts, lines = zip(*map(_verified, tables or KINDS), strict=True)
+    _show({"tables": verdicts}, lines, as_json)

@@ -43,7 +43,7 @@ MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
 K_S, NU = 50.0, 0.3  # first conductivity [W/(m K)] and Poisson's ratio
-MAX_SAMPLES = 500  # of a spectrum, for a step of a slider to stay short
+MAX_SAMPLES = 500  # samples of a spectrum, so that a step of a slider stays fast
 
 
 def packed(values: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
@@ -19,6 +20,7 @@ from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, in_unit, resolve
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
+from mbma_tables.law.leakage import LeakageLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.law.rough_body import pressed
 from mbma_tables.materials import ELASTIC_PSI, hardness_in
@@ -48,11 +50,17 @@ class ExportedLaw:
     length: str  # unit of length,
     stress: str  # and of stress
     made_by: tuple[str, ...] = ()  # header lines with the command that writes the file again
+    direction: str | float | None = None  # of a simulated map's leakage
 
     @property
     def units(self) -> Units:
         """Both units."""
         return Units(self.length, self.stress)
+
+    @functools.cached_property
+    def leakage(self) -> LeakageLaw:
+        """The law's leakage, in its direction."""
+        return self.law.leakage if self.direction is None else self.law.leakage.along(self.direction)
 
     def answer(self, u: FloatArray) -> Contact:
         """The theory itself at mean separations."""
@@ -162,17 +170,18 @@ class ExportedLaw:
 
     def _of_leakage(self, scatter: Numbers, pressure: FloatArray) -> tuple[str, ...]:
         """Lines on leakage."""
-        blocked, least = self.law.leakage.blocked_at, "never blocked"
+        blocked, least = self.leakage.blocked_at, "never blocked"
         if blocked > -np.inf:
             c = (self.law.h_max - blocked) / 2
             load = float(self.law.pressure(separation=blocked))
             least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
+        way = "" if self.law.gaps is None else f", direction {self.direction or 'both, their geometric mean'}"
         return (
-            f"leakage is the flow coefficient K [{self.length}^3] of the gaps: flow per length of seal is "
+            f"leakage is the flow coefficient K [{self.length}^3] of the gaps{way}: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "
             f"{1e-3 * factor('Pa', self.stress, 'stress'):.4g} {self.stress} s",
             least,
-            f"K is within {self.law.leakage.error:.1e} of that at the law's area",
+            f"K is within {self.leakage.error:.1e} of that at the law's area",
             "scatter of K from simulation to simulation, "
             + self._spread("one standard deviation of ln K", scatter, pressure),
         )
@@ -233,6 +242,7 @@ def exported_law(
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
     made_by: tuple[str, ...] = (),
+    direction: str | float | None = None,
 ) -> ExportedLaw:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
     if isinstance(surface, ForceLaw):
@@ -249,7 +259,7 @@ def exported_law(
     own = chosen_theory(one, theory, variant=variant)
     law = contact_law(one, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    return ExportedLaw(one, law, own, modulus, float(cap), length, stress, made_by)
+    return ExportedLaw(one, law, own, modulus, float(cap), length, stress, made_by, direction)
 
 
 def _exported_force(force: ForceLaw, made_by: tuple[str, ...]) -> ExportedForce:

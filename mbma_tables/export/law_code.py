@@ -129,7 +129,7 @@ class AskedLaw(NamedTuple):
     flow: FlowNumbers | None
     slopes: dict[str, float]  # ratios of functions to the slope of a law,
     sloped: ContactLaw  # of the contact without a hardness
-    more: dict[str, str]  # units of what was asked of `MORE`
+    more: dict[str, str]  # units of the requested quantities of `MORE`
     said: tuple[str, ...]
 
 
@@ -177,7 +177,7 @@ def asked_law(
     more |= {"leakage": f"{exported.length}^3"} if leakage else {}
     sloped, factor = exported.law.unloading if slopes else (exported.law, 1.0)
     slopes = {what: factor * ratio for what, ratio in slopes.items()}
-    numbers, flow = law_numbers(exported.law), flow_numbers(exported.law.leakage) if leakage else None
+    numbers, flow = law_numbers(exported.law), flow_numbers(exported.leakage) if leakage else None
     return AskedLaw(exported, numbers, flow, slopes, sloped, more, _head(exported, numbers, more))
 
 
@@ -230,7 +230,7 @@ def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str
     parts = {place: number(value) for place, value in ends.items()}
     blocks = {"LAW": law.block}
     if asked.flow:
-        blocks["FLOW"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
+        blocks["FLOW"], parts["FLOW_H_RMS"] = asked.exported.leakage.block, number(asked.flow.h_rms)
     if asked.sloped is not law:
         blocks["ELASTIC"] = asked.sloped.block
     if target == "javascript-law":

@@ -49,7 +49,7 @@ def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: 
     if quantity == "pressure":
         return c, pressure
     if quantity in ("leakage", "hydraulic_aperture"):
-        flow = np.asarray(law.leakage(separation=d))
+        flow = np.asarray(exported.leakage(separation=d))
         # the first row that is blocked is the last
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
         return pressure[open_], flow[open_] if quantity == "leakage" else np.cbrt(flow[open_])
@@ -106,6 +106,7 @@ def describe_law(
     hardness: float | str = np.inf,
     peklenik: float | None = None,
     made_by: tuple[str, ...] = (),
+    direction: str | float | None = None,
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -154,6 +155,8 @@ def describe_law(
         Equally spaced rows instead, for comparison.
     made_by : tuple of str
         Lines for the header of a file that say how to write it again.
+    direction : str or float, optional
+        Of leakage of a simulated map: "x", "y" or degrees from x; else the geometric mean of both axes.
 
     Raises
     ------
@@ -179,7 +182,7 @@ def describe_law(
             raise InputError("rtol and largest_overclosure are not of a film: give rows and pressures")
     elif peklenik is not None:
         raise InputError("peklenik belongs to quantity='film': leave it out")
-    exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by)
+    exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by, direction)
     law = exported.law
     units = law.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
@@ -234,19 +237,19 @@ def _table(
     if flow:
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
-            floor = float(law.leakage(separation=law.separation(area=LARGEST_AREA))) ** (1 / 3 if aperture else 1)
+            floor = float(exported.leakage(separation=law.separation(area=LARGEST_AREA))) ** (1 / 3 if aperture else 1)
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
     if slope := quantity in ("conductance", "tangential_stiffness"):
-        # between no contact and the smallest pressure that counts there is one row alone, that of zero
+        # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or law.highest < np.inf)
     comments = exported.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
-        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
+        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(exported, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
         *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
@@ -266,9 +269,10 @@ def _table(
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, more, facts)
 
 
-def _why_there(law: ContactLaw, end: float, quantity: str) -> str:
+def _why_there(exported: ExportedLaw, end: float, quantity: str) -> str:
     """The reason for the end of the rows."""
-    if quantity == "leakage" and law.leakage.blocked_at >= law.h_max - 2 * end:
+    law = exported.law
+    if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - 2 * end:
         return "where contact blocks the gaps"
     if end < _last(law) * (1 - ROUNDING):
         return "the largest asked for"

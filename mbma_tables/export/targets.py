@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
 LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"})
-ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "quantity", "peklenik"}
-CODE = LAW | {"name", "leakage"}
+ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "quantity", "peklenik", "direction"}
+CODE = LAW | {"name", "leakage", "direction"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {

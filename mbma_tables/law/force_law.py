@@ -70,7 +70,7 @@ class Body(HalfSpace):
 
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
-    """Units by quantity, and what one stress times areas is in that of force."""
+    """Units by quantity, and the factor from stress times area to the unit of force."""
     length, force, newtons = unit_of("approach", units), unit_of("energy" if plane else "island_force", units), 1.0
     if units.length is not None and units.stress in SIZES["stress"]:
         force, per = ("N/mm", 1e-3) if plane else ("N", 1.0)

@@ -83,7 +83,9 @@ class ContactLaw(Law, Derived, Displayed):
     elastic : callable or None
         With a hardness, function that makes the law of the elastic contact.
     materials : Pair or None
-        If given.
+        Where they are named.
+    gaps : theory or None
+        Of a simulated map, what knows the flow through its gaps.
 
     Examples
     --------
@@ -114,6 +116,7 @@ class ContactLaw(Law, Derived, Displayed):
     hardness: float = math.inf
     elastic: Callable[[], ContactLaw] | None = None
     materials: Pair | None = None
+    gaps: Any = None
 
     @property
     def rows(self) -> Any:

@@ -1,4 +1,4 @@
-"""Leakage of a contact law: flow coefficient as polynomials of the gap, from that at which contact percolates."""
+"""Leakage of a contact law: flow coefficient as polynomials of the gap, from that at which contact blocks it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.leakage import flow
+from mbma_tables.answers.leakage import along, degrees, flow
 from mbma_tables.answers.leakage_table import shipped_flow
-from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
 from mbma_tables.law import block as at
@@ -18,7 +18,6 @@ from mbma_tables.law import pieces as fit
 from mbma_tables.laws.effective_medium import wide_gap
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply
-from mbma_tables.theories import OF_MAPS
 
 RTOL, SHARE = 1e-4, 0.1  # tolerance of the polynomials, or this share of the law's own error
 MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow is a power
@@ -26,7 +25,10 @@ MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LeakageLaw:
-    """Flow coefficient k h_rms^3 [length^3] of one surface against its gap, from `ContactLaw.leakage`."""
+    """Flow coefficient k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it.
+
+    Of a simulated map it is the geometric mean of both axes.
+    """
 
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
@@ -37,6 +39,11 @@ class LeakageLaw:
     # in the layout of a law's block: the coefficient in place of force, and the hydraulic aperture in place of area;
     # from `blocked_at` to h_max, or to the end of a law without last contact
     block: FloatArray
+
+    def along(self, direction: str | float) -> LeakageLaw:
+        """Of a simulated map, the same along an axis, "x" or "y", or in a direction in degrees from x; else itself."""
+        found = number_in("direction", degrees(direction), -360.0, 360.0)
+        return self if self.law.gaps is None else leakage_law(self.law, self.law.surface, found)
 
     def __call__(
         self,
@@ -64,30 +71,41 @@ class LeakageLaw:
         return found.reshape(np.shape(d))[()]
 
 
-def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
-    """Leakage of a contact law's surface, as polynomials of the gap that begin where contact percolates.
+def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -> LeakageLaw:
+    """Leakage of a contact law's surface, as polynomials of the gap that begin where contact blocks it.
+
+    Of a simulated map in a `direction`, in degrees from x, or the geometric mean of both axes.
 
     Raises
     ------
     InputError
-        For theories of a simulated map, whose leakage differs by axis.
+        For a simulated map that is blocked in this direction at the lightest load.
     """
-    if law.theory in OF_MAPS:
-        raise InputError(
-            f"a law has the leakage of isotropic gaps only; with theory {law.theory!r} contact(...).leakage has it "
-            "along both axes, .x and .y"
-        )
-    threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)
-    rtol = max(RTOL, SHARE * law.error)
-    deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
-    blocked = bool(law.area(separation=deepest) >= threshold)
-    bottom = float(law.separation(area=threshold)) if blocked else law.lowest
+    h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
     top = min(law.h_max, law.highest) if law.block.view(np.int64)[at.ENDS] else law.highest
+    turns: tuple[float, ...] = ()
+    if law.gaps is None:
+        threshold = shipped_flow().constants.threshold
+        deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
+        blocked = bool(law.area(separation=deepest) >= threshold)
+        bottom = float(law.separation(area=threshold)) if blocked else law.lowest
+        head = law.block
+        turns = tuple(head[k] * head[k + 1] for k in (at.KINK_SIGN, at.KINK_SIGN_2) if head[k])
+    else:
+        bottom, turns = _ends(law, direction)
+        blocked = bottom > law.lowest
+        bottom = max(bottom, law.lowest)
     span = top - bottom
 
+    def coefficient(d: FloatArray) -> FloatArray:
+        u = (law.h_max + d) / 2
+        if law.gaps is None:
+            return h_rms**3 * flow(surface, u, np.asarray(law.area(separation=d)))
+        x, y, xy = law.gaps.flow(surface, u)
+        return np.asarray(np.sqrt(x * y) if direction is None else along(direction, x, y, xy))
+
     def values(x: FloatArray) -> FloatArray:
-        d = bottom + span * x
-        K = h_rms**3 * flow(surface, (law.h_max + d) / 2, np.asarray(law.area(separation=d)))
+        K = coefficient(bottom + span * x)
         return np.stack([K, np.cbrt(K)])
 
     # gaps close as u under full compression
@@ -97,8 +115,7 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
         range(MOST_OCTAVES if blocked else 6, MOST_OCTAVES + 1),
         rtol,
     )
-    head = law.block
-    kinks = [(head[k] * head[k + 1] - bottom) / span for k in (at.KINK_SIGN, at.KINK_SIGN_2) if head[k]]
+    kinks = [(turn - bottom) / span for turn in turns]
     side = fit.Side(1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1)))
     try:
         pieces = fit.side_pieces(side, rtol)
@@ -109,7 +126,25 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
     block.view(np.int64)[at.ENDS] = blocked
     block.flags.writeable = False
     error = float(errors[:, 0].max()) + _between_nodes(pieces, values)
+    if law.gaps is not None:
+        # bodies apart: the h_rms of the wide gap that continues it
+        missed = 1 - float(values(np.array(1.0))[0]) / ((law.h_max + top) / 2) ** 3
+        h_rms = law.h_max / np.sqrt(max(1.5 / max(missed, 1e-6) - 4, 1e-3))
     return LeakageLaw(law, h_rms, bottom if blocked else -np.inf, error, block)
+
+
+def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
+    """Separation of a simulated map from which on it is open, and separations of kinks."""
+    ends = [2 * end - law.h_max for _, end in law.gaps.closing]
+    shares = np.abs(np.sin(np.deg2rad([90.0, 0.0] if direction is None else [90.0 + direction, direction])))
+    if direction is None:
+        bottom = max(ends)
+    else:
+        bottom = min(end for end, share in zip(ends, shares, strict=True) if share > 1e-9)
+    first = 2 * float(law.gaps.rows[2, 0]) - law.h_max
+    if not bottom < first:
+        raise InputError("the map is blocked in this direction at its lightest simulated load: there is no leakage law")
+    return bottom, tuple(turn for turn in {max(ends), first} if turn > bottom)
 
 
 def _between_nodes(pieces: fit.Pieces, values: fit.Values) -> float:

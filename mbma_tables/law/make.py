@@ -103,18 +103,18 @@ def contact_law(
         if cap.ndim:
             raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
         if cap < math.inf:
-            from mbma_tables.theories.yielding import Yielding
+            from mbma_tables.theories.saturated import with_hardness
 
             elastic = functools.partial(contact_law, surface, chosen, rtol=rtol, E_star=modulus)
             yields = {"hardness": float(cap), "elastic": elastic}
-            chosen = Yielding(chosen, float(cap) / modulus)
+            chosen = with_hardness(chosen, float(cap) / modulus)
     one = surface
     if one.labelled:
         one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))
     if one.shape != ():
         raise InputError(f"a law needs one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
-    facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, **yields}
+    facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, "gaps": chosen.gaps(), **yields}
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:
@@ -175,7 +175,7 @@ def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
     # far larger errors at some gaps, as at the lightest contact of a small map, are ignored
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
-    bends = np.asarray(theory.elastic.bends(surface), dtype=float)
+    bends = np.asarray(theory.bends(surface), dtype=float)
 
     width = highest if not ends else h_max / 2 if lowest else h_max
     above = fit.Side(1, lowest / width, lambda x: answer(width * x), tuple(bends / width))

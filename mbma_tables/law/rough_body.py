@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 SHAPES = ("sphere", "cylinder")
 JOHNSON = 2 / math.e  # reference over R: approaches are Johnson's (5.57) in Hertz's contact
-LAYER_RTOL = 1e-8  # of the layer's law, as far as its theory allows
-ROUNDING = 1e-3  # of h_max, by which a law goes beyond the largest approach, so that it has the largest force
+LAYER_RTOL = 1e-8  # tolerance of the layer's law, as far as its theory allows
+ROUNDING = 1e-3  # share of h_max by which a law exceeds the largest approach, so that it has the largest force
 MOMENTS = 128  # nodes of the effective radius
 POINTS = 101  # points of a profile
 COUNTED = 0.1  # share of the force above which a reason against the layer's law applies

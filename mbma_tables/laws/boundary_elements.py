@@ -1,72 +1,230 @@
-"""Boundary elements (BEM): contact of a periodic height map with a rigid plane, by Tamaas (the extra `simulate`)."""
+"""Boundary elements: a height map pressed flat, elastic or with pressures that cannot exceed a hardness, E* = 1.
+
+Pressures 0 <= p <= p_m of a given mean, on elastic half-spaces. Conjugate gradients run on the points that are free to
+move, and every step is projected exactly (in the Euclidean norm) onto the set of pressures that are allowed; scaling
+the load instead can cycle. A map that its mirror images continue is solved by cosine transforms on its own points, a
+quarter of those of the periodic cell. Loading only, frictionless, hardness constant.
+"""
 
 from __future__ import annotations
 
-import os
 import time
+from typing import Any
 
 import numpy as np
+import scipy.fft
 
-from mbma_tables.common.arguments import FloatArray, needed
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 
 # F/(A0 E* g), g the rms gradient: from 0.1% to 97% contact of a Gaussian surface
 LOADS = (4.4e-4, 1e-3, 2e-3, 4.5e-3, 0.01, 0.02, 0.04, 0.07, 0.11, 0.17, 0.25, 0.37, 0.53, 0.75, 1.05)
-TOLERANCE = 1e-6
-MAX_ITERATIONS = 50_000  # surfaces stretched 1:16 take 4,000
+TOLERANCE = 1e-6  # mean complementarity error over mean pressure times h_rms
+MAX_ITERATIONS = 3000
+STIFFNESS_RTOL = 1e-4
 CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
+# of the boundary of the area in cell edges: elastic points beside yielded ones, and the yielded area's own boundary
+MIXED, YIELDED = 0.8, 0.65
+
+
+def waves(values: FloatArray, mirrored: bool = False) -> FloatArray:
+    """Amplitudes of the waves of a periodic map, or of the cosines of one that its mirror images continue."""
+    return np.asarray(scipy.fft.dctn(values, norm="forward") if mirrored else scipy.fft.rfft2(values, norm="forward"))
+
+
+def composed(modes: FloatArray, shape: tuple[int, ...], mirrored: bool = False) -> FloatArray:
+    """The map of such amplitudes; of cosines on another number of points, too."""
+    if mirrored:
+        return np.asarray(scipy.fft.idctn(modes, s=shape, norm="forward"))
+    return np.asarray(scipy.fft.irfft2(modes, s=shape, norm="forward"))
+
+
+def wavenumbers(shape: tuple[int, ...], sizes: tuple[float, ...], mirrored: bool = False) -> FloatArray:
+    """Wavenumber of each of these amplitudes [1/length]."""
+    steps = [side / count for side, count in zip(sizes, shape, strict=True)]
+    if mirrored:
+        axes = [np.pi * np.arange(count) / side for count, side in zip(shape, sizes, strict=True)]
+    else:
+        axes = [
+            2 * np.pi * f(n, step) for f, n, step in zip((np.fft.fftfreq, np.fft.rfftfreq), shape, steps, strict=True)
+        ]
+    return np.asarray(np.hypot(axes[0][:, None], axes[1]))
+
+
+def project(p: FloatArray, mean: float, cap: float) -> FloatArray:
+    """The nearest pressures in [0, cap] of that mean: all shifted alike, then clipped; the shift by Newton's method."""
+    low, high = float(p.min()) - cap if np.isfinite(cap) else float(p.min()) - mean - 1, float(p.max())
+    shift, total = 0.0, mean * p.size
+    for _ in range(200):
+        moved = p - shift
+        clipped = np.clip(moved, 0, cap)
+        miss = float(clipped.sum()) - total
+        if abs(miss) <= 1e-13 * total:
+            break
+        if miss > 0:
+            low = max(low, shift)
+        else:
+            high = min(high, shift)
+        free = int(np.count_nonzero((moved > 0) & (moved < cap)))
+        following = shift + miss / free if free else 0.5 * (low + high)
+        shift = following if low < following < high else 0.5 * (low + high)
+    return clipped
 
 
 class Contact:
-    """A periodic map against a rigid plane: Polonsky and Keer's conjugate gradients in Tamaas, E* = 1.
+    """A map against a rigid plane; each load starts from the pressures of the one before.
 
-    Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact.
+    Parameters
+    ----------
+    surface : ndarray, shape (n, m)
+        Heights [length].
+    sizes : pair of float
+        Sides of the map.
+    tolerance : float
+        Mean complementarity error over mean pressure times h_rms, at which iterations end.
+    hardness : float
+        Largest pressure over E*; infinite where nothing yields.
+    mirrored : bool
+        Whether mirror images along both axes continue the map, which otherwise is periodic.
     """
 
-    gap: FloatArray
+    def __init__(
+        self,
+        surface: FloatArray,
+        sizes: tuple[float, float],
+        tolerance: float = TOLERANCE,
+        hardness: float = np.inf,
+        mirrored: bool = False,
+    ) -> None:
+        self.surface = np.asarray(surface, float) - np.mean(surface)
+        self.sizes, self.tolerance, self.cap, self.mirrored = sizes, tolerance, hardness, mirrored
+        self.h_rms = float(self.surface.std())
+        q = wavenumbers(self.surface.shape, sizes, mirrored)
+        self._compliance = np.divide(2.0, q, out=np.zeros_like(q), where=q > 0)
+        self._stiffness = q / 2
+        self.pressure: FloatArray | None = None
 
-    def __init__(self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE) -> None:
-        os.environ.setdefault("OMP_NUM_THREADS", "1")
-        tamaas = needed("tamaas", "simulate")
-        tamaas.set_log_level(tamaas.LogLevel.error)
-        self.surface = np.ascontiguousarray(surface, dtype=float)
-        self.model = tamaas.ModelFactory.createModel(
-            tamaas.model_type.basic_2d, list(map(float, sizes)), list(surface.shape)
+    def _filtered(self, field: FloatArray, filter_: FloatArray) -> FloatArray:
+        return composed(waves(field, self.mirrored) * filter_, field.shape, self.mirrored)
+
+    def deflect(self, pressure: FloatArray) -> FloatArray:
+        """Displacement of mean zero."""
+        return self._filtered(pressure, self._compliance)
+
+    def press(self, force: float) -> dict[str, float]:
+        """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map.
+
+        Raises
+        ------
+        ConvergenceError
+            Where the tolerance is not reached.
+        """
+        started = time.process_time()
+        shape, cap = self.surface.shape, self.cap
+        p = np.full(shape, force) if self.pressure is None else project(self.pressure, force, cap)
+        gap = self.deflect(p) - self.surface
+        direction, size, free_before = np.zeros(shape), 1.0, None
+        for iteration in range(MAX_ITERATIONS):
+            inside = (p > 0) & (p < cap)
+            if inside.any():
+                level = float(gap[inside].mean())
+            else:
+                # any level between open and yielded points
+                level = 0.5 * (float(gap[p <= 0].min(initial=np.inf)) + float(gap[p >= cap].max(initial=-np.inf)))
+            rest = gap - level
+            # what is left to gain by each point, over the load
+            wrong = np.where(rest > 0, rest * p, -rest * np.minimum(cap - p, force))
+            residual = float(wrong.mean()) / (force * self.h_rms)
+            if residual <= self.tolerance:
+                break
+            free = inside | ((p <= 0) & (rest < 0)) | ((p >= cap) & (rest > 0))
+            slope = np.where(free, rest - rest[free].mean(), 0.0)
+            new_size = float(np.sum(slope * slope))
+            kept = free_before is not None and np.array_equal(free, free_before)
+            direction = slope + (new_size / size if iteration and size > 0 else 0.0) * np.where(free, direction, 0.0)
+            if free_before is not None and not kept:
+                direction = np.where(free, direction - direction[free].mean(), 0.0)
+            size, free_before = new_size, free
+            moved = self.deflect(direction)
+            step = float(np.sum(slope * direction)) / float(np.sum(direction * moved))
+            if not step > 0:
+                direction, step = slope, new_size / float(np.sum(slope * self.deflect(slope)))
+            # held points are pushed against their bounds, so that the projection's shift does not free them
+            p = project(p - step * np.where(free, direction, rest), force, cap)
+            gap = self.deflect(p) - self.surface
+        else:
+            what = f"F/(A0 E*) = {force:g}" + (f", p_m = {cap:g}" if cap < np.inf else "")
+            raise ConvergenceError(f"boundary elements at {what} end with a residual of {residual:.1e}")
+        self.pressure, self._rest = p, rest
+        return self._found(force, residual, iteration) | {"seconds": time.process_time() - started}
+
+    def _beside(self, field: Any) -> list[Any]:
+        """The field at the four neighbours of each point."""
+        wide = np.pad(field, 1, "symmetric" if self.mirrored else "wrap")
+        return [wide[2:, 1:-1], wide[:-2, 1:-1], wide[1:-1, 2:], wide[1:-1, :-2]]
+
+    def _found(self, force: float, residual: float, iterations: int) -> dict[str, float]:
+        p, rest = self.traction, self._rest
+        touching, yielded = p > 0, p >= self.cap * (1 - 1e-9)
+        elastic = touching & ~yielded
+        beside, held = np.any(self._beside(yielded), axis=0), self._beside(touching)
+        open_edges, mixed_edges = (
+            sum(int(np.count_nonzero(points & ~other)) for other in held) for points in (elastic, elastic & beside)
         )
-        self.model.E, self.model.nu = 1.0, 0.0
-        self._solver = tamaas.PolonskyKeerRey(self.model, self.surface, tolerance)
-        self._solver.max_iter = MAX_ITERATIONS
-        self._tolerance = tolerance
+        own_edges = sum(int(np.count_nonzero(yielded & ~other)) for other in self._beside(yielded))
+        raw, raw_yielded, full = float(touching.mean()), float(yielded.mean()), force / self.cap
+        area = raw - CORRECTION * (open_edges + MIXED * mixed_edges) / p.size
+        return {
+            "area": max(area, full),
+            "area_yielded": min(raw_yielded + YIELDED * CORRECTION * own_edges / p.size, full),
+            "area_raw": raw,
+            "area_yielded_raw": raw_yielded,
+            "mean_separation": float(np.maximum(rest, 0).mean()),
+            "plane_separation": float(rest.mean()),
+            "energy": float(np.mean(p * self.deflect(p)) / 2),
+            "pressure_weighted_height": float(np.mean(p * self.surface) / force),
+            "residual": residual,
+            "iterations": float(iterations),
+        }
 
     @property
     def traction(self) -> FloatArray:
         """Pressures of the last load over E*."""
-        return np.asarray(self.model.traction)
+        assert self.pressure is not None
+        return self.pressure
 
-    def press(self, force: float) -> dict[str, float]:
-        """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map."""
-        started = time.process_time()
-        try:
-            residual = self._solver.solve(force)
-        except (ArithmeticError, RuntimeError) as fault:
-            # for example with a single element in contact
-            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}") from None
-        if not residual <= self._tolerance:
-            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
-        seconds = time.process_time() - started
-        pressure, moved = self.traction, np.asarray(self.model.displacement)
-        touching = pressure > 0
-        edges = sum(int(np.count_nonzero(touching != np.roll(touching, 1, axis))) for axis in (0, 1))
-        raw = float(touching.mean())
-        # the engine moves the whole surface by the gap; elastic energy has the displacement about its mean
-        gap = moved - self.surface
-        self.gap = np.where(touching, 0.0, np.maximum(gap - gap[touching].mean(), 0.0))
-        return {
-            "area": raw - CORRECTION * edges / touching.size,
-            "area_raw": raw,
-            "mean_separation": float(gap.mean() - gap[touching].mean()),
-            "energy": float(np.mean(pressure * (moved - moved.mean())) / 2),
-            "pressure_weighted_height": float(np.mean(pressure * self.surface) / force),
-            "residual": float(residual),
-            "seconds": seconds,
-        }
+    @property
+    def gap(self) -> FloatArray:
+        """Gaps of the last load, zero in contact, yielded points flattened."""
+        return np.where(self.traction > 0, 0.0, np.maximum(self._rest, 0))
+
+    def frozen_stiffness(self) -> float:
+        """-dF/du of the contact area as it is, sticking neither to yielding nor to opening [E*/length].
+
+        Pressures on the area alone, of mean 1, that move it as a whole: preconditioned conjugate gradients.
+        """
+        touching = self.traction > 0
+        count = int(touching.sum())
+
+        def inside(field: FloatArray) -> FloatArray:
+            """On the area, of mean zero."""
+            return np.where(touching, field - field[touching].mean(), 0.0)
+
+        p = np.where(touching, touching.size / count, 0.0)
+        rest = -inside(self.deflect(p))
+        z = inside(self._filtered(rest, self._stiffness))
+        direction, gain = z, float(np.sum(rest * z))
+        first = gain
+        for _ in range(MAX_ITERATIONS):
+            if gain <= STIFFNESS_RTOL**2 * first or count < 2:
+                break
+            moved = inside(self.deflect(direction))
+            step = gain / float(np.sum(direction * moved))
+            p = p + step * direction
+            rest = rest - step * moved
+            z = inside(self._filtered(rest, self._stiffness))
+            gain, before = float(np.sum(rest * z)), gain
+            direction = z + gain / before * direction
+        else:
+            raise ConvergenceError("the stiffness of a frozen contact was not found")
+        return 1 / float(self.deflect(p)[touching].mean())

@@ -61,7 +61,7 @@ def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -
 
 
 def area_persson(force: ArrayLike) -> FloatArray:
-    """The same by Persson's theory, erf(sqrt(2) F)."""
+    """A/A0 by Persson's theory, erf(sqrt(2) F)."""
     return area_of(force, 1.0, 1.0)
 
 

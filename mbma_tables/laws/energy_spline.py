@@ -40,17 +40,15 @@ class LoadCurve:
     ----------
     rows : ndarray, shape (4, n)
         F/(A0 E*), rising, A/A0, rising, u [length], falling, and U/(A0 E*) [length].
-    apart : int, optional
-        Interval (its first load) whose ends were simulated on different grids: their energies are not comparable.
     """
 
-    def __init__(self, rows: FloatArray, apart: int = -1) -> None:
+    def __init__(self, rows: FloatArray) -> None:
         force, area, mean_separation, energy = rows
         self.x = np.log(force)
         self.work = energy + force * mean_separation
         fine = self.x[:-1, None] + np.diff(self.x)[:, None] * np.arange(FINE) / FINE
         self._fine = np.append(fine, self.x[-1])
-        self._spline: Any = _constrained(self.x, mean_separation, np.diff(self.work), apart)
+        self._spline: Any = _constrained(self.x, mean_separation, np.diff(self.work))
         self._slope = self._spline.derivative()
         if not (self._slope(self._fine) < 0).all():
             self._spline = PchipInterpolator(self.x, mean_separation)
@@ -118,8 +116,8 @@ class LoadCurve:
 class Continued(LoadCurve):
     """The curves with extrapolation, from full compression at u = 0 to first contact at u = `top` [length]."""
 
-    def __init__(self, rows: FloatArray, apart: int, top: float) -> None:
-        super().__init__(rows, apart)
+    def __init__(self, rows: FloatArray, top: float) -> None:
+        super().__init__(rows)
         self.top, self.u = top, (float(rows[2, 0]), float(rows[2, -1]))
         first, last = (float(part) for part in super().stiffness(self.x[[0, -1]]))
         self.power = max(first * (top - self.u[0]) / float(rows[0, 0]), 1.0)
@@ -196,22 +194,20 @@ class Continued(LoadCurve):
         return self._joined(x, super().energy, lambda beyond: light * np.exp(beyond * (1 + 1 / self.power)), pressed)
 
 
-def left_out(rows: FloatArray, apart: int) -> FloatArray:
-    """Largest change of ln F and ln A if one of the four loads nearest to an interval is omitted, shape (2, n - 1)."""
+def left_out(rows: FloatArray) -> FloatArray:
+    """Change of ln F and ln A that one of the four loads nearest to an interval makes, at most, shape (2, n - 1)."""
     changes = np.zeros((2, rows.shape[1] + 2))
     for k in range(1, rows.shape[1] - 1):
-        # the interval across the omitted load has two grids if one of its neighbours has
-        less = LoadCurve(np.delete(rows, k, axis=1), apart if apart < k else apart - 1)
+        less = LoadCurve(np.delete(rows, k, axis=1))
         x = less.log_force(rows[2, k])
         found = np.array([x, np.log(less.area(x))])
         changes[:, k + 1] = np.abs(found - np.log(rows[:2, k]))
     return np.asarray(np.lib.stride_tricks.sliding_window_view(changes, 4, axis=1).max(axis=-1))
 
 
-def _constrained(x: FloatArray, u: FloatArray, work: FloatArray, apart: int) -> CubicSpline:
+def _constrained(x: FloatArray, u: FloatArray, work: FloatArray) -> CubicSpline:
     """Cubic spline of u over ln F, not-a-knot, with the integrals of u over F between loads."""
-    free = np.delete(np.arange(x.size - 1), apart) if apart >= 0 else np.arange(x.size - 1)
-    middle = (x[1:] + x[:-1])[free] / 2
+    middle = (x[1:] + x[:-1]) / 2
     knots = np.sort(np.append(x, middle))
     at, between = np.searchsorted(knots, x), np.searchsorted(knots, middle)
     basis = CubicSpline(knots, np.eye(knots.size))
@@ -219,8 +215,8 @@ def _constrained(x: FloatArray, u: FloatArray, work: FloatArray, apart: int) -> 
     half = np.diff(knots)[:, None] / 2
     t = knots[:-1, None] + half * (1 + NODES)
     parts = np.einsum("ij,ijk->ik", np.exp(t) * half * WEIGHTS, basis(t))
-    sums = parts[at[free]] + parts[between]
+    sums = parts[at[:-1]] + parts[between]
     values = np.zeros(knots.size)
     values[at] = u
-    values[between] = np.linalg.solve(sums[:, between], work[free] - sums[:, at] @ u)
+    values[between] = np.linalg.solve(sums[:, between], work - sums[:, at] @ u)
     return CubicSpline(knots, values)

@@ -95,7 +95,7 @@ def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowCons
     (array([0.9895, 1.0029]), [0.9895, 1.003])
     """
     held = np.minimum(area, flow.threshold - NEAREST)
-    share, gap = open_gaps(u, held, 1.0, deepest=1.0)
+    share, gap = open_gaps(u, held, 1.0, blended=True)
     blocked = np.where(area > 0, flow.obstructed(held), 0.0)
     k, carried = anisotropic_medium(share, gap, blocked, np.broadcast_to(peklenik, u.shape))
     shear = u - carried

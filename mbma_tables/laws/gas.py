@@ -123,24 +123,25 @@ def mean_inverse(
 
 
 def open_gaps(
-    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf, deepest: float = DEEPEST
+    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf, blended: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """Shares of the nominal area and gaps there [length] on a last axis of `NODES`, of contacts as for `mean_inverse`.
 
-    The shares add up to that of the open gaps; the mean gap over the nominal area is u. With `deepest` 1 gaps are
-    continuous at first contact.
+    The shares add up to that of the open gaps; the mean gap over the nominal area is u. `blended` gaps go over
+    smoothly into those before contact.
     """
     from scipy.special import ndtri
 
     gap, share, height, cap = (part[..., None] for part in np.broadcast_arrays(u, area, h_rms, eta))
     share = np.minimum(share, FULLEST)
     with np.errstate(divide="ignore"):
-        d = np.minimum(-ndtri(share), np.maximum(deepest * gap / height, DEEP))
-    d = np.where(share > 0, d, gap / height)
+        d = np.minimum(-ndtri(share), TAIL if blended else np.maximum(DEEPEST * gap / height, DEEP))
+    weight = share / (share + LIGHT) if blended else share > 0
+    d = gap / height + (d - gap / height) * weight
     q = 1 + BEND * share / (share + LIGHT) * -np.expm1(-((cap / SOFT) ** POWER))
-    node, weight = _rule()
+    node, share_of_node = _rule()
     low, high = np.maximum(d - TAIL, 0.0), np.maximum(d + TAIL, 0.0)
     y = low + (high - low) * node
-    density = np.exp(-((d - y) ** 2) / 2) / math.sqrt(2 * math.pi) * weight * (high - low)
+    density = np.exp(-((d - y) ** 2) / 2) / math.sqrt(2 * math.pi) * share_of_node * (high - low)
     bent = y**q
     return density, gap * bent / (density * bent).sum(axis=-1, keepdims=True)

@@ -1,7 +1,4 @@
-"""BEM of one map at a list of loads, on a coarser grid where that resolves its contacts.
-
-Grids of eight or more sampling steps along the shortest wavelength are halved for the heavier loads. Flow is solved on
-gaps of the full grid: displacements of a coarser one are smooth, the heights are not, so the former are interpolated.
+"""One map pressed at a list of loads by boundary elements, and the flow through its gaps.
 
 Each load, and each flow, is stored in `mbma_tables.common.cache` as soon as it is computed.
 """
@@ -11,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,119 +17,205 @@ from mbma_tables.common import cache
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.progress import doing, shown
-from mbma_tables.laws.boundary_elements import Contact
-from mbma_tables.laws.reynolds import flow_conductance
+from mbma_tables.laws.boundary_elements import Contact, composed, wavenumbers, waves
+from mbma_tables.laws.reynolds import flow_tensor
 
-MIN_POINTS = 4.0  # sampling steps per wavelength; with fewer, areas of boundary elements are too large
-HALVED = 8.0  # sampling steps per wavelength, from which heavier loads use half of the grid
-LIGHT = 0.06  # contact area above which half of the grid is used
-TOLERANCE = 1e-3
+MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary elements are too large
+TOLERANCE = 1e-5
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
+# loads added for the flow, at most: where its logarithm falls by more than this, and where an axis closes between
+# loads further apart than this in ln F
+FLOWS, STEEP, NARROW = 6, 1.2, 0.1
 ROUNDING = 1e-6
-KEPT = "pressed 1"  # version of cached results: change it when this file gives other numbers
+KEPT = "pressed 2"  # of what is cached: another text where this file finds other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
+YIELDING = (*QUANTITIES, "plane_separation", "area_yielded", "frozen_stiffness", "pressure_weighted_height")
 
 
-def coarser(values: FloatArray, points: float = 0.0) -> FloatArray:
-    """A periodic map on every second sampling step along each axis, without wavelengths below `points` of these."""
+def resampled(values: FloatArray, shape: tuple[int, ...], mirrored: bool = False) -> FloatArray:
+    """A map, periodic or continued by its mirror images, on another number of points, by its waves."""
     from scipy.signal import resample
 
-    if points:
-        q2 = np.add.outer(*(np.fft.fftfreq(count) ** 2 for count in values.shape))
-        values = np.fft.ifft2(np.where(q2 <= (0.5 / points) ** 2 * (1 + ROUNDING), np.fft.fft2(values), 0)).real
-    for axis, count in enumerate(values.shape):
-        values = resample(values, count // 2, axis=axis)
+    if mirrored:
+        return composed(waves(values, True), shape, True)
+    for axis, count in enumerate(shape):
+        values = resample(values, count, axis=axis)
     return np.asarray(values)
 
 
+def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> FloatArray:
+    """A map on half as many points along each axis, by its waves of at least `points` of the new sampling steps."""
+    if points:
+        q = wavenumbers(values.shape, values.shape, mirrored)
+        kept = np.where(q <= np.pi / points * (1 + ROUNDING), waves(values, mirrored), 0)
+        values = composed(kept, values.shape, mirrored)
+    return resampled(values, tuple(count // 2 for count in values.shape), mirrored)
+
+
+class Press:
+    """A map that is pressed when it is first called with a load over A0 E*; lengths of the map.
+
+    Parameters
+    ----------
+    gradient : float
+        About its rms gradient.
+    mirrored : bool
+        Whether its mirror images continue it; else it is periodic.
+    hardness : float
+        Over E*.
+    left_out : float
+        Wavelength [length] below which a large map was cut off; 0 if it was not.
+    """
+
+    def __init__(
+        self,
+        heights: FloatArray,
+        sizes: tuple[float, float],
+        gradient: float,
+        tolerance: float = TOLERANCE,
+        mirrored: bool = False,
+        hardness: float = np.inf,
+        left_out: float = 0.0,
+    ) -> None:
+        self.left_out = left_out
+        self.heights, self.sizes, self.gradient, self.mirrored = heights, sizes, gradient, mirrored
+        self._tolerance, self._cap = tolerance, hardness / gradient
+        self._engine: Contact | None = None
+        self.quantities = YIELDING if hardness < np.inf else QUANTITIES
+        # of rms gradient one, heights of order one
+        self.scale = float(np.abs(heights).max())
+        self._sizes = sizes[0] * gradient / self.scale, sizes[1] * gradient / self.scale
+        settings = heights.shape, *(f"{side:.9g}" for side in self._sizes), tolerance, mirrored, f"{self._cap:.9g}"
+        self._own = _digest(heights / self.scale, *settings)
+        units = {"energy": gradient * self.scale, "frozen_stiffness": gradient / self.scale}
+        lengths = dict.fromkeys(("mean_separation", "plane_separation", "pressure_weighted_height"), self.scale)
+        self._units = np.array([(units | lengths).get(name, 1.0) for name in self.quantities])
+        self._found: dict[float, tuple[FloatArray, FloatArray]] = {}
+
+    def name(self, load: float) -> str:
+        """Under which a load is cached."""
+        return _digest(self._own, f"{load / self.gradient:.9g}")
+
+    def __call__(self, load: float) -> tuple[FloatArray, FloatArray]:
+        """`quantities`, and the gaps in single precision."""
+        if load not in self._found:
+            name = self.name(load)
+            kept = cache.load(name, row=(len(self.quantities),), gap=self.heights.shape)
+            if kept is None:
+                if self._engine is None:
+                    own = self.heights / self.scale
+                    self._engine = Contact(own, self._sizes, self._tolerance, self._cap, self.mirrored)
+                result = self._engine.press(load / self.gradient)
+                if self._cap < np.inf:
+                    result["frozen_stiffness"] = self._engine.frozen_stiffness()
+                row = np.array([result[name] for name in self.quantities])
+                kept = {"row": row, "gap": self._engine.gap.astype(np.float32)}
+                cache.keep(name, **kept)
+            self._found[load] = kept["row"] * self._units, kept["gap"] * np.float32(self.scale)
+        return self._found[load]
+
+    def loads(self, wanted: FloatArray, more: bool) -> tuple[FloatArray, FloatArray]:
+        """Loads, and rows of `quantities` at them, rising; `more` are added until contact is covered far enough."""
+        found: dict[float, FloatArray] = {}
+
+        def add(load: float) -> None:
+            doing(f"boundary elements {_bar(len(found), max(len(wanted), len(found) + 1))}")
+            found[load] = self(load)[0]
+
+        with shown("boundary elements"):
+            for load in map(float, wanted):
+                add(load)
+            for _ in range(MORE if more else 0):
+                low, high = min(found), max(found)
+                # where one element touches, the solver may fail
+                if found[low][0] > LOWEST:
+                    with contextlib.suppress(ConvergenceError):
+                        add(low * LIGHTER)
+                if found[high][0] < HIGHEST and high * HEAVIER < self._cap * self.gradient:
+                    add(high * HEAVIER)
+        cache.trim()
+        loads = np.array(sorted(found))
+        return loads, np.array([found[load] for load in loads.tolist()]).T
+
+    def flow(self, load: float) -> FloatArray:
+        """Flow coefficients xx, yy and xy [length^3] through the gaps under a load over A0 E*; 0 where blocked."""
+        name = f"{self.name(load)}-flow"
+        kept = cache.load(name, flow=(3,))
+        if kept is None:
+            kept = {"flow": flow_tensor(self(load)[1] / self.scale, self.sizes, self.mirrored)}
+            cache.keep(name, **kept)
+        return np.asarray(kept["flow"] * self.scale**3)
+
+    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Mean gaps u of some loads [length], falling, and their flow, shape (m, 3).
+
+        At every second ln F, then between loads where it falls most, or an axis closes; `separation` is u at ln F.
+        """
+        found: dict[float, FloatArray] = {}
+
+        def add(own: float) -> bool:
+            doing(f"flow through the gaps {_bar(len(found), max(x.size // 2 + FLOWS // 2, len(found) + 1))}")
+            found[own] = self.flow(float(np.exp(own)))
+            return bool(found[own][:2].any())
+
+        with shown("flow through the gaps"):
+            # once blocked both ways, heavier loads are
+            for own in x[::2].tolist():
+                if not add(own):
+                    break
+            for _ in range(FLOWS):
+                at = np.array(sorted(found))
+                K = np.array([found[own][:2] for own in at.tolist()])
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    fall = np.nan_to_num(np.log(K[:-1] / K[1:]), posinf=np.inf)
+                fall[np.isinf(fall) & (np.diff(at)[:, None] <= NARROW)] = 0.0
+                worst = fall.max(axis=1)
+                k = int(worst.argmax())
+                if worst[k] < STEEP:
+                    break
+                between = x[(x > at[k]) & (x < at[k + 1])]
+                add(float(between[between.size // 2]) if between.size else float(at[k] + at[k + 1]) / 2)
+        at = np.array(sorted(found))
+        cache.trim()
+        return separation(at), np.array([found[own] for own in at.tolist()])
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class Pressed:
-    """A periodic map at some loads; lengths of the map.
+class Table:
+    """What was found of a map, without the map and its gaps.
 
     Attributes
     ----------
     rows : ndarray, shape (4, n)
         F/(A0 E*), A/A0, u and U/(A0 E*).
-    coarse_from : int
-        First load on half of the grid; n if there is none.
-    """
-
-    heights: FloatArray
-    sizes: tuple[float, float]
-    rows: FloatArray
-    coarse_from: int
-    gaps: tuple[FloatArray, ...]
-    names: tuple[str, ...]  # key of the cached loads
-    left_out: float = 0.0  # wavelength [length] below which a large map was cut off; 0 if it was not
-    cut: float = 0.0  # sampling steps of the coarse grid per shortest wavelength, where shorter ones were omitted
-
-    def flow(self) -> FloatArray:
-        """Flow coefficient along both axes [length^3], shape (n, 2); 0 where blocked."""
-        found, scale = np.zeros((len(self.gaps), 2)), float(np.abs(self.heights).max())
-        own = _digest(self.heights / scale)
-        with shown("flow through the gaps"):
-            for k in range(len(self.gaps)):
-                doing(f"flow through the gaps {_bar(k, len(self.gaps))}")
-                name = _digest(self.names[k], own, f"{self.rows[2, k] / scale:.9g}")
-                kept = cache.load(name, flow=(2,))
-                if kept is None:
-                    kept = {"flow": flow_conductance(self.gap(k), self.sizes) / scale**3}
-                    cache.keep(name, **kept)
-                found[k] = kept["flow"] * scale**3
-                # once blocked along both axes, heavier loads are blocked as well
-                if not found[k].any():
-                    break
-        return found
-
-    def gap(self, k: int) -> FloatArray:
-        """Gaps [length] on the full grid, of mean u."""
-        from scipy.signal import resample
-
-        gap = self.gaps[k].astype(float)
-        if gap.shape == self.heights.shape:
-            return gap
-        moved = gap + coarser(self.heights, self.cut)
-        for axis, count in enumerate(self.heights.shape):
-            moved = resample(moved, count, axis=axis)
-        gap = moved - self.heights
-        # level at which the gaps cut off at zero have the given mean
-        ordered = np.sort(gap, axis=None)
-        below = np.cumsum(ordered[::-1])[::-1] - ordered * np.arange(gap.size, 0, -1)
-        level = np.interp(-self.rows[2, k] * gap.size, -below, ordered)
-        return np.asarray(np.maximum(gap - level, 0.0))
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Table:
-    """Results for a map, without the map and its gaps: rows and flow as in `Pressed`.
-
-    Attributes
-    ----------
+    flow_gaps, flow : ndarray, shape (m,) and (m, 3)
+        Mean gaps, falling, and flow coefficients xx, yy, xy [length^3].
     points, elements : float
         Sampling steps along the shortest wavelength, and elements of the map that do not repeat each other.
     left_out : float
-        As of `Pressed`.
+        As of `Press`.
     origin : str
         Description of the map and of the simulation.
     """
 
     rows: FloatArray
-    flows: FloatArray
-    coarse_from: int
+    flow_gaps: FloatArray
+    flow: FloatArray
     points: float
     elements: float
     left_out: float = 0.0
     origin: str = ""
 
-    def flow(self) -> FloatArray:
-        """Flow coefficient along both axes [length^3], shape (n, 2); 0 where blocked."""
-        return self.flows
+    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """`flow_gaps` and `flow`."""
+        return self.flow_gaps, self.flow
 
     def resized(self, up: float, along: float) -> Table:
         """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
         by = np.array([[up / along], [1.0], [up], [up**2 / along]])
-        return dataclasses.replace(self, rows=self.rows * by, flows=self.flows * up**3, left_out=self.left_out * along)
+        gaps, flow, left_out = self.flow_gaps * up, self.flow * up**3, self.left_out * along
+        return dataclasses.replace(self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out)
 
 
 def _digest(*parts: Any) -> str:
@@ -145,62 +229,3 @@ def _digest(*parts: Any) -> str:
 
 def _bar(done: int, number: int) -> str:
     return f"[{'#' * done}{'.' * (number - done)}] {done} of {number}"
-
-
-def press(
-    heights: FloatArray,
-    sizes: tuple[float, float],
-    loads: FloatArray,
-    points: float,
-    gradient: float,
-    area: Any = None,
-    tolerance: float = TOLERANCE,
-) -> Pressed:
-    """Simulate a periodic map; `loads` over A0 E*, `points` per shortest wavelength, `gradient` its rms gradient.
-
-    If its approximate `area` at a load is known, heavier loads use half of the grid, and loads are added
-    until contacts from `LOWEST` to `HIGHEST` are covered.
-    """
-    # scaled to an rms gradient of one and heights of order one
-    scale = float(np.abs(heights).max())
-    stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
-    halved = area is not None and points >= HALVED * (1 - ROUNDING)
-    engines: dict[bool, Contact] = {}
-    found: dict[float, tuple[bool, FloatArray, FloatArray]] = {}
-    names: dict[float, str] = {}
-    own = _digest(heights / scale, heights.shape, *(f"{side:.9g}" for side in stretched), tolerance)
-
-    def add(load: float, coarse: bool) -> None:
-        # further loads are added after those requested
-        doing(f"boundary elements {_bar(len(found), max(len(loads), len(found) + 1))}")
-        name = _digest(own, coarse, f"{load / gradient:.9g}")
-        shape = tuple(count // (1 + coarse) for count in heights.shape)
-        names[load] = name
-        kept = cache.load(name, row=(len(QUANTITIES),), gap=shape)
-        if kept is None:
-            if coarse not in engines:
-                engines[coarse] = Contact((coarser(heights) if coarse else heights) / scale, stretched, tolerance)
-            result = engines[coarse].press(load / gradient)
-            row = np.array([result[name] for name in QUANTITIES])
-            kept = {"row": row, "gap": engines[coarse].gap.astype(np.float32)}
-            cache.keep(name, **kept)
-        found[load] = coarse, kept["row"], kept["gap"]
-
-    with shown("boundary elements"):
-        for load in map(float, loads):
-            add(load, halved and float(area(np.array(load))) > LIGHT)
-        for _ in range(MORE if area is not None else 0):
-            low, high = min(found), max(found)
-            # with a single element in contact the solver may fail
-            if found[low][1][0] > LOWEST:
-                with contextlib.suppress(ConvergenceError):
-                    add(low * LIGHTER, False)
-            if found[high][1][0] < HIGHEST:
-                add(high * HEAVIER, halved)
-    cache.trim()
-    order = sorted(found)
-    rows = np.array([[load, *found[load][1]] for load in order]).T
-    rows[2:] *= np.array([[scale], [gradient * scale]])
-    fine = sum(not found[load][0] for load in order)
-    gaps = tuple(found[load][2] * np.float32(scale) for load in order)
-    return Pressed(heights, sizes, rows, fine, gaps, tuple(names[load] for load in order))

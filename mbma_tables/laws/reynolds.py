@@ -6,6 +6,7 @@ factorisation. Closed gaps are found by labelling connected gaps, not by a small
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,20 @@ def flow_conductance(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) ->
     >>> flow_conductance(gap).round(3).tolist()
     [7.0, 0.0]
     """
-    return flow_and_couette(gap, sizes)[0]
+    return flow_tensor(gap, sizes)[:2]
+
+
+def flow_tensor(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0), mirrored: bool = False) -> FloatArray:
+    """K of `flow_conductance` along both axes, and K_xy [length^3], of gaps that may be continued by mirror images.
+
+    Flow per width along an axis is K_xx or K_yy times the mean pressure gradient along it, and K_xy times that along
+    the other one; images have no K_xy.
+    """
+    values = _checked(gap)
+    if not mirrored:
+        K = _solved(values, sizes)[0]
+        return np.array([K[0, 0], K[1, 1], K[0, 1]])
+    return np.array([*(_between_mirrors(values, sizes, axis) for axis in (0, 1)), 0.0])
 
 
 def flow_and_couette(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) -> tuple[FloatArray, FloatArray]:
@@ -90,13 +104,45 @@ def flow_and_couette(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) ->
     pressure of div(h^3 grad p) = 6 viscosity U dh/dx, by reciprocity from that of `flow_conductance`. A shear flow
     factor (Patir, Cheng, J. Lubrication Tech. 101 (1979) 220) is (u - h_c)/h_rms, u the mean gap.
     """
-    gap = finite_array("gap", gap)
-    if gap.ndim != 2:
-        raise InputError(f"gap must be a grid, got shape {gap.shape}")
-    require("gap", gap, gap >= 0, "at least 0")
+    K, couette = _solved(_checked(gap), sizes)
+    return np.diagonal(K).copy(), couette
+
+
+def _checked(gap: ArrayLike) -> FloatArray:
+    values = finite_array("gap", gap)
+    if values.ndim != 2:
+        raise InputError(f"gap must be a grid, got shape {values.shape}")
+    require("gap", values, values >= 0, "at least 0")
+    return values
+
+
+def _faces(
+    number: np.ndarray, cubes: FloatArray, axis: int, steps: list[float], mirrored: bool = False
+) -> tuple[Any, Any, Any, FloatArray]:
+    """Points whose next neighbour along an axis is open, too, numbers of both, and the conductance of their faces."""
+    beside = np.roll(number, -1, axis)
+    joined = (number >= 0) & (beside >= 0)
+    if mirrored:
+        joined[(-1, slice(None)) if axis == 0 else (slice(None), -1)] = False
+    # a b/(a + b) would underflow where both are tiny
+    face = 2 / (1 / cubes[joined] + 1 / np.roll(cubes, -1, axis)[joined]) * steps[1 - axis] / steps[axis]
+    return joined, number[joined], beside[joined], face
+
+
+def _factors(rows: Sequence[Any], columns: Sequence[Any], values: Sequence[Any], more: Any, free: Any) -> Any:
+    """Factors of the matrix of faces, `more` on its diagonal, without the rows that are not `free`."""
+    entries = np.concatenate([*values, *values])
+    matrix = coo_array((-entries, (np.concatenate([*rows, *columns]), np.concatenate([*columns, *rows]))))
+    matrix = matrix - diags_array(matrix.sum(axis=1) - more)
+    kept = matrix.tocsc() if free is None else matrix.tocsc()[free][:, free]
+    return splu(kept, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
+def _solved(gap: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """K of a periodic cell, shape (2, 2), and h_c along both axes."""
     owner, along = open_ways(gap)
     if not any(along):
-        return np.zeros(2), np.zeros(2)
+        return np.zeros((2, 2)), np.zeros(2)
     steps = [side / points for side, points in zip(sizes, gap.shape, strict=True)]
     number = np.full(gap.shape, -1)
     number[owner > 0] = np.arange(np.count_nonzero(owner))
@@ -105,35 +151,46 @@ def flow_and_couette(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) ->
     forces, uniform = np.zeros((np.count_nonzero(owner), 2)), np.zeros(2)
     carried, mean = np.zeros_like(forces), np.zeros(2)
     for axis in (0, 1):
-        beside, k = np.roll(cubes, -1, axis), np.roll(number, -1, axis)
-        joined = (number >= 0) & (k >= 0)
-        a, b = cubes[joined], beside[joined]
-        # a b/(a + b) would underflow where both are tiny
-        face = 2 / (1 / a + 1 / b) * steps[1 - axis] / steps[axis]
-        i, j = number[joined], k[joined]
+        joined, i, j, face = _faces(number, cubes, axis, steps)
         one, other = gap[joined], np.roll(gap, -1, axis)[joined]
         wider, ratio = np.maximum(one, other), np.minimum(one, other) / np.maximum(one, other)
         couette = wider * ratio * (1 + ratio**2) / (1 + ratio**3) * steps[1 - axis]
         carried[:, axis] = np.bincount(i, couette, len(forces)) - np.bincount(j, couette, len(forces))
         mean[axis] = couette.sum() * steps[axis]
-        rows += [i, j]
-        columns += [j, i]
-        values += [-face, -face]
+        rows.append(i)
+        columns.append(j)
+        values.append(face)
         forces[:, axis] = np.bincount(i, face, len(forces)) - np.bincount(j, face, len(forces))
         forces[:, axis] *= steps[axis]
         uniform[axis] = face.sum() * steps[axis] ** 2
-    matrix = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))))
-    matrix = matrix - diags_array(matrix.sum(axis=1))
-    # pressure is determined up to a constant in each connected gap
+    # pressure is free by a constant in each connected gap
     fixed = np.unique(owner[owner > 0], return_index=True)[1]
     free = np.delete(np.arange(len(forces)), fixed)
-    factors = splu(
-        matrix.tocsc()[free][:, free],
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    pressure = factors.solve(forces[free])
-    found = (uniform - np.sum(forces[free] * pressure, axis=0)) / (sizes[0] * sizes[1])
-    couette = (mean - np.sum(carried[free] * pressure, axis=0)) / (sizes[0] * sizes[1])
-    return np.where(along, found, 0.0), np.where(along, couette, 0.0)
+    pressure = _factors(rows, columns, values, 0.0, free).solve(forces[free])
+    area = sizes[0] * sizes[1]
+    found = (np.diag(uniform) - forces[free].T @ pressure) / area
+    couette = (mean - np.sum(carried[free] * pressure, axis=0)) / area
+    return np.where(np.outer(along, along), found, 0.0), np.where(along, couette, 0.0)
+
+
+def _between_mirrors(gap: FloatArray, sizes: tuple[float, float], axis: int) -> float:
+    """K along an axis of gaps continued by their mirror images, between the mirrors at its ends."""
+    labels, _ = label(gap > 0)
+    open_ = np.isin(labels, np.setdiff1d(np.intersect1d(labels.take(0, axis), labels.take(-1, axis)), 0))
+    if not open_.any():
+        return 0.0
+    steps = [side / points for side, points in zip(sizes, gap.shape, strict=True)]
+    number = np.full(gap.shape, -1)
+    number[open_] = np.arange(np.count_nonzero(open_))
+    cubes = gap**3
+    faces = [_faces(number, cubes, way, steps, True)[1:] for way in (0, 1)]
+    count = int(np.count_nonzero(open_))
+    ends: list[Any] = []
+    for side in (0, -1):
+        # half a step from a mirror, where pressure is that of the end
+        there = number.take(side, axis) >= 0
+        half: Any = 2 * np.take(cubes, side, axis)[there] * steps[1 - axis] / steps[axis]
+        ends.append(np.bincount(number.take(side, axis)[there], half, count))
+    i, j, face = ([own[k] for own in faces] for k in range(3))
+    pressure = _factors(i, j, face, ends[0] + ends[1], None).solve(ends[1])
+    return float(ends[0] @ pressure * sizes[axis] / sizes[1 - axis])

@@ -208,7 +208,7 @@ class _Planner:
         return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use, theory)
 
     def many_gaps(self) -> bool:
-        """Whether totals at the prescribed gaps cost more than a law, where there is one."""
+        """Whether totals at the prescribed gaps cost more than a law, if one can be made."""
         if self.count < MIN_LAW_GAPS or "finite_height" in self.problem.dropped:
             return False
         from mbma_tables.law.make import MIN_LAW_RTOL
@@ -286,7 +286,7 @@ class _Planner:
         return float(get_theory(self.problem.theory, surface).answer(surface, 0.5 * surface.h_max).error)
 
     def seconds_of_law(self, inverse: bool) -> float:
-        """Of a law's answers at the gaps."""
+        """Seconds of a law's evaluations at the gaps."""
         found = self.costs.of("law", "invert") if inverse else 0.0
         return self.count * (self.costs.of("law", "lookup") + found)
 

@@ -31,7 +31,8 @@ def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
     Returns
     -------
     MeasuredSurface
-        Without a map; its `provenance` has the differences of h_rms, gradient and highest point between scans.
+        Without a map; its `provenance` says how much h_rms, gradient and highest point differ from scan to scan, and
+        what the laws of its `scans` differ by adds to the scatter of its contacts.
 
     Raises
     ------
@@ -78,6 +79,7 @@ def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
         bands=_bands([scan.bands for scan in known]),
         anisotropy=bearing.anisotropy,
         unit=first.unit,
+        scans=tuple(known),
         provenance=(record | {"told": f"average of {len(known)} scans: {spread}"},),
     )
     return dataclasses.replace(whole, provenance=(*whole.provenance, resolution(whole)))

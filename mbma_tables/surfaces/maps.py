@@ -322,7 +322,7 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
     # the curves of the map do not include the added wavelengths
     C = np.append(surface.C, np.exp(level - slope * np.log(q)))
-    plain = dataclasses.replace(surface, bearing=None, bands=None, map=None, table=None)
+    plain = dataclasses.replace(surface, bearing=None, bands=None, map=None, table=None, scans=())
     longer = dataclasses.replace(plain, q=np.append(surface.q, q), C=C, samples=samples)
     area = float(surface.rms_gradient / longer.rms_gradient)
     stiffness = float(surface.h_rms / longer.h_rms)

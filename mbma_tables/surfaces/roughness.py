@@ -36,8 +36,8 @@ SAID = {
     "Sds": "m4 = 6 pi sqrt(3) m2 Sds: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted",
     "Spd": "m4 = 6 pi sqrt(3) m2 Spd: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted; where "
     "small ones are pruned, as ISO 25178-2 does, the curvature found here is a lower bound",
-    "longest": "q0 = 2 pi/longest: no roughness of longer waves",
-    "shortest": "q1 = 2 pi/shortest: no roughness of shorter waves",
+    "longest": "q0 = 2 pi/longest: no roughness of longer wavelengths",
+    "shortest": "q1 = 2 pi/shortest: no roughness of shorter wavelengths",
     "rolloff": "the spectrum is flat from the longest wave to this one, and one power law from there on",
     "hurst": "the spectrum is one power law with this Hurst exponent between its longest and its shortest wave",
     "h_max": "contact begins at h_max above the mid-plane",

@@ -72,7 +72,9 @@ class SpectralSurface(AnySurface):
     map : Treated, optional
         The treated heights themselves, for `theory="simulated"`.
     table : Table, optional
-        Existing results of boundary elements for them (`mbma_tables.laws.pressing`).
+        What boundary elements found of them already (`mbma_tables.laws.pressing`).
+    scans : tuple of MeasuredSurface, optional
+        Several, of which it is the average (`mbma_tables.surfaces.averages`).
     samples : array_like, shape (n,), optional
         Independent samples behind each entry of C, as weights of a fit.
     anisotropy : float, optional
@@ -107,6 +109,7 @@ class SpectralSurface(AnySurface):
     bands: RadialSpectrum | None = None
     map: Treated | None = None
     table: Table | None = None
+    scans: tuple[Any, ...] = ()
     samples: Any = None
     anisotropy: float | None = None
     unit: str | None = None
@@ -252,6 +255,7 @@ class SpectralSurface(AnySurface):
             bands=bands,
             map=whole,
             table=None if self.table is None else self.table.resized(up, along),
+            scans=tuple(scan.resized(up, along) for scan in self.scans),
         )
 
     def between(self, low: float, high: float) -> Self:
@@ -267,6 +271,7 @@ class SpectralSurface(AnySurface):
             bands=None,
             map=None,
             table=None,
+            scans=(),
         )
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 

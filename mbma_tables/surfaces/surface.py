@@ -322,8 +322,7 @@ class MeasuredSurface(SpectralSurface):
         Parameters
         ----------
         band : tuple of float, optional
-            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
-            and left out.
+            (q0, q1) to fit and to take as a plain power law; else without a roll-off below and a departure above.
 
         Returns
         -------

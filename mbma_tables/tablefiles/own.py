@@ -26,7 +26,7 @@ from mbma_tables.tablefiles.netcdf import (
     verified,
 )
 
-KIND, FORMAT = "simulated_map", "1.0"
+KIND, FORMAT = "simulated_map", "2.0"
 REQUIRED = ("mbma_kind", "format_version", "values_sha256")
 ADVICE = "make it anew: `mbma fit MAP --simulate --out OWN.nc`"
 
@@ -39,6 +39,11 @@ def is_own(path: os.PathLike[str] | str) -> bool:
             return stream.read().startswith(SEAL)
     except (OSError, ValueError):
         return False
+
+
+def holds_own(path: os.PathLike[str] | str) -> bool:
+    """Whether a file is such a table, damaged or not, and no other."""
+    return is_own(path) and KIND.encode() in pathlib.Path(path).read_bytes()
 
 
 def write_own(

@@ -28,6 +28,7 @@ TAIL = 3.0, 0.8  # u/h_rms from which the error of the table grows, and its rate
 # standard deviations added to that of Gaussian maps, for maps without `departures` and for others; with these, 70% of
 # docs/data/machined.nc lie within one and 93.5% within two standard deviations
 MAP_SCATTER = {"area": (0.038, 0.075), "pressure": (0.046, 0.13), "stiffness": (0.13, 0.21)}
+LIKE_SCANS = 1e-3, 0.9  # A/A0 at which scans are compared
 MANY = 1000  # entries for which polynomials of one surface are made
 ROUNDING = 1e-14  # rounding of a separation beside h_max
 
@@ -105,6 +106,21 @@ def _contact(batch: Batch, u: FloatArray) -> FloatArray:
     out[2] *= gradient
     out[2] /= h_rms
     return out.reshape(3, *shape)
+
+
+def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatArray:
+    """Standard deviation of ln of a quantity from scan to scan of an averaged surface, at its contact areas."""
+    law = _own_law(surface)
+    u = law.mean_separation("area", np.clip(area, *LIKE_SCANS))
+    (pressure, _, steep), _ = law.answer(u)
+    found = []
+    for own in map(_own_law, surface.scans):
+        closer = own.mean_separation("pressure", pressure)
+        if quantity == "pressure":
+            found.append((closer - u) * steep / pressure)
+        else:
+            found.append(np.log(own.area(pressure) if quantity == "area" else own.answer(closer)[0][2]))
+    return np.asarray(np.std(found, axis=0, ddof=1))
 
 
 def area_reasons(area: FloatArray) -> dict[str, Any]:
@@ -232,7 +248,8 @@ class Calibrated(Theory):
         if surface.outside(PRESSED):
             return np.full(np.shape(area), np.nan)
         stated = calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
-        return np.hypot(stated, MAP_SCATTER[quantity][bool(self.departures(surface))])
+        stated = np.hypot(stated, MAP_SCATTER[quantity][bool(self.departures(surface))])
+        return np.hypot(stated, _spread(surface, quantity, area)) if surface.scans else stated
 
     def scatter_name(self, surface: AnySurface) -> str:
         """Advice: with a map the scatter is much smaller."""

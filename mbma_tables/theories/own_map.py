@@ -13,7 +13,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, coarser
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.surfaces.treatment import Treated, mirrored
+from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.calibrated_curves import own_law
 
 # A/A0 by the law of the map, at which it is simulated
@@ -22,11 +22,9 @@ MOST_POINTS = 2**20  # points of the largest map that is simulated without chang
 REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
 
 
-def continued(treated: Treated) -> tuple[FloatArray, tuple[float, float]]:
-    """A map of mean zero whose edges meet, by its mirror images where it is not periodic, and its sides [length]."""
-    values = treated.heights if treated.periodic else mirrored(treated.heights)
-    sizes = values.shape[0] * treated.steps[0], values.shape[1] * treated.steps[1]
-    return values - values.mean(), sizes
+def sides(treated: Treated) -> tuple[float, float]:
+    """Sides of a map [length]."""
+    return treated.heights.shape[0] * treated.steps[0], treated.heights.shape[1] * treated.steps[1]
 
 
 def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
@@ -40,8 +38,8 @@ def unresolved(points: float, area: FloatArray) -> dict[str, NDArray[np.bool_]]:
     return {text: np.full(area.shape, points < MIN_POINTS * (1 - ROUNDING))}
 
 
-def reduced(values: FloatArray, points: float) -> tuple[FloatArray, float, float]:
-    """A periodic map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps.
+def reduced(values: FloatArray, points: float, mirrored: bool) -> tuple[FloatArray, float, float]:
+    """A map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps.
 
     Every second point is left out until at most `MOST_POINTS` remain; where that leaves fewer than four along the
     shortest wavelength, shorter ones than four are cut off.
@@ -50,7 +48,7 @@ def reduced(values: FloatArray, points: float) -> tuple[FloatArray, float, float
     while values.size > MOST_POINTS:
         step *= 2
         fine = points >= 2 * MIN_POINTS * (1 - ROUNDING)
-        values = coarser(values) if fine else coarser(values, MIN_POINTS)
+        values = coarser(values, 0.0 if fine else MIN_POINTS, mirrored)
         points, cut = (points / 2, cut) if fine else (MIN_POINTS, step * MIN_POINTS)
     return values, points, cut
 

@@ -24,7 +24,6 @@ ROWS = {
     "energy": ("elastic energy over A0 E*", "{length}"),
 }
 NUMBERS = {
-    "coarse_from": "first load on half of the grid; the number of loads if there is none",
     "points": "sampling steps along the shortest wavelength",
     "elements": "independent elements of the map",
     "left_out": "wavelength below which a large map was cut off, 0 if it was not",
@@ -32,6 +31,7 @@ NUMBERS = {
 }
 # parts of the surface, by the names of their fields; `band` of a spectrum is for the map's own grid
 PARTS: dict[str, Any] = {"heights": Heights, "bearing": Bearing, "bands": RadialSpectrum}
+FAITHFUL = 1e-6  # relative, of curves at the loads they go through
 POWERS = {
     **dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), "{length}"),
     **{"q": "1/{length}", "q2_mean_inverse": "{length}^2", "variance": "{length}^2", "curvature": "1/{length}^2"},
@@ -50,8 +50,10 @@ def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
     table: dict[str, Any] = {}
     for row, (name, (meaning, unit)) in zip(theory.rows, ROWS.items(), strict=True):
         table[name] = ("load",), row, meaning, unit
-    table["flow"] = ("load", "axis"), pressed.flow(), "flow coefficient along both axes, 0 where blocked", "{length}^3"
-    numbers = (pressed.coarse_from, theory.points, theory.elements, pressed.left_out, surface.anisotropy)
+    gaps, flow = theory._flows
+    table["flow_gaps"] = ("flow_load",), gaps, "u of a load whose flow is known", "{length}"
+    table["flow"] = ("flow_load", "axis"), flow, "flow coefficients xx, yy and xy, 0 where blocked", "{length}^3"
+    numbers = (theory.points, theory.elements, pressed.left_out, surface.anisotropy)
     for (name, meaning), value in zip(NUMBERS.items(), numbers, strict=True):
         table[name] = (), value, meaning, "{length}" if name == "left_out" else "1"
     table["q"] = ("wave",), surface.q, "wavenumber", "1/{length}"
@@ -95,10 +97,10 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         bands = RadialSpectrum(**known, band=np.empty(0, np.intp))
         numbers = [values[name].item() for name in NUMBERS]
         rows = np.stack([values[name] for name in ROWS])
-        if values["flow"].shape != (rows.shape[-1], 2) or rows.ndim != 2:
+        if values["flow"].shape != (*values["flow_gaps"].shape, 3) or rows.ndim != 2:
             raise InputError("has loads and flows that do not fit each other")
-        points, elements, left_out, anisotropy = numbers[1:]
-        table = Table(rows, values["flow"], int(numbers[0]), points, elements, left_out, own["source"])
+        points, elements, left_out, anisotropy = numbers
+        table = Table(rows, values["flow_gaps"], values["flow"], points, elements, left_out, own["source"])
         return MeasuredSurface(
             values["q"], values["C"], values["h_max"].item(), **parts, bands=bands, table=table,
             samples=values["samples"], anisotropy=anisotropy, unit=own.get("length_unit"),
@@ -106,6 +108,21 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
         raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {ADVICE}") from None
+
+
+def verify_own(path: os.PathLike[str] | str) -> tuple[int, float]:
+    """Number of loads of such a file, and by how much its curves miss their pressures and areas, relatively.
+
+    A `TableFileError` where that is more than `FAITHFUL`.
+    """
+    from mbma_tables.theories.simulated import BoundaryElements
+
+    theory = BoundaryElements.of(read_surface(path))
+    found = theory.answer(theory.surface, theory.rows[2])
+    missed = float(np.abs(np.array(found[:2]) / theory.rows[:2] - 1).max())
+    if not missed <= FAITHFUL:
+        raise TableFileError(f"{path}: its curves miss its simulated loads by {missed:.1e}; {ADVICE}")
+    return theory.rows.shape[1], missed
 
 
 def _plain(value: Any) -> Any:

@@ -132,8 +132,12 @@ class Theory(abc.ABC):
             return np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
         return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
 
+    def gaps(self) -> Any:
+        """Of a simulated map, the theory that knows the flow through its gaps."""
+        return None
+
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficient [length^3] along both axes, shape (2, ...), of simulated gaps; None if there are none."""
+        """Flow coefficients xx, yy and xy [length^3], shape (3, ...), of simulated gaps, if there are any."""
         return None
 
     def flow_trust(
@@ -147,8 +151,8 @@ class Theory(abc.ABC):
         u = np.asarray(mean_separation, dtype=float)
         high = np.broadcast_to(self.interval(surface)[1], u.shape)
         low = np.minimum(u, high)
-        # between the jumps of derivatives, across which the quadrature does not converge
-        edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.elastic.bends(surface)), high], axis=0)
+        # from bend to bend, across which no rule converges
+        edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.bends(surface)), high], axis=0)
         found, missed = integral(lambda x, k: self.at(u.shape, k).answer(select(surface, u.shape, k), x)[0], edges)
         if missed.any():
             raise unfinished(missed, "the elastic energy")

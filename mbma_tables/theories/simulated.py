@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws.energy_spline import Continued, LoadCurve, left_out
-from mbma_tables.laws.pressing import HIGHEST, LOWEST, ROUNDING, TOLERANCE, Pressed, Table, press
+from mbma_tables.laws.pressing import HIGHEST, LOWEST, ROUNDING, TOLERANCE, Press, Table
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -26,17 +26,10 @@ from mbma_tables.theories.own_table import read_surface, write_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 MIN_LOADS = 4
-MATCHED = 1e-6  # relative difference up to which a surface is the same
-STRAYS = 2.7  # roots of the number of elements joining between two loads: exceeded with probability 1e-6 (Kolmogorov)
-# standard deviations against contact on the full grid at tolerance 1e-6, at contact areas between the loads above, of
-# the 65 maps of `python -m generate machined`: the larger of the 68% quantile and half of the 95% quantile
+MATCHED = 1e-6  # relative, of the surface that is asked about
+STRAYS = 2.7  # roots of the elements that join between two loads: beyond strays one path in 10^6 (Kolmogorov)
+# A/A0 of the 65 maps of `python -m generate machined` at which scatter was measured
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
-SCATTER = {
-    "area": (0.042, 0.022, 0.0071, 0.0097, 0.011, 0.0041, 0.0060),
-    "pressure": (0.0037, 0.0026, 0.0016, 0.0023, 0.0010, 0.0010, 0.0025),
-    "stiffness": (0.026, 0.016, 0.0080, 0.0073, 0.010, 0.010, 0.0094),
-    "flow": (0.0043, 0.031, 0.032, 0.55, 2.2, 2.2, 2.2),
-}
 AREA_OF_FLOW = 0.4
 EVALUATED = 1e-5  # error of the curves through the default loads; laws need not be more accurate
 
@@ -55,9 +48,9 @@ class BoundaryElements(Theory):
     points : float, optional
         Sampling steps per shortest wavelength; below four, areas are too large and results are not `valid`.
     elements : float, optional
-        Number of independent elements of the map; 1 if not known, so that `error` is the first bound of the Notes.
-    pressed : Pressed or Table, optional
-        The simulation, with the gaps at each load or the flow along both axes.
+        Of the map that do not repeat each other; 1, where the number is not known, leaves `error` to the first bound.
+    pressed : Press or Table, optional
+        What they are of, from which the flow is known.
     origin : str, optional
         Description of the map and of the simulation.
     own_loads : bool, optional
@@ -78,6 +71,18 @@ class BoundaryElements(Theory):
     """
 
     name = "simulated"
+    areas: tuple[float, ...] = own_map.AREAS  # by the law of the map, at its loads
+    tolerance, tested = TOLERANCE, (LOWEST, HIGHEST)  # of boundary elements; A/A0
+    # standard deviations against contact on the full grid at tolerance 1e-6, at `TESTED_AREAS`, which lie between the
+    # loads: the larger of the 68% quantile and half of the 95% quantile of the errors
+    scatters: Mapping[str, tuple[float, ...]] = MappingProxyType(
+        {
+            "area": (0.042, 0.022, 0.0071, 0.0097, 0.011, 0.0041, 0.0060),
+            "pressure": (0.0037, 0.0026, 0.0016, 0.0023, 0.0010, 0.0010, 0.0025),
+            "stiffness": (0.026, 0.016, 0.0080, 0.0073, 0.010, 0.010, 0.0094),
+            "flow": (0.0043, 0.031, 0.032, 0.55, 2.2, 2.2, 2.2),
+        }
+    )
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """None: the theory is of this map."""
@@ -92,7 +97,7 @@ class BoundaryElements(Theory):
         energy: ArrayLike,
         points: float = np.inf,
         elements: float = 1.0,
-        pressed: Pressed | Table | None = None,
+        pressed: Press | Table | None = None,
         own_loads: bool = False,
         origin: str = "",
     ) -> None:
@@ -107,18 +112,14 @@ class BoundaryElements(Theory):
         require("area", rows[1], np.diff(rows[1], prepend=0) >= 0, "rising")
         require("mean_separation", rows[2], np.diff(rows[2], prepend=np.inf) < 0, "falling")
         self.rows = rows
-        split = rows.shape[1] if pressed is None else pressed.coarse_from
-        self._apart = split - 1 if split < rows.shape[1] else -1
         # an h_max that was stated may lie below the gap of the first load
         self.ends_at_h_max = own_loads and bool(rows[2, 0] < float(np.asarray(surface.h_max)))
-        self.fit = LoadCurve(rows, self._apart)
-        if self.ends_at_h_max:
-            self.fit = Continued(rows, self._apart, float(np.asarray(surface.h_max)))
-        self._left_out = left_out(rows, self._apart)
+        self.fit = Continued(rows, float(np.asarray(surface.h_max))) if self.ends_at_h_max else LoadCurve(rows)
+        self._left_out = left_out(rows)
 
     @classmethod
     def of(
-        cls, surface: AnySurface, loads: Sequence[float] | None = None, tolerance: float = TOLERANCE
+        cls, surface: AnySurface, loads: Sequence[float] | None = None, tolerance: float | None = None
     ) -> BoundaryElements:
         """Simulate the map of a surface from `Surface.from_map`; loads in `common.cache` or in its `table` are reused.
 
@@ -127,26 +128,29 @@ class BoundaryElements(Theory):
         InputError
             For a surface that was not made from a map, or whose map is not known after a change.
         """
-        if isinstance(surface, MeasuredSurface) and surface.table is not None and loads is None:
-            table = surface.table
+        table = surface.table if isinstance(surface, MeasuredSurface) and cls is BoundaryElements else None
+        if table is not None and loads is None:
             F, A, u, U = table.rows
             return cls(surface, F, A, u, U, table.points, table.elements, table, True, table.origin)
         whole = own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        values, sizes = own_map.continued(whole)
-        values, points, cut = own_map.reduced(values, own_map.steps_along(surface, whole))
+        steps, mirrored = own_map.steps_along(surface, whole), not whole.periodic
+        values, points, cut = own_map.reduced(whole.heights - whole.heights.mean(), steps, mirrored)
         gradient = own_law(surface).gradient
         if loads is None:
-            wanted, law_area = own_map.law_loads(surface, own_map.AREAS), own_law(surface).area
+            wanted = own_map.law_loads(surface, cls.areas)
         else:
             given = finite_array("loads", loads)
             require("loads", given, (given > 0) & (np.diff(given, prepend=0) > 0), "positive and rising")
-            wanted, law_area = gradient * given, None
-        found = press(values, sizes, wanted, points, gradient, law_area, tolerance)
-        found = dataclasses.replace(found, left_out=cut * max(whole.steps))
-        pressure, area, u, energy = found.rows
-        size, origin = whole.heights.size, own_map.origin_of(whole, tolerance)
-        return cls(surface, pressure, area, u, energy, points, size, found, loads is None, origin)
+            wanted = gradient * given
+        accuracy = cls.tolerance if tolerance is None else tolerance
+        settings: Any = {"mirrored": mirrored, "left_out": cut * max(whole.steps)}
+        press = Press(values, own_map.sides(whole), gradient, accuracy, **settings)
+        pressure, (area, u, energy) = press.loads(wanted, loads is None)
+        # flow by the accurate gaps
+        gaps = press if accuracy <= TOLERANCE else Press(values, own_map.sides(whole), gradient, **settings)
+        size, origin = whole.heights.size, own_map.origin_of(whole, accuracy)
+        return cls(surface, pressure, area, u, energy, points, size, gaps, loads is None, origin)
 
     @classmethod
     def from_map(
@@ -158,7 +162,7 @@ class BoundaryElements(Theory):
         periodic: bool | None = None,
         detrend: str | None = None,
         loads: Sequence[float] | None = None,
-        tolerance: float = TOLERANCE,
+        tolerance: float | None = None,
         **treatment: Any,
     ) -> BoundaryElements:
         """Simulate a map by Tamaas (the extra `simulate`): four seconds for 256 x 256 points, one core.
@@ -173,7 +177,7 @@ class BoundaryElements(Theory):
             to 95%, and more if these do not cover 0.1% to 90% contact. With eight or more sampling steps along
             the shortest wavelength, those above 6% contact then use every second step.
         tolerance : float, optional
-            Of the boundary elements.
+            Of the boundary elements, 1e-5 by default.
 
         Raises
         ------
@@ -264,35 +268,53 @@ class BoundaryElements(Theory):
         """Elastic energy over A0 E* [length]."""
         return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
 
+    def gaps(self) -> Any:
+        """Itself, if the flow is known."""
+        return None if self.pressed is None else self
+
     @functools.cached_property
-    def _flows(self) -> FloatArray:
-        """Flow along both axes at each load, computed on first access."""
+    def _flows(self) -> tuple[FloatArray, FloatArray]:
+        """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
         assert self.pressed is not None
-        return self.pressed.flow()
+        return self.pressed.flows(self.fit.x, self.fit.separation)
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficient [length^3] along both axes, by the gaps; 0 from the load at which an axis is blocked."""
+        """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked.
+
+        Along an axis that closes at u1, ln K over ln(u - u1) is a monotone cubic, straight below the last open load;
+        xy is sqrt(xx yy) times what is linear in u.
+        """
         if self.pressed is None:
             return None
-        u = self._within(surface, mean_separation)
-        found = np.zeros((2, *u.shape))
-        for axis, (known, (last, end)) in enumerate(zip(self._flows.T, self._closing, strict=True)):
-            if last <= self.rows[2, 1]:
-                passing = self.rows[2] >= last
-                curve = PchipInterpolator(np.log(self.rows[2, passing][::-1]), np.log(known[passing][::-1]))
-                # beyond the last open load with the same slope; wider gaps by their cube
+        # bodies apart are farther apart than the theory needs
+        u = np.maximum(self._within(surface, mean_separation), mean_separation)
+        gaps, known = self._flows
+        found = np.zeros((3, *u.shape))
+        for axis, (last, end) in enumerate(self.closing):
+            passing = (gaps >= last) & (known[:, axis] > 0)
+            if passing.any():
+                x, y = np.log(gaps[passing][::-1] - end), np.log(known[passing, axis][::-1])
+                if x.size == 1:
+                    x, y = np.append(x - 1, x), np.append(y - 3, y)
+                curve = PchipInterpolator(x, y)
                 with np.errstate(divide="ignore"):
-                    below = np.minimum(np.log(u / last), 0.0) * curve(np.log(last), 1)
-                wider = np.maximum(u / self.rows[2, 0], 1.0) ** 3
-                inside = np.log(np.clip(u, last, self.rows[2, 0]))
-                found[axis] = np.where(u > end, np.exp(curve(inside) + below) * wider, 0.0)
+                    own = np.log(np.maximum(np.minimum(u, gaps[0]) - end, 0.0))
+                below = max(float(curve(x[0], 1)), 1.0) * np.minimum(own - x[0], 0.0)
+                found[axis] = np.exp(curve(np.maximum(own, x[0])) + below)
+                # towards parallel planes, which pass the cube of their distance
+                wide = u**3 - (gaps[0] ** 3 - known[0, axis]) * u / gaps[0]
+                found[axis] = np.where(u > gaps[0], wide, found[axis])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = np.nan_to_num(known[:, 2] / np.sqrt(known[:, 0] * known[:, 1]))
+        found[2] = np.sqrt(found[0] * found[1]) * np.interp(-u, -gaps, turn)
         return found
 
-    @property
-    def _closing(self) -> list[tuple[float, float]]:
-        """For both axes, u of the last load at which it is open and of the first at which it is blocked."""
-        u = np.append(self.rows[2], 0.0)
-        return [(float(u[max(k - 1, 0)]), float(u[k])) for k in np.cumprod(self._flows > 0, axis=0).sum(axis=0)]
+    @functools.cached_property
+    def closing(self) -> list[tuple[float, float]]:
+        """Of both axes, u of the last load at which it is open and of the first at which it is blocked [length]."""
+        gaps, known = self._flows
+        u = np.append(gaps, 0.0)
+        return [(float(u[max(k - 1, 0)]), float(u[k])) for k in np.cumprod(known[:, :2] > 0, axis=0).sum(axis=0)]
 
     def flow_trust(
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
@@ -300,7 +322,7 @@ class BoundaryElements(Theory):
         """Standard deviation of ln of that flow on tested maps, and a mask where an axis may be blocked."""
         if self.pressed is None:
             return None
-        near = [(mean_separation < last) & (mean_separation > end) for last, end in self._closing]
+        near = [(mean_separation < last) & (mean_separation > end) for last, end in self.closing]
         reasons = {
             "leakage: the map may be blocked, as it is at the next simulated load": np.logical_or(*near),
             f"leakage: A/A0 is above {AREA_OF_FLOW:g}": area > AREA_OF_FLOW,
@@ -318,14 +340,14 @@ class BoundaryElements(Theory):
         return {
             **own_map.unresolved(self.points, answer.area),
             cut: np.full(answer.area.shape, left_out > 0),
-            f"A/A0 is below {LOWEST:g}": (answer.area < LOWEST) & (answer.area > 0),
-            f"A/A0 is above {HIGHEST:g}": answer.area > HIGHEST,
+            f"A/A0 is below {self.tested[0]:g}": (answer.area < self.tested[0]) & (answer.area > 0),
+            f"A/A0 is above {self.tested[1]:g}": answer.area > self.tested[1],
         }
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid at tolerance 1e-6; NaN with loads of one's own, and beyond them."""
         with np.errstate(divide="ignore"):
-            found = np.interp(np.log(area), np.log(TESTED_AREAS), SCATTER[quantity])
+            found = np.interp(np.log(area), np.log(TESTED_AREAS), self.scatters[quantity])
         return np.where(self.own_loads & ~self._beyond(area), found, np.nan)
 
     def _beyond(self, area: FloatArray) -> NDArray[np.bool_]:

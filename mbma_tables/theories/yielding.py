@@ -217,11 +217,24 @@ class Yielding(Theory):
         return super().mean_separation_at(surface, quantity, wanted)
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """`Theory.inverted`, with an error for forces above the hardness."""
+        """As of any theory; no force is beyond the hardness."""
+        shape = self._refuse(quantity, wanted)
+        return super().inverted(surface, quantity, np.broadcast_to(wanted, shape))
+
+    def _refuse(self, quantity: str, wanted: FloatArray) -> tuple[int, ...]:
+        """The shape of entries, whose pressures are at most the hardness."""
         over = np.asarray(wanted > self.hardness)
         if quantity == "pressure" and over.any():
             raise OutOfRangeError("pressure must be at most the hardness", over)
-        return super().inverted(surface, quantity, np.broadcast_to(wanted, over.shape))
+        return over.shape
+
+    def bends(self, surface: AnySurface) -> FloatArray:
+        """Those of the elastic contact."""
+        return self.elastic.bends(surface)  # type: ignore[no-any-return]
+
+    def gaps(self) -> Any:
+        """The elastic contact's."""
+        return self.elastic.gaps()
 
     def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Mean separations u at forces over A0 E*, and `lighter` of `loaded` where areas need that."""

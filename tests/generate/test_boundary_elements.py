@@ -167,7 +167,7 @@ class TestCampaign:
             assert len(campaign(kind)) == shipped.sizes["surface"]
 
     def test_failures_come_last_and_are_named(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("mbma_tables.laws.boundary_elements.MAX_ITERATIONS", 2)
+        monkeypatch.setattr("generate.boundary_elements.tamaas_contact.MAX_ITERATIONS", 2)
         tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
         with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
             run(tasks, tmp_path)

@@ -53,7 +53,7 @@ def test_its_picture(surface, tmp_path):
 def test_what_has_no_map(surface, tmp_path):
     for found in (
         contact(surface, pressure=[0.01, 0.02]),
-        contact(surface, pressure=0.01, hardness=0.1),
+        contact(surface, pressure=0.01, hardness=[0.1, 0.2]),
         contact(surface, mean_separation=2 * float(surface.h_max)),
         contact(Surface(0.8, 0.1, 2.0, 1.0, 3.0), separation=1.0),
     ):

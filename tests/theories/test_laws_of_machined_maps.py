@@ -1,13 +1,11 @@
 """The law of a map on machined surfaces: what it states of itself, against what boundary elements found."""
 
-import importlib.util
-
 import numpy as np
 import pytest
 
+from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law
-from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.theories import theory_name
 from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
@@ -117,8 +115,3 @@ class TestDefaultTheory:
         found = contact(noise, area=0.1, theory="corrected")
         assert not found.valid
         assert any("sampling steps, fewer than 4" in reason for reason in found.reasons)
-
-    def test_without_the_engine_the_law_answers(self, monkeypatch):
-        real = importlib.util.find_spec
-        monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "tamaas" else real(name))
-        assert contact(self.surface(), area=0.1).theory == "calibrated"

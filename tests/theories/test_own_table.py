@@ -13,7 +13,7 @@ from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
 from mbma_tables.common import cache
 from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
-from mbma_tables.laws import pressing
+from mbma_tables.laws import boundary_elements, pressing
 from mbma_tables.laws.energy_spline import Continued
 from mbma_tables.theories import BoundaryElements, own_map
 from mbma_tables.theories.corrected import of_map
@@ -48,7 +48,8 @@ def test_it_opens_without_the_map(surface, own):
             np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
         np.testing.assert_array_equal([found.leakage.x, found.leakage.y], [known.leakage.x, known.leakage.y])
     hard = {"pressure": 0.005, "hardness": 0.05}
-    assert contact(own, **hard).yielded == contact(surface, **hard, theory="simulated").yielded
+    # a law of hardness without the map, simulated with it
+    assert contact(own, **hard).yielded == pytest.approx(contact(surface, **hard, theory="simulated").yielded, abs=0.1)
     assert own.provenance[0]["points"] == [64, 64]
     with pytest.raises(InputError, match="this surface has none"):
         contact(own, area=0.1, theory="corrected")
@@ -113,6 +114,38 @@ def test_every_variable_explains_itself(file):
         assert dataset["C"].units == "um^4"
 
 
+def test_info_and_verify(file, tmp_path):
+    table = json.loads(run("tables", "info", file, "--json"))
+    assert table["attributes"]["mbma_kind"] == "simulated_map"
+    assert table["variables"]["area"][1] > 0.9
+    (verdict,) = json.loads(run("tables", "verify", file, "--json"))["tables"]
+    assert verdict["points"] >= 12
+    assert verdict["table_error"] < 1e-9
+    assert "hashes match; 12 simulated loads" in run("tables", "verify", file)
+    bad = tmp_path / "bad.nc"
+    bad.write_bytes(file.read_bytes().replace(b"mbma fit MAP", b"mbma fit PAM"))
+    assert "mbma fit MAP --simulate" in refused("tables", "verify", bad)
+
+
+def test_exports_have_the_leakage_along_an_axis(file, own, tmp_path):
+    out = tmp_path / "law.py"
+    words = ("--map", file, "--E-star", "1GPa", "--leakage", "--direction")
+    run("export", "python-law", *words, "y", "--out", out)
+    code: dict = {}
+    exec(out.read_text(), code)
+    gap = np.linspace(0.3, 0.9, 20) * own.h_max
+    expected = contact(own, mean_separation=gap).leakage.y
+    np.testing.assert_allclose(code["leakage"](own.h_max - gap), expected, rtol=1e-3)
+    assert "direction y" in out.read_text()
+    run("export", "csv", *words, "30", "--out", tmp_path / "rows.csv")
+    rows = np.genfromtxt(tmp_path / "rows.csv", delimiter=",", comments="#", skip_header=0)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    known = contact(own, pressure=rows[5, 0], E_star=1.0).leakage.along(30.0)
+    assert rows[5, 1] == pytest.approx(known, rel=0.02)
+    assert "must be 'x', 'y' or degrees" in refused("export", "csv", *words, "z", "--out", tmp_path / "no.csv")
+    assert "add --leakage" in refused("export", "csv", *words[:4], "--direction", "x", "--out", tmp_path / "no.csv")
+
+
 def test_on_the_command_line(tmp_path):
     np.save(tmp_path / "map.npy", heights(Part("milled", 1, 64)))
     table = tmp_path / "own.nc"
@@ -157,7 +190,7 @@ class TestBeyondTheLoads:
         u = np.linspace(1.9, 1.0, 30)
         force = 0.1 * (2 - u) ** 3
         rows = np.array([force, erf(0.2 * force), u, 0.1 * (2 - u) ** 4 / 4])
-        curve = Continued(rows, -1, 2.0)
+        curve = Continued(rows, 2.0)
         light = np.array([1.92, 1.95, 1.999])
         x = np.log(0.1 * (2 - light) ** 3)
         np.testing.assert_allclose(curve.log_force(light), x, rtol=1e-3)
@@ -188,13 +221,13 @@ class TestCache:
 
     def test_a_second_process_simulates_nothing(self, place, monkeypatch):
         first = self.pressed()
-        flows = first.pressed.flow()
+        flows = first._flows
         monkeypatch.setattr(pressing, "Contact", None)
-        monkeypatch.setattr(pressing, "flow_conductance", None)
+        monkeypatch.setattr(pressing, "flow_tensor", None)
         for again in (self.pressed(), self.pressed(1e-3, "mm")):
             np.testing.assert_allclose(again.rows[:2], first.rows[:2], rtol=1e-9)
-        assert np.array_equal(self.pressed().pressed.flow(), flows)
-        assert self.pressed(1e-3, "mm").pressed.flow()[0] == pytest.approx(1e-9 * flows[0])
+        np.testing.assert_array_equal(self.pressed()._flows[1], flows[1])
+        np.testing.assert_allclose(self.pressed(1e-3, "mm")._flows[1], 1e-9 * flows[1], rtol=1e-6)
 
     def test_it_goes_on_where_it_was_interrupted(self, place, monkeypatch):
         real, calls = pressing.Contact, []
@@ -280,10 +313,9 @@ class TestLargeMaps:
 
 
 def test_a_solver_that_fails_is_no_crash(monkeypatch):
-    # one element that stands out touches alone
-    spike = np.zeros((64, 64))
-    spike[5, 5] = 1.0
-    surface = Surface.from_map(spike + 1e-6 * heights(Part("gaussian", 0, 64)), 1.0, periodic=True)
+    monkeypatch.setenv(cache.VARIABLE, "off")
+    monkeypatch.setattr(boundary_elements, "MAX_ITERATIONS", 2)
+    surface = Surface.from_map(heights(Part("gaussian", 0, 64)), 1.0, periodic=True)
     with pytest.raises(ConvergenceError, match="boundary elements at F/"):
         BoundaryElements.of(surface)
     assert contact(surface, pressure=1e-3).theory == "calibrated"

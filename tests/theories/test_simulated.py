@@ -5,16 +5,18 @@ import pytest
 from helpers import random_map
 from scipy.special import erf
 
+from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined import makers
 from generate.machined.makers import Part
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.answers.leakage import flow
-from mbma_tables.common.errors import InputError, MbmaError, OutOfRangeError
+from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.laws.boundary_elements import LOADS as SHIPPED_LOADS
-from mbma_tables.laws.boundary_elements import Contact
+from mbma_tables.laws.boundary_elements import Contact as OwnContact
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.theories import BoundaryElements
+from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
 
 pytest.importorskip("tamaas")
@@ -116,12 +118,6 @@ def test_rows_that_make_no_law(truth, count, change, message):
         BoundaryElements(truth.surface, **{name: column[:count] for name, column in columns.items()})
 
 
-def test_without_the_engine_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "tamaas", None)
-    with pytest.raises(MbmaError, match=r"pip install 'mbma_tables\[simulate\]'"):
-        BoundaryElements.from_map(heights(), 1.0, periodic=True)
-
-
 class TestOfASurface:
     @pytest.fixture(scope="class", params=[("honed", 0), ("milled", 2)], ids=["honed", "milled"])
     @staticmethod
@@ -173,14 +169,26 @@ class TestOfASurface:
         assert leakage.valid[:2].all()
         assert not leakage.valid[3]
 
+    def test_loads_cover_the_contact(self, part):
+        rows = of_map("simulated", part[1]).rows
+        assert rows[1, 0] <= 1e-3
+        assert rows[1, -1] >= 0.9
+
     def test_laws_and_other_units(self, part):
         surface = part[1]
         law = contact_law(surface, theory="simulated", E_star="1 GPa")
         point = contact(surface, pressure="5 MPa", theory="simulated", E_star="1 GPa")
         assert law.at_pressure("5 MPa").area == pytest.approx(point.area, rel=0.01)
         assert law.theory == "simulated"
-        with pytest.raises(InputError, match=r"contact\(\.\.\.\)\.leakage has it along both axes"):
-            law.leakage(pressure="5 MPa")
+        for axis in ("x", "y"):
+            own, direct = law.leakage.along(axis), getattr(point.leakage, axis)
+            assert own(pressure="5 MPa") == pytest.approx(direct, rel=0.02)
+            u = np.linspace(0.02, 1, 300) * law.h_max
+            true = getattr(contact(surface, mean_separation=u, theory="simulated").leakage, axis)
+            np.testing.assert_allclose(own(u), true, rtol=2 * own.error, atol=1e-6 * true.max())
+            assert (own(u)[u < (own.blocked_at + law.h_max) / 2] == 0).all()
+        assert law.leakage.along(30.0)(pressure="5 MPa") == pytest.approx(point.leakage.along(30.0), rel=0.02)
+        assert law.leakage(pressure="5 MPa") == pytest.approx(point.leakage.K, rel=0.02)
         other = contact(surface.to("mm"), pressure=0.005, theory="simulated")
         assert other.mean_separation == pytest.approx(1e-3 * point.mean_separation, rel=1e-3)
         with pytest.raises(InputError, match="this surface has none"):
@@ -205,10 +213,6 @@ def test_the_energy_gives_a_knot_between_two_loads():
     np.testing.assert_allclose(curve.log_force(cubic(between)), between, atol=1e-10)
     exact = np.exp(between) * sum((-1) ** n * cubic.deriv(n)(between) if n else 0 for n in range(4))
     np.testing.assert_allclose(curve.energy(between), exact, rtol=1e-9)
-    # energies of two grids differ by more than what is between loads
-    rows[3, 2:] += 0.01
-    np.testing.assert_allclose(LoadCurve(rows, 1).separation(between), cubic(between), rtol=1e-9)
-    assert np.abs(LoadCurve(rows).separation(between) - cubic(between)).max() > 0.01
 
 
 def test_loads_far_apart_keep_the_curves_monotone():
@@ -220,3 +224,36 @@ def test_loads_far_apart_keep_the_curves_monotone():
     assert (np.diff(curve.separation(x)) < 0).all()
     assert (np.diff(curve.area(x)) > 0).all()
     assert (curve.stiffness(x) > 0).all()
+
+
+@pytest.mark.parametrize("eta", [0.1, 0.4])
+def test_a_hardness_is_simulated(eta):
+    values, cap = makers.heights(Part("honed", 1, 128)), eta * makers.GRADIENT
+    surface = Surface.from_map(values, 1.0, periodic=True)
+    pressure = cap * np.array([0.03, 0.2, 0.5])
+    engine, rows = OwnContact(values, (128.0, 128.0), hardness=cap), []
+    for force in pressure.tolist():
+        row = engine.press(force)
+        rows.append((row["area"], row["mean_separation"], row["area_yielded"] / row["area"], engine.frozen_stiffness()))
+    area, u, yielded, frozen = np.array(rows).T
+    found = contact(surface, pressure=[*pressure, pressure[1]], hardness=[cap, cap, cap, np.inf], theory="simulated")
+    np.testing.assert_allclose(found.area[:3], area, rtol=0.03)
+    np.testing.assert_allclose(found.mean_separation[:3], u, rtol=0.03)
+    np.testing.assert_allclose(found.yielded[:3], yielded, atol=0.03)
+    np.testing.assert_allclose(found.unloading_stiffness[:3], frozen, rtol=0.1)
+    elastic = contact(surface, pressure=pressure[1], theory="simulated")
+    assert (found.area[3], found.yielded[3]) == (pytest.approx(elastic.area), 0.0)
+    assert (found.leakage.K[0] < elastic.leakage.K) == (found.mean_separation[0] < elastic.mean_separation)
+    # towards the hardness everywhere
+    heavy = contact(surface, pressure=cap * np.array([0.95, 0.999]), hardness=cap, theory="simulated")
+    assert (np.diff(heavy.area) > 0).all()
+    assert heavy.area[1] == pytest.approx(1, abs=2e-3)
+    law = contact_law(surface, theory="simulated", hardness=cap)
+    assert law.at_pressure(pressure[1]).area == pytest.approx(found.area[1], rel=1e-3)
+    steps = contact(surface, pressure=pressure[1] * np.array([0.99, 1.01]), hardness=cap, theory="simulated")
+    derived = contact(surface, mean_separation=float(found.mean_separation[1]), hardness=cap, theory="simulated",
+                      derivatives=True)  # fmt: skip
+    slope = np.diff(steps.pressure)[0] / np.diff(steps.separation)[0]
+    assert derived.pressure_by["separation"] == pytest.approx(slope, rel=0.02)
+    with pytest.raises(OutOfRangeError, match="at most the hardness"):
+        contact(surface, pressure=1.1 * cap, hardness=cap, theory="simulated")

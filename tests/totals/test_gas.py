@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from generate.boundary_elements.capped import CappedContact, load_at
+from generate.boundary_elements.capped import load_at
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
+from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.gas import R, jump_of, mean_inverse
 from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
 
@@ -20,7 +21,7 @@ def test_gaps_of_boundary_elements(hurst, seed, eta):
     recipe = Recipe("self_affine", hurst, 6, 4, seed, 128)
     z = heights(recipe)
     slope = np.hypot(*np.gradient(z, 1 / 128)).std()
-    solved, jumps = CappedContact(z / slope, recipe.sizes, eta), np.array([0.3, 1.0, 3.0])
+    solved, jumps = Contact(z / slope, recipe.sizes, hardness=eta), np.array([0.3, 1.0, 3.0])
     for area in (0.01, 0.05, 0.2):
         solved.press(load_at(area, eta))
         gap, open_ = solved.gap * slope, solved.pressure <= 0

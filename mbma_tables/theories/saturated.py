@@ -1,0 +1,219 @@
+"""A simulated map with a hardness: boundary elements whose pressures end at it, for each hardness anew."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator
+
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.pressing import TOLERANCE, Press
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories import own_map
+from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.simulated import BoundaryElements
+from mbma_tables.theories.yielding import Yielding
+
+KEPT = 8  # hardnesses of maps whose simulations are kept
+STEP = 0.02  # of ln E*, of its derivatives
+TESTED_ETA = 0.1  # p_m/(E* g) down to which it was tested
+# standard deviations of ln of a quantity, by `python -m generate machined`
+SCATTER = {"area": 0.010, "pressure": 0.011, "stiffness": 0.033}
+
+
+class Loaded(NamedTuple):
+    """As `yielding.Loaded`."""
+
+    answer: TheoryAnswer
+    yielded: FloatArray
+    unloading_stiffness: FloatArray
+    plane_separation: FloatArray
+
+
+class Plastic(BoundaryElements):
+    """The map of a simulated theory at one hardness."""
+
+    @classmethod
+    @functools.lru_cache(KEPT)
+    def pressed_to(cls, theory: BoundaryElements, cap: float) -> Plastic:
+        """Pressed to the loads of the elastic theory's contact areas, p_m/E* = cap."""
+        known, surface = theory.pressed, theory.surface
+        assert isinstance(known, Press)
+        elastic = own_map.law_loads(surface, own_map.AREAS)  # type: ignore[arg-type]
+        loads = ((cap * np.array(own_map.AREAS)) ** -2 + elastic**-2) ** -0.5
+        press = Press(
+            known.heights, known.sizes, known.gradient, TOLERANCE, known.mirrored, cap, left_out=known.left_out
+        )
+        force, rows = press.loads(loads, True)
+        area, u, energy, plane, yielded, frozen, height = rows
+        # d(F H_p - U)/dF is the gap of the mean planes, to which what is flattened comes
+        flattened = PchipInterpolator(force, u - plane).antiderivative()(force)
+        work = force * height - energy + flattened
+        stored = work - force * u
+        stored = stored + 2 * np.abs(stored).max()
+        found = cls(surface, force, area, u, stored, theory.points, theory.elements, press, True, theory.origin)
+        found._more = PchipInterpolator(found.fit.x, np.array([yielded / area, np.log(frozen), u - plane]).T)
+        found._last = np.array([cap - force[-1], 1 - area[-1]])
+        found._power = float(found.fit.stiffness(found.fit.x[-1:])[0]) * u[-1] / (cap - force[-1])
+        found._cap = cap
+        return found
+
+    _more: Any  # yielded share, ln of the frozen stiffness and u less the gap of the mean planes, by ln F
+    _last: FloatArray  # what the heaviest load lacks of the hardness, and its area of full contact
+    _cap: float
+    _power: float  # of u, as which both vanish
+
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force, area and stiffness; heavier contacts go over to the hardness everywhere."""
+        last = self.rows[2, -1]
+        inside, left = (
+            super().answer(surface, np.maximum(mean_separation, last)),
+            (mean_separation / last) ** self._power,
+        )
+        with np.errstate(all="ignore"):
+            steep = self._power * self._last[0] * left / mean_separation
+        beyond = mean_separation < last
+        pressure = np.where(beyond, self._cap - self._last[0] * left, inside.pressure)
+        area = np.where(beyond, 1 - self._last[1] * left, inside.area)
+        return TheoryAnswer(pressure, area, np.where(beyond, steep, inside.stiffness), inside.error)
+
+    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Mean separation [length] at a pressure over E* or an area."""
+        row = 0 if quantity == "pressure" else 1
+        end = self.rows[row, -1]
+        u, missed = super().inverted(surface, quantity, np.minimum(wanted, end))
+        left = np.minimum(((self._cap, 1.0)[row] - wanted) / self._last[row], 1.0)
+        return np.where(wanted > end, self.rows[2, -1] * left ** (1 / self._power), u), missed
+
+    def found(self, mean_separation: FloatArray) -> FloatArray:
+        """Force, area, stiffness, error, yielded share, frozen stiffness and gap of the mean planes."""
+        answer = self.answer(self.surface, mean_separation)
+        x = self.fit.log_force(np.clip(mean_separation, self.rows[2, -1], self.rows[2, 0]))
+        share, frozen, flattened = np.moveaxis(self._more(x), -1, 0)
+        touching = answer.pressure > 0
+        more = np.where(touching, share, 0.0), np.where(touching, np.exp(frozen), 0.0), mean_separation - flattened
+        return np.array([*answer, *more])
+
+
+class Saturated(Yielding):
+    """A simulated map whose pressures cannot exceed a hardness; lru_cache keeps the last simulations.
+
+    Parameters
+    ----------
+    theory : BoundaryElements
+        The elastic one.
+    hardness : array_like
+        p_m/E*, positive; each different one is simulated, which takes as long as the elastic contact or twice as long.
+    """
+
+    elastic: BoundaryElements
+
+    def at(self, shape: tuple[int, ...], place: Any) -> Theory:
+        """With the hardnesses at flat places of a broadcast shape."""
+        found = super().at(shape, place)
+        return found if found is self else Saturated(self.elastic, found.hardness)  # type: ignore[attr-defined]
+
+    def _each(self, ask: Callable[..., Any], *given: ArrayLike) -> Any:
+        """What simulations answer at entries with their hardnesses; rows first."""
+        caps, *values = np.broadcast_arrays(self.hardness, *given)
+        parts = {
+            cap: np.asarray(ask(self._simulation(cap), *(value[caps == cap] for value in values)))
+            for cap in np.unique(caps).tolist()
+        }
+        found = np.empty((*next(iter(parts.values())).shape[:-1], *caps.shape))
+        for cap, part in parts.items():
+            found[..., caps == cap] = part
+        return found
+
+    def _simulation(self, cap: float) -> Any:
+        return self.elastic if np.isinf(cap) else Plastic.pressed_to(self.elastic, cap)
+
+    def loaded(self, surface: AnySurface, mean_separation: FloatArray, lighter: Any = None) -> Any:
+        """The answer at mean separations u [length], and what follows from the simulation."""
+
+        def ask(own: Any, u: FloatArray) -> Any:
+            if isinstance(own, Plastic):
+                return own.found(u)
+            answer = own.answer(surface, u)
+            return [*answer, np.zeros_like(u), answer.stiffness, u]
+
+        found = self._each(ask, mean_separation)
+        return Loaded(TheoryAnswer(*found[:4]), *found[4:])
+
+    def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, None]:
+        """Mean separations u at forces over A0 E*."""
+        return self.mean_separation_at(surface, "pressure", pressure), None
+
+    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Mean separation [length] at a pressure over E* or an area; no force is beyond the hardness."""
+        self._refuse(quantity, wanted)
+        u = self._each(lambda own, value: own.inverted(surface, quantity, value)[0], wanted)
+        return u, np.zeros(u.shape, bool)
+
+    def curve(self, surface: AnySurface, quantity: str) -> Any:
+        """As of any theory."""
+        return Theory.curve(self, surface, quantity)
+
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
+        """From full compression to first contact."""
+        return self.elastic.interval(surface, quantity)
+
+    def bends(self, surface: AnySurface) -> FloatArray:
+        """Mean separations [length] of the first and the last load."""
+        return np.asarray(self._simulation(float(self.hardness)).bends(surface))
+
+    def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...]:
+        """Derivatives of force and area by the gap, and at held hardness by the logarithm of "E_star"."""
+        u = np.asarray(mean_separation, float)
+        stretch = np.exp(STEP * np.array([1.0, -1.0]))
+        higher, lower = (Saturated(self.elastic, self.hardness * by).loaded(surface, u).answer for by in stretch)
+        near = 1e-4 * float(np.asarray(surface.h_max))
+        further, closer = (self.loaded(surface, np.maximum(u + way * near, 0.0)).answer for way in (1, -1))
+        return tuple(
+            {"mean_separation": (a - b) / (2 * near), "E_star": (d - c) / (2 * STEP)}
+            for a, b, c, d in zip(further[:2], closer[:2], higher[:2], lower[:2], strict=True)
+        )
+
+    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        """Flow coefficients xx, yy and xy [length^3] through the gaps of the yielded contact."""
+        return np.asarray(self._each(lambda own, u: own.flow(surface, u), mean_separation))
+
+    def flow_trust(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """As of the elastic contact."""
+        names: list[str] = []
+
+        def ask(own: Any, u: FloatArray, share: FloatArray) -> Any:
+            scatter, reasons = own.flow_trust(surface, u, share)
+            names[:] = reasons
+            return [scatter, *reasons.values()]
+
+        scatter, *masks = self._each(ask, mean_separation, area)
+        return scatter, {name: mask > 0 for name, mask in zip(names, masks, strict=True)}
+
+    def gaps(self) -> Any:
+        """The simulation at one hardness."""
+        return self._simulation(float(self.hardness)) if self.hardness.ndim == 0 else None
+
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """Standard deviation against contact at a tolerance of 1e-6; "stiffness" is the frozen contact's."""
+        elastic = self.elastic.scatter(surface, quantity, area)
+        return np.where(np.isinf(self.hardness), elastic, np.hypot(elastic, SCATTER.get(quantity, 0.0)))
+
+    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+        """The elastic theory's reasons, and hardnesses below those that were tested."""
+        soft = np.broadcast_to(self._eta(surface) < TESTED_ETA * (1 - 1e-9), np.shape(answer.area))
+        own = {f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": soft}
+        return {**self.elastic.reasons(surface, answer, mean_separation), **own}
+
+
+def with_hardness(theory: Theory, hardness: ArrayLike) -> Yielding:
+    """A theory with a hardness over E*: a simulated map is simulated anew, another contact goes through a law."""
+    simulated = isinstance(theory, BoundaryElements) and theory.name == BoundaryElements.name
+    known = simulated and theory.own_loads and isinstance(theory.pressed, Press)  # type: ignore[attr-defined]
+    return (Saturated if known else Yielding)(theory, hardness)
