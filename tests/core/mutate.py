@@ -43,8 +43,8 @@ if __name__ == "__main__":
     calls, times, tried = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()), int(sys.argv[2]), 0
     known, trusted = dict(functions()), set()
     for call in calls:
-        if call.name.endswith("_fits") and call.returned:
-            trusted |= {one.tobytes() for one in call.given if isinstance(one, np.ndarray)}
+        if call.name == "phi":
+            trusted |= {one.tobytes() for one in call.given[2:5]}
     for call in calls:
         sound = [isinstance(one, np.ndarray) and one.tobytes() in trusted for one in call.given]
         for _ in range(times if call.given else 0):
@@ -53,7 +53,7 @@ if __name__ == "__main__":
                 for one, kept in zip(call.given, sound, strict=True)
             ]
             for k in RANDOM.integers(len(given), size=RANDOM.integers(1, 4)):
-                # tables that the core has found to be sound stay as they are
+                # tables, whose places models/universal.py checks, stay as they are
                 given[k] = given[k] if sound[k] else spoilt(given[k])
             tried += 1
             try:
