@@ -161,15 +161,12 @@ def contact(
     chosen = chosen_theory(
         surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside, workers=workers
     )
-    yields = stated and not (isinstance(hardness, float | np.ndarray) and _infinite(np.asarray(hardness)))
+    # what is no number is refused where it is checked
+    known = np.asarray(hardness) if isinstance(hardness, float | np.ndarray) else None
+    yields = stated and (known is None or known.dtype.kind != "f" or not known.size or bool((known != np.inf).any()))
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
     make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
     return make(surface, value, E_star, hardness, by, source, derivatives)
-
-
-def _infinite(hardness: Any) -> bool:
-    """Whether every hardness is infinite; values that are no numbers are rejected elsewhere."""
-    return bool(hardness.dtype.kind == "f" and hardness.size and np.isposinf(hardness).all())
 
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
@@ -211,9 +208,9 @@ def _contact(
     theory: Any = source.theory
     if source.yields:
         # what it needs of scipy takes long to import
-        from mbma_tables.theories.saturated import with_hardness
+        from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
-        theory = with_hardness(theory, cap / modulus)
+        theory = WITH_HARDNESS.get(type(theory), Yielding)(theory, cap / modulus)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
     held = by if by in QUANTITIES else None
     by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}

@@ -76,10 +76,11 @@ class Source:
         """The theory, with the hardness where there is one."""
         if not self.yields:
             return self.theory
-        from mbma_tables.theories.saturated import with_hardness
+        from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
         broadcast_shape(E_star=E_star, hardness=hardness)
-        return with_hardness(self.theory, checked_hardness(hardness) / E_star)
+        kind = WITH_HARDNESS.get(type(self.theory), Yielding)
+        return kind(self.theory, checked_hardness(hardness) / E_star)
 
     def map(
         self,

@@ -82,7 +82,7 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
     if holds_own(table):
         import numpy as np
 
-        from mbma_tables.theories.simulated import BoundaryElements
+        from mbma_tables.theories import BoundaryElements
 
         theory = BoundaryElements.from_netcdf(table)
         answer = theory.answer(theory.surface, theory.rows[2])

@@ -29,6 +29,7 @@ AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
 MIN_LAW_GAPS, MIN_LAW_GAPS_OF_OTHERS = 4000, 150  # of MBMA, and of other theories
 MIN_THEORY_LAW_RTOL = 1e-9
 YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # over an elastic call, and over one of many elastic gaps (docs/yield.md)
+LAST = 0.95  # largest share of h_max at which the error of a theory is looked up
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 
 
@@ -283,7 +284,12 @@ class _Planner:
         from mbma_tables.theories import get_theory
 
         surface = self.problem.surface
-        return float(get_theory(self.problem.theory, surface).answer(surface, 0.5 * surface.h_max).error)
+        h_max, gaps = float(surface.h_max), self.problem.gaps
+        known = gaps is not None and self.problem.prescribed not in INVERTED
+        # the farther from the mid-plane, the larger
+        farthest = np.max(gaps if self.problem.prescribed == "mean_separations" else (h_max + gaps) / 2) if known else 0
+        u = min(max(farthest, 0.5 * h_max), LAST * h_max)
+        return float(get_theory(self.problem.theory, surface).answer(surface, np.asarray(u)).error)
 
     def seconds_of_law(self, inverse: bool) -> float:
         """Seconds of a law's evaluations at the gaps."""

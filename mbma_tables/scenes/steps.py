@@ -223,9 +223,9 @@ def other_theory(
     else:
         theory = get_theory(name, surface)
     if hardness < math.inf:
-        from mbma_tables.theories.saturated import with_hardness
+        from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
-        theory = with_hardness(theory, hardness / E_star)
+        theory = WITH_HARDNESS.get(type(theory), Yielding)(theory, hardness / E_star)
     found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
     return OtherTheory(
         E_star * found.pressure, found.area, *(theory.scatter(surface, name, found.area) for name in found._fields[:2])

@@ -338,8 +338,7 @@ class MeasuredSurface(SpectralSurface):
         --------
         >>> import numpy as np
         >>> from mbma_tables import Surface
-        >>> q = np.geomspace(0.2, 50, 60)
-        >>> face = Surface.from_spectrum(q, 0.01 * np.maximum(q, 1) ** -3.6, h_max=1.1)  # flat up to q = 1
+        >>> face = Surface.from_spectrum(q := np.geomspace(0.2, 50, 60), np.maximum(q, 1) ** -3.6, h_max=9.0)  # a plateau
         >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
         H = 0.80 from q = 1.00
         """

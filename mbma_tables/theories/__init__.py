@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mbma_tables.theories.mbma import Mbma
     from mbma_tables.theories.persson import Method, Persson
     from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
-    from mbma_tables.theories.simulated import BoundaryElements
+    from mbma_tables.theories.saturated import BoundaryElements as BoundaryElements
 
 __all__ = [
     "THEORIES",
@@ -37,7 +37,7 @@ __all__ = [
 THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")  # also their modules
 _NAMED = dict(zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True))
 # a theory's module is imported when first needed
-_HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson", "BoundaryElements": "simulated"}
+_HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson", "BoundaryElements": "saturated"}
 _HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by simulating it
 # of MBMA

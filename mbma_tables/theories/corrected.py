@@ -13,7 +13,7 @@ from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import own_map
-from mbma_tables.theories.simulated import BoundaryElements
+from mbma_tables.theories.saturated import BoundaryElements
 
 # points along a side, and of the map, between which it is the default
 LEAST_SIDE, MOST_POINTS = 64, 2**18

@@ -1,7 +1,7 @@
 """The interface of theories: pressure, area and stiffness of a surface at mean separations.
 
-A user's object with a `name` and an ``answer(surface, mean_separation)`` is also accepted. Quantities without a closed
-form (energy, the separation at a given load) are computed from the theory's forces.
+A user's object with a `name` and an ``answer(surface, mean_separation)`` is also accepted; what has no closed form
+(energy, the separation at a given load) is computed from its forces.
 """
 
 from __future__ import annotations
@@ -21,14 +21,11 @@ from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.differences import integral
 
 LOOKS, FEW_LOOKS = 128, 8  # initial gaps of an inversion, for one surface and for each of a batch,
-LOOKED_AT = 7.0  # range of ln u - ln(h_max - u) for these,
-FAR = 12.0  # and largest u/h_rms for theories without last contact
-STEPS = 200
-MISSED = 0.5  # largest miss of ln of a value between two adjacent floats u
+LOOKED_AT, FAR = 7.0, 12.0  # range of ln u - ln(h_max - u) for these, and largest u/h_rms without last contact
+STEPS, MISSED = 200, 0.5  # of an inversion; largest miss of ln of a value between two adjacent floats u
 SCAN = 49  # compressions at which a law is searched for a turning point
-SETTLED = 1e-7  # step of a logarithm before the last one, whose error is about its square
-SETTLED_STEP = 1e-4  # step of y, which is large where values hardly change
-SETTLED_BOTH = 1e-14  # product with the previous step, where slopes are not known
+# last steps of a logarithm (its error is about the square) and of y; product of the last two where slopes are not known
+SETTLED, SETTLED_STEP, SETTLED_BOTH = 1e-7, 1e-4, 1e-14
 FARTHEST = 40.0  # step of y
 DISTINCT = 8.9e-16  # smallest relative difference of distinct gaps
 
@@ -269,8 +266,7 @@ def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:
 
 def _places(u: FloatArray, value: FloatArray, steep: FloatArray, end: FloatArray) -> FloatArray:
     """Rows of ln value, y, and the derivative of y by that logarithm."""
-    rest = 1 - u / end
-    return np.array([np.log(value), np.log(u / rest), -value / (steep * u * rest)])
+    return np.array([np.log(value), np.log(u / (rest := 1 - u / end)), -value / (steep * u * rest)])
 
 
 def _through(places: FloatArray, goal: FloatArray) -> FloatArray:
@@ -294,8 +290,8 @@ def _middle(low: FloatArray, high: FloatArray) -> FloatArray:
 class Search:
     """The solutions, from values at gaps in order from last contact on.
 
-    The values are rows of one column for all entries, or of one for each. `exact`: `steep`, -dvalue/du, is exact; else
-    it is approximate, and differences are used. `end` is the last gap with contact, which may be infinite.
+    The values are rows of one column for all entries, or of one for each. Unless `exact`, `steep` is an approximate
+    -dvalue/du, and differences are used. `end` is the last gap with contact, which may be infinite.
     """
 
     def __init__(

@@ -15,8 +15,8 @@ from mbma_tables.laws.pressing import TOLERANCE, Press
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import own_map
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
-from mbma_tables.theories.simulated import BoundaryElements
-from mbma_tables.theories.yielding import Yielding
+from mbma_tables.theories.simulated import BoundaryElements as BoundaryElements
+from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
 KEPT = 8  # hardnesses of maps whose simulations are kept
 STEP = 0.02  # of ln E*, of its derivatives
@@ -212,8 +212,9 @@ class Saturated(Yielding):
         return {**self.elastic.reasons(surface, answer, mean_separation), **own}
 
 
-def with_hardness(theory: Theory, hardness: ArrayLike) -> Yielding:
-    """A theory with a hardness over E*: a simulated map is simulated anew, another contact goes through a law."""
-    simulated = isinstance(theory, BoundaryElements) and theory.name == BoundaryElements.name
-    known = simulated and theory.own_loads and isinstance(theory.pressed, Press)  # type: ignore[attr-defined]
-    return (Saturated if known else Yielding)(theory, hardness)
+def _with_hardness(theory: BoundaryElements, hardness: ArrayLike) -> Yielding:
+    """A map whose points are known is simulated anew; a table or loads of one's own go through the law of hardness."""
+    return (Saturated if theory.own_loads and isinstance(theory.pressed, Press) else Yielding)(theory, hardness)
+
+
+WITH_HARDNESS[BoundaryElements] = _with_hardness

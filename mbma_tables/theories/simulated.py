@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -10,33 +9,29 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.common.arguments import FloatArray, finite_array, require
-from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.common.errors import InputError
 from mbma_tables.laws.energy_spline import Continued, LoadCurve, left_out
 from mbma_tables.laws.pressing import HIGHEST, LOWEST, ROUNDING, TOLERANCE, Press, Table
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.tablefiles.own import ADVICE
 from mbma_tables.theories import own_map
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.calibrated_curves import own_law
 from mbma_tables.theories.own_table import read_surface, write_table
-from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.protocol import TheoryAnswer
+from mbma_tables.theories.simulated_flow import SimulatedFlow
 
 MIN_LOADS = 4
-FAITHFUL = 1e-6  # relative, of curves at the loads they go through
-MATCHED = 1e-6  # relative, of the surface that is asked about
 STRAYS = 2.7  # roots of the elements that join between two loads: beyond strays one path in 10^6 (Kolmogorov)
 # A/A0 of the 65 maps of `python -m generate machined` at which scatter was measured
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
-AREA_OF_FLOW = 0.2
 EVALUATED = 1e-5  # error of the curves through the default loads; laws need not be more accurate
 
 
-class BoundaryElements(Theory):
+class BoundaryElements(SimulatedFlow):
     """BEM results of one map at a list of loads, and curves between them.
 
     Parameters
@@ -221,19 +216,6 @@ class BoundaryElements(Theory):
         """Open such a table (`TableFileError` if damaged or edited); for its `.surface` "simulated" is the default."""
         return cls.of(read_surface(path))
 
-    @classmethod
-    def verify(cls, path: os.PathLike[str] | str) -> tuple[int, float]:
-        """Number of loads of such a file, and by how much its curves miss their pressures and areas, relatively.
-
-        A `TableFileError` where that is more than `FAITHFUL`.
-        """
-        theory = cls.from_netcdf(path)
-        found = theory.answer(theory.surface, theory.rows[2])
-        missed = float(np.abs(np.array(found[:2]) / theory.rows[:2] - 1).max())
-        if not missed <= FAITHFUL:
-            raise TableFileError(f"{path}: its curves miss its simulated loads by {missed:.1e}; {ADVICE}")
-        return theory.rows.shape[1], missed
-
     def _error(self, u: FloatArray, found: FloatArray) -> FloatArray:
         """Bound on the relative error of pressure and area, from their logarithms at mean separations."""
         if self.own_loads:
@@ -283,67 +265,6 @@ class BoundaryElements(Theory):
         """Elastic energy over A0 E* [length]."""
         return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
 
-    def gaps(self) -> Any:
-        """Itself, if the flow is known."""
-        return None if self.pressed is None else self
-
-    @functools.cached_property
-    def _flows(self) -> tuple[FloatArray, FloatArray]:
-        """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
-        assert self.pressed is not None
-        return self.pressed.flows(self.fit.x, self.fit.separation)
-
-    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked.
-
-        Along an axis that closes at u1, ln K over ln(u - u1) is a monotone cubic, straight below the last open load;
-        xy is sqrt(xx yy) times what is linear in u.
-        """
-        if self.pressed is None:
-            return None
-        # bodies apart are farther apart than the theory needs
-        u = np.maximum(self._within(surface, mean_separation), mean_separation)
-        gaps, known = self._flows
-        found = np.zeros((3, *u.shape))
-        for axis, (last, end) in enumerate(self.closing):
-            passing = (gaps >= last) & (known[:, axis] > 0)
-            if passing.any():
-                x, y = np.log(gaps[passing][::-1] - end), np.log(known[passing, axis][::-1])
-                if x.size == 1:
-                    x, y = np.append(x - 1, x), np.append(y - 3, y)
-                curve = PchipInterpolator(x, y)
-                with np.errstate(divide="ignore"):
-                    own = np.log(np.maximum(np.minimum(u, gaps[0]) - end, 0.0))
-                below = max(float(curve(x[0], 1)), 1.0) * np.minimum(own - x[0], 0.0)
-                found[axis] = np.exp(curve(np.maximum(own, x[0])) + below)
-                # towards parallel planes, which pass the cube of their distance
-                wide = u**3 - (gaps[0] ** 3 - known[0, axis]) * u / gaps[0]
-                found[axis] = np.where(u > gaps[0], wide, found[axis])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.nan_to_num(known[:, 2] / np.sqrt(known[:, 0] * known[:, 1]))
-        found[2] = np.sqrt(found[0] * found[1]) * np.interp(-u, -gaps, turn)
-        return found
-
-    @functools.cached_property
-    def closing(self) -> list[tuple[float, float]]:
-        """Of both axes, u of the last load at which it is open and of the first at which it is blocked [length]."""
-        gaps, known = self._flows
-        u = np.append(gaps, 0.0)
-        return [(float(u[max(k - 1, 0)]), float(u[k])) for k in np.cumprod(known[:, :2] > 0, axis=0).sum(axis=0)]
-
-    def flow_trust(
-        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
-    ) -> tuple[FloatArray, dict[str, Any]] | None:
-        """Standard deviation of ln of that flow on tested maps, and a mask where an axis may be blocked."""
-        if self.pressed is None:
-            return None
-        near = [(mean_separation < last) & (mean_separation > end) for last, end in self.closing]
-        reasons = {
-            "leakage: the map may be blocked, as it is at the next simulated load": np.logical_or(*near),
-            f"leakage: A/A0 is above {AREA_OF_FLOW:g}": area > AREA_OF_FLOW,
-        }
-        return self.scatter(surface, "flow", area), reasons
-
     def heights(self, surface: AnySurface) -> Any:
         """The map's own bearing curve, for a hardness."""
         return Calibrated().heights(surface)
@@ -368,19 +289,3 @@ class BoundaryElements(Theory):
     def _beyond(self, area: FloatArray) -> NDArray[np.bool_]:
         """Mask of contacts lighter or heavier than those simulated."""
         return np.asarray((area < self.rows[1, 0] * (1 - ROUNDING)) | (area > self.rows[1, -1] * (1 + ROUNDING)))
-
-    def _within(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        for name in ("h_rms", "h_max"):
-            own, given = float(getattr(self.surface, name)), np.asarray(getattr(surface, name))
-            good = np.abs(given - own) <= MATCHED * own
-            require(name, given, good, f"{own:.9g}: a simulation of one map is for that map only, its .surface")
-        shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
-        u = np.broadcast_to(np.asarray(mean_separation, float), shape)
-        low, high = map(float, self.interval(self.surface))
-        if self.ends_at_h_max:
-            # bodies are apart beyond h_max
-            require("mean_separation", u, u >= 0, "at least 0")
-            return np.asarray(np.minimum(u, high))
-        good = (u >= low * (1 - 1e-12)) & (u <= high * (1 + 1e-12))
-        require("mean_separation", u, good, f"between {low:.6g} and {high:.6g}, which were simulated")
-        return np.asarray(np.clip(u, low, high))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -264,3 +264,7 @@ class Yielding(Theory):
         soft = np.broadcast_to(self._eta(surface) < TESTED_ETA * (1 - 1e-9), np.shape(answer.area))
         own = {f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": soft}
         return {**self.elastic.reasons(surface, answer, mean_separation), **own}
+
+
+# what makes the theory with a hardness, of theories that have a way of their own
+WITH_HARDNESS: dict[type, Callable[[Any, ArrayLike], Yielding]] = {}

@@ -227,7 +227,7 @@ def test_beyond_the_heights_simulated_nothing_changes():
             contact(Surface(hurst, 0.001, 0.001 * zeta_1, 1.0, h_max), area=[1e-3, 1e-2, 0.1], theory="calibrated")
             for h_max in (5.5, 8.0)
         )
-        for name, rtol in {"pressure": 1e-6, "mean_separation": 2e-4, "stiffness": 2e-3}.items():
+        for name, rtol in {"pressure": 1e-6, "mean_separation": 5e-4, "stiffness": 2e-3}.items():
             np.testing.assert_allclose(getattr(far, name), getattr(near, name), rtol=rtol)
         assert far.valid.all()
 

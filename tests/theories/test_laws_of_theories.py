@@ -189,7 +189,7 @@ test_what_is_no_law = refusals(
     ({"theory": "persson", "rtol": 1e-10}, "rtol"),
     ({"theory": "persson", "surface": Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0)}, "one surface, got a batch"),
     ({"theory": Negative()}, "no positive force and area"),
-    ({"theory": Noisy()}, "theory 'cones': the law needs more than .* ask for a larger rtol"),
+    ({"theory": Noisy()}, "theory 'cones': the law needs more than .* use a larger rtol"),
     error=(InputError, ConvergenceError),
 )
 
