@@ -31,6 +31,7 @@ from scipy.special import erf
 
 from benchmarks.exports import exported
 from benchmarks.kernels import BEFORE, held_out, measured
+from benchmarks.maps import maps
 from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from generate.files import ROOT
@@ -331,7 +332,7 @@ def main(write: bool) -> None:
     rng = np.random.default_rng(SEED)
     load = os.getloadavg()
     click.echo(f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}")
-    for section in (kernels, few_numbers, fresh_process, tables, totals, laws, calibrated, exported, scenes):
+    for section in (kernels, few_numbers, fresh_process, tables, totals, laws, calibrated, maps, exported, scenes):
         section(rng)
     click.echo(f"\nload average {os.getloadavg()[0]:.2f} at the end")
     if write:
