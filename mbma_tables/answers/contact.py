@@ -210,7 +210,9 @@ def _contact(
         # what it needs of scipy takes long to import
         from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
-        theory = WITH_HARDNESS.get(type(theory), Yielding)(theory, cap / modulus)
+        with np.errstate(over="ignore"):  # beyond the largest number nothing yields
+            eta = cap / modulus
+        theory = WITH_HARDNESS.get(type(theory), Yielding)(theory, eta)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
     held = by if by in QUANTITIES else None
     by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}
@@ -258,7 +260,8 @@ def _places(
     elif by == "mean_separation":
         average = asked
     else:
-        wanted = asked / modulus if by == "pressure" else asked
+        with np.errstate(over="ignore"):  # what is infinite is refused as too large
+            wanted = asked / modulus if by == "pressure" else asked
         try:
             if by == "pressure" and source.yields:
                 average, lighter = theory.pressed(surface, wanted)
