@@ -240,7 +240,7 @@ def write(path: pathlib.Path, evidence: pathlib.Path = EVIDENCE) -> xr.Dataset:
     return made
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=EVIDENCE)
 @click.option(
     "--table", type=click.Path(path_type=pathlib.Path, exists=True), default=TABLE, help="The library's file."

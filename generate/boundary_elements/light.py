@@ -72,7 +72,7 @@ def summary(found: FloatArray) -> list[list[str]]:
     return lines
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.option("--data", type=PATH, default=DATA / "light_loads.npz", show_default=True)
 def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""

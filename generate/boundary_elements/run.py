@@ -42,20 +42,18 @@ def run(
         raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.option("--of", "kind", type=click.Choice(list(SOLVERS)), default="elastic", show_default=True)
 @click.option("--folder", type=click.Path(path_type=pathlib.Path), help="One file a surface.  [default: its kind]")
 @click.option("--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write this netCDF file, no runs.")
 @click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option("--scheduler", help="Address of a dask scheduler, whose workers see this checkout and the folder.")
 def boundary_elements(
     kind: str,
     folder: pathlib.Path | None,
     target: pathlib.Path | None,
     points: int,
     workers: int,
-    scheduler: str | None,
 ) -> None:
     """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
 
@@ -70,5 +68,5 @@ def boundary_elements(
         counted = collect(dataset(tasks, folder, kind), target)
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
-    with executor(workers, scheduler) as pool:
+    with executor(workers) as pool:
         run(tasks, folder, pool, functools.partial(simulate_to, solve=SOLVERS[kind]))

@@ -90,7 +90,7 @@ def solve(recipe: Recipe, grid: int, finest: int, start: str) -> Iterator[tuple[
         yield (*node, found["area"], found["mean_separation"] / length, *times)
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.option("--folder", type=PATH, default="boundary_elements", show_default=True, help="One file a grid.")
 @click.option("--out", "target", type=PATH, default=DATA / "boundary_element_grids.csv", show_default=True)
 @click.option("--collect", is_flag=True, help="Write what there is, no runs.")
@@ -121,7 +121,7 @@ def middle(treated: Treated) -> Treated:
     return dataclasses.replace(treated, heights=treated.heights[kept])
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.argument("maps", nargs=-1, required=True, type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
 @click.option("--folder", type=PATH, default=DATA, show_default=True)
 def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
@@ -165,7 +165,7 @@ def gap_errors(kind: str) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 def gaps() -> None:
     """Print errors of a gas's conductance against gaps of boundary elements, for docs/joints.md: six minutes."""
     for kind in SURFACES:

@@ -125,13 +125,13 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     Stopped and called again, it goes on where it was. Answers of theories are kept in folders of their own: remove
     these to ask a changed library again.
     """
-    from generate.tables.commands import executor
+    from generate.workers import executor
 
     tasks: list[Any] = [Task(cast(Any, part), "") for part in parts()]
     solvers: dict[str, Callable[[Part], dict[str, Any]]] = {"": solved}
     solvers |= {form: functools.partial(answers, form=form, folder=folder) for form in FORMS}
     hard: list[Any] = [Task(cast(Any, part), "") for part in yielding_parts()]
-    with executor(workers, None) as pool:
+    with executor(workers) as pool:
         run(hard, folder / "hardness", pool, functools.partial(simulate_to, solve=cast(Any, yielded)))
         for form, solve in solvers.items():
             run(tasks, folder / form, pool, functools.partial(simulate_to, solve=cast(Any, solve)))
