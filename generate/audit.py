@@ -3,8 +3,6 @@
 README and docs/guarantees.md quote the counts.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import reprlib

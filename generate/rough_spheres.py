@@ -4,8 +4,6 @@ Gaussian roughness on spheres of radius `RADIUS` against a rigid flat, on a half
 the convolution of DC-FFT), E* = 1, lengths in sampling steps. Their rows go into docs/data/rough_spheres.csv.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

@@ -1,7 +1,5 @@
 """Where jobs run: here, or in processes of this machine."""
 
-from __future__ import annotations
-
 import concurrent.futures
 import contextlib
 import functools

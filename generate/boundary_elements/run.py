@@ -1,23 +1,36 @@
-"""`python -m generate boundary_elements`: run the campaign, or gather what there is of it into one file."""
+"""`python -m generate boundary_elements`: run a campaign, or gather what there is of it into one netCDF file.
 
-from __future__ import annotations
+`variables.toml` describes the file's variables.
+"""
 
+import datetime
 import functools
+import json
 import pathlib
 import shutil
+import tomllib
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import click
+import numpy as np
+import xarray as xr
 from tqdm import tqdm
 
-from generate.boundary_elements.capped import simulate_capped, solve_flow
-from generate.boundary_elements.collect import collect, dataset
-from generate.boundary_elements.design import Task, campaign
-from generate.boundary_elements.solve import simulate, simulate_to
-from generate.boundary_elements.surfaces import Recipe
+from generate.boundary_elements.solve import HARDNESSES, simulate, simulate_capped, simulate_to, solve_flow
+from generate.boundary_elements.surfaces import SPLITS, Recipe, Task, campaign
+from generate.provenance import source_digest, versions
 from generate.workers import Pool, attempts, executor
+from mbma_tables.common.errors import InputError
+from mbma_tables.laws import bearing_curve as bearing
+from mbma_tables.laws.boundary_elements import TOLERANCE
 
 SOLVERS = {"elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow}
+TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("variables.toml").read_text(encoding="utf-8"))
+DIMENSIONS = ("surface", "load", "quantile", "top", "band", "band_or_end", "axis")
+COORDINATES: dict[str, Any] = {"quantile": bearing.QUANTILES, "top": bearing.FRACTIONS, "eta": HARDNESSES}
+SINGLE = {"quantiles", "mean_height", "top_gradient", "tension_force", "tension", "band_energy"}  # kept to 7 digits
+LOADED = {"band_energy", "flow"}
 
 
 def run(
@@ -42,6 +55,83 @@ def run(
         raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
 
 
+def _variable(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
+    """One number or curve of all surfaces; NaN where a surface has fewer loads."""
+    of_hardness = kind == "hardness" and name in TEXTS["hardness"]
+    dimension = "hardness" if of_hardness else next(d for d in DIMENSIONS if name in TEXTS[d])
+    own = [np.asarray(content[name]) for content in found]
+    dims = [] if dimension == "surface" else [dimension]
+    if dimension == "load" or name in LOADED:
+        dims = ["load", *(d for d in dims if d != "load")]
+        values = np.full((len(own), max(map(len, own)), *own[0].shape[1:]), np.nan)
+        for row, v in zip(values, own, strict=True):
+            row[: len(v)] = v
+    else:
+        dims += ["load"] if of_hardness else []
+        values = np.array(own)
+    number = "f4" if name in SINGLE or of_hardness else "f8"
+    attributes = {"long_name": TEXTS[dimension][name], "units": "s" if name == "seconds" else "1"}
+    return xr.Variable(["surface", *dims], values.astype(number), attributes)
+
+
+def _flags(values: Sequence[str], meanings: Sequence[str], name: str) -> xr.Variable:
+    attributes = {"long_name": name, "flag_values": np.arange(len(meanings), dtype="i1")}
+    numbers = np.array([list(meanings).index(value) for value in values], "i1")
+    return xr.Variable("surface", numbers, attributes | {"flag_meanings": " ".join(meanings)})
+
+
+def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") -> xr.Dataset:
+    """All solved surfaces of these tasks of a campaign."""
+    solved = [task for task in tasks if (folder / f"{task.recipe.name}.npz").exists()]
+    if not solved:
+        raise InputError(f"no surface of this campaign is in {folder}")
+    texts, recipes, found = TEXTS["files"][kind], [task.recipe for task in solved], list[dict[str, Any]]()
+    for recipe in recipes:
+        with np.load(folder / f"{recipe.name}.npz", allow_pickle=False) as content:
+            found.append(dict(content))
+    data = xr.Dataset({name: _variable(name, found, kind) for name in texts["numbers"]})
+    data["kind"] = _flags([r.kind for r in recipes], sorted({r.kind for r in recipes}), "family of surfaces")
+    meaning = "what a fit may see: the training set and no other"
+    data["split"] = _flags([task.split for task in solved], SPLITS, meaning)
+    for name, meaning in TEXTS["recipe"].items():
+        values = np.array([getattr(recipe, name) for recipe in recipes])
+        data[name] = ("surface", values, {"long_name": meaning, "units": "1"})
+    for name, meaning in TEXTS["coordinates"].items():
+        dimension = "hardness" if name == "eta" else name
+        if dimension in data.dims:
+            data[name] = (dimension, np.array(COORDINATES[name]), {"long_name": meaning, "units": "1"})
+    engine = ", ".join(sorted({str(content["engine"]) for content in found}))
+    method = f"{engine}: conjugate gradients of Polonsky and Keer"
+    if kind == "hardness":
+        method = "mbma_tables.laws.boundary_elements: projected conjugate gradients"
+    made_by = {"engine": engine, "numpy": ", ".join(sorted({str(content["numpy"]) for content in found}))}
+    data.attrs = {
+        "Conventions": "CF-1.11",
+        "title": texts["title"],
+        "institution": "mbma_tables contributors",
+        "source": f"{method}, force control, tolerance {TOLERANCE:g}; periodic, frictionless, without adhesion",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate boundary_elements --of {kind} "
+        "--collect",
+        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
+        "comment": TEXTS["files"]["comment"] + texts["comment"],
+        "versions": json.dumps(versions() | made_by),
+        "code_sha256": source_digest((*TEXTS["files"]["modules"], *texts["modules"])),
+        "surfaces_planned": len(tasks),
+        "surfaces_solved": len(found),
+    }
+    return data
+
+
+def collect(data: xr.Dataset, target: pathlib.Path) -> int:
+    """Write the file; the number of surfaces in it."""
+    encoding: dict[str, dict[str, Any]] = {str(name): {"zlib": True, "complevel": 9} for name in data.data_vars}
+    encoding |= {str(name): {"_FillValue": None} for name in data.coords}
+    partial = target.with_suffix(".partial")
+    data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+    partial.replace(target)
+    return int(data.sizes["surface"])
+
+
 @click.command()
 @click.option("--of", "kind", type=click.Choice(list(SOLVERS)), default="elastic", show_default=True)
 @click.option("--folder", type=click.Path(path_type=pathlib.Path), help="One file a surface.  [default: its kind]")
@@ -49,11 +139,7 @@ def run(
 @click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 def boundary_elements(
-    kind: str,
-    folder: pathlib.Path | None,
-    target: pathlib.Path | None,
-    points: int,
-    workers: int,
+    kind: str, folder: pathlib.Path | None, target: pathlib.Path | None, points: int, workers: int
 ) -> None:
     """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
 

@@ -13,10 +13,9 @@ import click
 import numpy as np
 import xarray as xr
 
-from generate.boundary_elements.collect import collect
-from generate.boundary_elements.design import Task
-from generate.boundary_elements.run import run
+from generate.boundary_elements.run import collect, run
 from generate.boundary_elements.solve import simulate_to
+from generate.boundary_elements.surfaces import Task
 from generate.machined.hardness import ETA, WAYS, yielded
 from generate.machined.makers import FAMILIES, Part
 from generate.machined.solve import answered, solved, surface_of

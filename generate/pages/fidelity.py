@@ -1,7 +1,6 @@
 """docs/fidelity.md: theories beside simulations."""
 
-from __future__ import annotations
-
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -9,11 +8,15 @@ import numpy as np
 
 from generate import distances
 from generate.calibrated_file import QUANTITIES, by_bin
-from generate.distances import HUES
-from generate.pages.page import Measured, panels, percent, table
+from generate.pages.page import Measured, panels, table
 
 BANDED = ("MBMA reported", "calibrated")
 BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
+
+
+def percent(value: float) -> str:
+    """A fraction in percent to two digits; a dash where it is not finite."""
+    return f"{float(f'{100 * value:.2g}'):g}" if math.isfinite(value) else "—"
 
 
 def summary_table(sets: Iterable[distances.DataSet]) -> str:
@@ -38,7 +41,7 @@ def by_contact(sets: dict[str, distances.DataSet], keys: list[str], height: floa
     for column, key in zip(axes.T, keys, strict=True):
         seen = sets[key].seen
         for theory, make in distances.THEORIES.items():
-            style: dict[str, Any] = {"color": HUES[theory], "label": theory}
+            style: dict[str, Any] = {"color": distances.HUES[theory], "label": theory}
             if len(seen) > 2:
                 area = np.concatenate([one.area for one in seen])
                 for ax, values in zip(column, distances.distances(seen, make).values(), strict=True):
@@ -48,7 +51,7 @@ def by_contact(sets: dict[str, distances.DataSet], keys: list[str], height: floa
                     ax.plot(x, np.exp(mean), ".-", **style)
                     if theory in BANDED:
                         band = np.exp(mean - spread), np.exp(mean + spread)
-                        ax.fill_between(x, *band, color=HUES[theory], alpha=0.15, lw=0)
+                        ax.fill_between(x, *band, color=distances.HUES[theory], alpha=0.15, lw=0)
                 continue
             for k, one in enumerate(seen):
                 for ax, values in zip(column, distances.distances([one], make).values(), strict=True):
@@ -79,6 +82,5 @@ def drawn() -> dict[str, Any]:
 
 
 def measure() -> Measured:
-    """The measured blocks of the page, and its figures."""
     parts = {"summary": summary_table(distances.data_sets().values())}
     return parts, {f"docs/figures/{name}.svg": figure for name, figure in drawn().items()}

@@ -1,7 +1,5 @@
 """docs/machined.md: errors of answers on maps of machined surfaces by family, and how many their scatter covers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,8 +5,6 @@
 ``python -m generate pages NAME`` writes them.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import itertools
@@ -21,13 +19,13 @@ from click.testing import CliRunner
 
 from generate.files import ROOT
 from mbma_tables.common.files import write_file
+from mbma_tables.common.plots import new_figure, to_picture
 
-_OWN = ("architecture", "cost", "explorer", "fidelity", "joints", "machined", "stability", "tables")
 PAGES = {
-    **{name: f"{name}:measure" for name in _OWN},
-    **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
-    **{name: f"film:{name}" for name in ("lubrication", "rough_bodies")},
-    **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
+    **{name: f"library:{name}" for name in ("architecture", "formula", "readme", "tables", "theories")},
+    **{name: f"bodies:{name}" for name in ("joints", "lubrication", "rough_bodies")},
+    **{name: f"{name}:measure" for name in ("cost", "explorer", "fidelity", "machined", "stability")},
+    **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "laws:yielding"},
     **{"gallery": "maps:gallery", "maps": "maps:measure"},
 }
 Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files
@@ -35,7 +33,6 @@ MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def measured(name: str) -> Measured:
-    """Measure a page."""
     module, _, function = PAGES[name].partition(":")
     found: Measured = getattr(importlib.import_module(f"generate.pages.{module}"), function)()
     return found
@@ -87,11 +84,6 @@ def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> st
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def percent(value: float) -> str:
-    """A fraction in percent to two digits; a dash where it is not finite."""
-    return f"{float(f'{100 * value:.2g}'):g}" if math.isfinite(value) else "—"
-
-
 def duration(seconds: float) -> str:
     """A time to two digits, in its unit."""
     unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s), ("ns", 1e-9))
@@ -105,14 +97,10 @@ def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
 
 def panels(rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any) -> tuple[Any, Any]:
     """A figure and its axes."""
-    from mbma_tables.common.plots import new_figure
-
     figure = new_figure(*size)
     return figure, figure.subplots(rows, columns, **options)
 
 
 def svg(figure: Any) -> bytes:
     """A figure as the content of an SVG file, the same bytes for the same figure."""
-    from mbma_tables.common.plots import to_picture
-
     return to_picture(figure, "svg", dpi=100, outlines=True)

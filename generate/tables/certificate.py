@@ -1,7 +1,5 @@
 """What both tables are held to: held-out errors, points to replay, physical rules."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`python -m generate tables`: make the tables and the coefficients of the height integrals."""
 
-from __future__ import annotations
-
 import os
 import pathlib
 import shutil

@@ -1,7 +1,5 @@
 """Configurations of tables: TOML files, the shipped ones beside this module."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

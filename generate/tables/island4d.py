@@ -8,8 +8,6 @@
 with sigma of Eq. (32) in units of s: the first parameter is read at zeta_1 without bound, where s is h_rms.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """The universal table: Chebyshev series of Phi_F/mu and Phi_A over cells of (X, mu)."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

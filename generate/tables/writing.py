@@ -1,7 +1,5 @@
 """Write table files (netCDF-4): their fields with labels, and the texts of `texts.toml`."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -10,11 +10,9 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from generate.boundary_elements.collect import collect, dataset
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign
-from generate.boundary_elements.run import SOLVERS, boundary_elements, run
+from generate.boundary_elements.run import SOLVERS, boundary_elements, collect, dataset, run
 from generate.boundary_elements.solve import Contact, simulate, simulate_to
-from generate.boundary_elements.surfaces import Recipe, heights
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Recipe, Task, campaign, heights
 from generate.files import ROOT
 from mbma_tables.laws.bearing_curve import FRACTIONS, bearing
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import erf
 
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.boundary_elements.evidence import cases
-from generate.boundary_elements.light import BINS, compared, recipes
+from generate.boundary_elements.studies import LIGHT_BINS, compared, light_recipes
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.calibrated import errors
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
 from mbma_tables.common.files import shipped_file
@@ -491,9 +491,9 @@ def test_light_loads_are_those_of_boundary_elements():
         rows = known["rows"].astype(float)
     assert rows.shape[0] >= 20
     errors = []
-    for recipe, own in zip(recipes(), rows, strict=True):
+    for recipe, own in zip(light_recipes(), rows, strict=True):
         area, stiffness, _ = compared(recipe, own)
-        seen = (area > BINS[0]) & (area < BINS[-1]) & np.isfinite(stiffness)
+        seen = (area > LIGHT_BINS[0]) & (area < LIGHT_BINS[-1]) & np.isfinite(stiffness)
         errors.append(stiffness[seen])
     assert abs(np.mean(np.concatenate(errors))) < 0.1
     assert np.std(np.concatenate(errors)) < 0.3
