@@ -1,7 +1,7 @@
 """Theories of others, for `python -m generate score`: Persson's with published corrections of its energy and area.
 
-The formulas were read in the public programs github.com/xylcsi/PerssonModelFudgeFactor, which compare them. With the share s
-of the squared gradient g^2 of wavenumbers below q, forces F over A0 E* g and the cover P(q)::
+The formulas were read in the public programs github.com/xylcsi/PerssonModelFudgeFactor, which compare them. With the
+share s of the squared gradient g^2 of wavenumbers below q, forces F over A0 E* g and the cover P(q)::
 
     P = erf(sqrt(2) F/sqrt(v)),  dv/ds = S(P), v(0) = 0      Yang and Persson, Wang and Mueser
     P = erf(sqrt(2) F/sqrt(s (gamma + (1 - gamma) P)))       Xu et al.
