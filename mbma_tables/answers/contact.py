@@ -220,7 +220,7 @@ def _contact(
         require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
         totals = theory.totals(surface, places["separation"], E_star, derivatives)
-        fields = vars(totals) | places
+        fields = totals._asdict() | places
     else:
         u = np.asarray(places["mean_separation"])
         loaded = theory.loaded(surface, u, lighter) if source.yields else None

@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, require, whole_number_in
-from mbma_tables.models import QUANTITIES, AnyModel, check_outside, island_model_name
-from mbma_tables.models.named import get_model
+from mbma_tables.islands.geometry import kinks
+from mbma_tables.models import QUANTITIES, AnyModel, check_outside, get_model, island_model_name
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
 from mbma_tables.theories.protocol import SCAN, Curve, Theory, TheoryAnswer, select
-from mbma_tables.totals.contact import Totals, totals_at
+from mbma_tables.totals.contact import QUADRATURE_SHARE, Sums, Totals, totals_at
 from mbma_tables.totals.island import check_band
-from mbma_tables.totals.island_sum import QUADRATURE_SHARE, Sums, kinks
 from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
