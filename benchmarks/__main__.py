@@ -273,11 +273,6 @@ def few_numbers(rng: np.random.Generator) -> None:
         "law.pressure(separation=1.0)": (lambda: law.pressure(separation=1.0), CALLS, 0.15),
         "law.pressure of ten numbers": (lambda: law.pressure(ten), CALLS, 1.0),
         "contact at a pressure with a hardness": (lambda: contact(surface, pressure=1e-3, **yielding), 50, 500.0),
-        "the same with derivatives": (
-            lambda: contact(surface, pressure=1e-3, derivatives=True, **yielding),
-            20,
-            5000.0,
-        ),
         "100 gaps of Persson's theory": (lambda: contact(surface, mean_separation=u, theory="persson"), 3, 2000.0),
         "Persson's law": (lambda: contact_law(surface, theory="persson"), 3, 50e3),
         "Persson's law with a hardness": (lambda: contact_law(surface, theory="persson", hardness=0.1), 1, 150e3),

@@ -114,7 +114,7 @@ class Island4dModel(Displayed):
         else:
             self._refuse_ends(H, low)
         require("zeta_u", high, high > low, "above zeta_d")
-        place = to_axes(*(array.ravel() for array in (delta, low, high, H)), self.variant)
+        place = to_axes(delta.ravel(), low.ravel(), high.ravel(), H.ravel(), self.variant)
         phi, error = self._answer(place, outside, shape)
         return Lookup(*(row.reshape(shape)[()] for row in (place.force * phi[0], place.area * phi[1], error)))
 

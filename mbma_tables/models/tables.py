@@ -57,7 +57,7 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     """
     if table in (UNIVERSAL, ISLAND4D):
         with HDF5_LOCK:
-            return _opened(str(table))  # type: ignore[no-any-return]
+            return _opened(str(table))
     return _model(read_table(table))
 
 
@@ -85,8 +85,9 @@ def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
         X, mu, scales = points["X"], points["mu"], np.ones((2, 1))
         table = np.stack(model.answer(X, mu)[:2])
     else:
-        raw = [points[name] for name in ARGUMENTS[ISLAND4D]]
-        table, place = np.stack(model.lookup(*raw)[:2]), to_axes(*raw, model.variant)
+        delta, zeta_d, zeta_u, hurst = (points[name] for name in ARGUMENTS[ISLAND4D])
+        table = np.stack(model.lookup(delta, zeta_d, zeta_u, hurst)[:2])
+        place = to_axes(delta, zeta_d, zeta_u, hurst, model.variant)
         X, mu, scales = place.X, place.mu, np.stack([place.force, place.area])
     solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     return table, scales * np.stack([solved.phi_F, solved.phi_A])
