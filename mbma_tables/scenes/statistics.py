@@ -8,7 +8,8 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import AnyModel, RigidModel, answer_islands, get_model, island_model_name
+from mbma_tables.models import AnyModel, RigidModel, answer_islands, island_model_name
+from mbma_tables.models.named import get_model
 from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.any_surface import AnySurface

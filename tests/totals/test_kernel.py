@@ -9,7 +9,7 @@ from catalogue import LEVEL
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
 from mbma_tables.islands.geometry import FIELDS, geometry
-from mbma_tables.models import get_model
+from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
 from mbma_tables.totals import contact as sums
