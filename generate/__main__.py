@@ -8,14 +8,14 @@ from typing import Any
 import click
 
 from generate.files import ROOT
-from generate.pages.page import PAGES, measured, write
+from generate.page import PAGES, measured, write
 from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 COMMANDS = {
     **{
         name: f"generate.{name}"
-        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
+        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "score", "wheels")
     },
     **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
     "boundary_elements": "generate.boundary_elements.run",

@@ -18,8 +18,8 @@ import hypothesis
 import numpy as np
 from hypothesis import strategies as st
 
+from generate import page
 from generate.files import ROOT, evidence
-from generate.pages import page
 from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
 from mbma_tables.laws.calibrated import self_affine_law
 

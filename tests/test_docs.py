@@ -13,11 +13,11 @@ import tomllib
 import click
 import netCDF4
 import pytest
+from generate.page import MARKED, fill, svg
 
 import mbma_tables
 from generate.files import ROOT
 from generate.pages import library
-from generate.pages.page import MARKED, fill, svg
 from mbma_tables.models.tables import shipped
 from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS
 

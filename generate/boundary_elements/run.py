@@ -15,12 +15,15 @@ from typing import Any
 import click
 import numpy as np
 import xarray as xr
+from scipy.interpolate import CubicSpline
 from tqdm import tqdm
 
 from generate.boundary_elements.solve import HARDNESSES, simulate, simulate_capped, simulate_to, solve_flow
 from generate.boundary_elements.surfaces import SPLITS, Recipe, Task, campaign
+from generate.calibrated_file import Variable, variable, write_part
 from generate.provenance import source_digest, versions
 from generate.workers import Pool, attempts, executor
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws import bearing_curve as bearing
 from mbma_tables.laws.boundary_elements import TOLERANCE
@@ -31,6 +34,7 @@ DIMENSIONS = ("surface", "load", "quantile", "top", "band", "band_or_end", "axis
 COORDINATES: dict[str, Any] = {"quantile": bearing.QUANTILES, "top": bearing.FRACTIONS, "eta": HARDNESSES}
 SINGLE = {"quantiles", "mean_height", "top_gradient", "tension_force", "tension", "band_energy"}  # kept to 7 digits
 LOADED = {"band_energy", "flow"}
+STIFFNESS = "-dF/du over A0 E* g/h_rms, by a cubic spline of ln u against ln F through the loads of a surface"
 
 
 def run(
@@ -55,7 +59,7 @@ def run(
         raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
 
 
-def _variable(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
+def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
     """One number or curve of all surfaces; NaN where a surface has fewer loads."""
     of_hardness = kind == "hardness" and name in TEXTS["hardness"]
     dimension = "hardness" if of_hardness else next(d for d in DIMENSIONS if name in TEXTS[d])
@@ -70,14 +74,46 @@ def _variable(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Varia
         dims += ["load"] if of_hardness else []
         values = np.array(own)
     number = "f4" if name in SINGLE or of_hardness else "f8"
-    attributes = {"long_name": TEXTS[dimension][name], "units": "s" if name == "seconds" else "1"}
-    return xr.Variable(["surface", *dims], values.astype(number), attributes)
+    labels = {"long_name": TEXTS[dimension][name], "units": "s" if name == "seconds" else "1"}
+    return xr.Variable(["surface", *dims], values.astype(number), labels)
+
+
+def stiffness(data: xr.Dataset) -> FloatArray:
+    """-dF/du of every surface by a spline; NaN without a gap."""
+    found = np.full(data.force.shape, np.nan)
+    for row, force, u in zip(found, data.force.values, data.mean_separation.values, strict=True):
+        known = u > 0
+        log_u = CubicSpline(np.log(force[known]), np.log(u[known]))
+        row[known] = -force[known] / (u[known] * log_u.derivative()(np.log(force[known])))
+    return found
+
+
+def of_recipes(recipes: Sequence[Recipe]) -> dict[str, Variable]:
+    """What random surfaces are made of."""
+    return {
+        name: variable("surface", np.array([getattr(recipe, name) for recipe in recipes]), meaning)
+        for name, meaning in TEXTS["recipe"].items()
+    }
+
+
+def attributes(title: str, source: str, command: str, modules: Sequence[str], **more: Any) -> dict[str, Any]:
+    """Attributes of a group of the data set."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "institution": "mbma_tables contributors",
+        "source": source,
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {command}",
+        "versions": json.dumps(versions()),
+        "code_sha256": source_digest(tuple(modules)),
+        **more,
+    }
 
 
 def _flags(values: Sequence[str], meanings: Sequence[str], name: str) -> xr.Variable:
-    attributes = {"long_name": name, "flag_values": np.arange(len(meanings), dtype="i1")}
+    labels = {"long_name": name, "flag_values": np.arange(len(meanings), dtype="i1")}
     numbers = np.array([list(meanings).index(value) for value in values], "i1")
-    return xr.Variable("surface", numbers, attributes | {"flag_meanings": " ".join(meanings)})
+    return xr.Variable("surface", numbers, labels | {"flag_meanings": " ".join(meanings)})
 
 
 def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") -> xr.Dataset:
@@ -89,53 +125,40 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") 
     for recipe in recipes:
         with np.load(folder / f"{recipe.name}.npz", allow_pickle=False) as content:
             found.append(dict(content))
-    data = xr.Dataset({name: _variable(name, found, kind) for name in texts["numbers"]})
+    data = xr.Dataset({name: collected(name, found, kind) for name in texts["numbers"]})
     data["kind"] = _flags([r.kind for r in recipes], sorted({r.kind for r in recipes}), "family of surfaces")
     meaning = "what a fit may see: the training set and no other"
     data["split"] = _flags([task.split for task in solved], SPLITS, meaning)
-    for name, meaning in TEXTS["recipe"].items():
-        values = np.array([getattr(recipe, name) for recipe in recipes])
-        data[name] = ("surface", values, {"long_name": meaning, "units": "1"})
+    data.update(of_recipes(recipes))
     for name, meaning in TEXTS["coordinates"].items():
         dimension = "hardness" if name == "eta" else name
         if dimension in data.dims:
-            data[name] = (dimension, np.array(COORDINATES[name]), {"long_name": meaning, "units": "1"})
+            data[name] = variable(dimension, np.array(COORDINATES[name]), meaning)
+    if kind == "elastic":
+        data["stiffness"] = variable(data.force.dims, stiffness(data), STIFFNESS)
     engine = ", ".join(sorted({str(content["engine"]) for content in found}))
     method = f"{engine}: conjugate gradients of Polonsky and Keer"
     if kind == "hardness":
         method = "mbma_tables.laws.boundary_elements: projected conjugate gradients"
     made_by = {"engine": engine, "numpy": ", ".join(sorted({str(content["numpy"]) for content in found}))}
-    data.attrs = {
-        "Conventions": "CF-1.11",
-        "title": texts["title"],
-        "institution": "mbma_tables contributors",
-        "source": f"{method}, force control, tolerance {TOLERANCE:g}; periodic, frictionless, without adhesion",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate boundary_elements --of {kind} "
-        "--collect",
-        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
-        "comment": TEXTS["files"]["comment"] + texts["comment"],
-        "versions": json.dumps(versions() | made_by),
-        "code_sha256": source_digest((*TEXTS["files"]["modules"], *texts["modules"])),
-        "surfaces_planned": len(tasks),
-        "surfaces_solved": len(found),
-    }
+    data.attrs = attributes(
+        texts["title"],
+        f"{method}, force control, tolerance {TOLERANCE:g}; periodic, frictionless, without adhesion",
+        f"boundary_elements --of {kind} --collect",
+        (*TEXTS["files"]["modules"], *texts["modules"]),
+        references="area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
+        comment=TEXTS["files"]["comment"] + texts["comment"],
+        versions=json.dumps(versions() | made_by),
+        surfaces_planned=len(tasks),
+        surfaces_solved=len(found),
+    )
     return data
-
-
-def collect(data: xr.Dataset, target: pathlib.Path) -> int:
-    """Write the file; the number of surfaces in it."""
-    encoding: dict[str, dict[str, Any]] = {str(name): {"zlib": True, "complevel": 9} for name in data.data_vars}
-    encoding |= {str(name): {"_FillValue": None} for name in data.coords}
-    partial = target.with_suffix(".partial")
-    data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
-    partial.replace(target)
-    return int(data.sizes["surface"])
 
 
 @click.command()
 @click.option("--of", "kind", type=click.Choice(list(SOLVERS)), default="elastic", show_default=True)
 @click.option("--folder", type=click.Path(path_type=pathlib.Path), help="One file a surface.  [default: its kind]")
-@click.option("--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write this netCDF file, no runs.")
+@click.option("--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write into this file, no runs.")
 @click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 def boundary_elements(
@@ -151,8 +174,9 @@ def boundary_elements(
     folder = folder or pathlib.Path("boundary_elements", kind)
     tasks = [task for task in campaign(kind) if task.recipe.points <= points]
     if target is not None:
-        counted = collect(dataset(tasks, folder, kind), target)
-        click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
+        data = dataset(tasks, folder, kind)
+        write_part(target, data, kind)
+        click.echo(f"{target}: {data.sizes['surface']} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers) as pool:
         run(tasks, folder, pool, functools.partial(simulate_to, solve=SOLVERS[kind]))

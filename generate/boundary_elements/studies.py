@@ -1,7 +1,6 @@
 """Further commands on simulated maps: `grids`, `measured_maps`, `light` and `gaps`."""
 
 import dataclasses
-import io
 import itertools
 import pathlib
 import time
@@ -11,17 +10,19 @@ from typing import Any
 import click
 import numpy as np
 import pandas as pd
+import xarray as xr
 from tqdm import tqdm
 
+from generate.boundary_elements.run import TEXTS, attributes, collected, of_recipes
 from generate.boundary_elements.solve import LOADS, Contact, load_at, prepared, pressed
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, Recipe, campaign, heights
-from generate.calibrated_file import rms
-from generate.files import to_csv
+from generate.calibrated_file import rms, variable, write_part
 from generate.timing import seconds_of_work
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
+from mbma_tables.data import FILE
 from mbma_tables.laws import boundary_elements
 from mbma_tables.laws.bearing_curve import bearing
 from mbma_tables.laws.gas import mean_inverse
@@ -34,7 +35,7 @@ GRIDS = (32, 64, 128, 256, 512, 1024)  # points a side; 60 of the shortest waves
 STARTS = ("cold", "continued")
 COLUMNS = ("hurst", "zeta_1", "waves", "seed", "points", "start", "force", "area", "mean_separation", "seconds", "cost")
 HEAD = """\
-# Held-out surfaces of boundary_elements.nc on grids of 32 to 1024 points a side, by python -m generate grids.
+# Held-out surfaces of the group elastic on grids of 32 to 1024 points a side, by python -m generate grids.
 # force in A0 E* g, g the rms gradient of the finest grid; area A/A0, corrected for its perimeter; separation in h_rms.
 # seconds of the processor a load; cost: those over the fixed piece of work of docs/cost.md, timed before and after.
 """
@@ -92,14 +93,9 @@ def grids(target: pathlib.Path) -> None:
     rows = list[tuple[Any, ...]]()
     for grid, recipe, start in tqdm(list(itertools.product(GRIDS, surfaces, STARTS)), disable=None):
         rows += solve(recipe, grid, GRIDS[-1], start)
-    write_file(target, to_csv(HEAD, pd.DataFrame(rows, columns=COLUMNS), "%.8g"))
+    text = pd.DataFrame(rows, columns=COLUMNS).to_csv(index=False, float_format="%.8g", lineterminator="\n")
+    write_file(target, (HEAD + text).encode())
     click.echo(f"{target}: {len(rows)} loads")
-
-
-def write_arrays(target: pathlib.Path, arrays: dict[str, Any]) -> None:
-    content = io.BytesIO()
-    np.savez_compressed(content, **arrays)
-    write_file(target, content.getvalue(), make_folders=True)
 
 
 def middle(treated: Treated) -> Treated:
@@ -110,19 +106,23 @@ def middle(treated: Treated) -> Treated:
 
 @click.command()
 @click.argument("maps", nargs=-1, required=True, type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
-@click.option("--folder", type=PATH, default=DATA, show_default=True)
-def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
+@click.option("--data", type=PATH, default=FILE, show_default=True)
+def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
     """Simulate measured maps for docs/fidelity.md, read by SurfaceTopography: a few minutes each."""
+    solved = []
     for path in maps:
         treated = middle(treated_map(path, {"periodic": False}))
         surface = mirrored(treated.heights - treated.heights.mean())
         sizes = surface.shape[0] * treated.steps[0], surface.shape[1] * treated.steps[1]
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
-        found = pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi)
-        target = folder / f"measured_{path.stem}.npz"
-        write_arrays(target, found)
-        click.echo(f"{target}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
+        solved.append(found := pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
+        click.echo(f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
+    group = xr.Dataset({name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]})
+    title = f"Measured maps, at most {LARGEST} x {LARGEST} points of each and their mirror images, pressed flat"
+    source = f"{solved[0]['engine']}; periodic, frictionless, without adhesion"
+    group.attrs = attributes(title, source, "measured_maps", TEXTS["files"]["modules"])
+    write_part(data, group.assign_coords(surface=[path.stem for path in maps]), "measured")
 
 
 def light_recipes() -> list[Recipe]:
@@ -147,9 +147,9 @@ def light_contacts(recipe: Recipe) -> FloatArray:
     return rows
 
 
-def compared(recipe: Recipe, rows: FloatArray) -> FloatArray:
+def compared(recipe: Recipe, one: xr.Dataset) -> FloatArray:
     """A/A0, ln of simulated over the law's stiffness between loads, and of force at equal u; shape (3, loads - 1)."""
-    h_max, area, u = rows[0, 0], rows[1], rows[2]
+    h_max, area, u = float(one.h_max), *(one[name].values.astype(float) for name in ("area", "mean_separation"))
     face = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, 1.0, h_max)
     scale = float(face.rms_gradient)
     known = contact(face, pressure=LIGHT_LOADS * scale, theory="calibrated").mean_separation
@@ -161,12 +161,31 @@ def compared(recipe: Recipe, rows: FloatArray) -> FloatArray:
     return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
 
 
+def light_data(rows: FloatArray) -> xr.Dataset:
+    """The group of `light_contacts` of each of `light_recipes`."""
+    texts, over = TEXTS["load"], ("surface", "load")
+    data = xr.Dataset(of_recipes(light_recipes())).assign(
+        h_max=variable("surface", rows[:, 0, 0], TEXTS["surface"]["h_max"]),
+        force=variable("load", LIGHT_LOADS, texts["force"]),
+        area=variable(over, rows[:, 1], f"{texts['area']}; NaN where a single point is in contact"),
+        mean_separation=variable(over, rows[:, 2], texts["mean_separation"]),
+    )
+    title, source = "Random rough surfaces at light loads, from first contact on", "Tamaas, as the group elastic"
+    data.attrs = attributes(title, source, "light", TEXTS["files"]["modules"])
+    return data
+
+
+def each_light(data: xr.Dataset) -> Iterator[tuple[Recipe, xr.Dataset]]:
+    """Every surface of the group."""
+    return zip(light_recipes(), (data.isel(surface=k) for k in range(data.sizes["surface"])), strict=True)
+
+
 @click.command()
-@click.option("--data", type=PATH, default=DATA / "light_loads.npz", show_default=True)
+@click.option("--data", type=PATH, default=FILE, show_default=True)
 def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
-    rows = np.array([light_contacts(recipe) for recipe in tqdm(light_recipes(), disable=None)], dtype=np.float32)
-    write_arrays(data, {"loads": LIGHT_LOADS, "rows": rows})
+    rows = np.array([light_contacts(recipe) for recipe in tqdm(light_recipes(), disable=None)])
+    write_part(data, light_data(rows), "light_loads")
     click.echo(f"{data}: {rows.shape[0]} surfaces")
 
 

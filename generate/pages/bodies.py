@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from generate.boundary_elements.studies import LIGHT_BINS, LIGHT_LOADS, compared, light_recipes
+from generate.boundary_elements.studies import LIGHT_BINS, LIGHT_LOADS, compared, each_light
 from generate.calibrated_file import binned
-from generate.files import DATA, read_csv
-from generate.pages.page import Measured, panels, table
-from generate.rough_spheres import FILE, RADIUS, heights
+from generate.files import dataset
+from generate.page import Measured, panels, table
+from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Joint, Surface, flow_factors, rough_contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.law.rough_body import CELLS, mean_wavelength
@@ -38,12 +38,9 @@ def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArr
 def joints() -> Measured:
     """Stiffness at light loads against boundary elements, conductance against a usual correlation."""
     figure, (left, right) = panels(1, 2, (10, 3.8))
-    with np.load(DATA / "light_loads.npz") as known:
-        recipes = light_recipes()
-        by_waves: dict[int, list[FloatArray]] = {recipe.waves: [] for recipe in recipes}
-        for recipe, rows in zip(recipes, known["rows"].astype(float), strict=True):
-            by_waves[recipe.waves].append(compared(recipe, rows))
-    lines = []
+    by_waves, lines = dict[int, list[FloatArray]](), []
+    for recipe, one in each_light(dataset("light_loads")):
+        by_waves.setdefault(recipe.waves, []).append(compared(recipe, one))
     for waves, parts in by_waves.items():
         area, stiffness, _ = np.concatenate(parts, axis=1)
         bins = binned(area, stiffness, LIGHT_BINS)
@@ -61,10 +58,10 @@ def joints() -> Measured:
     usual, pressure = [], np.geomspace(0.1, 300, 40)
     for (name, materials), shortest in itertools.product(PAIRS.items(), SHORTEST):
         face = {"hurst": 0.8, "longest": "250 um", "shortest": shortest}
-        one = Joint(face | {"Rq": "1.6 um"}, face | {"Rq": "0.8 um"}, materials=materials, nominal_area="4 cm^2")
-        pairs = zip(*conductances(one, np.array(PRESSURES)), strict=True)
+        joint = Joint(face | {"Rq": "1.6 um"}, face | {"Rq": "0.8 um"}, materials=materials, nominal_area="4 cm^2")
+        pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
         usual.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
-        law, correlation = conductances(one, pressure)
+        law, correlation = conductances(joint, pressure)
         (line,) = left.loglog(pressure, law, label=f"{name}, {shortest}")
         left.loglog(pressure, correlation, "--", color=line.get_color())
     left.set(xlabel="pressure [MPa]", ylabel="conductance [W/(m² K)]", title="law; dashed: Cooper-Mikic-Yovanovich")
@@ -103,9 +100,9 @@ def lubrication() -> Measured:
 
 
 def spheres() -> dict[str, FloatArray]:
-    """Every simulated contact of docs/data/rough_spheres.csv, and the library's at the same approach and force."""
-    parts = []
-    for (hurst, longest, h_rms, seed), rows in read_csv(FILE.name).groupby(["hurst", "longest", "h_rms", "seed"]):
+    """Every simulated contact, and the library's at the same approach and force."""
+    parts, contacts = [], dataset("rough_spheres").to_dataframe()
+    for (hurst, longest, h_rms, seed), rows in contacts.groupby(["hurst", "longest", "h_rms", "seed"]):
         face = Surface.from_map(heights(hurst, longest, h_rms, int(seed)), 1.0, periodic=True)
         force, approach, area, radius = (rows[n].to_numpy() for n in ("force", "approach", "area", "mean_radius"))
         same, pushed = rough_contact(face, RADIUS, force=force), rough_contact(face, RADIUS, approach=approach)

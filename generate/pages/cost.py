@@ -10,7 +10,7 @@ import pandas as pd
 from generate.cost_distances import SIMULATED
 from generate.distances import HUES
 from generate.files import ROOT, read_csv
-from generate.pages.page import Measured, panels, printed
+from generate.page import Measured, panels, printed
 from mbma_tables.scenes.costs import shipped_costs
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}

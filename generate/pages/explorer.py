@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from typing import Any
 
-from generate.pages.page import Measured, table
+from generate.page import Measured, table
 from mbma_tables import Surface
 from mbma_tables.export.explorer import explorer_page
 

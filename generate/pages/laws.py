@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from generate.boundary_elements.evidence import Capped, capped
 from generate.boundary_elements.surfaces import REFINEMENT, SPLITS, TRAINING
@@ -14,8 +15,8 @@ from generate.calibrated_file import binned
 from generate.calibrated_hardness import BARS, blind
 from generate.files import dataset
 from generate.leakage_flow import Flow, cases
-from generate.leakage_law import EDGES, EVIDENCE, LARGE, errors, noise_floor, summary
-from generate.pages.page import Measured, panels, spans, table
+from generate.leakage_law import EDGES, LARGE, errors, noise_floor, summary
+from generate.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact, materials
 from mbma_tables.answers.leakage_table import GROUP, shipped_flow
 from mbma_tables.common.arguments import FloatArray
@@ -57,7 +58,7 @@ RATIOS = ("elastic area over true", "elastic force over true")
 
 def calibrated() -> Measured:
     """Accuracy and constants that `python -m generate calibrated` stored."""
-    data = dataset(shipped_file("calibrated.nc"))
+    data = xr.load_dataset(shipped_file("calibrated.nc"))
     edges, sets = (*data.contact_low.values, data.contact_high.values[-1]), data.attrs["sets"].split("; ")
     words = [functools.reduce(lambda text, pair: text.replace(*pair), WORDS.items(), name) for name in SETS]
     parts, header = {}, f"surfaces, and what is known of them | {spans(edges)}"
@@ -97,7 +98,7 @@ def bars(stored: str) -> str:
 
 def refinement() -> str:
     """Errors of raw and corrected areas on coarse grids against the finest, by points a shortest wave and contact."""
-    data = dataset("boundary_elements.nc")
+    data = dataset("elastic")
     one = data.isel(surface=data.split.values == SPLITS.index(REFINEMENT))
     finest, spacings = one.points.values == one.points.values.max(), one.points / (one.zeta_1 * one.waves)
     rows = []
@@ -116,7 +117,7 @@ def refinement() -> str:
 
 def leakage() -> Measured:
     """Deviations of leakage laws from simulation, and their curves."""
-    seen = cases(dataset(EVIDENCE))
+    seen = cases(dataset("leakage"))
     parts = {"accuracy": leakage_accuracy(), "cells": of_cells(seen), "floor": floor()}
     return parts, {"docs/figures/leakage.svg": draw_leakage(seen)}
 
@@ -204,7 +205,7 @@ def draw_leakage(seen: Sequence[Any]) -> Any:
 
 def yielding() -> Measured:
     """When a contact is elastic, how accurate the law with a hardness is, metals."""
-    seen, (_, attributes) = capped(dataset("hardness.nc")), shipped_part("hardness")
+    seen, (_, attributes) = capped(dataset("hardness")), shipped_part("hardness")
     ratios = simulated(seen)
     rows = [[psi, *((v.mean(), v.std()) for v in ratios[1:, ratios[0] == psi])] for psi in np.unique(ratios[0])]
     header = f"psi | {RATIOS[0]}, equal force | {RATIOS[1]}, equal u | yielded share"

@@ -17,7 +17,7 @@ from generate.boundary_elements.evidence import MIN_WAVES
 from generate.boundary_elements.surfaces import TRAINING
 from generate.files import ROOT, evidence
 from generate.formulas.printing import HEADER, latex_steps, read_functions
-from generate.pages.page import Measured, duration, panels, table
+from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.plots import draw_compression, theory_label

@@ -10,7 +10,7 @@ from generate.machined.campaign import FORMS
 from generate.machined.coverage import left_out
 from generate.machined.errors import QUANTITIES, coverage, errors, seen
 from generate.machined.makers import FAMILIES, Part, heights
-from generate.pages.page import Measured, panels, table
+from generate.page import Measured, panels, table
 from mbma_tables.common.arguments import FloatArray
 
 NAMES = {"simulated": "simulation", "law": "law of hardness on the simulated elastic contact"}
@@ -98,7 +98,7 @@ def _figure(data: xr.Dataset) -> Any:
 
 def measure() -> Measured:
     """The tables."""
-    data, lines = dataset("machined.nc"), []
+    data, lines = dataset("machined"), []
     for form in FORMS:
         for valid, name in ((True, "valid"), (False, "not valid")):
             found = [coverage(data, form, quantity, valid) for quantity in QUANTITIES]

@@ -12,7 +12,7 @@ from scipy.signal import resample
 
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, Recipe, heights
 from generate.files import ROOT, dataset, read_csv, to_csv
-from generate.pages.page import Measured, printed, table
+from generate.page import Measured, printed, table
 from mbma_tables import Surface, contact
 from mbma_tables.answers.measurement import curves, draw
 from mbma_tables.common.arguments import FloatArray
@@ -124,7 +124,7 @@ def ratios(
 
 def simulated() -> Iterator[Seen]:
     """Held-out surfaces by name, as maps, with F/(A0 E*), A/A0 and u of boundary elements."""
-    data = dataset("boundary_elements.nc")
+    data = dataset("elastic")
     kinds = data.kind.attrs["flag_meanings"].split()
     order = [KINDS.index(kinds[k]) if kinds[k] in KINDS else -1 for k in data.kind.values]
     for one in (data.isel(surface=number) for number in np.lexsort((data["shape"].values, np.array(order)))):

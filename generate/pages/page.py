@@ -23,6 +23,7 @@ from mbma_tables.common.plots import new_figure, to_picture
 
 PAGES = {
     **{name: f"library:{name}" for name in ("architecture", "formula", "readme", "tables", "theories")},
+    "data": "fidelity:data",
     **{name: f"bodies:{name}" for name in ("joints", "lubrication", "rough_bodies")},
     **{name: f"{name}:measure" for name in ("cost", "explorer", "fidelity", "machined", "stability")},
     **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "laws:yielding"},
@@ -82,6 +83,11 @@ def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> st
 
     lines = [header.split(" | "), ["---"] * (header.count(" | ") + 1), *(map(cell, itertools.count(), r) for r in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def percent(value: float) -> str:
+    """A fraction in percent to two digits; a dash where it is not finite."""
+    return f"{float(f'{100 * value:.2g}'):g}" if math.isfinite(value) else "—"
 
 
 def duration(seconds: float) -> str:

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from generate.page import svg
 
 from generate.pages import stability as cases
-from generate.pages.page import svg
 from mbma_tables import InputError
 from mbma_tables.islands.greenwood_tripp import rigid_sphere
 

@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from generate.page import MARKED, fill
 
 from generate.__main__ import main
 from generate.files import ROOT
 from generate.pages import library, maps
-from generate.pages.page import MARKED, fill
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
 
