@@ -18,6 +18,7 @@ from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, in_unit, resolve
+from mbma_tables.law import block as at
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.leakage import LeakageLaw
@@ -56,6 +57,27 @@ class ExportedLaw:
     def units(self) -> Units:
         """Both units."""
         return Units(self.length, self.stress)
+
+    @property
+    def ends(self) -> bool:
+        """Whether contact ends at c = 0, and pressure is zero below."""
+        return self.law.highest == np.inf
+
+    @property
+    def c_least(self) -> float:
+        """Begin of the range of overclosures."""
+        return -np.inf if self.ends else (self.law.h_max - float(self.law.block[at.HIGHEST])) / 2
+
+    @property
+    def c_most(self) -> float:
+        """End of the range of overclosures."""
+        return (self.law.h_max - float(self.law.block[at.LOWEST])) / 2
+
+    @property
+    def c_turn(self) -> float:
+        """Overclosure at the maximum of pressure, or at full compression."""
+        law = self.law
+        return (law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 2
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:

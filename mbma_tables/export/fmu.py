@@ -20,9 +20,8 @@ from mbma_tables.common.units import factor
 from mbma_tables.export.code import BuildError, built_by
 from mbma_tables.export.exported_law import ExportedLaw
 from mbma_tables.export.law_code import AskedLaw, asked_law, code_name, text_of
-from mbma_tables.export.law_numbers import LawNumbers
 from mbma_tables.export.targets import CODE, Target
-from mbma_tables.export.text import filled
+from mbma_tables.export.text import filled, template
 from mbma_tables.surfaces.any_surface import AnySurface
 
 # names that differ in the C of both standards
@@ -84,29 +83,41 @@ def fmu(
     if target not in STANDARDS:
         raise InputError(f"target must be one of {tuple(STANDARDS)}, got {target!r}")
     code_name(name)
-    found = asked_law(surface, E_star, **asked)
-    law, variables = text_of("c-law", name, found), _variables(found)
+    found, third = asked_law(surface, E_star, **asked), target == "fmu3"
+    law, exported = text_of("c-law", name, found), found.exported
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{target} {law}')}}}"
-    parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "START": repr(_start(found.numbers))}
-    parts |= {
+    parts = STANDARDS[target] | {
+        "LAW": law,
+        "NAME": name,
+        "TOKEN": token,
+        "START": repr(_start(exported)),
         "LEAKAGE": found.more.get("leakage", ""),
-        "SLOPED": "LAW" if found.sloped is found.exported.law else "ELASTIC",
+        "SLOPED": "LAW" if found.sloped is exported.law else "ELASTIC",
+        "LEAST": "-INFINITY" if exported.ends else repr(exported.c_least),
+        "MOST": repr(exported.c_most),
+        "WRAPPER": template(f"{STANDARDS[target]['FMI']}.c"),
+        "DECLARED": template(f"{STANDARDS[target]['FMI']}.h"),
     }
-    least, most = found.numbers.c_least, found.numbers.c_most
-    parts |= {"LEAST": "-INFINITY" if found.numbers.ends else repr(least), "MOST": repr(most)}
-    parts |= {"WRAPPER": filled(f"{parts['FMI']}.c"), "DECLARED": filled(f"{parts['FMI']}.h")}
-    source, third = (
-        filled("fmu.c", {what: repr(ratio) for what, ratio in found.slopes.items()}, **parts),
-        target == "fmu3",
-    )
+    source = filled("fmu.c", {what: repr(ratio) for what, ratio in found.slopes.items()}, **parts)
     built = _binaries(name, source, third, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
     said = "\n".join((*found.said, f"binaries: {listed}"))
-    files = {"modelDescription.xml": _description(third, name, token, said, variables, found.exported)}
-    files[f"sources/{name}.c"] = source.encode()
+    files = {
+        "modelDescription.xml": _description(third, name, token, said, found),
+        f"sources/{name}.c": source.encode(),
+    }
     if third:
-        files["sources/buildDescription.xml"] = _build(name)
-    return _zipped(files | built)
+        root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+        set_ = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": name})
+        set_ = ET.SubElement(set_, "SourceFileSet", {"language": "C99"})
+        ET.SubElement(set_, "SourceFile", {"name": f"{name}.c"})
+        files["sources/buildDescription.xml"] = _xml(root)
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for path, content in (files | built).items():
+            # without the time of writing: the same law is the same file
+            archive.writestr(zipfile.ZipInfo(path), content, zipfile.ZIP_DEFLATED)
+    return stream.getvalue()
 
 
 def _binaries(name: str, source: str, third: bool, asked: str) -> dict[str, bytes]:
@@ -131,15 +142,16 @@ def _binaries(name: str, source: str, third: bool, asked: str) -> dict[str, byte
     return found
 
 
-def _start(numbers: LawNumbers) -> float:
-    return 0.0 if numbers.ends else max(0.0, numbers.c_least)
+def _start(exported: ExportedLaw) -> float:
+    return 0.0 if exported.ends else max(0.0, exported.c_least)
 
 
 def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """XML attributes of each variable, by value reference."""
-    length, stress, numbers = found.exported.length, found.exported.stress, found.numbers
-    ends = {"max": repr(numbers.c_most)} | ({} if numbers.ends else {"min": repr(numbers.c_least)})
-    asked = {"start": repr(_start(numbers)), **ends, "description": "h_max less the mean separation"}
+    exported = found.exported
+    length, stress = exported.length, exported.stress
+    asked = {"start": repr(_start(exported)), "max": repr(exported.c_most)}
+    asked |= {} if exported.ends else {"min": repr(exported.c_least)}
     outputs = {
         "pressure": (stress, "force over nominal area"),
         "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
@@ -147,17 +159,17 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
         "energy": (f"{stress} {length}", "integral of pressure over overclosure"),
         **{name: (unit, SAID[name]) for name, unit in found.more.items()},
     }
+    said = "h_max less the mean separation"
     return [
         {"name": "time", "causality": "independent", "unit": "s"},
-        {"name": "overclosure", "causality": "input", "unit": length, **asked},
+        {"name": "overclosure", "causality": "input", "unit": length, "description": said, **asked},
         *({"name": n, "causality": "output", "unit": u, "description": said} for n, (u, said) in outputs.items()),
     ]
 
 
-def _description(
-    third: bool, name: str, token: str, text: str, variables: list[dict[str, str]], exported: ExportedLaw
-) -> bytes:
+def _description(third: bool, name: str, token: str, text: str, found: AskedLaw) -> bytes:
     """modelDescription.xml of either standard."""
+    variables = _variables(found)
     root = ET.Element(
         "fmiModelDescription",
         {"fmiVersion": "3.0" if third else "2.0", "modelName": name}
@@ -170,7 +182,7 @@ def _description(
         if not third:
             ET.SubElement(ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"})
     units = ET.SubElement(root, "UnitDefinitions")
-    bases = _units(exported)
+    bases = _units(found.exported)
     for unit in dict.fromkeys(variable["unit"] for variable in variables):
         named = ET.SubElement(units, "Unit", {"name": unit})
         if unit in bases:
@@ -215,26 +227,9 @@ def _units(exported: ExportedLaw) -> dict[str, dict[str, str]]:
     }
 
 
-def _build(name: str) -> bytes:
-    root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    files = ET.SubElement(ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": name}), "SourceFileSet")
-    files.set("language", "C99")
-    ET.SubElement(files, "SourceFile", {"name": f"{name}.c"})
-    return _xml(root)
-
-
 def _xml(root: ET.Element) -> bytes:
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
-
-
-def _zipped(files: dict[str, bytes]) -> bytes:
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w") as archive:
-        for path, content in files.items():
-            # without the time of writing: the same law is the same file
-            archive.writestr(zipfile.ZipInfo(path), content, zipfile.ZIP_DEFLATED)
-    return stream.getvalue()
 
 
 TARGETS = tuple(Target(name, functools.partial(fmu, name), CODE | {"binaries"}, rows=False) for name in STANDARDS)
