@@ -22,7 +22,7 @@ from mbma_tables.scenes.specimen import Specimen
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
-DEFAULTS = {"variant": "reported", "exponential": False, "leakage": False, "check": False}
+DEFAULTS = {"variant": "reported", "leakage": False, "check": False}
 
 
 class _Target(click.ParamType[str]):
@@ -61,7 +61,6 @@ class _Export(click.Command):
 @options.optional_specimen_options
 @click.option("--rows", type=int, help="Number of rows of a table; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
-@options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option(
@@ -86,7 +85,6 @@ class _Export(click.Command):
     type=click.Choice(["here", "all", "none"]),
     help="In an FMU: for this platform, for all by zig, or none.",
 )
-@click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @options.theory_option
 @options.hardness_option
 @options.variant_option
@@ -101,10 +99,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
     given = {name: value for name, value in values.items() if value is not None and value != DEFAULTS.get(name)}
-    special = f"{target} --exponential" if "exponential" in given else target
-    kind = targets().get(special) or targets()[target]
+    kind = targets()[target]
     _refuse_unused(kind, given)
-    given.pop("exponential", None)
     if "direction" in given and "leakage" not in given:
         raise InputError("--direction is of leakage: add --leakage or leave it out")
     if target in group("CODE"):
@@ -146,8 +142,6 @@ def _law_files(target: Target, out: Path, joint: dict[str, Any], given: dict[str
     """Contents of the files of one surface's law."""
     if target.end and out.suffix != target.end:
         raise InputError(f"--out of {target.name} must be NAME{target.end}, got {out.name!r}")
-    if str(out) == "-" and not target.alone:
-        raise InputError(f"{target.name} is two files: --out must be that of the first")
     files = target.files(*_rows(target, out, joint, given), **given) if target.rows else target.files(**joint, **given)
     if str(out) == "-":
         return {out: files[""]}

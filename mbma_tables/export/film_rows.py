@@ -20,13 +20,6 @@ NEAREST = 1e-9  # smallest overclosure evaluated, over h_max
 NAMES = ("phi_x", "phi_y", "shear_x", "shear_y", "pressure")
 
 
-def facts_of(exported: ExportedLaw, **more: tuple[float, str]) -> dict[str, tuple[float, str]]:
-    """Numbers of a joint required by some programs, with their units."""
-    surface = exported.surface
-    own = {"h_rms": (float(surface.h_rms), exported.length), "rms_gradient": (float(surface.rms_gradient), "1")}
-    return own | {"E_star": (exported.modulus, exported.stress)} | more
-
-
 def film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float, peklenik: float | None) -> LawTable:
     """Flow factors and asperity pressure at mean gaps whose ratios are equal."""
     h_rms, h_max, length, stress = float(exported.surface.h_rms), exported.law.h_max, exported.length, exported.stress
@@ -51,7 +44,7 @@ def film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float,
         *_of_film(found, length),
         end=h_max - min(u[0], h_max * (1 - NEAREST)),
     )
-    facts = facts_of(exported, peklenik=(found.peklenik, "1"))
+    facts = exported.facts | {"peklenik": (found.peklenik, "1")}
     y, unit = columns.pop("phi_x")
     names, theory = ("mean_separation", "phi_x"), exported.law.theory
     return LawTable(u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts)

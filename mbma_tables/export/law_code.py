@@ -36,6 +36,7 @@ static const struct {{
 }};
 static const mbma_law {name} = {{&{name}_DATA.head, {name}_DATA.rows, {name}_DATA.records, {records} - 1}};
 """  # of a law in C
+MODELICA_NAMES = r"\b(?<!type )(\w+)(?:\[[^]]*\])? = [-\d{]|function (\w+)"
 # functions that other files see, where they are made
 _MADE = re.compile(r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M)
 
@@ -168,10 +169,11 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
     """The text of a target's own file, or of another template of it."""
     language, exported = LANGUAGES[target], asked.exported
     yields, leaks = asked.sloped is not exported.law, asked.more.get("leakage", "")
-    if yields and language.array is not None:
+    nested = target == "modelica-law"
+    if yields and language.array is not None and not nested:
         raise InputError(
             f"{target} has no place for an unloading stiffness, which conductance and tangential stiffness of yielded "
-            "contact follow: leave the hardness out, or take c-law, fortran-law, javascript-law or an FMU"
+            "contact follow: leave the hardness out, or take c-law, fortran-law, javascript-law, modelica-law or an FMU"
         )
     lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
     lines.append(_example(exported, language))
@@ -197,16 +199,30 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
     if language.array is None:
         parts |= _core(target, name, asked)
     else:
-        laws = {"": law_numbers(exported.law)} | ({"flow_": flow_numbers(exported.leakage)} if leaks else {})
-        for prefix, found in laws.items():
-            parts[f"{prefix}records".upper()] = str(found["centre"].size)
-            for what, value in found.items():
-                text = str(value) if isinstance(value, int) else ""
-                text = text or (language.number(value) if isinstance(value, float) else language.array(value))
-                parts[f"{prefix}{what}".upper()] = text
+        parts |= _numbers(language, "", law_numbers(exported.law))
+        if leaks:
+            parts |= _numbers(language, "flow_", flow_numbers(exported.leakage))
+        if nested:
+            parts["SLOPED"] = "elastic.elastic_tangent" if yields else "tangent"
+        if yields:
+            own = parts | _numbers(language, "", law_numbers(asked.sloped)) | {"NAME": "elastic", "HEADER": ""}
+            text = filled(language.template, **own | {"LEAKAGE": "", "ELASTIC": ""}).strip()
+            # some tools confuse names of a package with those of one in it
+            names = "|".join(constant or function for constant, function in re.findall(MODELICA_NAMES, text))
+            parts["ELASTIC"] = re.sub(rf"\b({names})\b", r"elastic_\1", text)
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts)
     return filled(language.template, each, **parts)
+
+
+def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[str, str]:
+    """Numbers of a law by their placeholders."""
+    assert language.array is not None
+    texts = {"RECORDS": str(numbers["centre"].size)}
+    for what, value in numbers.items():
+        text = str(value) if isinstance(value, int) else ""
+        texts[what.upper()] = text or (language.number(value) if isinstance(value, float) else language.array(value))
+    return {f"{prefix}{what}".upper(): text for what, text in texts.items()}
 
 
 def _core(target: str, name: str, asked: AskedLaw) -> dict[str, str]:
@@ -280,7 +296,6 @@ TARGETS = tuple(
         functools.partial(law_files, name),
         CODE - {"leakage"} if language.subroutine else CODE,
         rows=False,
-        alone=name != "fortran-law",
     )
     for name, language in LANGUAGES.items()
 )

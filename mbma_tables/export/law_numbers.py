@@ -33,9 +33,16 @@ VALUES, SLOPES, FLAT = 2e-14, 4e-13, 1e-4
 def flow_numbers(leakage: LeakageLaw) -> dict[str, Any]:
     """Numbers of a law's leakage, by name."""
     head, ((x, records), *_) = leakage.block, _sides(leakage.block)
-    numbers: dict[str, Any] = {"blocked": -float(head[at.H_MAX]), "scale": float(head[SCALE]), "power": float(head[POWER_F])}
-    numbers |= {"h_rms": leakage.h_rms, "edges": x[1:], "centre": records[:, CENTRE], "rate": records[:, RATE]}
-    return numbers | {"p": records[:, FORCE_AT:AREA_AT]}
+    return {
+        "blocked": -float(head[at.H_MAX]),
+        "scale": float(head[SCALE]),
+        "power": float(head[POWER_F]),
+        "h_rms": leakage.h_rms,
+        "edges": x[1:],
+        "centre": records[:, CENTRE],
+        "rate": records[:, RATE],
+        "p": records[:, FORCE_AT:AREA_AT],
+    }
 
 
 def law_numbers(law: ContactLaw) -> dict[str, Any]:

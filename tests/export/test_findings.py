@@ -135,16 +135,6 @@ def test_calculix_does_not_read_tabular_surface_to_surface(rows, tmp_path):
     assert "no force at up to 41 rows, without a message, and from 50 rows on it aborts" in text
 
 
-def test_the_exponential_card_states_its_limits():
-    text = solvers.exponential(Surface.named("concrete"), "13.3 MPa")
-    for share, p in re.findall(r"(\d+)% up to p = ([\d.e-]+)", text):
-        c0, p0 = map(float, text.splitlines()[-1].split(", "))
-        found = contact(Surface.named("concrete"), pressure=float(p), E_star="13.3 MPa", theory="persson")
-        written = p0 * np.exp((1.1 - found.mean_separation) / (c0 / np.log(100)))
-        assert abs(written / float(p) - 1) == pytest.approx(float(share) / 100, rel=0.05)
-    assert text.count("up to p") == 2
-
-
 JAX = """
 import json
 import jax

@@ -122,7 +122,7 @@ test_requests_that_are_refused = refusals(
     lambda target, law, options: law_points.text(target, law, **options),
     *((target, "calibrated", HEAT | {"leakage": True}, "has no place for leakage") for target in SUBROUTINES),
     *((f"{code}-gapcon", "mbma", {}, "conductance needs conductivity") for code in ("abaqus", "calculix")),
-    *((f"{code}-law", "hardened", HEAT, "leave the hardness out") for code in ("jax", "modelica")),
+    ("jax-law", "hardened", HEAT, "leave the hardness out"),
     ("c-law", "calibrated", {"kappa": 3.0}, "kappa must be"),
     ("cobol-law", "mbma", {}, "target must be one of"),
     ("c-law", "mbma", {"name": "1 x"}, "a name must be a letter"),
@@ -446,7 +446,7 @@ end Ask;
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["mbma", "calibrated"])
+@pytest.mark.parametrize("name", ["mbma", "calibrated", "hardened"])
 def test_modelica(name, tmp_path):
     rumoca, known = pytest.importorskip("rumoca"), points(name)
     text, answers = law_points.text("modelica-law", name, name="road", leakage=True, kappa=KAPPA, **HEAT), []
