@@ -32,19 +32,8 @@ MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotrop
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
-def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms: bool) -> Any:
-    """The numbers of an option in the specimen's units."""
-    if not over_h_rms:
-        return finite_array(name, specimen.units.number(name, given))
-    named = [text for text in given if isinstance(text, str)]
-    if named:
-        raise InputError(f"--over-h-rms is about multiples of h_rms, which have no unit, got {', '.join(named)}")
-    return finite_array(name, given) * specimen.surface.h_rms
-
-
 @click.command("contact", short_help="Pressure and area at given gaps, pressures or areas.")
 @options.load_options(options.numbers_option)
-@options.over_h_rms
 @options.leakage_option
 @options.numbers_option(
     "--conductivity", help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'."
@@ -54,7 +43,6 @@ def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms
 @options.output_options
 def contact_command(
     loads: dict[str, list[float | str]],
-    over_h_rms: bool,
     leakage: bool,
     conductivity: list[float | str] | None,
     specimen: Specimen,
@@ -72,11 +60,9 @@ def contact_command(
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
     ((name, numbers),) = loads.items()
-    if over_h_rms and name in ("pressure", "area"):
-        raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
     from mbma_tables.answers.contact import contact
 
-    known = {name: _numbers(name, numbers, specimen, over_h_rms)}
+    known: dict[str, Any] = {name: finite_array(name, specimen.units.number(name, numbers))}
     answer = contact(specimen.surface, **known, **model.keywords(specimen))
     yields = ("yielded", "unloading_stiffness") if model.yields else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
@@ -166,12 +152,11 @@ def curve_command(
 
 @click.command("island", short_help="Contact islands at given approaches.")
 @options.numbers_option("--delta", help="Approach z_max - d of an island [length], positive; may be repeated.")
-@options.over_h_rms
 @options.specimen_options
 @options.model_options
 @options.output_options
 def island_command(
-    delta: list[float | str] | None, over_h_rms: bool, specimen: Specimen, model: options.Model, output: options.Output
+    delta: list[float | str] | None, specimen: Specimen, model: options.Model, output: options.Output
 ) -> None:
     """Band, radii, densities, force and area of contact islands at given approaches.
 
@@ -184,7 +169,7 @@ def island_command(
     from mbma_tables.totals.island import island
 
     asked = {name: value for name, value in model.keywords(specimen).items() if name != "theory"}
-    answer = island(specimen.surface, _numbers("delta", delta, specimen, over_h_rms), **asked)
+    answer = island(specimen.surface, finite_array("delta", specimen.units.number("delta", delta)), **asked)
     values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")}
     units = {name: unit_of(f"island_{name}", specimen.units) for name in ("force", "area")}
     report_answer("island", specimen, model, answer, values, units).write(output)

@@ -92,8 +92,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law), subroutines of solvers
-    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of FMI 2 (fmu) or 3 (fmu3); c, fortran and
-    javascript are the whole model as code, of the paper's variants reported and printed.
+    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of FMI 2 (fmu); c, fortran and javascript are
+    the whole model as code, of the paper's variants reported and printed.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """

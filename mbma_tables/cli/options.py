@@ -183,7 +183,6 @@ length_unit = functools.partial(
     click.option, "--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."
 )
 stress_unit_option = _option("stress_unit", "Unit of plain moduli and of the answer, such as MPa.", metavar="UNIT")
-over_h_rms = _option("over_h_rms", "The lengths given are multiples of h_rms.", is_flag=True)
 
 _SPECIMEN_OPTIONS = (
     _option(
@@ -291,7 +290,7 @@ plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PA
 
 # headings of help, and the options below them; others are below "Options"
 _SECTIONS = {
-    "What is known": "separation mean_separation pressure area over_h_rms",
+    "What is known": "separation mean_separation pressure area",
     "Surface": "surface file map",
     "Measured map": f"{' '.join(specimens.MAP_OPTIONS)} model",
     "Surface in numbers": "hurst q0 q1 zeta_1 h_rms h_max nominal_area m0 m2 m4",
