@@ -180,13 +180,6 @@ class Yielding(Theory):
             self._bound = surface, (eta, functools.partial(law.closed, self.elastic.heights(surface), *sizes))
         return self._bound[1]
 
-    def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Mean separations [length] of the elastic contact at the forces of this one."""
-        pressure = self.curve(surface, "pressure")(mean_separation)[0]
-        # theories without last contact have force at every gap
-        least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
-        return np.asarray(self.elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0])
-
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
         low, high = self.elastic.interval(surface, "pressure")
