@@ -13,7 +13,7 @@ import pandas as pd
 import xarray as xr
 from tqdm import tqdm
 
-from generate.boundary_elements.run import TEXTS, attributes, collected, of_recipes
+from generate.boundary_elements.run import TEXTS, collected, group, of_recipes
 from generate.boundary_elements.solve import LOADS, Contact, load_at, prepared, pressed
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, Recipe, campaign, heights
 from generate.calibrated_file import rms, variable, write_part
@@ -116,13 +116,13 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
         sizes = surface.shape[0] * treated.steps[0], surface.shape[1] * treated.steps[1]
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
-        solved.append(found := pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
-        click.echo(f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
-    group = xr.Dataset({name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]})
-    title = f"Measured maps, at most {LARGEST} x {LARGEST} points of each and their mirror images, pressed flat"
-    source = f"{solved[0]['engine']}; periodic, frictionless, without adhesion"
-    group.attrs = attributes(title, source, "measured_maps", TEXTS["files"]["modules"])
-    write_part(data, group.assign_coords(surface=[path.stem for path in maps]), "measured")
+        solved.append(pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
+        click.echo(
+            f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(solved[-1]['anisotropy']):.3g}"
+        )
+    found = {name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]}
+    own = group("measured", found, engine=str(solved[0]["engine"])).assign_coords(surface=[path.stem for path in maps])
+    write_part(data, own, "measured")
 
 
 def light_recipes() -> list[Recipe]:
@@ -147,10 +147,10 @@ def light_contacts(recipe: Recipe) -> FloatArray:
     return rows
 
 
-def compared(recipe: Recipe, one: xr.Dataset) -> FloatArray:
+def compared(one: xr.Dataset) -> FloatArray:
     """A/A0, ln of simulated over the law's stiffness between loads, and of force at equal u; shape (3, loads - 1)."""
     h_max, area, u = float(one.h_max), *(one[name].values.astype(float) for name in ("area", "mean_separation"))
-    face = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, 1.0, h_max)
+    face = Surface(float(one.hurst), 1.0, float(one.zeta_1), 1.0, h_max)
     scale = float(face.rms_gradient)
     known = contact(face, pressure=LIGHT_LOADS * scale, theory="calibrated").mean_separation
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -161,32 +161,17 @@ def compared(recipe: Recipe, one: xr.Dataset) -> FloatArray:
     return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
 
 
-def light_data(rows: FloatArray) -> xr.Dataset:
-    """The group of `light_contacts` of each of `light_recipes`."""
-    texts, over = TEXTS["load"], ("surface", "load")
-    data = xr.Dataset(of_recipes(light_recipes())).assign(
-        h_max=variable("surface", rows[:, 0, 0], TEXTS["surface"]["h_max"]),
-        force=variable("load", LIGHT_LOADS, texts["force"]),
-        area=variable(over, rows[:, 1], f"{texts['area']}; NaN where a single point is in contact"),
-        mean_separation=variable(over, rows[:, 2], texts["mean_separation"]),
-    )
-    title, source = "Random rough surfaces at light loads, from first contact on", "Tamaas, as the group elastic"
-    data.attrs = attributes(title, source, "light", TEXTS["files"]["modules"])
-    return data
-
-
-def each_light(data: xr.Dataset) -> Iterator[tuple[Recipe, xr.Dataset]]:
-    """Every surface of the group."""
-    return zip(light_recipes(), (data.isel(surface=k) for k in range(data.sizes["surface"])), strict=True)
-
-
 @click.command()
 @click.option("--data", type=PATH, default=FILE, show_default=True)
 def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
-    rows = np.array([light_contacts(recipe) for recipe in tqdm(light_recipes(), disable=None)])
-    write_part(data, light_data(rows), "light_loads")
-    click.echo(f"{data}: {rows.shape[0]} surfaces")
+    recipes, over, texts = light_recipes(), ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
+    h_max, area, u = np.array([light_contacts(recipe) for recipe in tqdm(recipes, disable=None)]).swapaxes(0, 1)
+    columns = {"h_max": ("surface", h_max[:, 0]), "force": ("load", LIGHT_LOADS), "area": (over, area.astype("f4"))}
+    columns["mean_separation"] = over, u.astype("f4")
+    found = {name: variable(*column, texts[name]) for name, column in columns.items()}
+    write_part(data, group("light_loads", of_recipes(recipes) | found), "light_loads")
+    click.echo(f"{data}: {len(recipes)} surfaces")
 
 
 def gap_errors(kind: str) -> pd.DataFrame:

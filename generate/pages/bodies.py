@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from generate.boundary_elements.studies import LIGHT_BINS, LIGHT_LOADS, compared, each_light
+from generate.boundary_elements.run import surfaces
+from generate.boundary_elements.studies import LIGHT_BINS, LIGHT_LOADS, compared
 from generate.calibrated_file import binned
 from generate.files import dataset
 from generate.page import Measured, panels, table
@@ -39,8 +40,8 @@ def joints() -> Measured:
     """Stiffness at light loads against boundary elements, conductance against a usual correlation."""
     figure, (left, right) = panels(1, 2, (10, 3.8))
     by_waves, lines = dict[int, list[FloatArray]](), []
-    for recipe, one in each_light(dataset("light_loads")):
-        by_waves.setdefault(recipe.waves, []).append(compared(recipe, one))
+    for one in surfaces(dataset("light_loads")):
+        by_waves.setdefault(int(one.waves), []).append(compared(one))
     for waves, parts in by_waves.items():
         area, stiffness, _ = np.concatenate(parts, axis=1)
         bins = binned(area, stiffness, LIGHT_BINS)
