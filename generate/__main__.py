@@ -15,7 +15,7 @@ from mbma_tables.common.errors import MbmaError
 COMMANDS = {
     **{
         name: f"generate.{name}"
-        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "score", "wheels")
+        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
     },
     **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
     "boundary_elements": "generate.boundary_elements.run",
