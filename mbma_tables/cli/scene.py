@@ -30,7 +30,7 @@ def plan_command(file: Path, as_json: bool) -> None:
 
     Example: mbma plan examples/scene_joint.toml
     """
-    from mbma_tables.scenes.scene import Scene, advice
+    from mbma_tables.scenes.scene import Scene
 
     scene = Scene.from_toml(file)
     if not as_json:
@@ -45,7 +45,6 @@ def plan_command(file: Path, as_json: bool) -> None:
         "steps": [vars(step) | {"island_model": step.island_model_name} for step in plan.steps],
         "left_out": plan.left_out,
         "switched_off": plan.switched_off,
-        "advice": advice(scene).strip(),
     }
     echo(to_json(content))
 
