@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, nearest, number_in, require_flag
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights, one_height
@@ -25,6 +25,7 @@ from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, OPTIONS, Treated,
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
 WINDOW_OVERLAP = (35 / 18) ** 2  # Fourier components under that window that count as one independent component
+MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
 S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
 
@@ -77,8 +78,20 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     return treat(grid, steps, whole, Treatment(**given), own, info)
 
 
-def points_of_fit(treated: Treated) -> dict[str, Any]:
-    """Arguments of `fit_spectrum` from a height map: rings of its spectrum."""
+def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:
+    """Arguments of `fit_spectrum`: rings of a map's spectrum, else the samples."""
+    treated, known = surface.map, surface.bearing
+    if known is not None and known.slope_kurtosis > MAX_KURTOSIS:
+        raise NotSelfAffineError(
+            f"the map's slopes lie in a few edges or spikes: their kurtosis is {known.slope_kurtosis:.3g}, "
+            f"more than {MAX_KURTOSIS:g} (3: Gaussian)"
+        )
+    if treated is None:
+        q, C = surface.q, surface.C
+        width = np.diff(q, prepend=q[0]) + np.diff(q, append=q[-1])
+        counts = np.ones(q.size) if surface.samples is None else surface.samples
+        given = {"q": q, "C": C, "counts": counts, "variances": np.pi * C * q * width}
+        return {name: values[C > 0] for name, values in given.items()} | {"low": float(q[0])}
     # heights of order one, so that their squares neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
     q, C, waves = _within_band(treated, 1.0, radial_spectrum(treated.windowed() / scale, *treated.steps))

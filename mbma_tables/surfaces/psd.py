@@ -24,6 +24,7 @@ MAX_RESIDUAL = 0.2  # deviation of log10 C, a factor 1.6: larger ones make the f
 MAX_HURST_ERROR = 0.1  # the model's results at H and H +- 0.1 differ by tens of percent
 MAX_EXCESS = 10.0  # C over the law in a single bin; random with a probability below 1e-4
 MAX_PEAK = 100.0  # C over both its neighbourhoods; random in single samples with a probability of 2e-4
+MAX_ANISOTROPY = 1.36  # twice the mean squared gradient one way than across it
 MIN_VARIANCE_SHARE = 0.1  # a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
 
 
@@ -171,7 +172,13 @@ def _checked(band: Any, low: float, high: float) -> tuple[float, float] | None:
 
 
 def fit_spectrum(
-    q: FloatArray, C: FloatArray, counts: FloatArray, variances: FloatArray, low: float, band: Any
+    q: FloatArray,
+    C: FloatArray,
+    counts: FloatArray,
+    variances: FloatArray,
+    low: float,
+    band: Any,
+    anisotropy: float | None,
 ) -> dict[str, Any]:
     """Numbers of the `Surface` whose band fits C of the paper's convention, with their `fit`.
 
@@ -223,7 +230,7 @@ def fit_spectrum(
     )
     below = every[every.q <= fit.q_high]
     _refuse_peak(below.q, beyond(below), MAX_EXCESS, f"the power law between {fit.q_low:.4g} and {fit.q_high:.4g}")
-    _refuse_poor(fit, forced=band is not None)
+    _refuse_poor(fit, anisotropy or 1.0, forced=band is not None)
     # h_rms^2 is the integral of (6) between q0 and q1
     z0, z1 = q0 / unit, q1 / unit
     growth = -math.expm1(-2 * exponent * math.log(z1 / z0)) * z0 ** (-2 * exponent)
@@ -241,7 +248,7 @@ def _refuse_peak(q: FloatArray, excess: FloatArray, limit: float, over: str) -> 
         )
 
 
-def _refuse_poor(fit: SpectrumFit, *, forced: bool) -> None:
+def _refuse_poor(fit: SpectrumFit, anisotropy: float, *, forced: bool) -> None:
     band = f"between q = {fit.q_low:.4g} and {fit.q_high:.4g}"
     faults = {
         f"the band q0 = {fit.q0:.6g}, q1 = {fit.q1:.6g} is too narrow: q1/q0 = {fit.q1 / fit.q0:.4g}, and the model "
@@ -253,6 +260,8 @@ def _refuse_poor(fit: SpectrumFit, *, forced: bool) -> None:
         f"the self-affine band holds {fit.variance_share:.2%} of the variance of height, less than "
         f"{MIN_VARIANCE_SHARE:.0%}: the rest is form or waviness; remove it, or choose the band "
         "yourself": not forced and fit.variance_share < MIN_VARIANCE_SHARE,
+        f"the map is not isotropic: its anisotropy is {anisotropy:.3g}, more than {MAX_ANISOTROPY} (rms gradient along "
+        "over across)": anisotropy > MAX_ANISOTROPY,
     }
     for fault, found in faults.items():
         if found:

@@ -9,15 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import hinted
-from mbma_tables.common.errors import InputError, NotSelfAffineError
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.power_laws import sorted_spectrum
 from mbma_tables.surfaces.self_affine import SelfAffine
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
-
-MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
-MAX_ANISOTROPY = 1.36  # twice the mean squared gradient one way than across it
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -320,24 +317,7 @@ class MeasuredSurface(SpectralSurface):
         from mbma_tables.surfaces.maps import points_of_fit
         from mbma_tables.surfaces.psd import fit_spectrum
 
-        if self.bearing is not None and self.bearing.slope_kurtosis > MAX_KURTOSIS:
-            raise NotSelfAffineError(
-                f"the map's slopes lie in a few edges or spikes: their kurtosis is {self.bearing.slope_kurtosis:.3g}, "
-                f"more than {MAX_KURTOSIS:g} (3: Gaussian)"
-            )
-        if self.map is not None:
-            points = points_of_fit(self.map)
-        else:
-            width = np.diff(self.q, prepend=self.q[0]) + np.diff(self.q, append=self.q[-1])
-            samples = np.ones(self.q.size) if self.samples is None else self.samples
-            given = {"q": self.q, "C": self.C, "counts": samples, "variances": np.pi * self.C * self.q * width}
-            points = {name: values[self.C > 0] for name, values in given.items()} | {"low": float(self.q0)}
-        numbers = fit_spectrum(**points, band=band)
-        if self.anisotropy is not None and self.anisotropy > MAX_ANISOTROPY:
-            raise NotSelfAffineError(
-                f"the map is not isotropic: its anisotropy is {self.anisotropy:.3g}, more than {MAX_ANISOTROPY} "
-                "(rms gradient along over across)"
-            )
+        numbers = fit_spectrum(**points_of_fit(self), band=band, anisotropy=self.anisotropy)
         return Surface(**numbers, h_max=self.h_max, unit=self.unit, provenance=self.provenance)
 
 
