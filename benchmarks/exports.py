@@ -17,7 +17,7 @@ from mbma_tables import Surface, contact, open_table
 from mbma_tables.export.c_code import FLAGS
 from mbma_tables.export.code import SOURCES, write_code
 from mbma_tables.theories import Mbma
-from mbma_tables.totals.island_sum import QUADRATURE_SHARE
+from mbma_tables.totals.contact import QUADRATURE_SHARE
 
 POINTS, SURFACES, GAPS = 20_000, 2000, 200
 RTOL = 1e-8

@@ -17,7 +17,7 @@ from mbma_tables.common.errors import MbmaError
 GROUPS = {
     **{
         name: f"generate.{name}"
-        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
+        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "score", "wheels")
     },
     **dict.fromkeys(("gaps", "grids", "measured_maps"), "generate.boundary_elements.studies"),
     "light": "generate.boundary_elements.light",

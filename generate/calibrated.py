@@ -11,7 +11,6 @@ from typing import Any
 import click
 import numpy as np
 import pandas as pd
-import xarray as xr
 from scipy.interpolate import CubicSpline
 
 from generate import calibrated_hardness
@@ -20,8 +19,10 @@ from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, C
 from generate.calibrated_bars import measure
 from generate.calibrated_file import QUANTITIES, by_bin, cross_validated, fitted, within
 from generate.calibrated_table import write as write_table
+from generate.files import dataset
 from generate.leakage_law import write as write_leakage
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.data import FILE
 from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum
 from mbma_tables.laws.map_curves import MAP_CONSTANTS, MapConstants
 from mbma_tables.surfaces.surface import Surface
@@ -183,13 +184,14 @@ def others(found: Sequence[Case]) -> dict[str, FloatArray]:
 
 
 @click.command()
-@click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True))
+@click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE)
 @click.option("--table", type=click.Path(path_type=pathlib.Path), help="The library's file: table and errors.")
 @click.option("--tail", is_flag=True, help="Fit the tail of light loads alone: other constants are the library's.")
-@click.option("--hardness", is_flag=True, help="EVIDENCE has capped pressures: fit what a hardness adds.")
+@click.option("--hardness", is_flag=True, help="Fit what a hardness adds, to the group of that name.")
 def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, tail: bool, hardness: bool) -> None:
     """Fit the calibrated law to the training set of EVIDENCE; its errors there and elsewhere go into the table."""
-    data, said = xr.load_dataset(evidence), "held-out errors within one and two standard deviations:"
+    data = dataset("hardness" if hardness else "elastic", evidence)
+    said = "held-out errors within one and two standard deviations:"
     if hardness:
         of_hardness, written = calibrated_hardness.write(data, table)
         click.echo(f"{of_hardness}\n{said} {written.attrs['coverage']}")

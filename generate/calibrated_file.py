@@ -11,7 +11,6 @@ import pathlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
-import netCDF4
 import numpy as np
 import xarray as xr
 from scipy.optimize import least_squares
@@ -19,7 +18,8 @@ from scipy.optimize import least_squares
 from generate.provenance import source_digest, versions
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file, written_bytes
-from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, read_sealed
+from mbma_tables.data import read_groups
+from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL
 
 QUANTITIES = ("area", "force", "stiffness")  # as the file names them: the library's "pressure" is "force" there
 FOLDS = 5
@@ -96,21 +96,10 @@ def made_by(modules: Sequence[str]) -> dict[str, str]:
     }
 
 
-def read_parts(path: os.PathLike[str] | str) -> dict[str, xr.Dataset]:
-    """The groups of a sealed file by name, its root as ""; none where there is no file."""
-    source = pathlib.Path(path)
-    if not source.exists():
-        return {}
-    read_sealed(source)  # whole and undamaged
-    with HDF5_LOCK:
-        with netCDF4.Dataset(source) as opened:
-            names = ("", *opened.groups)
-        return {name: xr.load_dataset(source, group=name or None, engine="netcdf4") for name in names}
-
-
-def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "") -> None:
+def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "/") -> None:
     """Write the root, or one group, of a file, compressed and sealed; what else the file holds stays as it is."""
-    parts = read_parts(path) | {group: data}
+    path = pathlib.Path(path)
+    parts = (read_groups(path) if path.exists() else {}) | {group: data}
     packed = {"zlib": True, "complevel": 9, "shuffle": True, "_FillValue": None}
 
     def store(name: str) -> None:
@@ -121,7 +110,7 @@ def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "") 
                     n: v.encoding.get("dtype", v.dtype) for n, v in part.variables.items() if v.dtype.kind in "fiu"
                 }
                 encoding = {n: packed | ({"dtype": kinds[n]} if n in kinds else {}) for n in part.variables}
-                part.to_netcdf(name, "a" if k else "w", engine="netcdf4", group=own or None, encoding=encoding)
+                part.to_netcdf(name, "a" if k else "w", engine="netcdf4", group=own, encoding=encoding)
 
-    body = written_bytes(pathlib.Path(path).name, store)
+    body = written_bytes(path.name, store)
     write_file(path, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n", make_folders=True)

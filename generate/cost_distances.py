@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.calibrated_file import rms
-from generate.distances import COVER, HIGH, ISLAND_MODELS, LOW, THEORIES, distances, held_out, summed_up
+from generate.distances import COVER, ISLAND_MODELS, RANGES, THEORIES, distances, held_out, summed_up
 from generate.files import read_csv, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
@@ -21,8 +21,6 @@ from mbma_tables.laws.calibrated import Law, Spectrum, area
 from mbma_tables.scenes.costs import Distance
 from mbma_tables.theories import Persson
 
-DEEP = 0.1  # A/A0: deviations are given from LOW to DEEP and from DEEP to HIGH
-RANGES = ((LOW, DEEP), (DEEP, HIGH))
 SIMULATED = "boundary elements"
 POINTS, SLOW_POINTS = 1000, 50  # of each timed surface, in one call
 SLOW = ("inverse of (19)", "exact")

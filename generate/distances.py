@@ -7,24 +7,27 @@ at equal force. They are model errors: the theories are solved to 1e-6 or better
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve
+from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve, curves_of
 from generate.calibrated import errors
 from generate.calibrated_file import QUANTITIES, rms
-from generate.files import DATA, evidence, read_csv
+from generate.files import DATA, dataset, evidence, read_csv
 from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.data import FILE
 from mbma_tables.laws.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
 from mbma_tables.laws.map_curves import MAP_CONSTANTS
 from mbma_tables.surfaces.variants import REPORTED, Variant
 
-LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
+LOW, DEEP, HIGH = 0.01, 0.1, 0.97  # A/A0 of the simulations between which distances are summed up
+RANGES = ((LOW, DEEP), (DEEP, HIGH))
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
 MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
 ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps
@@ -139,15 +142,13 @@ def rolloff(number: int) -> Case:
     return _simulated("plateau", rows, ROLLOFF[number] / h_rms, spectrum)
 
 
-def measured(name: str) -> Case:
+def measured(name: str, path: pathlib.Path = FILE) -> Case:
     """A measured map as `python -m generate measured_maps` kept it."""
-    with np.load(DATA / f"measured_{name}.npz", allow_pickle=False) as content:
-        one = dict(content)
-    share, seen = one["band_variance"], (one["area"] > 0) & (one["area"] < MAX_AREA)
-    curves = {key: one[key].astype(float) for key in ("mean_height", "top_gradient", "tension_force", "tension")}
-    spectrum = Spectrum.from_shares(one["band_q"][share > 0], share[share > 0])
-    rows = [one[key][seen] for key in ("force", "area", "mean_separation")]
-    return _simulated("measured", rows, float(one["h_max"]), spectrum, anisotropy=float(one["anisotropy"]), **curves)
+    one = dataset("measured", path).sel(surface=name)
+    seen = (one.area.values > 0) & (one.area.values < MAX_AREA)
+    spectrum = Spectrum.from_shares(one.band_q.values, one.band_variance.values)
+    rows = [one[key].values[seen] for key in ("force", "area", "mean_separation")]
+    return _simulated("measured", rows, float(one.h_max), spectrum, **curves_of(one))
 
 
 def data_sets() -> dict[str, DataSet]:

@@ -6,6 +6,8 @@ import functools
 import pathlib
 from typing import Any
 
+from mbma_tables.data import FILE, boundary_elements
+
 ROOT = pathlib.Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
 
@@ -24,16 +26,14 @@ def read_csv(name: str | pathlib.Path) -> Any:
 
 
 @functools.cache
-def dataset(path: str | pathlib.Path) -> Any:
-    """A netCDF file, by its name in docs/data or its path, in memory."""
-    import xarray as xr
-
-    return xr.load_dataset(DATA / path)
+def dataset(group: str, path: pathlib.Path = FILE) -> Any:
+    """A group of the data set of boundary-element simulations, in memory."""
+    return boundary_elements(path)[group].to_dataset()
 
 
 @functools.cache
 def evidence() -> tuple[Any, ...]:
-    """The simulated surfaces (`Case`) of docs/data/boundary_elements.nc."""
+    """The simulated surfaces (`Case`) of the data set."""
     from generate.boundary_elements.evidence import cases
 
-    return tuple(cases(dataset("boundary_elements.nc")))
+    return tuple(cases(dataset("elastic")))

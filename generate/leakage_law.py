@@ -14,12 +14,14 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import RegularGridInterpolator
 
+from generate import files
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import TheoryCurve
 from generate.calibrated_file import FOLDS, by_bin, coordinates, fitted, made_by, rms, variable, within, write_part
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.data import FILE
 from mbma_tables.laws import effective_medium as leakage
 from mbma_tables.laws.calibrated import Constants, Spectrum
 from mbma_tables.laws.effective_medium import FlowConstants
@@ -51,9 +53,7 @@ MODULES = (
     *("generate.calibrated_file", "generate.leakage_flow", "generate.leakage_law"),
 )
 PROCESSES = 2
-ROOT = pathlib.Path(__file__).parents[1]
-TABLE = ROOT / "tables" / "calibrated.nc"
-EVIDENCE = ROOT / "docs" / "data" / "leakage.nc"
+TABLE = files.ROOT / "tables" / "calibrated.nc"
 
 
 def fit(training: Sequence[Flow], first: FlowConstants = DEFAULT) -> FlowConstants:
@@ -190,7 +190,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     simulated, beyond = certificate(values, constants, contact)
     data.attrs = {
         "title": "Flow coefficient of gaps: contact factor of an effective medium, and its errors against simulation",
-        "source": "mbma_tables.laws.effective_medium, its constants fitted to the training set of docs/data/leakage.nc",
+        "source": "mbma_tables.laws.effective_medium, its constants fitted to a training set of simulated flow",
         "references": "docs/leakage.md",
         "theories": " ".join(stated),
         "laws": "; ".join(LAWS),
@@ -233,15 +233,15 @@ def coverage(flows: Sequence[Flow], constants: FlowConstants, stated: FloatArray
     return within((miss / np.interp(area, middle, stated[:, 1]))[area < leakage.LARGEST_AREA])
 
 
-def write(path: pathlib.Path, evidence: pathlib.Path = EVIDENCE) -> xr.Dataset:
+def write(path: pathlib.Path, evidence: pathlib.Path = FILE) -> xr.Dataset:
     """Fit, and write the group into the calibrated law's file; what it holds."""
-    made = dataset(cases(xr.load_dataset(evidence)), load(path).constants)
+    made = dataset(cases(files.dataset("leakage", evidence)), load(path).constants)
     write_part(path, made, GROUP)
     return made
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=EVIDENCE)
+@click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE)
 @click.option(
     "--table", type=click.Path(path_type=pathlib.Path, exists=True), default=TABLE, help="The library's file."
 )

@@ -11,10 +11,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.interpolate import CubicSpline
 
 from generate.boundary_elements import capped
 from generate.boundary_elements.design import SPLITS, Task
+from generate.boundary_elements.surfaces import Recipe
+from generate.calibrated_file import Variable, variable
 from generate.provenance import source_digest, versions
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws import bearing_curve as bearing
 from mbma_tables.laws.boundary_elements import TOLERANCE
@@ -24,9 +28,10 @@ DIMENSIONS = ("surface", "load", "quantile", "top", "band", "band_or_end", "axis
 COORDINATES: dict[str, Any] = {"quantile": bearing.QUANTILES, "top": bearing.FRACTIONS, "eta": capped.HARDNESSES}
 SINGLE = {"quantiles", "mean_height", "top_gradient", "tension_force", "tension", "band_energy"}  # kept to 7 digits
 LOADED = {"band_energy", "flow"}
+STIFFNESS = "-dF/du over A0 E* g/h_rms, by a cubic spline of ln u against ln F through the loads of a surface"
 
 
-def _variable(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
+def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
     """One number or curve of all surfaces; NaN where a surface has fewer loads."""
     capped_too = kind == "hardness" and name in TEXTS["hardness"]
     dimension = "hardness" if capped_too else next(d for d in DIMENSIONS if name in TEXTS[d])
@@ -44,6 +49,38 @@ def _variable(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Varia
     number = "f4" if name in SINGLE or capped_too else "f8"
     attributes = {"long_name": TEXTS[dimension][name], "units": "s" if name == "seconds" else "1"}
     return xr.Variable(["surface", *dims], values.astype(number), attributes)
+
+
+def stiffness(data: xr.Dataset) -> FloatArray:
+    """-dF/du of every surface by a spline; NaN without a gap."""
+    found = np.full(data.force.shape, np.nan)
+    for row, force, u in zip(found, data.force.values, data.mean_separation.values, strict=True):
+        known = u > 0
+        log_u = CubicSpline(np.log(force[known]), np.log(u[known]))
+        row[known] = -force[known] / (u[known] * log_u.derivative()(np.log(force[known])))
+    return found
+
+
+def of_recipes(recipes: Sequence[Recipe]) -> dict[str, Variable]:
+    """What random surfaces are made of."""
+    return {
+        name: variable("surface", np.array([getattr(recipe, name) for recipe in recipes]), meaning)
+        for name, meaning in TEXTS["recipe"].items()
+    }
+
+
+def attributes(title: str, source: str, command: str, modules: Sequence[str], **more: Any) -> dict[str, Any]:
+    """Attributes of a group of the data set."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "institution": "mbma_tables contributors",
+        "source": source,
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {command}",
+        "versions": json.dumps(versions()),
+        "code_sha256": source_digest(tuple(modules)),
+        **more,
+    }
 
 
 def _flags(values: Sequence[str], meanings: Sequence[str], name: str) -> xr.Variable:
@@ -64,45 +101,32 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") 
     if not found:
         raise InputError(f"no surface of this campaign is in {folder}")
     texts, recipes = TEXTS["files"][kind], [task.recipe for task in solved]
-    data = xr.Dataset({name: _variable(name, found, kind) for name in texts["numbers"]})
+    data = xr.Dataset({name: collected(name, found, kind) for name in texts["numbers"]})
     data["kind"] = _flags([r.kind for r in recipes], sorted({r.kind for r in recipes}), "family of surfaces")
     meaning = "what a fit may see: the training set and no other"
     data["split"] = _flags([task.split for task in solved], SPLITS, meaning)
-    for name, meaning in TEXTS["recipe"].items():
-        values = np.array([getattr(recipe, name) for recipe in recipes])
-        data[name] = ("surface", values, {"long_name": meaning, "units": "1"})
+    data.update(of_recipes(recipes))
     for name, meaning in TEXTS["coordinates"].items():
         dimension = "hardness" if name == "eta" else name
         if dimension in data.dims:
-            data[name] = (dimension, np.array(COORDINATES[name]), {"long_name": meaning, "units": "1"})
+            data[name] = variable(dimension, np.array(COORDINATES[name]), meaning)
+    if kind == "elastic":
+        data["stiffness"] = variable(data.force.dims, stiffness(data), STIFFNESS)
     engine = ", ".join(sorted({str(content["engine"]) for content in found}))
     source = f"{engine}: conjugate gradients of Polonsky and Keer, force control, tolerance {TOLERANCE:g}"
     if kind == "hardness":
         method = "mbma_tables.laws.boundary_elements: projected conjugate gradients"
         source = f"{method}, force control, tolerance {TOLERANCE:g}"
     made_by = {"engine": engine, "numpy": ", ".join(sorted({str(content["numpy"]) for content in found}))}
-    data.attrs = {
-        "Conventions": "CF-1.11",
-        "title": texts["title"],
-        "institution": "mbma_tables contributors",
-        "source": f"{source}; periodic, frictionless, without adhesion",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate boundary_elements --of {kind} "
-        "--collect",
-        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
-        "comment": TEXTS["files"]["comment"] + texts["comment"],
-        "versions": json.dumps(versions() | made_by),
-        "code_sha256": source_digest((*TEXTS["files"]["modules"], *texts["modules"])),
-        "surfaces_planned": len(tasks),
-        "surfaces_solved": len(found),
-    }
+    data.attrs = attributes(
+        texts["title"],
+        f"{source}; periodic, frictionless, without adhesion",
+        f"boundary_elements --of {kind} --collect",
+        (*TEXTS["files"]["modules"], *texts["modules"]),
+        references="area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
+        comment=TEXTS["files"]["comment"] + texts["comment"],
+        versions=json.dumps(versions() | made_by),
+        surfaces_planned=len(tasks),
+        surfaces_solved=len(found),
+    )
     return data
-
-
-def collect(data: xr.Dataset, target: pathlib.Path) -> int:
-    """Write the file; the number of surfaces in it."""
-    encoding: dict[str, dict[str, Any]] = {str(name): {"zlib": True, "complevel": 9} for name in data.data_vars}
-    encoding |= {str(name): {"_FillValue": None} for name in data.coords}
-    partial = target.with_suffix(".partial")
-    data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
-    partial.replace(target)
-    return int(data.sizes["surface"])

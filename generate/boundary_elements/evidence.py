@@ -22,12 +22,12 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import matched
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.calibrated_curves import Curve
-from mbma_tables.theories.protocol import Theory
 
 GAUSSIAN = ("self_affine", "plateau", "filtered")
 MIN_WAVES = 2  # constants see no surface of one longest wave a side
 MAX_AREA = 0.98  # beyond, gaps are a few points
 LEVELS = np.geomspace(1e-5, 1.0, 400)  # u/h_max of a law's curve
+PRESSURES = np.geomspace(1e-5, 10.0, 400)  # F/(A0 E* g), likewise
 # u/h_max at which a theory's curve is known
 DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
 
@@ -72,22 +72,28 @@ class Simulated:
 class TheoryCurve:
     """A theory on a simulated surface: forces over A0 E* g, lengths over h_rms; NaN where the theory does not reach.
 
+    A theory has an ``answer`` at mean separations, or an ``at_pressure``, which returns A/A0 and the mean separation.
+
     Raises
     ------
     MbmaError
         Where the theory does not take the surface.
     """
 
-    def __init__(self, theory: Theory, one: Simulated) -> None:
+    def __init__(self, theory: Any, one: Simulated) -> None:
         self._theory, self._surface = theory, one.surface
         self._g, self._h_rms = float(self._surface.rms_gradient), float(self._surface.h_rms)
-        u = DEPTHS * float(self._surface.h_max)
+        u, pressure = DEPTHS * float(self._surface.h_max), PRESSURES * self._g
         with np.errstate(all="ignore"):
-            found = theory.answer(self._surface, u)
+            if hasattr(theory, "answer"):
+                pressure, area, *_ = theory.answer(self._surface, u)
+            else:
+                area, u = theory.at_pressure(self._surface, pressure)
         # of a theory whose force falls again, the branch of first contact
-        end = np.flatnonzero(np.append(np.diff(found.pressure) <= 0, True))[0] + 1
-        kept = slice(int(np.argmax(found.pressure[:end] > 0)), end)
-        self._log_force, self._log_area = np.log(found.pressure[kept] / self._g), np.log(found.area[kept])
+        falls = (np.diff(pressure) <= 0) | (np.diff(u) >= 0) | (u[1:] <= 0)
+        end = np.flatnonzero(np.append(falls, True))[0] + 1
+        kept = slice(int(np.argmax(pressure[:end] > 0)), end)
+        self._log_force, self._log_area = np.log(pressure[kept] / self._g), np.log(area[kept])
         self._u = u[kept] / self._h_rms
 
     def _at(self, values: FloatArray, force: FloatArray) -> FloatArray:
@@ -103,7 +109,12 @@ class TheoryCurve:
 
     def force(self, u: FloatArray) -> FloatArray:
         """Force at mean separations."""
-        return self._theory.answer(self._surface, np.minimum(u * self._h_rms, self._surface.h_max)).pressure / self._g
+        if not hasattr(self._theory, "answer"):
+            known = PchipInterpolator(self._u[::-1], self._log_force[::-1], extrapolate=False)
+            return np.asarray(np.exp(known(u)))
+        return np.asarray(
+            self._theory.answer(self._surface, np.minimum(u * self._h_rms, self._surface.h_max))[0] / self._g
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

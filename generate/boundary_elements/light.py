@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import io
 import pathlib
+from collections.abc import Iterator
 
 import click
 import numpy as np
+import xarray as xr
 from tqdm import tqdm
 
+from generate.boundary_elements.collect import TEXTS, attributes, of_recipes
 from generate.boundary_elements.solve import Contact, prepared
-from generate.boundary_elements.studies import DATA, PATH
+from generate.boundary_elements.studies import PATH
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.calibrated_file import binned
+from generate.calibrated_file import binned, variable, write_part
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
-from mbma_tables.common.files import write_file
+from mbma_tables.data import FILE
 
 LOADS = np.geomspace(2e-5, 0.012, 40)  # F/(A0 E* g): from first contact, a few points of the grid, to 3% contact
 BANDS = ((1, 8), (1, 32), (2, 16), (4, 10), (8, 5), (16, 3.2))  # longest wavelengths a side, and q1/q0
@@ -49,9 +51,9 @@ def solved(recipe: Recipe) -> FloatArray:
     return rows
 
 
-def compared(recipe: Recipe, rows: FloatArray) -> FloatArray:
+def compared(recipe: Recipe, one: xr.Dataset) -> FloatArray:
     """A/A0, ln of simulated over the law's stiffness between loads, and of force at equal u; shape (3, loads - 1)."""
-    h_max, area, u = rows[0, 0], rows[1], rows[2]
+    h_max, area, u = float(one.h_max), *(one[name].values.astype(float) for name in ("area", "mean_separation"))
     face = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, 1.0, h_max)
     scale = float(face.rms_gradient)
     known = contact(face, pressure=LOADS * scale, theory="calibrated").mean_separation
@@ -61,11 +63,30 @@ def compared(recipe: Recipe, rows: FloatArray) -> FloatArray:
     return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
 
 
-def summary(found: FloatArray) -> list[list[str]]:
+def data_of(rows: FloatArray) -> xr.Dataset:
+    """The group of what `solved` returned for each of `recipes`."""
+    texts, over = TEXTS["load"], ("surface", "load")
+    data = xr.Dataset(of_recipes(recipes())).assign(
+        h_max=variable("surface", rows[:, 0, 0], TEXTS["surface"]["h_max"]),
+        force=variable("load", LOADS, texts["force"]),
+        area=variable(over, rows[:, 1], f"{texts['area']}; NaN where a single point is in contact"),
+        mean_separation=variable(over, rows[:, 2], texts["mean_separation"]),
+    )
+    title, source = "Random rough surfaces at light loads, from first contact on", "Tamaas, as the group elastic"
+    data.attrs = attributes(title, source, "light", TEXTS["files"]["modules"])
+    return data
+
+
+def each(data: xr.Dataset) -> Iterator[tuple[Recipe, xr.Dataset]]:
+    """Every surface of the group."""
+    return zip(recipes(), (data.isel(surface=number) for number in range(data.sizes["surface"])), strict=True)
+
+
+def summary(found: xr.Dataset) -> list[list[str]]:
     """Mean and standard deviation of ln of simulated over the law's stiffness by wavelengths a side and contact."""
     lines, waves = [], np.array([recipe.waves for recipe in recipes()])
     for count in np.unique(waves):
-        own = [compared(r, rows) for r, rows in zip(recipes(), found, strict=True) if r.waves == count]
+        own = [compared(recipe, one) for recipe, one in each(found) if recipe.waves == count]
         area, stiffness, _ = np.concatenate(own, axis=1)
         bins = binned(area, stiffness, BINS)
         lines.append([str(count), *(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "" for part in bins)])
@@ -73,11 +94,9 @@ def summary(found: FloatArray) -> list[list[str]]:
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--data", type=PATH, default=DATA / "light_loads.npz", show_default=True)
+@click.option("--data", type=PATH, default=FILE, show_default=True)
 def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
-    content = io.BytesIO()
-    rows = np.array([solved(recipe) for recipe in tqdm(recipes(), disable=None)], dtype=np.float32)
-    np.savez_compressed(content, loads=LOADS, rows=rows)
-    write_file(data, content.getvalue(), make_folders=True)
+    rows = np.array([solved(recipe) for recipe in tqdm(recipes(), disable=None)])
+    write_part(data, data_of(rows), "light_loads")
     click.echo(f"{data}: {rows.shape[0]} surfaces")

@@ -11,10 +11,11 @@ import click
 from tqdm import tqdm
 
 from generate.boundary_elements.capped import simulate_capped, solve_flow
-from generate.boundary_elements.collect import collect, dataset
+from generate.boundary_elements.collect import dataset
 from generate.boundary_elements.design import Task, campaign
 from generate.boundary_elements.solve import simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe
+from generate.calibrated_file import write_part
 from generate.workers import Pool, attempts, executor
 
 SOLVERS = {"elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow}
@@ -45,7 +46,9 @@ def run(
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--of", "kind", type=click.Choice(list(SOLVERS)), default="elastic", show_default=True)
 @click.option("--folder", type=click.Path(path_type=pathlib.Path), help="One file a surface.  [default: its kind]")
-@click.option("--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write this netCDF file, no runs.")
+@click.option(
+    "--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write into this netCDF file, no runs."
+)
 @click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 @click.option("--scheduler", help="Address of a dask scheduler, whose workers see this checkout and the folder.")
@@ -67,8 +70,9 @@ def boundary_elements(
     folder = folder or pathlib.Path("boundary_elements", kind)
     tasks = [task for task in campaign(kind) if task.recipe.points <= points]
     if target is not None:
-        counted = collect(dataset(tasks, folder, kind), target)
-        click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
+        data = dataset(tasks, folder, kind)
+        write_part(target, data, kind)
+        click.echo(f"{target}: {data.sizes['surface']} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers, scheduler) as pool:
         run(tasks, folder, pool, functools.partial(simulate_to, solve=SOLVERS[kind]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import itertools
 import pathlib
 import time
@@ -13,16 +12,19 @@ from typing import Any
 import click
 import numpy as np
 import pandas as pd
+import xarray as xr
 from tqdm import tqdm
 
 from generate.boundary_elements.capped import load_at
+from generate.boundary_elements.collect import TEXTS, attributes, collected
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
 from generate.boundary_elements.solve import LOADS, Contact, prepared, pressed
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.calibrated_file import rms
+from generate.calibrated_file import rms, write_part
 from generate.timing import fixed_work
 from mbma_tables import Surface, contact
 from mbma_tables.common.files import write_file
+from mbma_tables.data import FILE
 from mbma_tables.laws import boundary_elements
 from mbma_tables.laws.bearing_curve import bearing
 from mbma_tables.laws.gas import mean_inverse
@@ -35,7 +37,7 @@ GRIDS = (32, 64, 128, 256, 512, 1024)  # points a side; 60 of the shortest waves
 STARTS = ("cold", "continued")
 COLUMNS = ("hurst", "zeta_1", "waves", "seed", "points", "start", "force", "area", "mean_separation", "seconds", "cost")
 HEAD = """\
-# Held-out surfaces of boundary_elements.nc on grids of 32 to 1024 points a side, by python -m generate grids.
+# Held-out surfaces of the group elastic on grids of 32 to 1024 points a side, by python -m generate grids.
 # force in A0 E* g, g the rms gradient of the finest grid; area A/A0, corrected for its perimeter; separation in h_rms.
 # seconds of the processor a load; cost: those over the fixed piece of work of docs/cost.md, timed before and after.
 """
@@ -123,21 +125,28 @@ def middle(treated: Treated) -> Treated:
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("maps", nargs=-1, required=True, type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
-@click.option("--folder", type=PATH, default=DATA, show_default=True)
-def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
+@click.option("--data", type=PATH, default=FILE, show_default=True)
+def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
     """Simulate measured maps for docs/fidelity.md, read by SurfaceTopography: a few minutes each."""
+    solved = []
     for path in maps:
         treated = middle(treated_map(path, {"periodic": False}))
         surface = mirrored(treated.heights - treated.heights.mean())
         sizes = surface.shape[0] * treated.steps[0], surface.shape[1] * treated.steps[1]
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
-        found = pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi)
-        content = io.BytesIO()
-        np.savez_compressed(content, **found)
-        target = folder / f"measured_{path.stem}.npz"
-        write_file(target, content.getvalue(), make_folders=True)
-        click.echo(f"{target}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
+        solved.append(found := pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
+        click.echo(f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
+    write_part(data, of_maps([path.stem for path in maps], solved), "measured")
+
+
+def of_maps(names: list[str], solved: list[dict[str, Any]]) -> xr.Dataset:
+    """The group of simulated maps."""
+    data = xr.Dataset({name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]})
+    title = f"Measured maps, at most {LARGEST} x {LARGEST} points of each and their mirror images, pressed flat"
+    source = f"{solved[0]['engine']}; periodic, frictionless, without adhesion"
+    data.attrs = attributes(title, source, "measured_maps", TEXTS["files"]["modules"])
+    return data.assign_coords(surface=names)
 
 
 def gap_errors(kind: str) -> pd.DataFrame:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
 import functools
-import json
 import pathlib
 from collections.abc import Callable
 from typing import Any, cast
@@ -13,14 +11,15 @@ import click
 import numpy as np
 import xarray as xr
 
-from generate.boundary_elements.collect import collect
+from generate.boundary_elements.collect import TEXTS, attributes
 from generate.boundary_elements.design import Task
 from generate.boundary_elements.run import run
 from generate.boundary_elements.solve import simulate_to
+from generate.calibrated_file import variable, write_part
 from generate.machined.hardness import ETA, WAYS, yielded
 from generate.machined.makers import FAMILIES, Part
 from generate.machined.solve import answered, solved, surface_of
-from generate.provenance import source_digest, versions
+from mbma_tables.data import FILE
 
 NUMBERS = 5  # parts of each family
 LARGE, SMOOTHEST = (
@@ -30,7 +29,6 @@ LARGE, SMOOTHEST = (
 EVERY = 3  # part that is pressed with a hardness, too
 FORMS = ("calibrated", "corrected", "simulated")
 MODULES = ("generate.machined.makers", "generate.machined.solve", "generate.boundary_elements.tamaas_contact")
-TARGET = pathlib.Path("docs/data/machined.nc")
 MEANINGS = {
     "pressure": "F/(A0 E*)",
     "area": "A/A0",
@@ -83,42 +81,38 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
         read = [dict(np.load(place / f"{part.name}.npz")) for part in have]
         engine = engine or str(read[0]["engine"])
         for name in (name for name in MEANINGS if name in read[0]):
-            attributes = {"long_name": MEANINGS[name], "units": "1"}
-            data[prefix + name] = (("surface", "load"), np.array([one[name] for one in read]), attributes)
+            data[prefix + name] = variable(("surface", "load"), np.array([one[name] for one in read]), MEANINGS[name])
     hard = {p.name: dict(np.load(folder / "hardness" / f"{p.name}.npz")) for p in yielding_parts() if p in have}
     data = data.assign_coords(yielding=[*hard], eta=list(ETA), way=list(WAYS))
     for name, meaning in HARD.items():
         values: Any = np.array([one[f"hard_{name}"] for one in hard.values()])
         over = ("yielding", "way", "eta", "hard_load") if values.ndim == 4 else ("yielding", "eta", "hard_load")
-        data[f"hard_{name}"] = over, values, {"long_name": meaning, "units": "1"}
+        data[f"hard_{name}"] = variable(over, values, meaning)
     surfaces = [surface_of(part)[1] for part in have]
-    for name, values in {
-        "shortest": [part.shortest for part in have],
-        "h_rms": [float(one.h_rms) for one in surfaces],
-        "skewness": [one.skewness for one in surfaces],
-        "kurtosis": [one.kurtosis for one in surfaces],
-        "anisotropy": [one.bearing.anisotropy for one in surfaces],
-        "slope_kurtosis": [one.bearing.slope_kurtosis for one in surfaces],
+    for name, (meaning, values) in {
+        "shortest": ("shortest wavelength in sampling steps", [part.shortest for part in have]),
+        "h_rms": ("root mean square height in sampling steps", [float(one.h_rms) for one in surfaces]),
+        "skewness": ("of heights", [one.skewness for one in surfaces]),
+        "kurtosis": ("of heights: 3 if Gaussian", [one.kurtosis for one in surfaces]),
+        "anisotropy": (TEXTS["surface"]["anisotropy"], [one.bearing.anisotropy for one in surfaces]),
+        "slope_kurtosis": (TEXTS["surface"]["slope_kurtosis"], [one.bearing.slope_kurtosis for one in surfaces]),
     }.items():
-        data[name] = ("surface", values)
-    data.attrs = {
-        "Conventions": "CF-1.11",
-        "title": "Maps of machined surfaces pressed flat by boundary elements, and what theories answer",
-        "institution": "mbma_tables contributors",
-        "source": f"{engine}, tolerance 1e-6; periodic, frictionless; flow by Reynolds' equation on the gaps",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate machined",
-        "comment": "Lengths in sampling steps, rms gradient 0.1. generate.machined.makers.heights makes the maps anew. "
+        data[name] = variable("surface", values, meaning)
+    data.attrs = attributes(
+        "Maps of machined surfaces pressed flat by boundary elements, and what theories answer",
+        f"{engine}, tolerance 1e-6; periodic, frictionless; flow by Reynolds' equation on the gaps",
+        "machined",
+        MODULES,
+        comment="Lengths in sampling steps, rms gradient 0.1. generate.machined.makers.heights makes the maps anew. "
         f"Names with {' or '.join(FORMS)} in front are answers of these theories.",
-        "versions": json.dumps(versions()),
-        "code_sha256": source_digest(MODULES),
-    }
+    )
     return data
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--folder", type=click.Path(path_type=pathlib.Path), default="machined", show_default=True)
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option("--out", type=click.Path(path_type=pathlib.Path), default=TARGET, show_default=True)
+@click.option("--out", type=click.Path(path_type=pathlib.Path), default=FILE, show_default=True)
 def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     """Press maps of machined surfaces by boundary elements (Tamaas): an hour on one core.
 
@@ -135,4 +129,6 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
         run(hard, folder / "hardness", pool, functools.partial(simulate_to, solve=cast(Any, yielded)))
         for form, solve in solvers.items():
             run(tasks, folder / form, pool, functools.partial(simulate_to, solve=cast(Any, solve)))
-    click.echo(f"{out}: {collect(gathered(folder), out)} of {len(tasks)} surfaces")
+    data = gathered(folder)
+    write_part(out, data, "machined")
+    click.echo(f"{out}: {data.sizes['surface']} of {len(tasks)} surfaces")

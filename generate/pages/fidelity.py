@@ -11,6 +11,8 @@ from generate import distances
 from generate.calibrated_file import QUANTITIES, by_bin
 from generate.distances import HUES
 from generate.pages.page import Measured, panels, percent, table
+from generate.score import OTHERS, scores, theories_of
+from mbma_tables.data import boundary_elements
 
 BANDED = ("MBMA reported", "calibrated")
 BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
@@ -78,7 +80,35 @@ def drawn() -> dict[str, Any]:
     return {name: by_contact(sets, keys, 9 if name == "fidelity" else 7.5) for name, keys in columns.items()}
 
 
+def draw_data(tree: Any) -> Any:
+    """Area against pressure, pressure against gap and flow against area, of every surface."""
+    figure, (left, middle, right) = panels(1, 3, (11, 3.6))
+    hard, elastic, leaky = (tree[name].to_dataset() for name in ("hardness", "elastic", "leakage"))
+    style: dict[str, Any] = {"ms": 1.5, "alpha": 0.5, "rasterized": True}
+    for row in range(hard.sizes["hardness"]):
+        of = hard.isel(hardness=row)
+        left.loglog(of.force.values.ravel(), of.area.values.ravel(), ".", color=str(0.8 - 0.13 * row), **style)
+    middle.semilogy(elastic.mean_separation.values.ravel(), elastic.force.values.ravel(), ".", color="C0", **style)
+    right.semilogy(leaky.area.values.ravel(), leaky.flow.max("axis").values.ravel(), ".", color="C2", **style)
+    left.set(xlabel="pressure F/(A0 E* g)", ylabel="contact area A/A0")
+    middle.set(xlabel="mean gap u/h_rms", ylabel="pressure F/(A0 E* g)", xlim=(0, 5))
+    right.set(xlabel="contact area A/A0", ylabel="flow coefficient/h_rms³", ylim=(1e-6, 100), xlim=(0, 0.5))
+    return figure
+
+
+def data() -> Measured:
+    """Groups of the data set, and a figure."""
+    tree, rows = boundary_elements(), []
+    for name, group in tree.children.items():
+        own = group.to_dataset()
+        of = own.to_dataframe() if "contact" in own.dims else None
+        count = own.sizes["surface"] if of is None else of.groupby([*of.columns[: of.columns.get_loc("force")]]).ngroups
+        rows.append([f"`{name}`", own.attrs["title"], count, int(np.isfinite(own.area).sum())])
+    return {"groups": table("group | content | surfaces | contacts", rows)}, {"docs/figures/data.svg": draw_data(tree)}
+
+
 def measure() -> Measured:
     """The measured blocks of the page, and its figures."""
     parts = {"summary": summary_table(distances.data_sets().values())}
+    parts["scores"] = scores(distances.THEORIES | theories_of(OTHERS))
     return parts, {f"docs/figures/{name}.svg": figure for name, figure in drawn().items()}

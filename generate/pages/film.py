@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from generate.files import read_csv
+from generate.files import dataset
 from generate.pages.page import Measured, panels, table
-from generate.rough_spheres import FILE, RADIUS, heights
+from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Surface, flow_factors, rough_contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.law.rough_body import CELLS, mean_wavelength
@@ -52,11 +52,12 @@ def lubrication() -> Measured:
 
 
 def spheres() -> dict[str, FloatArray]:
-    """Every simulated contact of docs/data/rough_spheres.csv, and the library's at the same approach and force."""
+    """Every simulated contact, and the library's at the same approach and force."""
     found: dict[str, list[Any]] = {
         name: [] for name in ("width", "off", "force", "area", "mean_radius", "scatter", "valid")
     }
-    for (hurst, longest, h_rms, seed), rows in read_csv(FILE.name).groupby(["hurst", "longest", "h_rms", "seed"]):
+    table = dataset("rough_spheres").to_dataframe()
+    for (hurst, longest, h_rms, seed), rows in table.groupby(["hurst", "longest", "h_rms", "seed"]):
         face = Surface.from_map(heights(hurst, longest, h_rms, int(seed)), 1.0, periodic=True)
         force, approach, area, radius = (rows[n].to_numpy() for n in ("force", "approach", "area", "mean_radius"))
         same, pushed = rough_contact(face, RADIUS, force=force), rough_contact(face, RADIUS, approach=approach)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from generate.boundary_elements.light import BINS, LOADS, compared, recipes, summary
-from generate.files import DATA
+from generate.boundary_elements.light import BINS, LOADS, compared, each, recipes, summary
+from generate.files import dataset
 from generate.pages.page import Measured, panels, table
 from mbma_tables import Joint
 from mbma_tables.common.arguments import FloatArray
@@ -35,8 +35,7 @@ def both(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def measure() -> Measured:
     """Both tables and a figure."""
-    with np.load(DATA / "light_loads.npz") as known:
-        found = known["rows"].astype(float)
+    found = dataset("light_loads")
     contacts = " | ".join(f"{low:.2%} to {high:.2%}" for low, high in itertools.pairwise(BINS))
     parts = {"light": table(f"longest wavelengths a side | {contacts}", summary(found))}
     rows, (figure, (left, right)) = [], panels(1, 2, (10, 3.8))
@@ -51,7 +50,7 @@ def measure() -> Measured:
     parts["usual"] = table(f"joint | shortest wavelength | {' | '.join(f'{p:g} MPa' for p in PRESSURES)}", rows)
     left.set(xlabel="pressure [MPa]", ylabel="conductance [W/(m² K)]", title="law; dashed: Cooper-Mikic-Yovanovich")
     left.legend(fontsize=7)
-    for recipe, own in zip(recipes(), found, strict=True):
+    for recipe, own in each(found):
         area, stiffness, _ = compared(recipe, own)
         style: dict[str, Any] = {"markersize": 2, "color": f"C{int(np.log2(recipe.waves))}", "rasterized": True}
         right.semilogx(area, np.exp(stiffness), ".", **style)

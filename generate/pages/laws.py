@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from generate.boundary_elements.design import REFINEMENT, SPLITS, TRAINING
 from generate.calibrated_file import binned
 from generate.files import dataset
 from generate.leakage_flow import Flow, cases
-from generate.leakage_law import EDGES, EVIDENCE, LARGE, errors, noise_floor, summary
+from generate.leakage_law import EDGES, LARGE, errors, noise_floor, summary
 from generate.pages.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact
 from mbma_tables.answers.leakage_table import GROUP, shipped_flow
@@ -40,7 +41,7 @@ DRAWN = (0.4, 0.8)  # Hurst exponents
 
 def calibrated() -> Measured:
     """Accuracy and constants that `python -m generate calibrated` stored."""
-    data = dataset(shipped_file("calibrated.nc"))
+    data = xr.load_dataset(shipped_file("calibrated.nc"))
     edges, sets = (*data.contact_low.values, data.contact_high.values[-1]), data.attrs["sets"].split("; ")
     words = [functools.reduce(lambda text, pair: text.replace(*pair), WORDS.items(), name) for name in SETS]
     parts, header = {}, f"surfaces, and what is known of them | {spans(edges)}"
@@ -80,7 +81,7 @@ def bars(stored: str) -> str:
 
 def refinement() -> str:
     """Errors of raw and corrected areas on coarse grids against the finest, by points a shortest wave and contact."""
-    data = dataset("boundary_elements.nc")
+    data = dataset("elastic")
     one = data.isel(surface=data.split.values == SPLITS.index(REFINEMENT))
     finest, spacings = one.points.values == one.points.values.max(), one.points / (one.zeta_1 * one.waves)
     rows = []
@@ -99,7 +100,7 @@ def refinement() -> str:
 
 def leakage() -> Measured:
     """Deviations of leakage laws from simulation, and their curves."""
-    seen = cases(dataset(EVIDENCE))
+    seen = cases(dataset("leakage"))
     parts = {"accuracy": leakage_accuracy(), "cells": of_cells(seen), "floor": floor()}
     return parts, {"docs/figures/leakage.svg": draw_leakage(seen)}
 

@@ -100,7 +100,7 @@ def _figure(data: xr.Dataset) -> Any:
 
 def measure() -> Measured:
     """The tables."""
-    data, lines = dataset("machined.nc"), []
+    data, lines = dataset("machined"), []
     for form in FORMS:
         for valid, name in ((True, "valid"), (False, "not valid")):
             found = [coverage(data, form, quantity, valid) for quantity in QUANTITIES]

@@ -127,7 +127,7 @@ def ratios(
 
 def simulated() -> Iterator[Seen]:
     """Held-out surfaces by name, as maps, with F/(A0 E*), A/A0 and u of boundary elements."""
-    data = dataset("boundary_elements.nc")
+    data = dataset("elastic")
     kinds = data.kind.attrs["flag_meanings"].split()
     order = [KINDS.index(kinds[k]) if kinds[k] in KINDS else -1 for k in data.kind.values]
     for one in (data.isel(surface=number) for number in np.lexsort((data["shape"].values, np.array(order)))):

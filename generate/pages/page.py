@@ -26,6 +26,7 @@ _OWN = ("architecture", "cost", "explorer", "fidelity", "joints", "machined", "s
 PAGES = {
     **{name: f"{name}:measure" for name in _OWN},
     **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
+    "data": "fidelity:data",
     **{name: f"film:{name}" for name in ("lubrication", "rough_bodies")},
     **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
     **{"gallery": "maps:gallery", "maps": "maps:measure"},

@@ -22,11 +22,10 @@ from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
-from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.geometry import geometry, kinks
 from mbma_tables.models import answer_islands
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.totals.island_sum import kinks
 
 DIGITS = 40
 ULP = np.finfo(float).eps

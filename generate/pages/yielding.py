@@ -36,7 +36,7 @@ RATIOS = ("elastic area over true", "elastic force over true")
 
 def measure() -> Measured:
     """When a contact is elastic, how accurate the law with a hardness is, metals."""
-    seen, (_, attributes) = capped(dataset("hardness.nc")), shipped_part("hardness")
+    seen, (_, attributes) = capped(dataset("hardness")), shipped_part("hardness")
     ratios = simulated(seen)
     rows = [[psi, *((v.mean(), v.std()) for v in ratios[1:, ratios[0] == psi])] for psi in np.unique(ratios[0])]
     header = f"psi | {RATIOS[0]}, equal force | {RATIOS[1]}, equal u | yielded share"

@@ -101,7 +101,7 @@ def contact(
         For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
     derivatives : bool
         Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
-        theories by numerical differentiation, to 1e-6.
+        theories by numerical differentiation, to 1e-6; not with a hardness, where `sensitivity` has relative ones.
     workers : int
         Number of threads for MBMA's batches of surfaces and gaps; results are identical for any number.
 
@@ -164,6 +164,8 @@ def contact(
     # what is no number is refused where it is checked
     known = np.asarray(hardness) if isinstance(hardness, float | np.ndarray) else None
     yields = stated and (known is None or known.dtype.kind != "f" or not known.size or bool((known != np.inf).any()))
+    if yields and derivatives:
+        raise InputError("derivatives are of elastic contacts: with a hardness sensitivity() has relative ones")
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
     make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
     return make(surface, value, E_star, hardness, by, source, derivatives)
@@ -215,12 +217,11 @@ def _contact(
         theory = WITH_HARDNESS.get(type(theory), Yielding)(theory, eta)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
     held = by if by in QUANTITIES else None
-    by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}
     if derivatives and held:
         require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
         totals = theory.totals(surface, places["separation"], E_star, derivatives)
-        fields = vars(totals) | places
+        fields = totals._asdict() | places
     else:
         u = np.asarray(places["mean_separation"])
         loaded = theory.loaded(surface, u, lighter) if source.yields else None
@@ -229,15 +230,12 @@ def _contact(
         fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "islands": None} | places
         fields["error"] = spread(found.error, np.shape(found.pressure))[()]
         if derivatives:
-            pressure_by, area_by = differentiate(theory, surface, u, lighter)
-            by_log_modulus = {"pressure": pressure_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
+            pressure_by, area_by = differentiate(theory, surface, u)
             fields |= {"pressure_by": {name: (E_star * slope)[()] for name, slope in pressure_by.items()}}
             fields |= {"area_by": {name: slope[()] for name, slope in area_by.items()}}
     if derivatives and held:
         slopes = {"pressure": fields["pressure_by"], "area": fields["area_by"]}
-        by_modulus = {"pressure": fields["pressure"] / E_star + by_log_modulus["pressure"]}
-        by_modulus["area"] = by_log_modulus["area"] / E_star
-        fields |= at_fixed(held, by, slopes, by_modulus)
+        fields |= at_fixed(held, by, slopes, fields["pressure"] / E_star)
     return _made(source, fields)
 
 

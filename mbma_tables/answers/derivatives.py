@@ -1,12 +1,8 @@
-"""Derivatives of a theory's force and area with respect to the gap and the surface's parameters.
-
-Where a theory has none in closed form they are finite differences with steps inside the range of contact; an error is
-raised if their estimated error is too large. With a hardness, the elastic derivatives enter its law by the chain rule.
-"""
+"""Derivatives of elastic theories by the gap and the surface's parameters: differences with steps inside of contact."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,103 +13,22 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.theories.differences import differences
-from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.protocol import Theory
 
 STEP = 0.02  # relative step of a parameter, or of its distance to a limit
 RTOL = 1e-6  # tolerance relative to the derivative, or to quantity/parameter
-GAP, MODULUS = "mean_separation", "E_star"
+GAP = "mean_separation"
 KINDS = ("pressure", "area")
 
-Answers = tuple[FloatArray, FloatArray]  # force and area
-Slopes = tuple[dict[str, FloatArray], ...]  # slopes of force and of area, by names
 
-
-def differentiate(
-    theory: Theory, surface: AnySurface, mean_separation: FloatArray, lighter: FloatArray | None = None
-) -> Slopes:
-    """Derivatives of F/(A0 E*) and A/A0 by "separation" d and each of the surface's parameters, the others held.
-
-    With a hardness, which is held, also by the logarithm of "E_star"; `lighter` is that of `Yielding.loaded`.
+def differentiate(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> list[dict[str, FloatArray]]:
+    """Derivatives of F/(A0 E*), and of A/A0, by "separation" d and each of the surface's parameters, the others held.
 
     Raises ConvergenceError where differences do not converge: at kinks of a theory, or where force is unbounded.
     """
-    u = np.asarray(mean_separation, dtype=float)
-    known = theory.slopes(surface, u)
-    if known is None and theory is not theory.elastic:
-        known = _yielding(theory, surface, u, lighter)
-    slopes = _elastic(theory, surface, u) if known is None else known
-    for found in slopes:
-        # d = 2 u - h_max is held, not u
-        by_gap = found.pop(GAP)
-        found["separation"] = by_gap / 2
-        if "h_max" in found:
-            found["h_max"] = found["h_max"] + by_gap / 2
-    return slopes
-
-
-def _elastic(theory: Theory, surface: AnySurface, u: FloatArray) -> Slopes:
-    known = theory.slopes(surface, u)
-    if known is not None:
-        return known
-    whole, names = theory.answer(surface, u), (GAP, *surface.parameters)
-
-    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> Answers:
-        found = theory.answer(moved, own[GAP])
-        return found.pressure, found.area
-
-    return _numerical(theory, surface, u, names, whole, answer)
-
-
-@np.errstate(all="ignore")
-def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArray | None) -> Slopes:
-    # imports scipy: needed for a hardness only
-    from mbma_tables.laws import hardness as law
-
-    elastic, names = capped.elastic, (GAP, *surface.parameters, MODULUS)
-    if lighter is None and not capped.knows_areas:
-        lighter = capped.lighter(surface, u)
-    whole = capped.loaded(surface, u, lighter)
-    shape = np.shape(whole.answer.pressure)
-    gaps = np.stack([np.broadcast_to(gap, shape) for gap in (u, lighter) if gap is not None])
-    # by gap, name and flat place
-    pressure, area = (
-        np.array([np.broadcast_to(slopes.get(name, 0.0), gaps.shape).reshape(len(gaps), -1) for name in names])
-        for slopes in _elastic(elastic, surface, gaps)
-    )
-    at_force, rise = np.broadcast_to(whole.elastic_area, shape).ravel(), np.zeros(0)
-    if lighter is not None:
-        # slopes of the area at given force: by the force, and by parameters
-        rise = np.nan_to_num(area[0, 1] / pressure[0, 1])
-        tilt = area[:, 1] - pressure[:, 1] * rise
-
-    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> Answers:
-        name, place = entry
-        known = zip(whole.elastic[:2], (pressure, area), strict=True)
-        force, share = (np.ravel(part)[place] + slope[name, 0, place] * x for part, slope in known)
-        hardness = np.broadcast_to(capped.hardness, shape).ravel()[place] / own[MODULUS]
-        sizes = np.asarray(moved.h_rms), np.asarray(moved.rms_gradient)
-        eta, endless = hardness / sizes[1], np.isinf(hardness)
-        load, _ = law.closed(elastic.heights(moved), *sizes, eta, own[GAP], force, np.zeros_like(force))
-        if lighter is None:
-            at = elastic.area_at(moved, load)
-        else:
-            at = at_force[place] + tilt[name, place] * x + rise[place] * (load - np.ravel(whole.answer.pressure)[place])
-        return np.where(endless, force, load), np.where(endless, share, law.area(load / sizes[1], at, eta))
-
-    return _numerical(capped, surface, u, names, whole.answer, answer)
-
-
-def _numerical(
-    theory: Theory,
-    surface: AnySurface,
-    u: FloatArray,
-    names: tuple[str, ...],
-    whole: TheoryAnswer,
-    answer: Callable[..., Answers],
-) -> Slopes:
-    """Differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, the parameter changed by x."""
+    whole, names = theory.answer(surface, mean_separation), (GAP, *surface.parameters)
     shape = np.shape(whole.pressure)
-    at = {name: getattr(surface, name) for name in (*PARAMETERS[1:], *surface.parameters)} | {GAP: u, MODULUS: 1.0}
+    at = {name: getattr(surface, name) for name in (*PARAMETERS[1:], *surface.parameters)} | {GAP: mean_separation}
     at = {name: np.broadcast_to(np.asarray(value, dtype=float), shape).ravel() for name, value in at.items()}
     size, values = at[GAP].size, np.stack([np.ravel(getattr(whole, kind)) for kind in KINDS])
     step, side = np.swapaxes([_steps(theory, at, name) for name in names], 0, 1).reshape(2, -1)
@@ -122,11 +37,9 @@ def _numerical(
 
     def moved(k: Any, x: FloatArray) -> FloatArray:
         number, place = np.divmod(k, size)
-        own = {name: value[place] for name, value in at.items()}
-        for j, name in enumerate(names):
-            own[name] = own[name] + np.where(number == j, x, 0.0)
-        others = surface.with_numbers(*(own[name] for name in surface.parameters))
-        return np.stack(answer(others, own, (number, place), x))
+        own = {name: at[name][place] + np.where(number == j, x, 0.0) for j, name in enumerate(names)}
+        found = theory.answer(surface.with_numbers(*(own[name] for name in surface.parameters)), own[GAP])
+        return np.stack([found.pressure, found.area])
 
     with np.errstate(all="ignore"):
         slopes, error = (each.reshape(2, len(names), *shape) for each in differences(moved, step, side, scale))
@@ -134,7 +47,13 @@ def _numerical(
     for kind, name in zip(*np.nonzero(missed.reshape(2, len(names), -1).any(axis=-1)), strict=True):
         text = f"theory {theory.name!r}: no derivative of {KINDS[kind]} by {names[name]} was found"
         raise ConvergenceError(text, missed[kind, name])
-    return tuple(dict(zip(names, rows, strict=True)) for rows in slopes)
+    made = [dict(zip(names, rows, strict=True)) for rows in slopes]
+    for found in made:
+        # d = 2 u - h_max is held, not u
+        found["separation"] = found.pop(GAP) / 2
+        if "h_max" in found:
+            found["h_max"] = found["h_max"] + found["separation"]
+    return made
 
 
 def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[FloatArray, FloatArray]:
@@ -160,7 +79,7 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
     return step, side
 
 
-def at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
+def at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: Any) -> dict[str, Any]:
     """Derivatives at fixed pressure or area: of the separation, and of the other quantity."""
     other = "area" if held == "pressure" else "pressure"
     steep, follows = slopes[held]["separation"], slopes[other]["separation"]
@@ -168,6 +87,6 @@ def at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, A
     gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
     free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
     if held == "pressure":
-        gap["E_star"] = -by_modulus["pressure"] / steep
-        free["E_star"] = by_modulus["area"] + follows * gap["E_star"]
+        gap["E_star"] = -by_modulus / steep
+        free["E_star"] = follows * gap["E_star"]
     return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}

@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from mbma_tables.answers.contact import contact
 from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, require
-from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import unit_of
@@ -38,53 +38,27 @@ USEFUL = 0.5  # standard deviation of ln phi above which a flow factor is not va
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class FlowFactors(Displayed):
-    """Patir and Cheng's factors of a rough gap, made by `flow_factors`; arrays of the shape of the gaps.
+    """Patir and Cheng's factors of a rough gap, made by `flow_factors`; arrays of the shape of the gaps."""
 
-    Attributes
-    ----------
-    mean_separation : ndarray
-        u, the mean gap [length].
-    phi_x, phi_y : ndarray
-        Pressure flow factors: flow is -phi u^3/(12 viscosity) dp/dx.
-    shear_x, shear_y : ndarray
-        Shear flow factors phi_s of the sliding face's roughness along x and y; of two rough faces they add, weighted by
-        their shares of h_rms^2 and signed (Patir and Cheng 1979).
-    pressure, area : ndarray
-        Asperity pressure F/A0 [stress] and A/A0.
-    scatter, shear_scatter : ndarray
-        Model uncertainty (1 sd) of ln phi and of ln phi_s.
-    valid : ndarray
-        Whether flow through such gaps was simulated.
-    reasons : dict
-        Reasons why not `valid`, each with a mask.
-    peklenik : float
-        Length of the roughness along x over that along y.
-    """
-
-    mean_separation: FloatArray
-    phi_x: FloatArray
-    phi_y: FloatArray
-    shear_x: FloatArray
-    shear_y: FloatArray
-    pressure: FloatArray
-    area: FloatArray
-    scatter: FloatArray
-    shear_scatter: FloatArray
-    valid: Any
-    reasons: dict[str, Any]
-    peklenik: float
+    reasons: dict[str, Any]  #: reasons why not `valid`, each with a mask
+    peklenik: float  #: length of the roughness along x over that along y
     surface: AnySurface
     units: dict[str, str]
+    mean_separation: FloatArray = quantity("mean gap u [length]")
+    phi_x: FloatArray = quantity("pressure flow factor along x; flow is -phi u^3/(12 viscosity) dp/dx")
+    phi_y: FloatArray = quantity("pressure flow factor along y")
+    # of two rough faces they add, weighted by their shares of h_rms^2 and signed (Patir and Cheng 1979)
+    shear_x: FloatArray = quantity("shear flow factor phi_s along x; that of the sliding face's roughness")
+    shear_y: FloatArray = quantity("shear flow factor phi_s along y")
+    pressure: FloatArray = quantity("asperity pressure F/A0 [stress]")
+    area: FloatArray = quantity("real over nominal contact area")
+    scatter: FloatArray = quantity("model uncertainty (1 sd) of ln phi")
+    shear_scatter: FloatArray = quantity("model uncertainty (1 sd) of ln phi_s")
+    valid: Any = quantity("whether flow through such gaps was simulated")
+    _dims = ("gap",)
 
-    @property
-    def K_x(self) -> FloatArray:
-        """Flow coefficient along x, phi_x u^3 [length^3]."""
-        return self.phi_x * self.mean_separation**3
-
-    @property
-    def K_y(self) -> FloatArray:
-        """Flow coefficient along y, phi_y u^3 [length^3]."""
-        return self.phi_y * self.mean_separation**3
+    K_x = property(lambda self: self.phi_x * self.mean_separation**3, doc="Flow coefficient phi_x u^3 [length^3].")
+    K_y = property(lambda self: self.phi_y * self.mean_separation**3, doc="Flow coefficient phi_y u^3 [length^3].")
 
     def _facts(self) -> dict[str, str]:
         held = ("mean_separation", "phi_x", "phi_y", "pressure", "area", "valid")
@@ -92,38 +66,20 @@ class FlowFactors(Displayed):
         return numbers | {"peklenik": f"{self.peklenik:.3g}", "surface": repr(self.surface)}
 
     def _variables(self) -> dict[str, Variable]:
-        meanings = {
-            "mean_separation": "mean gap u",
-            "phi_x": "pressure flow factor along x",
-            "phi_y": "pressure flow factor along y",
-            "shear_x": "shear flow factor along x",
-            "shear_y": "shear flow factor along y",
-            "pressure": "asperity pressure F/A0",
-            "area": "real over nominal contact area",
-            "K_x": "flow coefficient phi_x u^3",
-            "K_y": "flow coefficient phi_y u^3",
-            "scatter": "model uncertainty (1 sd) of ln phi",
-            "shear_scatter": "model uncertainty (1 sd) of ln phi_s",
-            "valid": "whether flow through such gaps was simulated",
-        }
-        return {
-            name: Variable(getattr(self, name), self.units.get(name, "1"), text, ("gap",))
-            for name, text in meanings.items()
-        }
+        flows = {"K_x": self.K_x, "K_y": self.K_y}
+        more = {n: Variable(v, self.units[n], "flow coefficient phi u^3", self._dims) for n, v in flows.items()}
+        return {**super()._variables(), **more}
 
     def _figure(self) -> Figure:
         order = np.argsort(self.mean_separation)
-
-        def at(name: str) -> FloatArray:
-            return np.asarray(getattr(self, name)[order], float)
-
+        at = {name: np.asarray(values[order], float) for name, (values, *_) in self._variables().items()}
         panels: dict[str, list[tuple[str, FloatArray, FloatArray | None]]] = {
-            "pressure flow factor": [(name, at(name), at("scatter")) for name in ("phi_x", "phi_y")],
-            "shear flow factor": [(name, at(name), at("shear_scatter")) for name in ("shear_x", "shear_y")],
-            f"asperity pressure [{self.units['pressure']}]": [("pressure", at("pressure"), None)],
-            "real contact area  A/A0": [("area", at("area"), None)],
+            "pressure flow factor": [(name, at[name], at["scatter"]) for name in ("phi_x", "phi_y")],
+            "shear flow factor": [(name, at[name], at["shear_scatter"]) for name in ("shear_x", "shear_y")],
+            f"asperity pressure [{self.units['pressure']}]": [("pressure", at["pressure"], None)],
+            "real contact area  A/A0": [("area", at["area"], None)],
         }
-        return draw_panels(at("mean_separation"), panels, f"mean gap u [{self.units['mean_separation']}]")
+        return draw_panels(at["mean_separation"], panels, f"mean gap u [{self.units['mean_separation']}]")
 
 
 @hinted
@@ -161,10 +117,6 @@ def flow_factors(
     -------
     FlowFactors
 
-    Raises
-    ------
-    InputError, OutOfRangeError
-
     Examples
     --------
     >>> from mbma_tables import Surface, flow_factors
@@ -173,44 +125,55 @@ def flow_factors(
     >>> print(film.phi_x.round(2), film.phi_y.round(2), film.shear_y.round(2))
     [1.05 1.06 1.02] [0.5 0.7 0.9] [0.84 0.68 0.37]
     """
-    one: Any = surface
-    theory = "calibrated" if theory is None else theory
     found = contact(
-        surface, mean_separation=mean_separation, theory=theory, E_star=E_star, hardness=hardness, materials=materials
+        surface,
+        mean_separation=mean_separation,
+        theory="calibrated" if theory is None else theory,
+        E_star=E_star,
+        hardness=hardness,
+        materials=materials,
     )
     if surface.labelled or surface.shape != ():
         raise InputError("flow factors need one surface, not a batch")
-    u = np.ravel(found.mean_separation)
-    low, high = (end * float(surface.h_rms) for end in RANGE)
-    require("mean_separation", u, (u >= low) & (u <= high), f"from {RANGE[0]:g} to {RANGE[1]:g} h_rms")
-    gamma = _peklenik(one) if peklenik is None else number_in("peklenik", peklenik, 1 / WIDEST_LAY, WIDEST_LAY)
+    u, h_rms, own = np.ravel(found.mean_separation), float(surface.h_rms), found.theory == "simulated"
+    low, high = RANGE
+    require("mean_separation", u, (u >= low * h_rms) & (u <= high * h_rms), f"from {low:g} to {high:g} h_rms")
+    gamma = _peklenik(surface) if peklenik is None else number_in("peklenik", peklenik, 1 / WIDEST_LAY, WIDEST_LAY)
     area, leak = np.ravel(found.area), found.leakage
-    own = found.theory == "simulated"
+    if own and peklenik is not None:
+        raise InputError("peklenik is not of a map that is simulated: leave it out")
     if own:
-        if peklenik is not None:
-            raise InputError("peklenik is not of a map that is simulated: leave it out")
         (phi_x, phi_y), shear = _simulated(found, u)
         of_lay, far = 0.0, False
     else:
-        ratio, shear = factors(u / float(surface.h_rms), area, gamma, shipped_flow().constants)
+        ratio, shear = factors(u / h_rms, area, gamma, shipped_flow().constants)
         phi_x, phi_y = np.ravel(leak.K) / u**3 * ratio
         of_lay = LAY[0] * area ** LAY[1] * np.log(gamma)
-        far = bool(gamma > WIDEST_LAY or gamma < 1 / WIDEST_LAY)
+        far = gamma > WIDEST_LAY or gamma < 1 / WIDEST_LAY
     of_contact = np.where(area > 0, np.nan_to_num(np.ravel(leak.scatter), nan=np.inf), 0.0)
     scatter = np.sqrt((OWN if own else OPEN) ** 2 + of_contact**2 + of_lay**2)
+    reasons = {text: np.ravel(mask) for text, mask in leak.reasons.items()}
     # the lightest contacts were not simulated, but their flow is nearly that before contact
-    light = f"A/A0 is below {TESTED_AREA[0]:g}"
-    reasons = {text: np.ravel(mask) for text, mask in leak.reasons.items() if text != light}
+    reasons.pop(f"A/A0 is below {TESTED_AREA[0]:g}", None)
     reasons |= {f"the lay is longer than {WIDEST_LAY:g} to 1, beyond simulated flow": np.full(u.shape, far)}
     reasons |= {f"the model uncertainty of ln phi is above {USEFUL:g}": scatter > USEFUL}
-    reasons = {text: mask for text, mask in reasons.items() if np.any(mask)}
     units = {name: found.units[name] for name in ("mean_separation", "pressure")}
-    units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units))
-    shear_scatter = np.full(u.shape, OWN_SHEAR if own else SHEAR)
     return FlowFactors(
-        u, phi_x, phi_y, shear[0], shear[1], np.ravel(found.pressure), area, scatter, shear_scatter,
-        ~np.logical_or.reduce([np.zeros(u.shape, bool), *reasons.values()]), reasons, float(gamma), surface, units,
-    )  # fmt: skip
+        reasons={text: mask for text, mask in reasons.items() if np.any(mask)},
+        peklenik=float(gamma),
+        surface=surface,
+        units=units | dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units)),
+        mean_separation=u,
+        phi_x=phi_x,
+        phi_y=phi_y,
+        shear_x=shear[0],
+        shear_y=shear[1],
+        pressure=np.ravel(found.pressure),
+        area=area,
+        scatter=scatter,
+        shear_scatter=np.full(u.shape, OWN_SHEAR if own else SHEAR),
+        valid=~np.logical_or.reduce(list(reasons.values())),
+    )
 
 
 def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 LARGEST_KNUDSEN = 0.1  # largest ratio of mean free path to channel for which first-order slip holds
 SLIP = 6.0  # in a plane channel slip multiplies the flow by 1 + 6 Kn
 # standard deviations of ln k of maps by their isotropic spectrum, which come on top, of maps that are valid for the
-# calibrated law and of others; at these contacts of docs/data/machined.nc
+# calibrated law and of others; at these contacts of the data set's group machined
 MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
 LIKE_GAUSSIAN, OTHERS = (0.29, 0.60, 0.89, 1.9, 6.3), (0.84, 1.3, 1.9, 3.0, 7.3)
 SIMULATED = 64.0  # zeta_1 up to which flow was simulated

@@ -141,7 +141,7 @@ class Contact(Interface, Displayed):
         return Curve(label, *(np.ravel(field)[order] for field in fields))
 
     def map(self) -> ContactMap:
-        """Pressure, gap and contact at every point of the surface's map at this pressure, simulated by Tamaas.
+        """Pressure, gap and contact at every point of the surface's map at this pressure, by boundary elements.
 
         The map is simulated on its full grid at the contact's pressure, whichever theory computed the contact.
 

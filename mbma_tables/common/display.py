@@ -7,10 +7,13 @@ picture (`_figure`).
 from __future__ import annotations
 
 import base64
+import dataclasses
 import html
+import inspect
 import os
+import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -49,8 +52,22 @@ def shown(value: Any, unit: str = "1") -> str:
     return " to ".join(ends) + ("" if unit == "1" else f" {unit}")
 
 
+def quantity(meaning: str) -> Any:
+    """A field of a `Displayed` dataclass; its meaning goes to the docstring and, up to a semicolon, to the Dataset."""
+    return dataclasses.field(metadata={"meaning": meaning})
+
+
 class Displayed:
     """Base class with display as a line, as a table with a picture, as a figure and as a Dataset."""
+
+    units: Any
+    _dims: ClassVar[tuple[str, ...] | None] = None
+
+    def __init_subclass__(cls) -> None:
+        held = {name: each.metadata for name, each in vars(cls).items() if isinstance(each, dataclasses.Field)}
+        lines = [f"{name}\n    {about['meaning']}" for name, about in held.items() if "meaning" in about]
+        if lines and cls.__doc__:
+            cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__), "\nAttributes\n----------", *lines])
 
     def _facts(self) -> Mapping[str, str]:
         """Its description, by name."""
@@ -58,7 +75,12 @@ class Displayed:
 
     def _variables(self) -> Mapping[str, Variable]:
         """Its quantities, by name."""
-        raise NotImplementedError
+        own: Any = self
+        known = {each.name: each.metadata["meaning"] for each in dataclasses.fields(own) if each.metadata}
+        return {
+            name: Variable(getattr(self, name), self.units.get(name, "1"), re.split(r";| \[", text)[0], self._dims)
+            for name, text in known.items()
+        }
 
     def _origin(self) -> Mapping[str, str]:
         """Further attributes of the Dataset."""

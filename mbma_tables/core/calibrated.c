@@ -225,19 +225,23 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
     size_t bad = 0;
     for (size_t begin = 0; begin < n; begin += CHUNK) {
         const size_t count = n - begin < (size_t)CHUNK ? n - begin : (size_t)CHUNK;
-        double goal[CHUNK], low[CHUNK], high[CHUNK], x[CHUNK];
+        double goal[CHUNK], end[CHUNK], low[CHUNK], high[CHUNK], x[CHUNK];
         bool done[CHUNK];
         size_t left = count;
         for (size_t k = 0; k < count; k++) {
             const size_t mine = held_owner(surfaces, owner[begin + k]);
-            const double F = force[begin + k], end = surfaces->ends[2 * mine + 1];
-            goal[k] = mbma_endless(mbma_log(mbma_max(F, DBL_MIN)), end);
+            end[k] = surfaces->ends[2 * mine + 1];
             low[k] = LEAST_LOG_SEPARATION;
-            high[k] = mbma_log(surfaces->h_max[mine]);
+            high[k] = surfaces->h_max[mine];
+        }
+        for (size_t k = 0; k < count; k++) {
+            const double F = force[begin + k];
+            goal[k] = mbma_endless(mbma_log(mbma_max(F, DBL_MIN)), end[k]);
+            high[k] = mbma_log(high[k]);
             /* ln F is about -3 u at light loads */
             x[k] = mbma_min(mbma_log(mbma_max(-0.3 * goal[k], 1e-3)), high[k] - 0.01);
             u[begin + k] = NAN;
-            done[k] = !(F > 0.0 && end == end && fabs(goal[k]) < INFINITY && (uint64_t)owner[begin + k] < surfaces->count);
+            done[k] = !(F > 0.0 && end[k] == end[k] && fabs(goal[k]) < INFINITY && (uint64_t)owner[begin + k] < surfaces->count);
         }
         /* steps of all entries together, which are independent */
         for (int step = 0; step < MOST_STEPS && left > 0; step++) {

@@ -13,16 +13,18 @@ MBMA_INLINE double mbma_ended(double log_r, double *slope) {
     return left * root / (1.0 + r);
 }
 
-/* ln F_G at ln F, by Newton's method for -ln r, from below since the function is concave. */
+/* ln F_G at ln F. With w = F_G/F_end - 1, F/F_end = sqrt(w^3 (1 + w))/(2 + w): two steps of Newton's method between the
+ * logarithms, which are nearly proportional, from a guess within 1%; logarithms of ratios near 1 by their Pade form. */
 MBMA_INLINE double mbma_endless(double log_force, double end) {
-    const double over = log_force - end;
-    double y = over < 0.0 ? mbma_exp(mbma_max(over, -700.0) / 1.5) : mbma_max(over, 1.0), more = 0.0;
-    for (int step = 0; step < 6; step++) {
-        const double r = mbma_exp(-mbma_min(y, 700.0)), left = -mbma_expm1(-mbma_min(y, 700.0));
-        more = mbma_log1p(r) - 1.5 * mbma_log(left);
-        y += (over - y + more) / (1.0 + 1.5 * r / left + r / (1.0 + r));
+    const double over = log_force - end, root = mbma_exp(mbma_held(over, -700.0, 40.0) / 1.5);
+    double part = sqrt(root + 2.5198421 / sqrt(1.0 + 0.66 * root)), w = part * root; /* 4^(2/3) for light loads */
+    for (int step = 0; step < 2; step++, w = part * root) {
+        const double square = (2.0 + w) * (2.0 + w), cube = part * part * part * (1.0 + w);
+        const double power = 3.0 + w / (1.0 + w) - 2.0 * w / (2.0 + w), half = (cube - square) / (cube + square);
+        part *= (power - half) / (power + half);
     }
-    return over < 0.0 ? end + y : log_force + more;
+    const double heavy = 0.5 * mbma_log((2.0 + w) * (2.0 + w) * (1.0 + w) / (w * w * w));
+    return over < 0.0 ? end + mbma_log1p(w) : log_force + heavy;
 }
 
 #endif

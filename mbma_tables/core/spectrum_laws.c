@@ -267,7 +267,7 @@ size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const d
 /* Newton's method for ln F of a surface without end, before the tail's factor ln F + tail. */
 static double separation_at(const mbma_spectrum_law *law, double log_force, double end, double tail, double *slope) {
     const double heaviest = law->edge[law->panels];
-    const double goal = log_force - end < 700.0 ? mbma_endless(log_force, end) : log_force;
+    const double goal = mbma_endless(log_force, end);
     double low = -800.0, high = heaviest, x = goal - law->shift, u = 0.0;
     *slope = 0.0;
     for (int step = 0; step < MOST_STEPS && goal - law->shift < heaviest; step++) {

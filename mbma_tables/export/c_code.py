@@ -26,7 +26,7 @@ from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import calibrated_table, persson
-from mbma_tables.totals.island_sum import QUADRATURE_SHARE
+from mbma_tables.totals.contact import QUADRATURE_SHARE
 
 FORM = "standard"  # the form of island model "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows

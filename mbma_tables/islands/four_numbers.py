@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,10 +49,6 @@ class Coordinates(NamedTuple):
     sigma: FloatArray  # times zeta_d^H
     force: FloatArray  # F_hat per Phi_F, sigma sqrt(2 R_d sigma)
     area: FloatArray  # A_hat per Phi_A, 2 pi D R_u R_d sigma^2
-
-    def some(self, chosen: Any) -> Coordinates:
-        """The islands at these indices."""
-        return Coordinates(*(field[chosen] for field in self))
 
 
 def to_axes(

@@ -1,6 +1,6 @@
-"""From an island's approach delta to its band, radii, densities, X and mu (Section 3.2).
+"""From an island's approach delta to its band, radii, densities, X and mu (Section 3.2); heights in s, lengths in 1/q0.
 
-Units as in `surfaces.spectrum`: heights in s, lengths in 1/q0. With e = zeta_1^(-2H) the ends are carried as
+With e = zeta_1^(-2H) the ends are carried as
 
     zeta_d^(-2H) = e + a,   zeta_u^(-2H) = e + b
 
@@ -40,6 +40,14 @@ def floor_offset(hurst: Any, zeta_1: Any, floor: float) -> Any:
     """floor^(-2H) - zeta_1^(-2H) without cancellation: the largest a (or b) above a floor; of numbers or arrays."""
     e = np.exp(-2.0 * hurst * np.log(zeta_1))
     return e * np.expm1(2.0 * hurst * np.log1p((zeta_1 - floor) / floor))
+
+
+def kinks(hurst: Any, zeta_1: Any, variant: Variant) -> tuple[Any, Any]:
+    """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
+    rms_over_s = np.sqrt(-np.expm1(-2 * hurst * np.log(zeta_1)))
+    slope_d, slope_u = 4 / 3 * variant.beta, variant.phi / (1 + variant.phi) * rms_over_s
+    at_d, at_u = (np.sqrt(floor_offset(hurst, zeta_1, floor)) for floor in (variant.floor_d, variant.floor_u))
+    return (at_d / slope_d)[()], (at_u / slope_u)[()]
 
 
 def summit_sigma(m0: Any, alpha: Any, summits: bool) -> Any:

@@ -32,27 +32,15 @@ COARSE_NODES = 12  # nodes of the initial guess
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class IslandSolution:
-    """Solutions of the island problem.
+    """Solutions of the island problem."""
 
-    Attributes
-    ----------
-    X, mu : ndarray
-        The arguments, broadcast.
-    phi_F, phi_A : ndarray
-        Force over E* sigma L and area over eta pi D R_u sigma L^2.
-    error : ndarray
-        Estimate of the larger relative error of the two.
-    iterations, nodes : ndarray of int
-        Newton steps and nodes of each solution.
-    """
-
-    X: FloatArray
+    X: FloatArray  #: the arguments, broadcast
     mu: FloatArray
-    phi_F: FloatArray
-    phi_A: FloatArray
-    error: FloatArray
-    iterations: NDArray[np.int64]
-    nodes: NDArray[np.int64]
+    phi_F: FloatArray  #: force over E* sigma L
+    phi_A: FloatArray  #: area over eta pi D R_u sigma L^2
+    error: FloatArray  #: estimate of the larger relative error of the two
+    iterations: NDArray[np.int64]  #: Newton steps of each solution
+    nodes: NDArray[np.int64]  #: Gauss nodes of each solution
     rtol: float
 
     @functools.cached_property
@@ -63,20 +51,9 @@ class IslandSolution:
         rho, pressure, gap = (rows.reshape(shape) for rows in profiles)
         return rho, pressure, gap
 
-    @property
-    def rho(self) -> FloatArray:
-        """Radii of the profiles over L, shape (..., nodes); solved on first access."""
-        return self._profiles[0]
-
-    @property
-    def pressure(self) -> FloatArray:
-        """p(rho) over E* sigma/L, shape (..., nodes)."""
-        return self._profiles[1]
-
-    @property
-    def gap(self) -> FloatArray:
-        """d(rho) over sigma, between the deformed sphere and the summits' mid-plane, shape (..., nodes)."""
-        return self._profiles[2]
+    rho = property(lambda self: self._profiles[0], doc="Radii of the profiles over L, shape (..., nodes).")
+    pressure = property(lambda self: self._profiles[1], doc="p(rho) over E* sigma/L, shape (..., nodes).")
+    gap = property(lambda self: self._profiles[2], doc="d(rho) over sigma, from sphere to mid-plane, (..., nodes).")
 
 
 def _newton(
@@ -106,22 +83,15 @@ def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
     return np.stack([math.pi / 5 * mu * height_integral(2.5, -X), math.pi / 2 * height_integral(2.0, -X)])
 
 
-def _nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
-    """Gauss nodes that usually give `rtol`; the error estimate of each solution is then checked."""
-    digits = max(-math.log10(rtol), 3.0)
-    softness = np.log10(np.maximum(mu, 1.0)) / 12
-    wanted: FloatArray = digits * np.sqrt(np.maximum(X, 0) + 5) * (1 + softness)
-    return wanted
-
-
 def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> tuple[Any, ...]:
     """Phi_F, Phi_A and error (entries, 3), steps, nodes, and which entries failed."""
-    phi = np.full((X.size, 3), np.nan)
-    steps = np.zeros(X.size, dtype=np.int64)
-    used = np.zeros(X.size, dtype=np.int64)
+    phi, (steps, used) = np.full((X.size, 3), np.nan), np.zeros((2, X.size), dtype=np.int64)
     failed = np.ones(X.size, dtype=bool)
     levels = LEVELS if nodes is None else np.array([nodes])
-    level = np.minimum(np.searchsorted(levels, _nodes_needed(X, mu, rtol)), len(levels) - 1)
+    # nodes that usually give `rtol`; the error estimate of each solution is then checked
+    softness = 1 + np.log10(np.maximum(mu, 1.0)) / 12
+    needed = max(-math.log10(rtol), 3.0) * np.sqrt(np.maximum(X, 0) + 5) * softness
+    level = np.minimum(np.searchsorted(levels, needed), len(levels) - 1)
     for number, count in enumerate(levels):
         now = np.flatnonzero(failed & (level <= number))
         if now.size == 0:
@@ -134,12 +104,7 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
     return phi, steps, used, failed | ~np.isfinite(phi).all(axis=1)
 
 
-def solve(
-    X: ArrayLike,
-    mu: ArrayLike,
-    rtol: float = 1e-10,
-    nodes: int | None = None,
-) -> IslandSolution:
+def solve(X: ArrayLike, mu: ArrayLike, rtol: float = 1e-10, nodes: int | None = None) -> IslandSolution:
     """Solve the island problem for phi_F, phi_A and the profiles of pressure and gap.
 
     Parameters
@@ -183,14 +148,13 @@ def solve(
     phi, steps, used, missed = _solve_newton(flat_X, flat_mu, rtol, nodes)
     fields: list[Any] = [*(part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)), rtol]
     result = IslandSolution(*fields)
-    failed = missed.reshape(shape)
-    if failed.any():
+    if missed.any():
         first = int(np.flatnonzero(missed)[0])
         raise ConvergenceError(
-            f"the solver did not reach the requested accuracy at {int(failed.sum())} of {failed.size} "
+            f"the solver did not reach the requested accuracy at {int(missed.sum())} of {missed.size} "
             f"entries, the first at X = {flat_X[first]:.6g}, mu = {flat_mu[first]:.6g} "
             f"(reached {phi[first, 2]:.1e}, requested {rtol:.1e})",
-            failed,
+            missed.reshape(shape),
             result,
         )
     return result

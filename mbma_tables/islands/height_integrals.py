@@ -1,12 +1,4 @@
-"""Height integrals of Gaussian summits, F_n(x) = integral_x^inf (z - x)^n phi(z) dz.
-
-phi is the standard normal density; n = 1/2, 1, 3/2, 2, 5/2. Eqs. (36) and (38) of the paper are F_{3/2}
-and F_1; F_{5/2} and F_2 are their integrals over a rigid sphere.
-
-Each F_n is eight polynomial pieces (`generate/tables/height_coefficients.py`), accurate to 1e-13 relative for x <= 10
-and to 5e-13 up to 37. The core does not use scipy's parabolic cylinder functions, which lose five digits near x =
--6 and seven near 6 and return NaN at -100.
-"""
+"""Height integrals of Gaussian summits, as polynomials of `generate/tables/height_coefficients.py`."""
 
 from __future__ import annotations
 
@@ -22,7 +14,10 @@ ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5)
 
 
 def height_integral(n: float, x: ArrayLike) -> Any:
-    """F_n(x) = integral_x^inf (z - x)^n phi(z) dz for n = 1/2, 1, 3/2, 2 or 5/2.
+    """F_n(x) = integral_x^inf (z - x)^n phi(z) dz of the normal density phi, for n = 1/2, 1, 3/2, 2 or 5/2.
+
+    Eqs. (36) and (38) are F_{3/2} and F_1; F_{5/2} and F_2 are their integrals over a rigid sphere. The relative error
+    is 1e-13 for x <= 10 and 5e-13 up to 37; scipy's parabolic cylinder functions lose up to seven digits.
 
     Parameters
     ----------
@@ -34,12 +29,7 @@ def height_integral(n: float, x: ArrayLike) -> Any:
     Returns
     -------
     numpy.ndarray or numpy.float64
-        F_n(x), dimensionless, in the shape of `x`. Beyond x = 38 it underflows smoothly to zero.
-
-    Raises
-    ------
-    InputError
-        If `n` is not one of `ORDERS` or `x` holds NaN or infinity.
+        F_n(x), dimensionless, in the shape of `x`; beyond x = 38 zero.
 
     Examples
     --------

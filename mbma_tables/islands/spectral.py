@@ -31,9 +31,8 @@ class Basis(NamedTuple):
 def gauss_legendre(n: int) -> tuple[FloatArray, FloatArray]:
     """Gauss nodes and weights on [0, 1], relative accuracy of a few n eps at the ends too.
 
-    Computed here because numpy and scipy form 1 - x^2 from a rounded x and lose up to five digits of the end weights,
-    which the pressure at an island's edge needs. Here t = 1 - x is the unknown and the recurrence runs over differences
-    of Legendre polynomials.
+    numpy and scipy form 1 - x^2 from a rounded x and lose up to five digits of the end weights, which the pressure at
+    an island's edge needs. Here t = 1 - x is the unknown, and the recurrence is of differences of polynomials.
     """
     theta = np.pi * (4 * np.arange(1, (n + 1) // 2 + 1) - 1) / (4 * n + 2)
     t = 2 * np.sin(theta / 2) ** 2

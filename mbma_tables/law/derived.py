@@ -1,4 +1,4 @@
-"""Quantities derived from a law on first access: unloading, sliding, softening, leakage, its picture."""
+"""Quantities derived from a law on first access: unloading, sliding, tangents, softening, leakage, its picture."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import functools
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.answers.interface import OF_LAY, OF_YIELDING, Tangential, ratio_of
-from mbma_tables.common.arguments import Numbers
+from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
@@ -19,11 +20,46 @@ from mbma_tables.law.block import softening
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.law.continued import ContinuedLaw
     from mbma_tables.law.leakage import LeakageLaw
 
-
+LIGHT, HEAVY = 1e-2, 0.99  # overclosures of the default ends of a continued law, over that of the law's last
 DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors of the polynomials
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ContinuedLaw:
+    """Pressure of a `ContactLaw` between two mean separations, and straight lines that continue it with its slope.
+
+    Towards wide gaps the line crosses zero: pressure is negative there, which attracts separated bodies in trial steps.
+    Neither end is a law of contact: check with `inside` that a solution lies between them.
+    """
+
+    law: Any
+    light: float  #: mean separation of the end towards wide gaps [length]
+    heavy: float  #: and of the other
+
+    def pressure_and_stiffness(self, mean_separation: ArrayLike | str) -> tuple[Numbers, Numbers]:
+        """F/A0 and its derivative -dp/du, in one pass."""
+        u = self._given(mean_separation)
+        held = np.clip(u, self.heavy, self.light)
+        pressure, stiffness = self.law.pressure_and_stiffness(held)
+        return pressure + stiffness * (held - u), stiffness
+
+    def pressure(self, mean_separation: ArrayLike | str) -> Numbers:
+        """F/A0."""
+        return self.pressure_and_stiffness(mean_separation)[0]
+
+    def stiffness(self, mean_separation: ArrayLike | str) -> Numbers:
+        """-dp/du."""
+        return self.pressure_and_stiffness(mean_separation)[1]
+
+    def inside(self, mean_separation: ArrayLike | str) -> Any:
+        """Whether the law itself applies, or the bodies are apart and its pressure is zero; False at first contact."""
+        u = self._given(mean_separation)
+        return (self.heavy <= u) & (u <= self.light)
+
+    def _given(self, mean_separation: ArrayLike | str) -> FloatArray:
+        return finite_array("mean_separation", self.law.units.number("mean_separation", mean_separation))
 
 
 class Derived:
@@ -110,9 +146,18 @@ class Derived:
         >>> bool(trial.inside(u)), round(float(law.pressure(u)), 12)
         (True, 0.1)
         """
-        from mbma_tables.law.continued import continued_law
-
-        return continued_law(self, pressures)
+        if pressures is None:
+            end = self.lowest if self.turning_point is None else self.turning_point
+            light, heavy = (self.h_max - share * (self.h_max - end) / 2 for share in (LIGHT, HEAVY))
+            if self.softening is not None:  # beyond it tangents fall, to zero where pressure turns down
+                heavy = max(heavy, self.softening)
+        elif isinstance(pressures, tuple | list | np.ndarray) and len(pressures) == 2:
+            light, heavy = (float(self.at_pressure(pressure).mean_separation) for pressure in pressures)
+        else:
+            raise InputError(f"pressures must be two rising numbers, got {pressures!r}")
+        if not heavy < light or not float(self.stiffness(light)) > 0:
+            raise InputError(f"pressures must be two rising numbers above zero, got {pressures!r}")
+        return ContinuedLaw(self, light, heavy)
 
     @functools.cached_property
     def softening(self: Any) -> float | None:

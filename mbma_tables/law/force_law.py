@@ -36,11 +36,6 @@ class Body(HalfSpace):
     newtons: float
 
     @property
-    def first(self) -> float:
-        """Approach of first contact, or from which on a law without one is covered."""
-        return -self.ends[1]
-
-    @property
     def name(self) -> str:
         """What it is, in words."""
         return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
@@ -95,26 +90,20 @@ def forces(given: Any, body: Body, length: str | None) -> Any:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ForceLaw:
-    """Force of a rough sphere or cylinder against its approach, made by `RoughContact.law`.
+    """Force of a rough sphere or cylinder against its approach, made by `RoughContact.law`; per length of a cylinder.
 
-    Approaches are numbers in the surface's unit or texts, "0.8 um"; zero force below `first`. `export.law_text` writes
-    it as source code.
-
-    Attributes
-    ----------
-    law : ContactLaw
-        The same in the layout of contact laws: "pressure" is force and "area" real area, against the approach that is
-        left to the largest one. Its `error` bounds the relative error of both.
-    first : float
-        Approach of first contact; of a layer without one, at a thousand-millionth of the largest force [length].
+    Approaches are numbers in the surface's unit or texts, "0.8 um"; zero force below `first`.
     """
 
+    #: the same in the layout of contact laws, against the approach that is left to the largest one: "pressure" is force
+    #: and "area" real area, `error` bounds the relative error of both
     law: ContactLaw
+    #: approach of first contact; of a layer without one, at a thousand-millionth of the largest force [length]
     first: float
     body: Body
 
     def force(self, approach: ArrayLike | str) -> Numbers:
-        """F; of a cylinder per length."""
+        """F."""
         return self.law.pressure(self._left(approach))
 
     def stiffness(self, approach: ArrayLike | str) -> Numbers:
@@ -122,7 +111,7 @@ class ForceLaw:
         return self.law.stiffness(self._left(approach))
 
     def area(self, approach: ArrayLike | str) -> Numbers:
-        """Real contact area; of a cylinder per length."""
+        """Real contact area."""
         return self.law.area(self._left(approach))
 
     def energy(self, approach: ArrayLike | str) -> Numbers:
@@ -161,7 +150,7 @@ class _Pressed(Theory):
 
 def force_law(body: Body, top: float, rtol: float) -> ForceLaw:
     """Force against approach up to `top`."""
-    first = body.first
+    first = -body.ends[1]
     if not body.touches:
         largest = body.solved(top, RTOL)
         first = body.approach_at(LIGHT * body.integral(largest, largest.p))

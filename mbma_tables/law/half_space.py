@@ -1,19 +1,9 @@
 """Contact of a sphere or a cylinder with an elastic half-space whose surface layer is a contact law.
 
-With the approach delta, counted from where the smooth bodies would touch, and the layer's mean separation u(r) ::
-
-    u = r^2/(2 R) - delta + w,    p = law(u),    w the displacement of the half-space under p
-
-which is the problem of J. A. Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153) with the law of any theory in
-place of their asperities. Newton's unknown is w at the nodes of `islands.spectral`. A fully compressed layer is
-rigid. Force and pressure are over E* here, and those of a cylinder are per length.
-
-The basis of a cylinder are Legendre polynomials of even degree in x over a. The kernel is -(2/pi) ln|x - s|, and by
-Neumann's integral 2 Q_n of P_n over x - s
-
-    -integral P_m P_n ln|x - s| dx ds = (4/(2n + 1)) (1/((m-n+1) (m+n)) - 1/((m-n-1) (m+n+2)))
-
-and 6 - 4 ln 2 for m = n = 0.
+At the approach delta from where the smooth bodies would touch, with p = law(u), u = r^2/(2 R) - delta + w, and w the
+displacement of the half-space under p: the problem of J. A. Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153)
+with any law in place of their asperities. Newton's unknown is w at the nodes of `islands.spectral`. A fully compressed
+layer is rigid. Force and pressure are over E* here, and those of a cylinder are per length.
 """
 
 from __future__ import annotations
@@ -41,7 +31,10 @@ FLAT = 0.01  # share of h_max by which a fully compressed layer may be thinner t
 
 @functools.lru_cache(maxsize=64)
 def plane_basis(nodes: int) -> Basis:
-    """The basis of pressures that are even in x, at nodes in (0, 1), v = (x/a)^2; w is against a point at x = a."""
+    """The basis of pressures that are even in x, at nodes in (0, 1), v = (x/a)^2; w is against a point at x = a.
+
+    Of Legendre polynomials of even degree under the kernel -(2/pi) ln|x - s|, by Neumann's integral 2 Q_n of P_n.
+    """
     x, weights = (part[nodes:] for part in gauss_legendre(2 * nodes))
     x = 2 * x - 1
     m, n = 2.0 * np.arange(nodes)[:, None], 2.0 * np.arange(nodes)
@@ -130,12 +123,7 @@ class HalfSpace:
         return Solved(radius, known, u, self.layer(u)[0], jacobian, math.inf)
 
     def solved(self, approach: float, rtol: float) -> Solved:
-        """The contact at an approach, with a relative change of force up to `rtol` at the last number of nodes.
-
-        Raises
-        ------
-        ConvergenceError
-        """
+        """The contact at an approach, with a relative change of force up to `rtol` at the last number of nodes."""
         found = self._newton(approach, math.sqrt(2 * self.radius * (approach + self.ends[1])), NODES[0])
         for nodes in NODES:
             t = np.linspace(0, 1, PLACES * nodes + 1)
@@ -152,13 +140,7 @@ class HalfSpace:
         return found._replace(error=error)
 
     def quantities(self, at: Solved) -> tuple[float, float, float]:
-        """Force over E*, its derivative by the approach over E*, and the real area.
-
-        Raises
-        ------
-        OutOfRangeError
-            If the law ends below the pressure in the middle.
-        """
+        """Force over E*, its derivative by the approach over E*, and the real area."""
         middle, low = finite_array("mean_separation", at.u.min()), self.ends[0]
         allowed = f"at least {low:.6g}, where the law of {self.law.theory!r} ends"
         require("mean_separation in the middle", middle, middle >= low - FLAT * self.law.h_max, allowed)

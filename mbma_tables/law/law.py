@@ -1,6 +1,6 @@
-"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses.
+"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses, from one record each.
 
-All of them come from one record of polynomials, found from the bits of the gap (`core/law.c`).
+A record has the polynomials of a stretch of gaps and is found from the bits of the gap (`core/law.c`).
 """
 
 from __future__ import annotations
@@ -55,38 +55,6 @@ class ContactLaw(Law, Derived, Displayed):
     Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the law's unit of length, or
     texts with their own, "0.8 um".
 
-    Attributes
-    ----------
-    h_max : float
-        Highest point [length]; if contact ends there, results are zero at this gap and above.
-    E_star : float
-        Effective modulus, in whose unit force is.
-    lowest, highest : float
-        Gaps d that the law covers; highest is infinite where contact ends at h_max.
-    error : float
-        Bound on the relative error of force and area, of the polynomials and of what they were made from together.
-        With a hardness it does not hold within 1e-6 h_max of last contact, where islands turn elastic one by one.
-    turning_point, area_turning_point : float or None
-        Gap below which force, or area, decreases under compression, if it does; inverses end there.
-    theory, variant, island_model : str
-        What made it; variant and island model are empty where the theory is not MBMA.
-    block : ndarray
-        The polynomials, in the layout that `mbma_tables/core/mbma.h` describes.
-    errors : ndarray, shape (records, 2)
-        Bounds on the relative error of a record's values, and of its slopes over F/x.
-    units : Units
-        Of lengths and stresses, as far as the surface and the modulus knew theirs.
-    surface : Surface
-        The surface of the law.
-    hardness : float
-        Infinite where nothing yields.
-    elastic : callable or None
-        With a hardness, function that makes the law of the elastic contact.
-    materials : Pair or None
-        Where they are named.
-    gaps : theory or None
-        Of a simulated map, what knows the flow through its gaps.
-
     Examples
     --------
     >>> from mbma_tables import Surface, contact_law
@@ -99,24 +67,26 @@ class ContactLaw(Law, Derived, Displayed):
     (0.00287, 1.06)
     """
 
-    h_max: float
-    E_star: float
-    lowest: float
-    highest: float
+    h_max: float  #: highest point [length]; if contact ends there, results are zero at this gap and above
+    E_star: float  #: effective modulus, in whose unit force is
+    lowest: float  #: least gap d that the law covers
+    highest: float  #: largest one; infinite where contact ends at h_max
+    #: bound on the relative error of force and area, of the polynomials and what they were made from together; with a
+    #: hardness it does not hold within 1e-6 h_max of last contact, where islands turn elastic one by one
     error: float
-    turning_point: float | None
-    area_turning_point: float | None
+    turning_point: float | None  #: gap below which force decreases under compression, if it does; inverses end there
+    area_turning_point: float | None  #: the same of the area
     theory: str
-    variant: str
+    variant: str  #: empty where the theory is not MBMA, as is `island_model`
     island_model: str
-    block: FloatArray
-    errors: FloatArray
-    units: Units = UNKNOWN
-    surface: AnySurface | None = None
-    hardness: float = math.inf
-    elastic: Callable[[], ContactLaw] | None = None
-    materials: Pair | None = None
-    gaps: Any = None
+    block: FloatArray  #: the polynomials, in the layout that `mbma_tables/core/mbma.h` describes
+    errors: FloatArray  #: bounds on the relative error of a record's values, and of its slopes over F/x, (records, 2)
+    units: Units = UNKNOWN  #: of lengths and stresses, as far as the surface and the modulus knew theirs
+    surface: AnySurface | None = None  #: the surface of the law
+    hardness: float = math.inf  #: infinite where nothing yields
+    elastic: Callable[[], ContactLaw] | None = None  #: with a hardness, makes the law of the elastic contact
+    materials: Pair | None = None  #: where they are named
+    gaps: Any = None  #: of a simulated map, the theory that knows the flow through its gaps
 
     @property
     def rows(self) -> Any:
@@ -130,8 +100,7 @@ class ContactLaw(Law, Derived, Displayed):
 
     def separations(self, mean_separation: Any = None, separation: Any = None) -> FloatArray:
         """Separations d, checked, of mean separations or of separations, one of them."""
-        name, given = self._known(mean_separation, separation)
-        return self._in_range(name, given)[1]
+        return self._in_range(*self._known(mean_separation, separation))[1]
 
     def _known(self, mean_separation: Any, separation: Any) -> tuple[str, Any]:
         """The one that is given, and its name."""
@@ -172,15 +141,12 @@ class ContactLaw(Law, Derived, Displayed):
         """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
         name, given = self._known(mean_separation, separation)
 
-        def check(given: Any) -> FloatArray:
-            return self._in_range(name, given)[0]
-
         def fill(gaps: FloatArray, *out: FloatArray) -> bool:
             found = dict(zip(wanted, out, strict=True))
             d = gaps if name == "separation" else 2 * gaps - self.h_max
             return not core.law_fill(d, self.block, *map(found.get, QUANTITIES))
 
-        return self._ask(given, len(wanted), check, fill)
+        return self._ask(given, len(wanted), lambda given: self._in_range(name, given)[0], fill)
 
     def _ask_one(self, what: int, mean_separation: Any, separation: Any) -> Any:
         """Arguments that a method of `Law` does not evaluate itself."""
@@ -202,13 +168,7 @@ class ContactLaw(Law, Derived, Displayed):
         return LawValues(*self._values(("pressure", "area", "stiffness", "energy"), mean_separation, separation))
 
     def separation(self, *, pressure: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
-        """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero.
-
-        Raises
-        ------
-        OutOfRangeError
-            If the branch does not reach the value; the message has the branch's end.
-        """
+        """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero."""
         if (pressure is None) == (area is None):
             raise InputError("give pressure or area, one of them")
         name, given = ("area", area) if pressure is None else ("pressure", self.units.number("pressure", pressure))
@@ -251,8 +211,7 @@ class ContactLaw(Law, Derived, Displayed):
         """Polynomials of x over force or area, made when first needed."""
         made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
         if name not in made:
-            turn = self.turning_point if name == "pressure" else self.area_turning_point
-            which = FORCE if name == "pressure" else AREA
+            which, turn = (FORCE, self.turning_point) if name == "pressure" else (AREA, self.area_turning_point)
             made[name] = inverse_block(which, self.block, self.lowest if turn is None else turn)
         return made[name]
 
@@ -262,8 +221,7 @@ class ContactLaw(Law, Derived, Displayed):
         l = h_max - d where contact ends there, else h_max + d. It includes the error of the polynomials, and for MBMA
         that of the islands as it propagates to slopes; not the error of another theory itself.
         """
-        d = self.separations(mean_separation, separation)
-        head = self.block
+        d, head = self.separations(mean_separation, separation), self.block
         x = (self.h_max + np.where(d < 0, head[at.MINUS], head[at.PLUS]) * d) * head[at.SCALE]
         bound = self.errors[self._records_at(d, x), 1]
         if head.view(np.int64)[at.ENDS]:
@@ -293,26 +251,22 @@ class ContactLaw(Law, Derived, Displayed):
     def _variables(self) -> dict[str, Variable]:
         ends = min(self.highest, self.h_max), max(self.lowest, -self.h_max)
         light, deep = np.geomspace(*SPACED, SHOWN_POINTS // 2)[:-1], np.linspace(SPACED[1], 1.0, SHOWN_POINTS // 2)
-        d = ends[0] + (ends[1] - ends[0]) * np.concatenate([light, deep])
-        d = np.maximum(d, ends[1])
-        names = ("separation", "mean_separation", "pressure", "area", "stiffness", "energy")
-        pressure, area, stiffness, energy = self.values(separation=d)
-        values = (d, (d + self.h_max) / 2, pressure, area, stiffness, energy)
-        return {n: Variable(v, unit_of(n, self.units), MEANINGS[n]) for n, v in zip(names, values, strict=True)}
+        d = np.maximum(ends[0] + (ends[1] - ends[0]) * np.concatenate([light, deep]), ends[1])
+        values = {"separation": d, "mean_separation": (d + self.h_max) / 2} | self.values(separation=d)._asdict()
+        return {name: Variable(value, unit_of(name, self.units), MEANINGS[name]) for name, value in values.items()}
 
     def compiled(self, quantity: str = "pressure") -> LowLevelCallable:
         """A quantity at a separation as a function of C, ``double (double, void *)``, which scipy calls without Python.
 
         Parameters
         ----------
-        quantity : str
-            "pressure" (F/A0), "area" (A/A0), "stiffness" (-dF/du), "area_slope" (-d(A/A0)/dd) or "energy" (by u).
+        quantity : {"pressure", "area", "stiffness", "area_slope", "energy"}
 
         Returns
         -------
         scipy.LowLevelCallable
-            NaN outside the law. For ctypes, cffi and other callers of C, `function` is a ctypes function and
-            `user_data` its last argument, which keeps the law alive.
+            NaN outside the law. For other callers of C, `function` is a ctypes function and `user_data` its last
+            argument, which keeps the law alive.
 
         Examples
         --------
@@ -331,10 +285,10 @@ class ContactLaw(Law, Derived, Displayed):
         if quantity not in QUANTITIES:
             raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
         addresses, data = self._addresses()
-        address = addresses[QUANTITIES.index(quantity)]
+        function = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_void_p)
         given = ctypes.c_void_p(data)
         given.law = self  # type: ignore[attr-defined]
-        return LowLevelCallable(ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_void_p)(address), given)
+        return LowLevelCallable(function(addresses[QUANTITIES.index(quantity)]), given)
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}

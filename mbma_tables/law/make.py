@@ -1,8 +1,4 @@
-"""`contact_law`: one surface's pressure and area by any theory, fitted by polynomials of the gap.
-
-MBMA's laws are made from a profile of the surface's islands, others from the theory's results; `law_pieces` fits
-the polynomials and bounds their errors.
-"""
+"""`contact_law`: pressure and area of one surface by any theory, fitted by polynomials of the gap (`law.pieces`)."""
 
 from __future__ import annotations
 
@@ -67,18 +63,14 @@ def contact_law(
     rtol : float
         Requested relative error of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; for
         other theories at least a tenth of their own error, the median over gaps.
-    island model, variant, E_star
-        As for `contact`; `island_model` may be a user-defined island model.
+    island_model, variant, E_star : optional
+        As for `contact`.
     hardness, materials : optional
         As for `contact`: the law of loading. Its `energy` is then the work of loading, not that recovered on unloading.
 
     Returns
     -------
     ContactLaw
-
-    Raises
-    ------
-    InputError, OutOfRangeError, ConvergenceError
 
     Examples
     --------
@@ -98,16 +90,15 @@ def contact_law(
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
     chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant)
     yields: dict[str, Any] = {}
-    if hardness is not None and hardness is not math.inf:
-        cap = checked_hardness(hardness_in(units, hardness))
-        if cap.ndim:
-            raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
-        if cap < math.inf:
-            from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
+    cap = checked_hardness(hardness_in(units, math.inf if hardness is None else hardness))
+    if cap.ndim:
+        raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
+    if cap < math.inf:
+        from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
-            elastic = functools.partial(contact_law, surface, chosen, rtol=rtol, E_star=modulus)
-            yields = {"hardness": float(cap), "elastic": elastic}
-            chosen = WITH_HARDNESS.get(type(chosen), Yielding)(chosen, float(cap) / modulus)
+        elastic = functools.partial(contact_law, surface, chosen, rtol=rtol, E_star=modulus)
+        yields = {"hardness": float(cap), "elastic": elastic}
+        chosen = WITH_HARDNESS.get(type(chosen), Yielding)(chosen, float(cap) / modulus)
     one = surface
     if one.labelled:
         one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))
@@ -214,32 +205,15 @@ def _finish(
     block, records, errors = fit.assemble(h_max, scale, sides, pieces, first, ends)
     order, signs = fit.order_of(sides, pieces)
     fit.fill_energies(records, order, signs, scale, first[2][0], beyond)
-    in_order = records[order]
-
-    def gap(turn: tuple[int, float] | None) -> float | None:
-        if turn is None:
-            return None
-        place, t = turn
-        x = in_order[place, at.CENTRE] + t / in_order[place, at.RATE]
-        return float(signs[place] * (x / scale - h_max))
-
-    turns = [gap(turn) for turn in fit.first_falls(in_order, signs)]
+    turns = [None if x is None else s * (x / scale - h_max) for x, s in fit.first_falls(records[order], signs)]
     # forces carry the modulus
     records[:, at.FORCE_AT : at.AREA_AT] *= facts["E_star"]
     records[:, at.ENERGY_AT] *= facts["E_star"]
     block.flags.writeable = False
     error, own = float(errors[:, 0].max()), own_error()
-    return ContactLaw(
-        **facts,
-        h_max=h_max,
-        lowest=lowest,
-        highest=highest,
-        error=error + own,
-        turning_point=turns[0],
-        area_turning_point=turns[1],
-        block=block,
-        errors=errors + np.array([0.0, leverage * own]),
-    )
+    ends_at: dict[str, Any] = {"h_max": h_max, "lowest": lowest, "highest": highest, "error": error + own}
+    ends_at |= {"turning_point": turns[0], "area_turning_point": turns[1]}
+    return ContactLaw(**facts, **ends_at, block=block, errors=errors + np.array([0.0, leverage * own]))
 
 
 def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> float:

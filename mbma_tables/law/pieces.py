@@ -1,8 +1,8 @@
 """Fitting a law: polynomials of force and area in buckets of x, their proven errors, energies, turning points.
 
-A side of a law is its stretch of gaps with one sign of d that has its own x in (0, 1]: the depth below h_max, or the
-height above full compression. Octaves of x are cut into equal buckets, doubled in number until every polynomial meets
-the tolerance. Of 16 Chebyshev coefficients nine are kept; the others bound the error of value and of slope.
+A side of a law has its own x in (0, 1]: the depth below h_max, or the height above full compression. Octaves of x are
+cut into equal buckets, doubled in number until every polynomial meets the tolerance. Of 16 Chebyshev coefficients nine
+are kept; the others bound the error of value and of slope.
 """
 
 from __future__ import annotations
@@ -135,19 +135,13 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
     return Pieces(whole[:, : at.RECORD], whole[:, at.RECORD : -1], rows)
 
 
-@functools.cache
-def _equal(e: int, count: int) -> list[tuple[float, float]]:
-    """Ends of the equal buckets of an octave."""
-    return list(itertools.pairwise(2.0**e * (1 + k / count) for k in range(count + 1)))
-
-
 def _buckets(side: Side, e: int, count: int) -> list[tuple[float, float]]:
-    """The same ends, with the kinks inserted."""
-    equal, inside = _equal(e, count), {kink for kink in side.kinks if 2.0**e < kink < 2.0 ** (e + 1)}
-    if side.start <= 2.0**e and not inside:
-        return equal
-    edges = {low if low > side.start * (1 + 1e-15) else side.start for low, _ in equal} | inside
-    return list(itertools.pairwise([*sorted(edges), 2.0 ** (e + 1)]))
+    """Ends of the equal buckets of an octave, with the kinks inserted."""
+    edges = [2.0**e * (1 + k / count) for k in range(count)]
+    inside = {kink for kink in side.kinks if 2.0**e < kink < 2.0 ** (e + 1)}
+    if side.start > 2.0**e or inside:
+        edges = sorted({low if low > side.start * (1 + 1e-15) else side.start for low in edges} | inside)
+    return list(itertools.pairwise([*edges, 2.0 ** (e + 1)]))
 
 
 def positive(found: FloatArray) -> FloatArray:
@@ -203,18 +197,10 @@ def order_of(sides: list[Side], pieces: list[Pieces]) -> tuple[Any, FloatArray]:
     return order, signs
 
 
-class Assembly(NamedTuple):
-    """A law's block, its records, which are a part of it, and bounds on their errors."""
-
-    block: FloatArray
-    records: FloatArray
-    errors: FloatArray
-
-
 def assemble(
     h_max: float, scale: float, sides: list[Side], pieces: list[Pieces], first: First, ends: tuple[float, float]
-) -> Assembly:
-    """The block of one side, or of two: s = -1 for d >= 0 and s = 1 below."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The block of one side, or of two: s = -1 for d >= 0 and s = 1 below; its records, a part of it; their errors."""
     low = min(side.start for side in sides)
     lowest = math.floor(math.log2(low))
     rows = np.full((len(sides), -lowest, 2), (63, 0))
@@ -234,7 +220,7 @@ def assemble(
     parts = [head, rows.view(np.float64), first[0], *(piece.records for piece in pieces)]
     block = np.concatenate([part.ravel() for part in parts])
     errors = np.concatenate([first[1][None], *(piece.errors for piece in pieces)])
-    return Assembly(block, block[head.size + rows.size :].reshape(-1, at.RECORD), errors)
+    return block, block[head.size + rows.size :].reshape(-1, at.RECORD), errors
 
 
 def fill_energies(records: FloatArray, order: Any, signs: FloatArray, scale: float, power: float, last: float) -> None:
@@ -254,15 +240,17 @@ def fill_energies(records: FloatArray, order: Any, signs: FloatArray, scale: flo
         first[at.ENERGY_AT] = reached[-1] + of_first if first[at.CENTRE] == 0 else records[1, at.ENERGY_AT]
 
 
-def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[int, float] | None]:
-    """Where force, and area, first stop increasing with compression: index of the record, t; None if never."""
+def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[float | None, float]]:
+    """x at which force, and area, first stop increasing with compression, None if never; and the sign of their side."""
     series = own[:, at.FORCE_AT : at.ENERGY_AT].reshape(-1, KEPT)
-    found: list[tuple[int, float] | None] = [None, None]
+    found: list[tuple[float | None, float]] = [(None, 0.0), (None, 0.0)]
     # a polynomial whose Bernstein coefficients are positive is positive
     for k in np.flatnonzero((series @ _bernstein() * -np.repeat(signs, 2)[:, None]).min(axis=1) <= 0).tolist():
         place, row = divmod(k, 2)
-        t = None if found[row] else _first_fall(-signs[place] * series[k], float(signs[place]))
-        found[row] = found[row] if t is None else (place, t)
+        sign = float(signs[place])
+        t = None if found[row][0] is not None else _first_fall(-sign * series[k], sign)
+        if t is not None:
+            found[row] = float(own[place, at.CENTRE] + t / own[place, at.RATE]), sign
     return found
 
 

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.answers.contact import chosen_theory, contact
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, hinted, nearest, number_in, require
-from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import new_figure
 from mbma_tables.islands.spectral import basis
 from mbma_tables.law.force_law import RTOL, Body, ForceLaw, force_law, forces, units_of
-from mbma_tables.law.half_space import HalfSpace, Solved
+from mbma_tables.law.half_space import Solved
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.laws.calibrated import Spectrum, spectrum_of
@@ -45,52 +45,33 @@ WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 class RoughContact(Displayed):
     """A rough sphere or cylinder on a flat, made by `rough_contact`; arrays of the shape of the loads.
 
-    Attributes
-    ----------
-    approach : ndarray
-        Approach of the bodies from the contact of their mean planes [length]; negative if only peaks are in contact.
-    force : ndarray
-        F, N where units are known; of a cylinder F per length, N/mm.
-    stiffness : ndarray
-        dF/d(approach).
-    area : ndarray
-        Real contact area [length^2]; of a cylinder per length.
-    contact_radius : ndarray
-        3 pi/4 times the mean of r weighted by p dr [length], which is Hertz's radius in his contact (Greenwood, Tripp
-        1967).
-    position, pressure, mean_separation : ndarray, shape (..., 101)
-        Profiles: distance from the middle up to the last contact [length], mean pressure [stress], u [length].
-    error : ndarray
-        Estimate of the relative numerical error of the force, with that of the layer's law.
-    scatter : ndarray
-        Standard deviation of ln F at the approach: of the layer's model uncertainty, and from place to place on the
-        faces, whose mean plane below a narrow contact is uncertain.
-    valid : ndarray
-        Whether the layer's law was tested for such contacts, where nine tenths of the force are, and the contact is
-        wider than 1.5 mean wavelengths, and narrower than a tenth of R.
-    reasons : dict
-        Reasons why not `valid`, each with a mask.
-    layer : ContactLaw
-        The law of the surface.
-    units : dict
-        Of the quantities.
+    Forces and areas of a cylinder are per length; profiles have 101 places in their last dimension.
     """
 
-    approach: Numbers
-    force: Numbers
-    stiffness: Numbers
-    area: Numbers
-    contact_radius: Numbers
-    position: FloatArray
-    pressure: FloatArray
-    mean_separation: FloatArray
-    error: Numbers
-    scatter: Numbers
-    valid: Any
-    reasons: dict[str, Any]
-    layer: ContactLaw
+    reasons: dict[str, Any]  #: reasons why not `valid`, each with a mask
+    layer: ContactLaw  #: the law of the surface
     units: dict[str, str]
     _body: Body
+    approach: Numbers = quantity("approach beyond touching mean planes [length]; negative if only peaks are in contact")
+    force: Numbers = quantity("normal force; N where units are known, of a cylinder N/mm")
+    stiffness: Numbers = quantity("derivative of force by approach")
+    area: Numbers = quantity("real contact area [length^2]")
+    contact_radius: Numbers = quantity(
+        "effective contact radius [length]; 3 pi/4 times the mean of r weighted by p dr, Hertz's radius in his contact "
+        "(Greenwood, Tripp 1967)"
+    )
+    position: FloatArray = quantity("distance from the middle [length]; up to the last contact")
+    pressure: FloatArray = quantity("mean pressure [stress]")
+    mean_separation: FloatArray = quantity("mean separation of the deformed faces [length]")
+    error: Numbers = quantity("estimate of the relative numerical error of force; with that of the layer's law")
+    scatter: Numbers = quantity(
+        "standard deviation of ln F at the approach; of the layer's model uncertainty, and from place to place on the "
+        "faces, whose mean plane below a narrow contact is uncertain"
+    )
+    valid: Any = quantity(
+        "whether the law was tested for such contacts; where nine tenths of the force are, and the contact is wider "
+        "than 1.5 mean wavelengths, and narrower than a tenth of R"
+    )
 
     def law(self, rtol: float = 1e-5) -> ForceLaw:
         """Force against approach from first contact to the largest approach of these, as polynomials.
@@ -108,9 +89,8 @@ class RoughContact(Displayed):
         >>> f"{ball.force('1 um'):.4g} N, {ball.stiffness('1 um'):.3g} N/um, {ball.approach('10 N'):.4g} um"
         '21.74 N, 18.3 N/um, 0.2727 um'
         """
-        return force_law(
-            self._body, float(np.max(self.approach)) + ROUNDING * self.layer.h_max, number_in("rtol", rtol, 1e-6, 0.1)
-        )
+        top = float(np.max(self.approach)) + ROUNDING * self.layer.h_max
+        return force_law(self._body, top, number_in("rtol", rtol, 1e-6, 0.1))
 
     def _facts(self) -> dict[str, str]:
         names = ("approach", "force", "stiffness", "area", "contact_radius", "valid")
@@ -119,25 +99,9 @@ class RoughContact(Displayed):
         return facts | {"theory": self.layer.theory, "surface": repr(self._body.surface)}
 
     def _variables(self) -> dict[str, Variable]:
-        meanings = {
-            "approach": "approach beyond touching mean planes",
-            "force": "normal force",
-            "stiffness": "derivative of force by approach",
-            "area": "real contact area",
-            "contact_radius": "effective contact radius",
-            "position": "distance from the middle",
-            "pressure": "mean pressure",
-            "mean_separation": "mean separation of the deformed faces",
-            "error": "estimate of the relative numerical error of force",
-            "scatter": "standard deviation of ln F at the approach from place to place and simulation to simulation",
-            "valid": "whether the law was tested for such contacts",
-        }
-        loads = ("load",) * np.ndim(self.approach)
-        return {
-            name: Variable(value := getattr(self, name), self.units.get(name, "1"), text,
-                           loads + ("place",) * (np.ndim(value) - len(loads)))
-            for name, text in meanings.items()
-        }  # fmt: skip
+        loads = np.ndim(self.approach)
+        known = super()._variables()
+        return {n: v._replace(dims=("load", "place")[1 - loads :][: np.ndim(v.values)]) for n, v in known.items()}
 
     def _figure(self) -> Figure:
         figure, units = new_figure(10, 4), self.units
@@ -197,10 +161,6 @@ def rough_contact(
     -------
     RoughContact
 
-    Raises
-    ------
-    InputError, OutOfRangeError, ConvergenceError
-
     Examples
     --------
     >>> from mbma_tables import Surface, rough_contact
@@ -226,7 +186,8 @@ def rough_contact(
         raise InputError("give approach or force, one of them")
     if force is None:
         wanted = finite_array("approach", units.number("approach", approach))
-        require("approach", wanted, wanted > body.first, f"above {body.first:.6g}, below which bodies are apart")
+        apart = -body.ends[1]
+        require("approach", wanted, wanted > apart, f"above {apart:.6g}, below which bodies are apart")
     else:
         given = finite_array("force", forces(force, body, units.length))
         require("force", given, given > 0, "positive")
@@ -239,13 +200,14 @@ def rough_contact(
 
 def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     """The contacts at some approaches [length]."""
-    rows, profiles = [], []
+    rows, profiles, rule = [], [], basis(MOMENTS)
     reasons: dict[str, list[bool]] = {}
     scale = body.law.E_star * body.newtons
     for k, approach in enumerate(map(float, wanted.ravel())):
         found = body.solved(approach, RTOL)
         force, stiffness, area = body.quantities(found)
-        a = _effective(body, found)
+        spread = rule.root_weights**2 * body.between(found, found.p, rule.v)
+        a = float(0.75 * math.pi * found.radius * np.sum(spread * rule.v) / np.sum(spread))
         scatter, against = _trust(body, found, force)
         width = 2 * a / mean_wavelength(body.surface)
         # the mean plane below the contact: that of a cell
@@ -265,8 +227,8 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     masks = {text: mask for text, mask in masks.items() if np.any(mask)}
     valid = ~np.logical_or.reduce([np.zeros(wanted.shape, bool), *masks.values()])
     return RoughContact(
-        wanted[()], F, stiffness, area, a, position, pressure, u, error + body.law.error, scatter, valid, masks,
-        body.law, body.units, body,
+        masks, body.law, body.units, body, wanted[()], F, stiffness, area, a, position, pressure, u,
+        error + body.law.error, scatter, valid,
     )  # fmt: skip
 
 
@@ -289,10 +251,3 @@ def mean_wavelength(surface: Any) -> float:
     spectrum = spectrum_of(surface) if known else Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
     steep = float(surface.rms_gradient) / float(surface.h_rms) / spectrum.gradient
     return 2 * math.pi / (steep * float(np.sum(spectrum.variance * spectrum.x)))
-
-
-def _effective(body: HalfSpace, found: Solved) -> float:
-    """3 pi/4 times the mean of r weighted by p dr."""
-    rule = basis(MOMENTS)
-    p = rule.root_weights**2 * body.between(found, found.p, rule.v)
-    return float(0.75 * math.pi * found.radius * np.sum(p * rule.v) / np.sum(p))

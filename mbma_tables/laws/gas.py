@@ -29,6 +29,7 @@ from mbma_tables.common.errors import InputError
 
 BEND, LIGHT, SOFT, POWER = 0.3, 0.004, 0.3, 1.2  # constants of q
 DEEP, DEEPEST = 2.5, 1.25  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
+FIRST = 1e-5  # A/A0 below which gaps go over to those before contact, without a jump
 TAIL, NODES = 8.0, 96  # range of heights in standard deviations, and number of quadrature nodes
 FULLEST = 1 - 1e-12
 R = 8.314462618  # J/(mol K)
@@ -127,8 +128,8 @@ def open_gaps(
 ) -> tuple[FloatArray, FloatArray]:
     """Shares of the nominal area and gaps there [length] on a last axis of `NODES`, of contacts as for `mean_inverse`.
 
-    The shares add up to that of the open gaps; the mean gap over the nominal area is u. `blended` gaps go over
-    smoothly into those before contact.
+    The shares add up to that of the open gaps; the mean gap over the nominal area is u. Those of light contacts
+    go over into those before contact, `blended` ones from larger areas on.
     """
     from scipy.special import ndtri
 
@@ -136,7 +137,7 @@ def open_gaps(
     share = np.minimum(share, FULLEST)
     with np.errstate(divide="ignore"):
         d = np.minimum(-ndtri(share), TAIL if blended else np.maximum(DEEPEST * gap / height, DEEP))
-    weight = share / (share + LIGHT) if blended else share > 0
+    weight = share / (share + (LIGHT if blended else FIRST))
     d = gap / height + (d - gap / height) * weight
     q = 1 + BEND * share / (share + LIGHT) * -np.expm1(-((cap / SOFT) ** POWER))
     node, share_of_node = _rule()

@@ -1,8 +1,4 @@
-"""Island models: force, area and error of an island at (X, mu).
-
-Totals accept any of them, by name or as an object. Two need no table: the exact solver and the
-rigid sphere.
-"""
+"""Island models: force, area and error of an island at (X, mu); totals accept any, by name or as an object."""
 
 from __future__ import annotations
 

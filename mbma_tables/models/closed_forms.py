@@ -1,11 +1,9 @@
-"""Closed forms: the island model "formula", and total force and area without a sum over islands.
-
-The forms are in `core/closed_forms.h`, written by `generate`; docs/formula.md lists them.
-"""
+"""Closed forms of `core/closed_forms.h` (docs/formula.md): the island model "formula", and total force and area."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,18 +22,19 @@ TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
 
 
-def _of_core(number: int) -> Callable[..., Any]:
-    """A closed form of arrays, which broadcast."""
-
-    def of(*given: ArrayLike) -> Any:
-        rest = [None] * (4 - len(given))
-        return answered(lambda *rows: core.closed_form(number, *rows[:-1], *rest, rows[-1]), given)[0][()]
-
-    return of
-
-
 NAMES = [(form, name) for form in ISLAND_FORMS for name in RESULTS] + [(TOTALS, "pressure"), (TOTALS, "area")]
-FUNCTIONS = {form: {name: _of_core(NAMES.index((form, name))) for name in own} for form, own in CERTIFICATES.items()}
+
+
+def _of_core(number: int, *given: ArrayLike) -> Any:
+    rest = [None] * (4 - len(given))
+    return answered(lambda *rows: core.closed_form(number, *rows[:-1], *rest, rows[-1]), given)[0][()]
+
+
+# of arrays, which broadcast
+FUNCTIONS: dict[str, dict[str, Callable[..., Any]]] = {
+    form: {name: functools.partial(_of_core, NAMES.index((form, name))) for name in own}
+    for form, own in CERTIFICATES.items()
+}
 
 
 class FormulaModel(Ranged):
@@ -45,11 +44,6 @@ class FormulaModel(Ranged):
     ----------
     form : {"standard", "pocket", "long"}
         Which of the forms.
-
-    Raises
-    ------
-    InputError
-        For an unknown form.
 
     Examples
     --------
@@ -80,10 +74,6 @@ class FormulaModel(Ranged):
             return out
 
         return self._answered(X, mu, outside, fill)
-
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A of islands."""
-        return self.answer(islands["X"], islands["mu"], outside=outside)
 
 
 class ClosedTotals(NamedTuple):
@@ -122,20 +112,14 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     """
     gap, modulus = finite_array("separation", separation), positive_array("E_star", E_star)
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
-    fields = {
-        "d_over_h_rms": gap / surface.h_rms,
-        "h_max_over_h_rms": surface.h_max / surface.h_rms,
-        "zeta_1": surface.zeta_1,
-        "hurst": surface.hurst,
-    }
-    given = {name: np.broadcast_to(np.asarray(field), shape) for name, field in fields.items()}
-    for name, field in given.items():
-        low, high = RANGES[TOTALS][name]
+    fields = gap / surface.h_rms, surface.h_max / surface.h_rms, surface.zeta_1, surface.hurst
+    given = [np.broadcast_to(np.asarray(field), shape) for field in fields]
+    for (name, (low, high)), field in zip(RANGES[TOTALS].items(), given, strict=False):
         require(name, field, (field >= low) & (field <= high), f"in [{low:g}, {high:g}], where the closed totals hold")
     gap, h_max = np.broadcast_to(gap, shape), np.broadcast_to(np.asarray(surface.h_max), shape)
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
     require("separation", gap, gap < h_max, "below h_max: there is no contact from there on")
-    pressure, area = (FUNCTIONS[TOTALS][name](*given.values()) for name in ("pressure", "area"))
+    pressure, area = (FUNCTIONS[TOTALS][name](*given) for name in ("pressure", "area"))
     low, _ = RANGES[TOTALS]["area"]
     require("area", np.asarray(area), area >= low, f"at least {low:g}, where the closed totals hold")
     scale = modulus * surface.q0 * surface.h_rms

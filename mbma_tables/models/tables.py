@@ -17,7 +17,7 @@ from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.models.island4d import Island4dModel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_table
-from mbma_tables.tablefiles.schema import FUNCTIONS, ISLAND4D, UNIVERSAL, TableContent
+from mbma_tables.tablefiles.schema import ARGUMENTS, FUNCTIONS, ISLAND4D, UNIVERSAL, TableContent
 
 
 def shipped(kind: str) -> pathlib.Path:
@@ -29,9 +29,7 @@ def _model(content: TableContent) -> UniversalModel | Island4dModel:
     return UniversalModel(content) if content.kind == UNIVERSAL else Island4dModel(content)
 
 
-@functools.cache
-def _opened(kind: str) -> UniversalModel | Island4dModel:
-    return _model(read_table(shipped(kind), kind))
+_opened = functools.cache(lambda kind: _model(read_table(shipped(kind), kind)))
 
 
 def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:
@@ -87,20 +85,16 @@ def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
         X, mu, scales = points["X"], points["mu"], np.ones((2, 1))
         table = np.stack(model.answer(X, mu)[:2])
     else:
-        delta, zeta_d, zeta_u, hurst = (points[name] for name in ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst"))
-        found = model.lookup(delta, zeta_d, zeta_u, hurst)
+        delta, zeta_d, zeta_u, hurst = (points[name] for name in ARGUMENTS[ISLAND4D])
+        table = np.stack(model.lookup(delta, zeta_d, zeta_u, hurst)[:2])
         place = to_axes(delta, zeta_d, zeta_u, hurst, model.variant)
         X, mu, scales = place.X, place.mu, np.stack([place.force, place.area])
-        table = np.stack([found.F_hat, found.A_hat])
     solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     return table, scales * np.stack([solved.phi_F, solved.phi_A])
 
 
 def verify(path: os.PathLike[str] | str, kind: str | None = None) -> Verdict:
-    """Check a table file, which must be of a `kind` where one is given: hashes, types, shapes and conformance points.
-
-    Raises `TableFileError` if results of the table or of the solver differ from the stored ones beyond their tolerance.
-    """
+    """Check a table file, of a `kind` where one is given; TableFileError beyond a tolerance of conformance points."""
     content = read_table(path, kind)
     points = content.conformance
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -31,9 +30,7 @@ class Ranged:
     ranges: Mapping[str, tuple[float, float]]
     holds = ""  # further text of the error beside a range
 
-    def _inside(
-        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
-    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+    def _flat(self, X: ArrayLike, mu: ArrayLike, refuse: bool = True) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Flat arguments and their common shape; an error for those outside the model's range."""
         given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
         for name, array in given.items() if refuse else ():
@@ -49,12 +46,20 @@ class Ranged:
     ) -> IslandAnswer:
         """Rows computed by `fill` from flat arguments, NaN outside the ranges."""
         check_outside(outside)
-        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
+        flat_X, flat_mu, shape = self._flat(X, mu, outside == "raise")
         out = fill(flat_X, flat_mu)
         missing = np.isnan(out[2])
         if outside == "exact" and missing.any():
             out[:, missing] = SOLVER.answer(flat_X[missing], flat_mu[missing])
         return IslandAnswer(*(row.reshape(shape)[()] for row in out))
+
+    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A at X and mu."""
+        raise NotImplementedError
+
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A of islands."""
+        return self.answer(islands["X"], islands["mu"], outside=outside)
 
 
 class UniversalModel(Ranged, Displayed):
@@ -97,15 +102,13 @@ class UniversalModel(Ranged, Displayed):
         lines = {f"mu = {mu:g}": (X[1:], self.answer(X[1:], mu).phi_F) for mu in (1e-3, 1.0, 1e3)}
         return draw_lines(lines, "X", "Phi_F")
 
-    def answer(self, X: ArrayLike, mu: ArrayLike, parallel: bool = False, *, outside: str = "raise") -> IslandAnswer:
+    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A with the error bound that the table states.
 
         Parameters
         ----------
         X, mu : array_like
             The arguments of Phi; they broadcast.
-        parallel : bool
-            Whether to use all cores, for large batches.
         outside : {"raise", "exact", "nan"}
             Where X or mu is not covered: an error, the exact solver, or NaN.
 
@@ -113,33 +116,24 @@ class UniversalModel(Ranged, Displayed):
         ------
         InputError, OutOfRangeError
         """
-        workers = (os.cpu_count() or 1) if parallel else 1
-        return self._answered(X, mu, outside, lambda flat_X, flat_mu: self._filled(flat_X, flat_mu, False, workers).T)
+        return self._answered(X, mu, outside, lambda flat_X, flat_mu: self._filled(flat_X, flat_mu, False).T)
 
-    def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool, workers: int = 1) -> FloatArray:
+    def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool) -> FloatArray:
         """Rows of Phi_F, Phi_A, error, and with `slopes` of the derivatives by X and mu; NaN outside."""
         rows = np.empty((X.size, 7 if slopes else 3))
 
         def fill(block: slice) -> None:
             core.phi(X[block], mu[block], *self.cells, int(slopes), rows[block], None)
 
-        in_blocks(fill, X.size, BLOCK, workers)
+        in_blocks(fill, X.size, BLOCK)
         return rows
-
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A of islands."""
-        return self.answer(islands["X"], islands["mu"], outside=outside)
 
     def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
         """Results and their derivatives by X and by mu, in one pass; the errors are those of the results."""
-        flat_X, flat_mu, shape = self._inside(X, mu)
+        flat_X, flat_mu, shape = self._flat(X, mu)
         columns = self._filled(flat_X, flat_mu, True).T
         force, area, error, F_X, F_mu, A_X, A_mu = (column.reshape(shape)[()] for column in columns)
         return IslandAnswer(force, area, error), IslandAnswer(F_X, A_X, error), IslandAnswer(F_mu, A_mu, error)
-
-    def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:
-        """Where arguments lie on each axis: -1 below, 0 inside, 1 above."""
-        return self._X.side(finite_array("X", X)), self._mu.side(finite_array("mu", mu))
 
     @functools.cached_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:

@@ -26,7 +26,7 @@ from mbma_tables.surfaces.treatment import Treated
 if TYPE_CHECKING:
     from mbma_tables.laws.pressing import Table
 
-# ranges of the surfaces of docs/data/boundary_elements.nc. If they are taken as isotropic Gaussian ones, area is within
+# ranges of the surfaces of the data set's group elastic. If they are taken as isotropic Gaussian ones, area is within
 # 20% between 1% and 10% contact; outside the ranges it is wrong by 30% to factors
 BY_SPECTRUM = {
     "skewness of heights": (-0.4, 0.4),
@@ -34,7 +34,7 @@ BY_SPECTRUM = {
     "kurtosis of slopes": (2.8, 3.3),
     "anisotropy": (1.0, 4.1),
 }
-# ranges of maps with the stated scatter; and of all kinds of which several were simulated (also docs/data/machined.nc),
+# ranges of maps with the stated scatter; and of all kinds of which several were simulated (also of its group machined),
 # for which the law by their map is wrong by up to 80%
 BY_MAP = {
     "skewness of heights": (-0.5, 0.5),

@@ -82,10 +82,6 @@ class Axis:
         """Place in node units, 0 ... nodes - 1."""
         return (self.to_grid(x) - self.start) * (1 / self.step)
 
-    def side(self, x: FloatArray) -> Any:
-        """-1 below the axis, 0 on it, 1 above."""
-        return ((x > self.high).astype(np.int8) - (x < self.low).astype(np.int8))[()]
-
     def coordinate(self, position: Any) -> Any:
         """Inverse of `position`; the ends are met exactly."""
         place = np.asarray(position, dtype=float)

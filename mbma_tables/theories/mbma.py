@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, require, whole_number_in
+from mbma_tables.islands.geometry import kinks
 from mbma_tables.models import QUANTITIES, AnyModel, check_outside, island_model_name
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
 from mbma_tables.theories.protocol import SCAN, Curve, Theory, TheoryAnswer, select
-from mbma_tables.totals.contact import Totals, totals_at
+from mbma_tables.totals.contact import QUADRATURE_SHARE, Sums, Totals, totals_at
 from mbma_tables.totals.island import check_band
-from mbma_tables.totals.island_sum import QUADRATURE_SHARE, Sums, kinks
 from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
@@ -90,15 +90,6 @@ class Mbma(Theory):
         stiffness = -2 * found.pressure_by["separation"]  # type: ignore[index]
         return TheoryAnswer(found.pressure, found.area, stiffness, found.error)
 
-    def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
-        """Derivatives by differentiated sums."""
-        by_table = self.island_model_name == "universal" and self.outside != "exact"
-        if not by_table and not isinstance(surface, MeasuredSurface):
-            return None
-        gap = 2 * np.asarray(mean_separation) - np.asarray(surface.h_max)
-        found = self.totals(surface, gap, derivatives=True)
-        return tuple(_at_mean_separation(by) for by in (found.pressure_by, found.area_by))
-
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force or area, and the slope of force."""
         h_max, which = np.asarray(surface.h_max), QUANTITIES.index(quantity)
@@ -167,13 +158,6 @@ class Mbma(Theory):
             low, high = np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN
             result[turns] = top * (1 - _highest(lambda x: np.asarray(curve(top * (1 - x))[row]), low, high))
         return result.reshape(surface.shape)
-
-
-def _at_mean_separation(by: Any) -> dict[str, FloatArray]:
-    """Derivatives by u = (h_max + d)/2 and by parameters at held u from those at held d."""
-    by_gap = by.pop("separation")
-    by |= {"h_max": by["h_max"] - by_gap} if "h_max" in by else {}
-    return {"mean_separation": 2 * by_gap, **by}
 
 
 def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:

@@ -35,6 +35,7 @@ def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
 def unresolved(points: float, area: FloatArray) -> dict[str, NDArray[np.bool_]]:
     """The reason against grids with too few sampling steps per shortest wavelength, and its mask."""
     text = f"the map's shortest wavelength has {points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
+    text += ": give a short_cutoff of so many steps"
     return {text: np.full(area.shape, points < MIN_POINTS * (1 - ROUNDING))}
 
 

@@ -155,10 +155,6 @@ class Theory(abc.ABC):
             raise unfinished(missed, "the elastic energy")
         return found
 
-    def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
-        """Derivatives of force and of area by "mean_separation" and the surface's parameters, if in closed form."""
-        return None
-
     def looks(self, surface: AnySurface) -> int:
         """Number of initial gaps of each surface in an inversion."""
         return LOOKS if surface.shape == () else FEW_LOOKS

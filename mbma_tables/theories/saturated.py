@@ -19,7 +19,6 @@ from mbma_tables.theories.simulated import BoundaryElements as BoundaryElements
 from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
 KEPT = 8  # hardnesses of maps whose simulations are kept
-STEP = 0.02  # of ln E*, of its derivatives
 TESTED_ETA = 0.1  # p_m/(E* g) down to which it was tested
 # standard deviations of ln of a quantity, by `python -m generate machined`
 SCATTER = {"area": 0.010, "pressure": 0.011, "stiffness": 0.033}
@@ -165,18 +164,6 @@ class Saturated(Yielding):
     def bends(self, surface: AnySurface) -> FloatArray:
         """Mean separations [length] of the first and the last load."""
         return np.asarray(self._simulation(float(self.hardness)).bends(surface))
-
-    def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...]:
-        """Derivatives of force and area by the gap, and at held hardness by the logarithm of "E_star"."""
-        u = np.asarray(mean_separation, float)
-        stretch = np.exp(STEP * np.array([1.0, -1.0]))
-        higher, lower = (Saturated(self.elastic, self.hardness * by).loaded(surface, u).answer for by in stretch)
-        near = 1e-4 * float(np.asarray(surface.h_max))
-        further, closer = (self.loaded(surface, np.maximum(u + way * near, 0.0)).answer for way in (1, -1))
-        return tuple(
-            {"mean_separation": (a - b) / (2 * near), "E_star": (d - c) / (2 * STEP)}
-            for a, b, c, d in zip(further[:2], closer[:2], higher[:2], lower[:2], strict=True)
-        )
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3] through the gaps of the yielded contact."""

@@ -1,7 +1,6 @@
-"""Total force and area of a surface at a gap: the sum over its contact islands (Eqs. 44-50).
+"""Total force and area of a surface at a gap: the sum over its contact islands (Eqs. 42-50).
 
-All properties of an island depend on its approach delta alone; the gap enters through the Gaussian weight and
-the upper limit h_max - d. In units of s and 1/q0,
+In units of s and 1/q0,
 
     F/(A0 E* q0 s) = integral_0^((h_max - d)/s) F_hat D_d K1 G d(delta/s),
     G = exp(-z'^2/2 sigma_d^2)/(sqrt(2 pi) sigma_d),   z' = (d + delta)/s - h_d (41),
@@ -11,33 +10,65 @@ and A/A0 likewise.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, grouped
-from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.arguments import FloatArray, grouped, spread
+from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
+from mbma_tables.core import OK, REASONS, UNRESOLVED, core, in_blocks
 from mbma_tables.models import AnyModel, exact_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, Sums, sums_by_table
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.profile import profile
 
+QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
+BLOCK = 256  # pairs between two checks for interrupts
+# of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
+COLUMNS, BY_COMPRESSION = 5, 3
 # most surfaces evaluated by profiles, in numpy; of more surfaces, those with enough gaps each for this to cost less
 FEW_SURFACES, MANY_GAPS = 16, 300
 LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Totals:
+class Sums(NamedTuple):
+    """Options of the sum over islands, as for `contact`."""
+
+    model: AnyModel
+    variant: Variant
+    rtol: float
+    outside: str = "raise"
+    workers: int = 1
+
+
+class Pairs(NamedTuple):
+    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
+
+    hurst: FloatArray
+    zeta_1: FloatArray
+    compression: FloatArray  # (h_max - d)/h_rms
+    peak: FloatArray  # h_max/h_rms
+
+    @classmethod
+    def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
+        """The pairs of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+        scaled = depth / surface.h_rms, surface.h_max / surface.h_rms
+        return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
+
+    def some(self, chosen: Any) -> Pairs:
+        """The pairs at these indices."""
+        return Pairs(*(field[chosen] for field in self))
+
+
+class Totals(NamedTuple):
     """Force and area of the MBMA model at given separations, with the fields of `Contact`.
 
-    `error` bounds that of quadrature and islands, relative to the island model ("rigid" itself is far from
-    elastic islands). Derivatives on a surface given by a spectrum are with respect to the separation only.
+    `error` bounds that of quadrature and islands, relative to the island model. Derivatives on a surface given by a
+    spectrum are by the separation only.
     """
 
     pressure: Any
@@ -49,11 +80,7 @@ class Totals:
 
 
 def totals_at(
-    surface: AnySurface,
-    gap: FloatArray,
-    how: Sums,
-    modulus: Any = 1.0,
-    derivatives: bool | str = False,
+    surface: AnySurface, gap: FloatArray, how: Sums, modulus: Any = 1.0, derivatives: bool | str = False
 ) -> Totals:
     """Force and area at separations d >= -h_max of the surface's broadcast shape; `derivatives` "separation" alone."""
     shape, variant = gap.shape, how.variant
@@ -84,14 +111,8 @@ def totals_at(
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
         area = variant.area_of(area)
-    return Totals(
-        pressure=(pressure.reshape(shape) * stress)[()],
-        area=area.reshape(shape)[()],
-        error=error.reshape(shape)[()],
-        islands=islands,
-        pressure_by=pressure_by,
-        area_by=area_by,
-    )
+    pressure = (pressure.reshape(shape) * stress)[()]
+    return Totals(pressure, area.reshape(shape)[()], error.reshape(shape)[()], islands, pressure_by, area_by)
 
 
 def _by_profiles(
@@ -166,6 +187,44 @@ def _sums(surface: AnySurface, depth: FloatArray, how: Sums, slopes: bool) -> tu
         )
     rows[:, left] = np.nan
     return rows, islands
+
+
+def sums_by_table(
+    model: AnyModel, pairs: Pairs, how: Sums, outside: str, slopes: bool = True
+) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
+    """Totals by the universal table gap by gap, (pairs, 2, COLUMNS or 1), bounds on their errors, and the islands.
+
+    Also returns the pairs that the table does not cover, whose totals are NaN.
+    """
+    if not isinstance(model, UniversalModel):
+        raise InputError(f"derivatives come from island model 'universal', {model.name!r} has none")
+    if slopes and outside == "exact":
+        raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
+    count = pairs.compression.size
+    status, bound = np.empty(count, np.uint8), np.empty(count)
+    out = np.empty((count, 2, COLUMNS if slopes else 1))
+
+    def fill(block: slice) -> int:
+        islands = np.zeros(1, np.int64)
+        own = *pairs.some(block), QUADRATURE_SHARE * how.rtol, how.variant.numbers, *model.cells, int(slopes)
+        core.totals(*own, out[block], bound[block], status[block], islands)
+        return int(islands[0])
+
+    islands = sum(in_blocks(fill, count, BLOCK, how.workers))
+    if (status == UNRESOLVED).any():
+        raise ConvergenceError("quadrature did not reach its tolerance", status == UNRESOLVED)
+    missing = np.flatnonzero(status != OK)
+    if missing.size and outside == "raise":
+        first = int(missing[0])
+        X, mu = model.content.axes
+        raise OutOfRangeError(
+            f"islands of {missing.size} of {count} entries lie outside the universal table "
+            f"({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g}), the first at hurst = {pairs.hurst[first]:g}, "
+            f"zeta_1 = {pairs.zeta_1[first]:g}, (h_max - d)/h_rms = {pairs.compression[first]:g} "
+            f"({REASONS[int(status[first])]}); outside='exact' solves these",
+            status != OK,
+        )
+    return out, bound, islands, missing
 
 
 def _by_parameter(

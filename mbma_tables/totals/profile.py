@@ -1,7 +1,7 @@
-"""Totals of one surface at any gap from its islands, evaluated once (Eqs. 44-49).
+"""Totals of one surface at any gap from its islands, evaluated once (Eqs. 42-49).
 
-All properties of an island depend on its approach delta alone; a gap enters through the Gaussian of its height and the
-upper limit h_max - d. So islands are evaluated once, at Gauss nodes of panels of delta, and summed at some gaps of each
+Islands depend on their approach delta alone; a gap enters through the Gaussian of their height and the upper limit
+h_max - d. So islands are evaluated once, at Gauss nodes of panels of delta, and summed at some gaps of each
 panel. Polynomials of ln(F) and ln(A) interpolate these sums; any other gap costs only their evaluation.
 """
 
@@ -21,14 +21,13 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core, in_blocks
-from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, s_over_h_rms
+from mbma_tables.islands.geometry import floors_of, geometry, kinks, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
-from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 
 NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
 GAPS = 10  # largest number of gaps of a panel: a series has 2 GAPS terms
@@ -134,13 +133,19 @@ class Source(NamedTuple):
     jacobian: float  # K1 (47) below at_d
 
     def density(self, g: dict[str, FloatArray], x: FloatArray, height: Any = 0.0) -> FloatArray:
-        """Islands per area and approach (42, 46) in the units of `g`, without the Gaussian factor."""
+        """Islands per area and approach (42, 43, 46) in the units of `g`, at `height` z'/sigma_d."""
         K1 = np.where(x < self.at_d, self.jacobian, 1.0)
-        return np.asarray(island_density(height, g["D_d"], g["sigma_d"]) * K1)
+        return np.asarray(g["D_d"] * np.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * g["sigma_d"]) * K1)
 
     def heights(self, g: dict[str, FloatArray], x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Shift and rate of z'/sigma_d (41) = shift - rate compression; nothing cancels at first contact."""
         return ((self.peak + x) * self.h_rms - g["h_d"]) / g["sigma_d"], self.h_rms / g["sigma_d"]
+
+
+def _jacobian_below(rms_over_s: float, variant: Variant) -> float:
+    """K1 below the kink, by (47) or (46)."""
+    printed = variant.jacobian == "printed"
+    return 1.0 - 4.0 / 3.0 * variant.beta / (1.0 if printed else rms_over_s) if printed or variant.offset else 1.0
 
 
 def source_of(surface: tuple[float, float, float] | MeasuredSurface, variant: Variant) -> Source:
@@ -153,14 +158,14 @@ def source_of(surface: tuple[float, float, float] | MeasuredSurface, variant: Va
         def islands(x: FloatArray) -> dict[str, FloatArray]:
             return geometry(x, hurst, zeta_1, variant) | {"hurst": np.full(x.size, hurst)}
 
-        jacobian = float(jacobian_below(h_rms, variant))
+        jacobian = _jacobian_below(h_rms, variant)
         return Source(islands, h_rms, peak, zeta_1**-hurst, float(breaks[0]), breaks, jacobian)
     own, h_rms, laws, floors = surface, float(surface.h_rms), surface.laws, floors_of(surface, variant)
     roots = np.sqrt(laws.above(Place(np.arange(laws.width.size), laws.width)))
     samples = [roots[roots < floors.root_d] / floors.slope_d, roots[roots < floors.root_u] / floors.slope_u]
     # T is a straight line up to a part of it
     layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
-    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), variant))
+    jacobian = _jacobian_below(1 / s_over_h_rms(surface), variant)
     return Source(
         lambda x: measured_islands(own, x * h_rms, variant), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
         floors.kinks[0] / h_rms, np.concatenate([*samples, floors.kinks]) / h_rms, jacobian,

@@ -10,8 +10,9 @@ from generate.boundary_elements.design import HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import Case
 from generate.calibrated import EDGES, coverage, cross_validate, errors, fit, summary, told
 from generate.calibrated_bars import measure
-from generate.calibrated_file import QUANTITIES, read_parts, write_part
+from generate.calibrated_file import QUANTITIES, write_part
 from mbma_tables.common.errors import TableFileError
+from mbma_tables.data import read_groups
 from mbma_tables.laws.calibrated import CONSTANTS, Law, Spectrum
 
 FORCES = np.geomspace(4e-4, 1.0, 15)
@@ -89,11 +90,11 @@ def test_parts_of_the_file_leave_one_another_alone(tmp_path):
     write_part(path, group, "hardness")
     write_part(path, xr.Dataset(attrs={"limit": 0.3}), "leakage")
     write_part(path, root.assign(a=root.a * 2))
-    parts = read_parts(path)
-    assert list(parts) == ["", "hardness", "leakage"]
+    parts = read_groups(path)
+    assert list(parts) == ["/", "hardness", "leakage"]
     assert parts["hardness"].identical(group)
     assert parts["leakage"].attrs == {"limit": 0.3}
-    assert parts[""].a.values.tolist() == [2, 4]
+    assert parts["/"].a.values.tolist() == [2, 4]
     path.write_bytes(path.read_bytes()[:-5])
     with pytest.raises(TableFileError):
         write_part(path, root)

@@ -14,7 +14,7 @@ NUMBER = r"\d[\d.e+-]*"
 
 def test_committed_page_is_what_the_code_computes():
     sets, page = distances.data_sets(), (ROOT / "docs" / "fidelity.md").read_text("utf-8")
-    committed = {line.split(" | ")[0]: line for line in page.splitlines()}
+    committed = {line.split(" | ")[0]: line for line in reversed(page.splitlines())}  # the first table
     for line in fidelity.summary_table(sets[name] for name in PICKED).splitlines():
         before = committed[line.split(" | ")[0]]
         assert re.sub(NUMBER, "", before) == re.sub(NUMBER, "", line)

@@ -1,13 +1,12 @@
 """Maps of machined surfaces: their makers, what the file holds, and how near answers on them are."""
 
 import dataclasses
-import pathlib
 
 import numpy as np
 import pytest
-import xarray as xr
 from scipy.stats import norm
 
+from generate.files import dataset
 from generate.machined import campaign, coverage
 from generate.machined import errors as page
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
@@ -16,13 +15,10 @@ from mbma_tables.laws.map_curves import MapLaw, PlateauConstants
 from mbma_tables.theories.corrected import Corrected
 from mbma_tables.theories.simulated import BoundaryElements
 
-FILE = pathlib.Path("docs/data/machined.nc")
-
 
 @pytest.fixture(scope="module")
 def data():
-    with xr.open_dataset(FILE) as opened:
-        return opened.load()
+    return dataset("machined")
 
 
 @pytest.mark.parametrize("family", FAMILIES)

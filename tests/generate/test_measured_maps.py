@@ -18,7 +18,7 @@ def test_the_middle_of_a_map_is_kept():
     assert kept - kept[0, 0] == pytest.approx(heights[:, 5:-5] - heights[0, 5], abs=1e-12)
 
 
-def test_a_file_of_heights_becomes_a_case(tmp_path, monkeypatch):
+def test_a_file_of_heights_becomes_a_case(tmp_path):
     pytest.importorskip("tamaas")
     pytest.importorskip("SurfaceTopography")
     x = np.linspace(0, 2 * np.pi, 33)[:-1]
@@ -28,10 +28,9 @@ def test_a_file_of_heights_becomes_a_case(tmp_path, monkeypatch):
     np.savetxt(tmp_path / "own.asc", grid)
     text = (tmp_path / "own.asc").read_text()
     (tmp_path / "own.asc").write_text("# Width: 1 m\n# Height: 1 m\n# Value units: m\n" + text)
-    done = CliRunner().invoke(measured_maps, [str(tmp_path / "own.asc"), "--folder", str(tmp_path)])
+    done = CliRunner().invoke(measured_maps, [str(tmp_path / "own.asc"), "--data", str(tmp_path / "own.nc")])
     assert done.exit_code == 0, done.output
-    monkeypatch.setattr(distances, "DATA", tmp_path)
-    one = distances.measured("own")
+    one = distances.measured("own", tmp_path / "own.nc")
     # what is kept gives the law that the map itself gives
     surface = Surface.from_map(grid, 1 / 32, periodic=False, model="measured")
     force = one.force[one.area > 0.02] * surface.bearing.gradient

@@ -41,17 +41,13 @@ def random_positions(shape, count, seed=2):
     return [np.ascontiguousarray(column) for column in np.concatenate([corners, inside, on_nodes]).T]
 
 
-def test_tensor_splines_and_their_slopes_are_those_of_scipy():
+def test_tensor_splines_are_those_of_scipy():
     values = node_values(SHAPE)
     coefs, spline = coefficients(values, 3, 4), by_scipy(values, 3, 4)
     assert coefs.shape == (*(n + 2 for n in SHAPE), 2)
     positions = random_positions(SHAPE, 500)
-    found, points = at_places(coefs, positions, slopes=True), np.stack(positions, axis=-1)
-    np.testing.assert_allclose(found[:, 0].T, spline(points), rtol=1e-11, atol=1e-11 * np.abs(values).max())
-    np.testing.assert_allclose(found[:, 0], at_places(coefs, positions), rtol=1e-13, atol=1e-13)
-    for axis in range(4):
-        order = [int(axis == k) for k in range(4)]
-        np.testing.assert_allclose(found[:, 1 + axis].T, spline(points, nu=order), rtol=1e-10, atol=1e-10)
+    found, points = at_places(coefs, positions), np.stack(positions, axis=-1)
+    np.testing.assert_allclose(found.T, spline(points), rtol=1e-11, atol=1e-11 * np.abs(values).max())
 
 
 @pytest.mark.parametrize("degree", [3, 5])

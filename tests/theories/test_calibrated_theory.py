@@ -16,8 +16,9 @@ from scipy.special import erf
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.boundary_elements.evidence import cases
-from generate.boundary_elements.light import BINS, compared, recipes
+from generate.boundary_elements.light import BINS, compared, each
 from generate.calibrated import errors
+from generate.files import dataset, evidence
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.bearing_curve import FRACTIONS, QUANTILES, bearing, radial_spectrum
@@ -134,10 +135,7 @@ class TestScatter:
     @pytest.fixture(scope="class")
     @staticmethod
     def held_out():
-        with xr.open_dataset(DATA / "boundary_elements.nc") as data:
-            return [
-                one for one in cases(data.load()) if one.split in (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM) and one.gaussian
-            ]
+        return [one for one in evidence() if one.split in (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM) and one.gaussian]
 
     @pytest.mark.parametrize("quantity", QUANTITIES)
     def test_stated_scatter_covers_held_out_errors(self, held_out, quantity):
@@ -270,7 +268,7 @@ class TestSpectrum:
 @pytest.mark.slow
 def test_measured_surfaces_that_are_not_valid_are_those_that_boundary_elements_contradict():
     # thresholds were read off training surfaces; these were held out
-    data = xr.open_dataset(DATA / "boundary_elements.nc")
+    data = dataset("elastic")
     data = data.isel(surface=np.isin(data.split, [1, 2]))
     told = {True: [], False: []}
     for number, one in enumerate(cases(data)):
@@ -486,12 +484,11 @@ def test_light_loads_end_as_a_hertzian_contact_does():
 
 
 def test_light_loads_are_those_of_boundary_elements():
-    """Stiffness at equal pressure and 0.02% to 1% contact of docs/data/light_loads.npz, as docs/joints.md states it."""
-    with np.load(DATA / "light_loads.npz") as known:
-        rows = known["rows"].astype(float)
-    assert rows.shape[0] >= 20
+    """Stiffness at equal pressure and 0.02% to 1% contact of the group light_loads, as docs/joints.md states it."""
+    rows = dataset("light_loads")
+    assert rows.sizes["surface"] >= 20
     errors = []
-    for recipe, own in zip(recipes(), rows, strict=True):
+    for recipe, own in each(rows):
         area, stiffness, _ = compared(recipe, own)
         seen = (area > BINS[0]) & (area < BINS[-1]) & np.isfinite(stiffness)
         errors.append(stiffness[seen])

@@ -62,25 +62,6 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
         _ = found.energy
 
 
-@each
-def test_derivatives_hold_the_hardness(theory):
-    caps = [HARDNESS, np.inf]
-
-    def at(modulus=MODULUS, h_rms=1.0, **more):
-        surface = Surface(0.8, 0.01, 2.0, h_rms, 3.0)
-        return contact(surface, pressure=50.0, E_star=modulus, theory=theory, hardness=caps, **more)
-
-    found = at(derivatives=True)
-    for name, step, sides in (
-        ("E_star", 1e-3 * MODULUS, [at(modulus=MODULUS * (1 + way * 1e-3)) for way in (1, -1)]),
-        ("h_rms", 1e-4, [at(h_rms=1 + way * 1e-4) for way in (1, -1)]),
-    ):
-        for kind in ("area", "separation"):
-            expected = (getattr(sides[0], kind) - getattr(sides[1], kind)) / (2 * step)
-            close = {"rel": 1e-4} if name == "E_star" or theory != "calibrated" else {"rel": 1e-5, "abs": 1e-7}
-            assert getattr(found, f"{kind}_by")[name] == pytest.approx(expected, **close), (name, kind)
-
-
 @pytest.mark.parametrize(
     ("theory", "rtol", "surface", "shares"),
     [
@@ -268,7 +249,7 @@ def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
     monkeypatch.setattr(kind, "answer", lambda self, *given: asked.append(given) or original(self, *given))
     hard = {"hardness": HARDNESS}
     cases = [(pressure, hard, most) for pressure in (0.1, 3.0, 30.0, 500.0)]
-    for pressure, more, calls in (*cases, *((30.0, {"derivatives": True} | cap, most + 3) for cap in ({}, hard))):
+    for pressure, more, calls in (*cases, (30.0, {"derivatives": True}, most + 3)):
         asked.clear()
         contact(SURFACE, pressure=pressure, E_star=MODULUS, theory=theory, **more)
         assert len(asked) <= calls

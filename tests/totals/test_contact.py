@@ -9,9 +9,8 @@ from catalogue import LEVEL, OWN
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
 from mbma_tables import contact as contact_by_island_model
-from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.geometry import geometry, kinks
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.totals.island_sum import kinks
 
 contact = functools.partial(contact_by_island_model, island_model="exact")
 

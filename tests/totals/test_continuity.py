@@ -13,12 +13,11 @@ from helpers import SCALE, difference_weights, with_slopes
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, height_integral, island
 from mbma_tables.core import core
-from mbma_tables.islands.geometry import FIELDS, geometry
+from mbma_tables.islands.geometry import FIELDS, geometry, kinks
 from mbma_tables.law.block import CENTRE, RATE
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.surfaces.variants import VARIANTS, get_variant
-from mbma_tables.totals.island_sum import kinks
 
 STEP = 1e-9
 EPS = np.finfo(float).eps

@@ -37,6 +37,8 @@ def test_limits():
     assert mean_inverse(1.0, 0.25, 1e6, 1.0) == pytest.approx(0.75e-6, rel=1e-5)
     assert mean_inverse(1e3, 1e-300, 0.1, 1.0) == pytest.approx(1e-3, rel=5e-3)
     assert mean_inverse(1e-12, 1.0, 1.0, 1.0) == pytest.approx(0.0, abs=1e-9)
+    # no jump at first contact
+    assert mean_inverse(3.0, 1e-12, 0.1, 1.0) == pytest.approx(mean_inverse(3.0, 0.0, 0.1, 1.0), rel=1e-6)
     # soft bodies: Gaussian heights cut off by a plane, by a sum over them
     z = np.random.default_rng(1).standard_normal(2_000_000)
     gap = np.maximum(1.5 - z, 0)

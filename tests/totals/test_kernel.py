@@ -12,8 +12,8 @@ from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
-from mbma_tables.totals import island_sum
-from mbma_tables.totals.island_sum import Pairs, Sums, sums_by_table
+from mbma_tables.totals import contact as sums
+from mbma_tables.totals.contact import Pairs, Sums, sums_by_table
 
 
 @pytest.mark.parametrize("variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name)
@@ -76,7 +76,7 @@ def test_what_cannot_be_resolved_is_said(monkeypatch):
             status[:], out[:], bound[:] = OK, 1.0, 1.0
             status[3] = UNRESOLVED
 
-    monkeypatch.setattr(island_sum, "core", Unresolved())
+    monkeypatch.setattr(sums, "core", Unresolved())
     with pytest.raises(ConvergenceError, match="quadrature did not reach its tolerance") as caught:
         contact(surface, separation=[0.0, 1.0], outside="nan")
     assert np.argwhere(caught.value.mask).tolist() == [[1, 1]]

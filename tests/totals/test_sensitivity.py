@@ -13,9 +13,9 @@ from helpers import difference_weights
 
 from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import Surface, contact
+from mbma_tables.islands.geometry import kinks
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import REPORTED, get_variant
-from mbma_tables.totals.island_sum import kinks
 
 # each of two flags by itself
 NO_OFFSET = dataclasses.replace(OWN, name="no offset", offset=False)

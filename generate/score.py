@@ -1,0 +1,77 @@
+"""``python -m generate score``: deviations of theories from the held-out simulations of the data set."""
+
+from __future__ import annotations
+
+import functools
+import pathlib
+import runpy
+import types
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import click
+
+from generate.boundary_elements.evidence import Case, TheoryCurve
+from generate.distances import RANGES, distances, held_out, summed_up
+from generate.files import ROOT
+from generate.pages.page import percent, table
+from mbma_tables.common.errors import InputError
+
+HEADER = "theory | area at given pressure | pressure at given gap | stiffness at given pressure | loads reached"
+OTHERS = ROOT / "generate" / "theories_of_others.py"
+FUNCTIONS = ("answer", "at_pressure")
+
+
+def theories_of(path: pathlib.Path) -> dict[str, Any]:
+    """Theories of a Python file by name: objects that have a name, or the file's own function, named as the file.
+
+    A theory has ``answer(surface, mean_separation)``, which returns F/(A0 E*) and A/A0, or
+    ``at_pressure(surface, pressure)``, which returns A/A0 and the mean separation.
+
+    Raises
+    ------
+    InputError
+        If the file has neither.
+    """
+    content = runpy.run_path(str(path))
+    found = {
+        one.name: one
+        for one in content.values()
+        if any(hasattr(one, function) for function in FUNCTIONS) and not isinstance(one, type | types.ModuleType)
+    }
+    if own := {name: content[name] for name in FUNCTIONS if callable(content.get(name))}:
+        found[content.get("name", path.stem)] = types.SimpleNamespace(**own)
+    if not found:
+        raise InputError(
+            f"{path} must have a function answer(surface, mean_separation) or at_pressure(surface, pressure), "
+            f"or objects with a name and one of these; it has {sorted(name for name in content if name[0] != '_')}"
+        )
+    return found
+
+
+def row(name: str, theory: Callable[[Case], Any], seen: Sequence[Case]) -> list[str]:
+    """Root mean square deviations in percent at light and deep contact, and the share of loads that is reached."""
+    sums = [[summed_up(seen, found, *ends) for ends in RANGES] for found in distances(seen, theory).values()]
+    rows = [[rms for rms, _ in own] for own in sums] + [[reached for _, reached in sums[0]]]
+    return [name, *(" / ".join(map(percent, values)) for values in rows)]
+
+
+def scores(theories: dict[str, Any]) -> str:
+    """A table of theories, as objects or as functions of a `Case`, on all held-out self-affine surfaces."""
+    seen = held_out()
+    of_case = {
+        n: one if isinstance(one, types.FunctionType) else functools.partial(TheoryCurve, one)
+        for n, one in theories.items()
+    }
+    return table(HEADER, [row(name, theory, seen) for name, theory in of_case.items()])
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
+def score(path: pathlib.Path) -> None:
+    """Print how far the theories of the Python file PATH are from boundary elements.
+
+    Root mean squares of ln(theory/simulation) in percent, at 1-10% / 10-97% contact, on the surfaces of which none was
+    used in a fit; docs/data.md describes PATH.
+    """
+    click.echo(scores(theories_of(path)))

@@ -1,0 +1,107 @@
+"""Scores of theories: a row against its deviations computed otherwise, and files without a theory."""
+
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.interpolate import CubicSpline
+from scipy.special import erf
+
+from generate.score import OTHERS, score, theories_of
+from generate.theories_of_others import FORCES, Corrected
+from mbma_tables import InputError, Surface
+from mbma_tables.data import boundary_elements
+from mbma_tables.laws.calibrated import PERSSON, Law, Spectrum
+
+# an exponential law that is inverted in closed form
+POWER, DECAY, KAPPA = 0.4, 0.5, 1.8
+FILE = f"""
+import numpy as np
+
+name = "exponential"
+
+def answer(surface, mean_separation):
+    pressure = {POWER} * surface.q0 * surface.h_rms * np.exp(-mean_separation / ({DECAY} * surface.h_rms))
+    return pressure, {KAPPA} * pressure / surface.rms_gradient
+"""
+INVERTED = f"""
+import numpy as np
+
+class Exponential:
+    name = "inverted"
+
+    def at_pressure(self, surface, pressure):
+        p0 = {POWER} * surface.q0 * surface.h_rms
+        return {KAPPA} * pressure / surface.rms_gradient, -{DECAY} * surface.h_rms * np.log(pressure / p0)
+
+theory = Exponential()
+"""
+
+
+def scored(path):
+    done = CliRunner().invoke(score, [str(path)], catch_exceptions=False)
+    assert done.exit_code == 0
+    return [[float(x) for x in re.findall(r"[\d.]+", line)] for line in done.stdout.splitlines()[2:]]
+
+
+def expected():
+    """The row of the file, from the data set's numbers and the closed form."""
+    data = boundary_elements()["elastic"].to_dataset()
+    kinds = data.kind.attrs["flag_meanings"].split()
+    errors = [[], [], []]
+    areas = []
+    for number in range(data.sizes["surface"]):
+        one = data.isel(surface=number)
+        if int(one.split) not in (1, 2) or kinds[int(one.kind)] != "self_affine" or int(one.waves) < 2:
+            continue
+        seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < 0.98)
+        force, area, u = (one[name].values[seen] for name in ("force", "area", "mean_separation"))
+        g = float(Surface(float(one.hurst), 1.0, float(one.zeta_1), 1.0, float(one.h_max)).rms_gradient)
+        gap = DECAY * np.log(POWER / (force * g))
+        gap[(gap < 1e-6 * float(one.h_max)) | (gap > float(one.h_max))] = np.nan
+        errors[0].append(np.where(np.isfinite(gap), np.log(KAPPA * force / area), np.nan))
+        errors[1].append(np.log(POWER / g) - u / DECAY - np.log(force))
+        errors[2].append(np.full(force.shape, np.nan))
+        known = np.isfinite(gap)
+        slopes = [CubicSpline(np.log(force[known]), np.log(x[known])).derivative() for x in (gap, u)]
+        compliances = [x[known] * slope(np.log(force[known])) for x, slope in zip((gap, u), slopes, strict=True)]
+        errors[2][-1][known] = np.log(compliances[1] / compliances[0])
+        areas.append(area)
+    area, row = np.concatenate(areas), []
+    for parts in errors:
+        every = np.concatenate(parts)
+        for low, high in ((0.01, 0.1), (0.1, 0.97)):
+            own = every[(area >= low) & (area <= high)]
+            row.append(100 * np.sqrt(np.nanmean(own**2)))
+    return row
+
+
+def test_a_row_is_what_the_data_set_says(tmp_path):
+    (tmp_path / "own.py").write_text(FILE)
+    (tmp_path / "other.py").write_text(INVERTED)
+    (row,), (inverted,) = scored(tmp_path / "own.py"), scored(tmp_path / "other.py")
+    assert row[:6] == pytest.approx(expected(), rel=0.05)
+    # one law, given at gaps and at pressures
+    assert inverted[0:4] == pytest.approx(row[0:4], rel=0.05)
+
+
+def test_perssons_theory_is_the_correction_without_one():
+    surface = Surface(0.7, 1.0, 40.0, 1.0, 3.3)
+    law = Law(Spectrum.self_affine(0.7, 40.0), None, PERSSON)
+    force = FORCES[(FORCES > 1e-3) & (FORCES < 2)]
+    area, u = Corrected("none", (1.0,)).at_pressure(surface, force * float(surface.rms_gradient))
+    assert area == pytest.approx(law.area(force), rel=1e-3)
+    assert u == pytest.approx(law.separation(force), rel=1e-3, abs=1e-7)
+    # the cover by its own equation solves it
+    xu = theories_of(OTHERS)["Xu et al. 2024"]
+    P = xu.cover(np.array([0.3, 1.0]))
+    right = 2 * FORCES**2 / (np.array([[0.3], [1.0]]) * (xu.gamma + (1 - xu.gamma) * P))
+    assert pytest.approx(erf(np.sqrt(right)), abs=1e-9) == P
+
+
+@pytest.mark.parametrize("text", ["", "x = 3\n", "class Theory:\n    name = 'a'\n    def answer(self, s, u): ...\n"])
+def test_files_without_a_theory_are_refused(text, tmp_path):
+    (tmp_path / "none.py").write_text(text)
+    with pytest.raises(InputError, match=r"must have a function answer\(surface, mean_separation\) or at_pressure"):
+        theories_of(tmp_path / "none.py")
