@@ -204,7 +204,7 @@ class Interface:
         >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
         >>> joint = contact(face, pressure="1 MPa", theory="calibrated", materials="steel 1020")
         >>> f"{joint.conductance():.0f} W/(m^2 K) and {joint.gap_conductance('air'):.0f}"
-        '3345 W/(m^2 K) and 9916'
+        '3345 W/(m^2 K) and 9921'
         """
         from mbma_tables.laws.gas import jump_of, mean_inverse
 
