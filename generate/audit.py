@@ -18,8 +18,9 @@ import hypothesis
 import numpy as np
 from hypothesis import strategies as st
 
-from generate import page
 from generate.files import ROOT, evidence
+from generate.page import table
+from generate.page import write as write_page
 from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
 from mbma_tables.laws.calibrated import self_affine_law
 
@@ -327,8 +328,6 @@ def audit(seed: int, scale: float, only: str, write: bool) -> None:
     if write:
         block = f"```\npython -m generate audit --seed {seed} --scale {scale:g} --write\n```\n\n"
         header = "search | answers | refused | beyond | largest"
-        page.write(
-            "guarantees", {"audit": block + page.table(header, (found[:-1] for found in rows), FORMATS)}, {}, ROOT
-        )
+        write_page("guarantees", {"audit": block + table(header, (found[:-1] for found in rows), FORMATS)}, {}, ROOT)
     if any(found.beyond for found in rows):
         raise SystemExit(1)
