@@ -31,7 +31,7 @@ def executor(workers: int, scheduler: str | None) -> Iterator[Pool]:
 
             client = Client(scheduler)
         except ImportError:
-            raise InputError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
+            raise InputError("--scheduler needs dask: pip install 'dask[distributed]'") from None
         except (OSError, ValueError) as fault:
             raise WorkerError(f"no dask scheduler at {scheduler}: {fault}") from None
         with client:
