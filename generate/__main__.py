@@ -17,9 +17,10 @@ from mbma_tables.common.errors import MbmaError
 GROUPS = {
     **{
         name: f"generate.{name}"
-        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "score", "wheels")
+        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
     },
     **dict.fromkeys(("gaps", "grids", "measured_maps"), "generate.boundary_elements.studies"),
+    "score": "generate.pages.score",
     "light": "generate.boundary_elements.light",
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas.fit",

@@ -6,7 +6,7 @@ import datetime
 import json
 import pathlib
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,14 +21,12 @@ from generate.provenance import source_digest, versions
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws import bearing_curve as bearing
-from mbma_tables.laws.boundary_elements import TOLERANCE
 
 TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("variables.toml").read_text(encoding="utf-8"))
 DIMENSIONS = ("surface", "load", "quantile", "top", "band", "band_or_end", "axis")
 COORDINATES: dict[str, Any] = {"quantile": bearing.QUANTILES, "top": bearing.FRACTIONS, "eta": capped.HARDNESSES}
-SINGLE = {"quantiles", "mean_height", "top_gradient", "tension_force", "tension", "band_energy"}  # kept to 7 digits
+BITS = {"band_energy": 10, "residual": 4, "seconds": 7}  # of mantissas that are kept; of others 24, of force 53
 LOADED = {"band_energy", "flow"}
-STIFFNESS = "-dF/du over A0 E* g/h_rms, by a cubic spline of ln u against ln F through the loads of a surface"
 
 
 def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
@@ -46,14 +44,17 @@ def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Varia
         dims = ["load", *(d for d in dims if d != "load")]
     else:
         values, dims = np.array(own), [*dims, *(["load"] if capped_too else [])]
-    number = "f4" if name in SINGLE or capped_too else "f8"
+    if name in BITS:
+        mantissa, exponent = np.frexp(values)
+        values = np.ldexp(np.round(mantissa * 2.0 ** BITS[name]) / 2.0 ** BITS[name], exponent)
+    number = "f8" if dimension == "surface" or (dimension == "load" and name == "force") else "f4"
     attributes = {"long_name": TEXTS[dimension][name], "units": "s" if name == "seconds" else "1"}
     return xr.Variable(["surface", *dims], values.astype(number), attributes)
 
 
 def stiffness(data: xr.Dataset) -> FloatArray:
     """-dF/du of every surface by a spline; NaN without a gap."""
-    found = np.full(data.force.shape, np.nan)
+    found = np.full(data.force.shape, np.nan, "f4")
     for row, force, u in zip(found, data.force.values, data.mean_separation.values, strict=True):
         known = u > 0
         log_u = CubicSpline(np.log(force[known]), np.log(u[known]))
@@ -69,18 +70,33 @@ def of_recipes(recipes: Sequence[Recipe]) -> dict[str, Variable]:
     }
 
 
-def attributes(title: str, source: str, command: str, modules: Sequence[str], **more: Any) -> dict[str, Any]:
-    """Attributes of a group of the data set."""
+def attributes(texts: dict[str, Any], made_by: dict[str, str]) -> dict[str, Any]:
+    """Attributes of a group of the data set, by its texts in `variables.toml` and the programs that made it."""
     return {
         "Conventions": "CF-1.11",
-        "title": title,
+        "title": texts["title"],
         "institution": "mbma_tables contributors",
-        "source": source,
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {command}",
-        "versions": json.dumps(versions()),
-        "code_sha256": source_digest(tuple(modules)),
-        **more,
-    }
+        "source": texts["source"].format_map(made_by),
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {texts['command']}",
+        "versions": json.dumps(versions() | made_by),
+        "code_sha256": source_digest(tuple(texts["modules"])),
+    } | {name: texts[name] for name in ("comment", "references") if name in texts}
+
+
+def group(kind: str, variables: Any, **made_by: str) -> xr.Dataset:
+    """A group of the data set with its attributes."""
+    return xr.Dataset(variables, attrs=attributes(TEXTS["groups"][kind], made_by))
+
+
+def of_contacts(kind: str, columns: Iterable[Any]) -> xr.Dataset:
+    """A group of a row a contact, its columns as `variables.toml` lists them."""
+    texts = TEXTS["groups"][kind]["columns"].items()
+    return group(kind, {n: variable("contact", v, m) for (n, m), v in zip(texts, columns, strict=True)})
+
+
+def surfaces(data: xr.Dataset) -> list[xr.Dataset]:
+    """Every surface of a group."""
+    return [data.isel(surface=number) for number in range(data.sizes["surface"])]
 
 
 def _flags(values: Sequence[str], meanings: Sequence[str], name: str) -> xr.Variable:
@@ -111,22 +127,10 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") 
         if dimension in data.dims:
             data[name] = variable(dimension, np.array(COORDINATES[name]), meaning)
     if kind == "elastic":
-        data["stiffness"] = variable(data.force.dims, stiffness(data), STIFFNESS)
-    engine = ", ".join(sorted({str(content["engine"]) for content in found}))
-    source = f"{engine}: conjugate gradients of Polonsky and Keer, force control, tolerance {TOLERANCE:g}"
-    if kind == "hardness":
-        method = "mbma_tables.laws.boundary_elements: projected conjugate gradients"
-        source = f"{method}, force control, tolerance {TOLERANCE:g}"
-    made_by = {"engine": engine, "numpy": ", ".join(sorted({str(content["numpy"]) for content in found}))}
-    data.attrs = attributes(
-        texts["title"],
-        f"{source}; periodic, frictionless, without adhesion",
-        f"boundary_elements --of {kind} --collect",
-        (*TEXTS["files"]["modules"], *texts["modules"]),
-        references="area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
-        comment=TEXTS["files"]["comment"] + texts["comment"],
-        versions=json.dumps(versions() | made_by),
-        surfaces_planned=len(tasks),
-        surfaces_solved=len(found),
-    )
+        data["stiffness"] = variable(data.force.dims, stiffness(data), TEXTS["load"]["stiffness"])
+    made_by = {what: ", ".join(sorted({str(content[what]) for content in found})) for what in ("engine", "numpy")}
+    common = TEXTS["files"]
+    texts = common | texts | {name: common[name] + texts[name] for name in ("modules", "comment")}
+    texts["command"] = f"boundary_elements --of {kind} --collect"
+    data.attrs = attributes(texts, made_by) | {"surfaces_planned": len(tasks), "surfaces_solved": len(found)}
     return data

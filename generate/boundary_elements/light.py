@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Iterator
 
 import click
 import numpy as np
 import xarray as xr
 from tqdm import tqdm
 
-from generate.boundary_elements.collect import TEXTS, attributes, of_recipes
+from generate.boundary_elements.collect import TEXTS, group, of_recipes, surfaces
 from generate.boundary_elements.solve import Contact, prepared
 from generate.boundary_elements.studies import PATH
 from generate.boundary_elements.surfaces import Recipe, heights
@@ -51,10 +50,10 @@ def solved(recipe: Recipe) -> FloatArray:
     return rows
 
 
-def compared(recipe: Recipe, one: xr.Dataset) -> FloatArray:
+def compared(one: xr.Dataset) -> FloatArray:
     """A/A0, ln of simulated over the law's stiffness between loads, and of force at equal u; shape (3, loads - 1)."""
     h_max, area, u = float(one.h_max), *(one[name].values.astype(float) for name in ("area", "mean_separation"))
-    face = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, 1.0, h_max)
+    face = Surface(float(one.hurst), 1.0, float(one.zeta_1), 1.0, h_max)
     scale = float(face.rms_gradient)
     known = contact(face, pressure=LOADS * scale, theory="calibrated").mean_separation
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -65,28 +64,18 @@ def compared(recipe: Recipe, one: xr.Dataset) -> FloatArray:
 
 def data_of(rows: FloatArray) -> xr.Dataset:
     """The group of what `solved` returned for each of `recipes`."""
-    texts, over = TEXTS["load"], ("surface", "load")
-    data = xr.Dataset(of_recipes(recipes())).assign(
-        h_max=variable("surface", rows[:, 0, 0], TEXTS["surface"]["h_max"]),
-        force=variable("load", LOADS, texts["force"]),
-        area=variable(over, rows[:, 1], f"{texts['area']}; NaN where a single point is in contact"),
-        mean_separation=variable(over, rows[:, 2], texts["mean_separation"]),
-    )
-    title, source = "Random rough surfaces at light loads, from first contact on", "Tamaas, as the group elastic"
-    data.attrs = attributes(title, source, "light", TEXTS["files"]["modules"])
-    return data
-
-
-def each(data: xr.Dataset) -> Iterator[tuple[Recipe, xr.Dataset]]:
-    """Every surface of the group."""
-    return zip(recipes(), (data.isel(surface=number) for number in range(data.sizes["surface"])), strict=True)
+    over, texts = ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
+    columns = {"h_max": ("surface", rows[:, 0, 0]), "force": ("load", LOADS), "area": (over, rows[:, 1].astype("f4"))}
+    columns["mean_separation"] = over, rows[:, 2].astype("f4")
+    found = {name: variable(*column, texts[name]) for name, column in columns.items()}
+    return group("light_loads", of_recipes(recipes()) | found)
 
 
 def summary(found: xr.Dataset) -> list[list[str]]:
     """Mean and standard deviation of ln of simulated over the law's stiffness by wavelengths a side and contact."""
-    lines, waves = [], np.array([recipe.waves for recipe in recipes()])
-    for count in np.unique(waves):
-        own = [compared(recipe, one) for recipe, one in each(found) if recipe.waves == count]
+    lines = []
+    for count in np.unique(found.waves):
+        own = [compared(one) for one in surfaces(found) if one.waves == count]
         area, stiffness, _ = np.concatenate(own, axis=1)
         bins = binned(area, stiffness, BINS)
         lines.append([str(count), *(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "" for part in bins)])

@@ -16,7 +16,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from generate.boundary_elements.capped import load_at
-from generate.boundary_elements.collect import TEXTS, attributes, collected
+from generate.boundary_elements.collect import TEXTS, collected, group
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
 from generate.boundary_elements.solve import LOADS, Contact, prepared, pressed
 from generate.boundary_elements.surfaces import Recipe, heights
@@ -142,11 +142,8 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
 
 def of_maps(names: list[str], solved: list[dict[str, Any]]) -> xr.Dataset:
     """The group of simulated maps."""
-    data = xr.Dataset({name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]})
-    title = f"Measured maps, at most {LARGEST} x {LARGEST} points of each and their mirror images, pressed flat"
-    source = f"{solved[0]['engine']}; periodic, frictionless, without adhesion"
-    data.attrs = attributes(title, source, "measured_maps", TEXTS["files"]["modules"])
-    return data.assign_coords(surface=names)
+    found = {name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]}
+    return group("measured", found, engine=str(solved[0]["engine"])).assign_coords(surface=names)
 
 
 def gap_errors(kind: str) -> pd.DataFrame:

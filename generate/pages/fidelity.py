@@ -11,7 +11,7 @@ from generate import distances
 from generate.calibrated_file import QUANTITIES, by_bin
 from generate.distances import HUES
 from generate.pages.page import Measured, panels, percent, table
-from generate.score import OTHERS, scores, theories_of
+from generate.pages.score import OTHERS, scores, theories_of
 from mbma_tables.data import boundary_elements
 
 BANDED = ("MBMA reported", "calibrated")

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from generate.boundary_elements.light import BINS, LOADS, compared, each, recipes, summary
+from generate.boundary_elements.collect import surfaces
+from generate.boundary_elements.light import BINS, LOADS, compared, summary
 from generate.files import dataset
 from generate.pages.page import Measured, panels, table
 from mbma_tables import Joint
@@ -50,13 +51,13 @@ def measure() -> Measured:
     parts["usual"] = table(f"joint | shortest wavelength | {' | '.join(f'{p:g} MPa' for p in PRESSURES)}", rows)
     left.set(xlabel="pressure [MPa]", ylabel="conductance [W/(m² K)]", title="law; dashed: Cooper-Mikic-Yovanovich")
     left.legend(fontsize=7)
-    for recipe, own in each(found):
-        area, stiffness, _ = compared(recipe, own)
-        style: dict[str, Any] = {"markersize": 2, "color": f"C{int(np.log2(recipe.waves))}", "rasterized": True}
+    for own in surfaces(found):
+        area, stiffness, _ = compared(own)
+        style: dict[str, Any] = {"markersize": 2, "color": f"C{int(np.log2(own.waves))}", "rasterized": True}
         right.semilogx(area, np.exp(stiffness), ".", **style)
     right.set(xlabel="contact A/A0", ylabel="simulated stiffness over law", ylim=(0, 2), xlim=(LOADS[0], 0.03))
     right.set_title("light loads, by longest wavelengths a side")
-    for waves in sorted({recipe.waves for recipe in recipes()}):
+    for waves in np.unique(found.waves):
         right.plot([], [], ".", color=f"C{int(np.log2(waves))}", label=str(waves))
     right.legend(fontsize=7)
     return parts, {"docs/figures/joints.svg": figure}
