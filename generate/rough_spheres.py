@@ -32,7 +32,7 @@ def heights(hurst: float, longest: float, h_rms: float, seed: int) -> FloatArray
 def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
     """Force over E*, approach, real area, and the mean distance from the axis, weighted by pressure."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    tamaas = needed("tamaas", "simulate")
+    tamaas = needed("tamaas")
     tamaas.set_log_level(tamaas.LogLevel.error)
     x = np.arange(POINTS) - (POINTS - 1) / 2
     r = np.hypot(x[:, None], x)

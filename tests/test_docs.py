@@ -64,6 +64,14 @@ def test_readme_quotes_the_audit():
     assert f"compared {sum(int(row.replace(',', '')) for row in rows):,} answers" in (ROOT / "README.md").read_text()
 
 
+def test_every_place_has_the_same_version():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    latest = re.search(r"^## (\S+) \((\S+)\)$", PAGES["CHANGELOG.md"], re.M)
+    assert settings["project"]["version"] == mbma_tables.__version__ == latest[1]
+    assert f"version: {latest[1]}\ndate-released: {latest[2]}\n" in citation
+
+
 def test_public_names_and_first_pages_have_examples():
     finder = doctest.DocTestFinder()
     public = ("Surface", "contact", "contact_law", "island", "open_table", "Scene", "height_integral")
