@@ -80,7 +80,6 @@ class Function:
 
     @property
     def name(self) -> str:
-        """Its name in Python, and in C after ``mbma_``."""
         return f"{self.form}_{self.result}"
 
 
@@ -283,7 +282,6 @@ def coefficients(function: Function, name: str, text: str) -> FloatArray:
 
 
 def powers(product: str) -> collections.Counter[str]:
-    """Powers of the letters of a product."""
     return collections.Counter(re.findall(r"[a-z]\w*", product))
 
 

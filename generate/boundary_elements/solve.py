@@ -78,7 +78,6 @@ def prepared(
 
 
 def simulate(recipe: Recipe) -> dict[str, Any]:
-    """All that is kept of one random surface."""
     return pressed(heights(recipe), recipe.sizes, recipe.q0)
 
 

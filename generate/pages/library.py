@@ -97,7 +97,6 @@ def architecture() -> Measured:
 
 
 def tables() -> Measured:
-    """Sizes, errors and axes of the shipped tables."""
     contents, sizes, axes = {kind: read_table(shipped(kind), kind) for kind in KINDS}, [], []
     for (kind, content), f in itertools.product(contents.items(), "FA"):
         names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
@@ -179,7 +178,6 @@ def latex_steps(function: Function) -> list[str]:
 
 
 def formula() -> Measured:
-    """Certificates, ranges and equations of the closed forms."""
     rows = []
     for form, result in ((form, result) for form, results in CERTIFICATES.items() for result in results):
         found = CERTIFICATES[form][result]

@@ -171,7 +171,6 @@ def summary(seen: list[Seen]) -> list[Any]:
 
 
 def measure() -> Measured:
-    """Blocks of the page; no other files."""
     groups, known = dict[str, list[Seen]](), read_rows()
     maps = [(one.name, one.path(), one.options) for one in (*EXAMPLES, *BARS) if one.name in known]
     files = [(f"measured: {n}", measured(path, own)[1], known[n][:3]) for n, path, own in maps if path is not None]
