@@ -22,6 +22,7 @@ from mbma_tables.data import FILE
 LOADS = np.geomspace(2e-5, 0.012, 40)  # F/(A0 E* g): from first contact, a few points of the grid, to 3% contact
 BANDS = ((1, 8), (1, 32), (2, 16), (4, 10), (8, 5), (16, 3.2))  # longest wavelengths a side, and q1/q0
 HURSTS, SEEDS, POINTS = (0.5, 0.8), (1, 2, 3, 4, 5), 256
+OVER = ("surface", "load")
 BINS = (2e-4, 5e-4, 1e-3, 3e-3, 1e-2)  # A/A0
 
 
@@ -62,15 +63,6 @@ def compared(one: xr.Dataset) -> FloatArray:
     return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
 
 
-def data_of(rows: FloatArray) -> xr.Dataset:
-    """The group of what `solved` returned for each of `recipes`."""
-    over, texts = ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
-    columns = {"h_max": ("surface", rows[:, 0, 0]), "force": ("load", LOADS), "area": (over, rows[:, 1].astype("f4"))}
-    columns["mean_separation"] = over, rows[:, 2].astype("f4")
-    found = {name: variable(*column, texts[name]) for name, column in columns.items()}
-    return group("light_loads", of_recipes(recipes()) | found)
-
-
 def summary(found: xr.Dataset) -> list[list[str]]:
     """Mean and standard deviation of ln of simulated over the law's stiffness by wavelengths a side and contact."""
     lines = []
@@ -87,5 +79,14 @@ def summary(found: xr.Dataset) -> list[list[str]]:
 def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
     rows = np.array([solved(recipe) for recipe in tqdm(recipes(), disable=None)])
-    write_part(data, data_of(rows), "light_loads")
+    h_max, area, u = rows[:, 0, 0], *np.moveaxis(rows[:, 1:].astype("f4"), 1, 0)
+    columns = {
+        "h_max": ("surface", h_max),
+        "force": ("load", LOADS),
+        "area": (OVER, area),
+        "mean_separation": (OVER, u),
+    }
+    texts = TEXTS["load"] | TEXTS["surface"]
+    found = {name: variable(*column, texts[name]) for name, column in columns.items()}
+    write_part(data, group("light_loads", of_recipes(recipes()) | found), "light_loads")
     click.echo(f"{data}: {rows.shape[0]} surfaces")

@@ -12,7 +12,6 @@ from typing import Any
 import click
 import numpy as np
 import pandas as pd
-import xarray as xr
 from tqdm import tqdm
 
 from generate.boundary_elements.capped import load_at
@@ -137,13 +136,9 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
         unit = min(sizes)
         solved.append(found := pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
         click.echo(f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
-    write_part(data, of_maps([path.stem for path in maps], solved), "measured")
-
-
-def of_maps(names: list[str], solved: list[dict[str, Any]]) -> xr.Dataset:
-    """The group of simulated maps."""
     found = {name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]}
-    return group("measured", found, engine=str(solved[0]["engine"])).assign_coords(surface=names)
+    known = group("measured", found, engine=str(solved[0]["engine"]))
+    write_part(data, known.assign_coords(surface=[path.stem for path in maps]), "measured")
 
 
 def gap_errors(kind: str) -> pd.DataFrame:
