@@ -13,7 +13,7 @@ import click
 import numpy as np
 from scipy.optimize import least_squares
 
-from generate.boundary_elements.collect import of_contacts
+from generate.boundary_elements.run import of_contacts
 from generate.boundary_elements.tamaas_contact import Contact
 from generate.calibrated_file import write_part
 from generate.machined.makers import GRADIENT, finished, rough
