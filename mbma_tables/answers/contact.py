@@ -117,10 +117,6 @@ def contact(
     ConvergenceError
         Where the accuracy was not reached; `mask` is true for these entries.
 
-    See Also
-    --------
-    contact_law : for many gaps on one surface.
-
     Examples
     --------
     >>> from mbma_tables import Surface, contact
@@ -250,13 +246,12 @@ def _places(
 ) -> tuple[dict[str, Any], Any]:
     """Both separations for the given quantity; with a hardness also `lighter` of `Yielding.loaded`."""
     h_max, lighter = np.asarray(surface.h_max), None
-    if by != "separation":
-        require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
-        average = (h_max + asked) / 2
         require(by, asked, asked >= -h_max, "at least -h_max, where the model ends at full compression")
-    elif by == "mean_separation":
-        average = asked
+    else:
+        require(by, asked, asked >= 0, "at least 0")
+    if by in ("separation", "mean_separation"):
+        average = (h_max + asked) / 2 if by == "separation" else asked
     else:
         with np.errstate(over="ignore"):  # what is infinite is refused as too large
             wanted = asked / modulus if by == "pressure" else asked

@@ -1,18 +1,4 @@
-"""Conductance and tangential stiffness of a contact: quantities that depend on constants of the bodies or of a gas.
-
-Shear is that under constant normal pressure, from the normal law. With kappa the normal over the tangential stiffness
-(`materials.tangential_ratio`), Coulomb friction f at each point::
-
-    full stick        k_t = k_n/kappa, k_n of small unloading: `unloading_stiffness`
-    partial slip      tau(delta) = f [p(u) - p(u + delta/(f kappa))]
-    gross slip        tau = f p, from delta = f kappa (h_max - u) on
-    energy of a cycle 8 times the integral of tau to its amplitude, less 4 tau delta (Masing 1926)
-
-Partial slip is the difference of two normal contacts (M. Ciavarella, J. Mech. Phys. Solids 46 (1998) 2391; J. Jaeger),
-for isotropic bodies whose normal pressures do not move them tangentially: nu = 0, or alike bodies nearly so. Surfaces
-with a lay have a full stick along and across it (`mbma_tables.laws.lay`). docs/joints.md has the distance from boundary
-elements.
-"""
+"""Conductance and tangential stiffness of a contact: quantities that depend on constants of the bodies or of a gas."""
 
 from __future__ import annotations
 
@@ -40,13 +26,25 @@ ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tangential:
-    """A contact under shear, made by `tangential` of contacts and laws, in the units of these."""
+    """A contact under shear at constant normal pressure, made by `tangential` of contacts and laws, in their units.
+
+    With kappa the normal over the tangential stiffness (`materials.tangential_ratio`), Coulomb friction f at each
+    point::
+
+        full stick        k_t = k_n/kappa, k_n of small unloading: `unloading_stiffness`
+        partial slip      tau(delta) = f [p(u) - p(u + delta/(f kappa))]
+        gross slip        tau = f p, from delta = f kappa (h_max - u) on
+        energy of a cycle 8 times the integral of tau to its amplitude, less 4 tau delta (Masing 1926)
+
+    Partial slip is the difference of two normal contacts (M. Ciavarella, J. Mech. Phys. Solids 46 (1998) 2391), for
+    isotropic bodies whose normal pressures do not move them tangentially: nu = 0, or alike bodies nearly so.
+    """
 
     ratio: Any  # kappa
     friction: float | None
     pressure: Numbers
     mean_separation: Numbers
-    stiffness: Numbers  # k_t of full stick, d(tau)/d(delta) [stress/length]
+    stiffness: Numbers  #: k_t of full stick, d(tau)/d(delta) [stress/length]
     last: Any  # mean separation of last contact, infinite where the theory has none
     units: Units
     # pressure and energy at mean separations, these at pressures; or why slip is not known
@@ -63,13 +61,7 @@ class Tangential:
         return found
 
     def shear(self, displacement: ArrayLike | str) -> Numbers:
-        """Shear stress F_t/A0 at a tangential displacement from rest [stress]; f p from `gross_slip` on.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
-            Without a friction, with a hardness, and for negative displacements.
-        """
+        """Shear stress F_t/A0 at a tangential displacement from rest [stress]; f p from `gross_slip` on."""
         normal, _, _, scale = self._known()
         delta = self._checked("displacement", displacement)
         found: Numbers = self.friction * (self.pressure - normal(self._moved(delta / scale)))
@@ -154,8 +146,8 @@ class Interface:
         Returns
         -------
         ndarray or DataArray
-            [unit of k/length of the surface], such as W/(m K um); in W/(m^2 K) for "45 W/(m K)", in S/m^2 for
-            "6e6 S/m", if the surface has a unit. Its scatter is `stiffness_scatter`.
+            [unit of k/length of the surface]; in W/(m^2 K) for "45 W/(m K)", in S/m^2 for "6e6 S/m". Its scatter is
+            `stiffness_scatter`.
 
         Examples
         --------
@@ -204,7 +196,7 @@ class Interface:
         >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
         >>> joint = contact(face, pressure="1 MPa", theory="calibrated", materials="steel 1020")
         >>> f"{joint.conductance():.0f} W/(m^2 K) and {joint.gap_conductance('air'):.0f}"
-        '3345 W/(m^2 K) and 9916'
+        '3345 W/(m^2 K) and 9921'
         """
         from mbma_tables.laws.gas import jump_of, mean_inverse
 
