@@ -172,7 +172,7 @@ class Leakage(Displayed):
         pressure_out: ArrayLike | str,
         width: ArrayLike | str,
         mean_free_path: ArrayLike | str,
-    ) -> Numbers:
+    ) -> Any:
         """Volume of an ideal gas at the outlet's pressure that leaks per time and length of seal [length^2/time].
 
         Isothermal: mass flow goes as p1^2 - p2^2. Slip of the first order adds the share 6 Kn, with Kn the mean free

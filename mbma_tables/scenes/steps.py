@@ -99,12 +99,12 @@ def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
         values["nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"] = problem.gaps
     for name in ("pressure", "area", "stiffness", "conductance", "energy"):
         if name == "conductance" and name in wanted:
-            from mbma_tables.totals.conductance import conductance, mean_conductivity
+            from mbma_tables.totals.conductance import mean_conductivity
 
             assert problem.conductivities is not None
             # yielded points unload elastically
             slope = quantity("stiffness" if problem.hardness is None else "unloading_stiffness")
-            values[name] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
+            values[name] = mean_conductivity(*problem.conductivities) / problem.E_star * slope
         elif name in wanted and not (name == "area" and "subscale_area" in problem.dropped):
             values[name] = quantity(name)
     run.found |= {name: (("gap",), array) for name, array in values.items()}
