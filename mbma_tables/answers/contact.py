@@ -292,23 +292,16 @@ def _of_labelled(
     """`contact` of DataArrays, lazily where they are."""
     units, held = source.units, by if by in QUANTITIES else None
     names = (*(("separation", "mean_separation") if held else ()), *QUANTITIES, "error")
-    fields: dict[str, Any] = {"islands": None}
-    slopes: list[tuple[str, str]] = []
     if derivatives:
-        kinds = [f"{kind}_by" for kind in QUANTITIES if kind != held] + (["separation_by"] if held else [])
-        free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
-        slopes = [(kind, name) for kind in kinds for name in free]
+        raise InputError("derivatives are of plain arrays: use .values of the DataArrays")
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, cap, by, source, derivatives)
-        return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
+        found = _contact(block, asked, modulus, cap, by, source, False)
+        return tuple(getattr(found, name) for name in names)
 
-    arrays = {by: value, "E_star": E_star, "hardness": hardness}
-    outputs = apply_to_surface(answer, surface, arrays, len(names) + len(slopes))
-    for found, name in zip(outputs, names, strict=False):
-        fields[name] = named(found, name, units)
-    for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
-        fields.setdefault(kind, {})[name] = found
+    outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star, "hardness": hardness}, len(names))
+    fields: dict[str, Any] = {name: named(found, name, units) for found, name in zip(outputs, names, strict=True)}
+    fields["islands"] = None
     # the given quantity keeps its name and attributes
     if by == "separation":
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 import types
 from typing import Any
@@ -14,54 +13,14 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import SIZES, Units, factor, unit_of
-from mbma_tables.law.half_space import FLAT, HalfSpace
+from mbma_tables.law.half_space import RTOL, Body
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import theory_law
-from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
-RTOL = 1e-7  # tolerance of the force of one contact
 LIGHT = 1e-9  # share of the largest force at which laws without a last contact begin
 NEWTONS = {"uN": 1e-6, "mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6}
 _FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N)\s*(?:/\s*(\w+))?\s*")
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Body(HalfSpace):
-    """What is pressed, and units of quantities: forces over E* times `newtons` are in the unit of force."""
-
-    surface: AnySurface
-    theory: Theory
-    units: dict[str, str]
-    newtons: float
-
-    @property
-    def name(self) -> str:
-        """What it is, in words."""
-        return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
-
-    def smooth_approach(self, force: FloatArray) -> FloatArray:
-        """Hertz's approach at a force over E*."""
-        if not self.plane:
-            return np.asarray((0.75 * force / math.sqrt(self.radius)) ** (2 / 3))
-        a = np.sqrt(4 * self.radius * force / math.pi)
-        return np.asarray(force / math.pi * (2 * np.log(2 * self.reference / a) + 1))
-
-    def approach_at(self, force: float) -> float:
-        """Approach at a force over E*: between those of the smooth body, and of one larger by h_max."""
-        from scipy.optimize import brentq
-
-        smooth, (thin, wide) = float(self.smooth_approach(np.asarray(force))), self.ends
-
-        def miss(approach: float) -> float:
-            found = self.solved(approach, RTOL)
-            return math.log(self.integral(found, found.p) / force)
-
-        low, high = smooth - wide * (1 - 1e-9), smooth - thin + 2 * FLAT * wide
-        # no layer is thinner than its law allows: there may be no such force
-        if miss(high) < 0:
-            self.quantities(self.solved(high, RTOL))
-        return float(brentq(miss, low, high, xtol=1e-12 * wide, rtol=1e-12))
 
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:

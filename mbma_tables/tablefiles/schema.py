@@ -119,11 +119,11 @@ class TableContent:
         cells = f"{self.coefficients.shape[0]} cells"
         return cells if self.kind == UNIVERSAL else " x ".join(f"{axis.nodes} {axis.name}" for axis in self.axes)
 
-    def facts(self) -> dict[str, str]:
+    def describe(self) -> str:
         """Range and error of the table, in one line."""
         ranges = ", ".join(f"{axis.name} {axis.low:g} to {axis.high:g}" for axis in self.axes)
         errors = ", ".join(f"{f} {self.attributes[f'largest_error_{f}']:.2g}" for f in FUNCTIONS)
-        return {"covers": ranges, "size": self.size, "largest held-out error": errors}
+        return f"covers {ranges}, size {self.size}, largest held-out error {errors}"
 
     def arrays(self) -> dict[str, Any]:
         """All arrays included in the values' hash, by their names in the file."""

@@ -24,7 +24,6 @@ from mbma_tables.islands.geometry import geometry, measured_islands
 from mbma_tables.models import AnyModel, answer_islands, island_model_name
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant, get_variant
 
@@ -106,8 +105,7 @@ def island(
     delta, rule = units.number("delta", delta), get_variant(variant)
     named: dict[str, Any] = {"variant": rule.name, "island_model": island_model_name(island_model)}
     if any_labelled(surface, delta, E_star):
-        asked = {"island_model": island_model, "variant": variant, "rtol": rtol}
-        return _of_labelled(surface, delta, E_star, asked, named)
+        raise InputError("island takes plain arrays: use .values of the DataArrays")
     approach, modulus = positive_array("delta", delta), positive_array("E_star", E_star)
     model = get_model(island_model, rtol, rule)
     require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
@@ -154,16 +152,3 @@ def refuse_bands(model: AnyModel) -> None:
             f"island model {model.name!r} supports islands of self-affine surfaces only: use 'universal' or 'exact', "
             "or surface.fit()"
         )
-
-
-def _of_labelled(surface: AnySurface, delta: Any, E_star: Any, asked: Any, named: Any) -> Island:
-    """`island` of DataArrays, lazily where they are."""
-    names = (*GEOMETRY, "force", "area", "error")
-
-    def answer(block: AnySurface, own: Any, modulus: Any) -> tuple[Any, ...]:
-        found = island(block, own, E_star=modulus, **asked)
-        return tuple(np.broadcast_to(getattr(found, name), np.shape(found.force)) for name in names)
-
-    outputs = apply_to_surface(answer, surface, {"delta": delta, "E_star": E_star}, len(names))
-    values = {name: found.rename(name) for name, found in zip(names, outputs, strict=True)}
-    return Island(delta=delta, **values, **named)
