@@ -47,6 +47,15 @@ def forces(given: Any, body: Body, length: str | None) -> Any:
     return float(found[1]) * NEWTONS[found[2]] * (1.0 if found[3] is None else factor("mm", found[3]))
 
 
+def _of(quantity: str, meaning: str) -> Any:
+    def found(self: Any, approach: ArrayLike | str) -> Numbers:
+        value: Numbers = getattr(self.law, quantity)(self._left(approach))
+        return value
+
+    found.__doc__ = meaning
+    return found
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class ForceLaw:
     """Force of a rough sphere or cylinder against its approach, made by `RoughContact.law`; per length of a cylinder.
@@ -61,26 +70,15 @@ class ForceLaw:
     first: float
     body: Body
 
-    def force(self, approach: ArrayLike | str) -> Numbers:
-        """F."""
-        return self.law.pressure(self._left(approach))
-
-    def stiffness(self, approach: ArrayLike | str) -> Numbers:
-        """dF/d(approach)."""
-        return self.law.stiffness(self._left(approach))
-
-    def area(self, approach: ArrayLike | str) -> Numbers:
-        """Real contact area."""
-        return self.law.area(self._left(approach))
-
-    def energy(self, approach: ArrayLike | str) -> Numbers:
-        """Work of loading, the integral of F over the approach."""
-        return self.law.energy(self._left(approach))
+    force = _of("pressure", "F.")
+    stiffness = _of("stiffness", "dF/d(approach).")
+    area = _of("area", "Real contact area.")
+    energy = _of("energy", "Work of loading, the integral of F over the approach.")
 
     def approach(self, force: Any) -> Numbers:
         """Approach at a force."""
-        found: FloatArray = self.law.at_pressure(forces(force, self.body, self.law.units.length)).mean_separation
-        return self.law.h_max + self.first - found
+        left: FloatArray = self.law.at_pressure(forces(force, self.body, self.law.units.length)).mean_separation
+        return self.law.h_max + self.first - left
 
     def _left(self, approach: ArrayLike | str) -> FloatArray:
         return self.law.h_max + self.first - finite_array("approach", self.law.units.number("approach", approach))
