@@ -114,8 +114,9 @@ def frozen_errors(one: Capped, elastic: tuple[FloatArray, ...], constants: cap.C
 def elastic_curve(node: tuple[float | str, ...], zeta_1: float, h_max: float, name: str) -> tuple[FloatArray, ...]:
     """Force, stiffness and Q of a theory at `LEVELS` of a self-affine surface."""
     surface, u = Surface(node[1], 1.0, zeta_1, 1.0, h_max), h_max * LEVELS[:-1]
-    found, g = get_theory(name).answer(surface, u), float(surface.rms_gradient)
-    return found.pressure / g, found.stiffness / g, get_theory(name).bearing_share(surface, u)[0]
+    theory, g = get_theory(name), float(surface.rms_gradient)
+    found = theory.answer(surface, u)
+    return found.pressure / g, found.stiffness / g, cap.bearing_share(u, theory.heights(surface))[0]
 
 
 def told(seen: Sequence[Capped], name: str, constants: Callable[[Capped], cap.Constants]) -> pd.DataFrame:

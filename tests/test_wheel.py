@@ -62,7 +62,7 @@ def test_the_readme_of_an_index_has_no_links_into_a_checkout(site):
     links = re.findall(r"\]\(([^)]*)\)", text)
     assert len(links) >= 4
     assert all(link.startswith("https://") for link in links)
-    assert "## Three recipes" in text
+    assert "## A bolted joint" in text
 
 
 def test_source_distribution_holds_what_the_checkout_holds(source, tmp_path):

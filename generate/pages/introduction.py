@@ -36,14 +36,14 @@ PRESSURES = (1e-4, 1e-3, 1e-2)  # over E*
 
 
 def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
-    """A/A0 at p/(E* g): the area law of the README."""
+    """A/A0 at p/(E* g): the area law of docs/formula.md."""
     t = pressure / 0.33
     s = (0.51 + 0.033 * math.log(alpha / 10) + t) / (1 + t)
     return np.asarray(erf(pressure * np.sqrt(2 / s)))
 
 
 def pocket_pressure(u: FloatArray, nu: float) -> FloatArray:
-    """p/(E* q0 h_rms) at u/h_rms: the law of separation of the README, by the spectrum's narrowness."""
+    """p/(E* q0 h_rms) at u/h_rms: the law of separation of docs/formula.md, by the spectrum's narrowness."""
     return np.asarray(u**-0.26 * np.exp(-1.91 * u - 2.8 * (nu - 0.63)))
 
 
@@ -108,7 +108,7 @@ def picture() -> Any:
 
 
 def readme() -> Measured:
-    """Theories with their deviation from simulations and their cost, the pocket laws' errors, the first picture."""
+    """Theories with their deviation from simulations and their cost, the first picture."""
 
     def off(*deviations: float) -> str:
         return " / ".join(f"{100 * math.expm1(d):.2g}%" if d < 0.5 else f"factor {math.exp(d):.2g}" for d in deviations)
@@ -118,12 +118,7 @@ def readme() -> Measured:
         cells = off(row.area_light, row.area_deep), off(row.force_light, row.force_deep)
         rows.append([what, *cells, duration(row.cost * shipped_costs().seconds)])
     header = "theory | error of area at given pressure | error of pressure at given separation | time per point"
-    shares = "; ".join(
-        f"error of {what} below {nine:.2g}% in nine cases of ten, at most {most:.2g}%"
-        for what, _, nine, most, _ in pocket_errors()
-    )
-    pocket = f"On held-out surfaces at 1-97% contact: {shares} ([method](docs/formula.md#pocket-laws))."
-    return {"theories": table(header, rows), "pocket": pocket}, {"docs/figures/first.svg": picture()}
+    return {"theories": table(header, rows)}, {"docs/figures/first.svg": picture()}
 
 
 def theories() -> Measured:

@@ -22,10 +22,12 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.common.files import write_file
 from mbma_tables.laws.boundary_elements import LOADS
+from mbma_tables.laws.pressing import Press
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories import BoundaryElements, get_theory
+from mbma_tables.theories.calibrated_curves import own_law
 from mbma_tables.theories.protocol import Theory
 from mbma_tables.theories.wrapped import answer_where_finite
 
@@ -80,13 +82,15 @@ def read_rows() -> dict[str, FloatArray]:
     return {str(name): own[COLUMNS].to_numpy().T for name, own in read_csv(ROOT / ROWS).groupby("map")}
 
 
-def refined(treated: Treated) -> FloatArray:
+def refined(treated: Treated, surface: MeasuredSurface) -> FloatArray:
     """Light loads of a map on twice as many points along each side, by Fourier interpolation: ten minutes."""
     values = mirrored(treated.heights - treated.heights.mean())
     for axis, count in enumerate(values.shape):
         values = resample(values, 2 * count, axis=axis)
     steps = [step / 2 for step in treated.steps]
-    return BoundaryElements.from_map(values, *steps, periodic=True, loads=LOADS[:4]).rows
+    press = Press(values, (values.shape[0] * steps[0], values.shape[1] * steps[1]), own_law(surface).gradient)
+    force, rows = press.loads(press.gradient * np.array(LOADS[:4]), False)
+    return np.array([force, *rows])
 
 
 def gallery() -> Measured:
@@ -98,7 +102,7 @@ def gallery() -> Measured:
             continue
         treated, surface = measured(path, example.options)
         if name not in rows and treated.heights.ndim == 2:
-            rows[name] = refined(treated) if fine else BoundaryElements.from_map(path, **example.options).rows
+            rows[name] = refined(treated, surface) if fine else BoundaryElements.of(surface).rows
             frames = [pd.DataFrame(own.T, columns=COLUMNS).assign(map=of) for of, own in sorted(rows.items())]
             # at once: what comes after may be stopped
             write_file(ROOT / ROWS, to_csv(HEAD, pd.concat(frames)[["map", *COLUMNS]], "%.9g"))

@@ -1,9 +1,8 @@
 """Boundary elements: a height map pressed flat, elastic or with pressures that cannot exceed a hardness, E* = 1.
 
-Pressures 0 <= p <= p_m of a given mean, on elastic half-spaces. Conjugate gradients run on the points that are free to
-move, and every step is projected exactly (in the Euclidean norm) onto the set of pressures that are allowed; scaling
-the load instead can cycle. A map that its mirror images continue is solved by cosine transforms on its own points, a
-quarter of those of the periodic cell. Loading only, frictionless, hardness constant.
+Conjugate gradients run on the points that are free to move, and every step is projected exactly onto the pressures
+0 <= p <= p_m of a given mean; scaling the load instead can cycle. A map that its mirror images continue is solved by
+cosine transforms on its own points. Loading only, frictionless.
 """
 
 from __future__ import annotations

@@ -1,18 +1,7 @@
-"""Contact of a rough surface by Persson's energy integral, its cover and weight calibrated on boundary elements.
+"""Persson's energy integral with cover and weight calibrated on boundary elements; equations in docs/calibrated.md.
 
-Units: force over A0 E* g with g the rms gradient in two dimensions, lengths in h_rms, wavenumbers x = q/q0, elastic
-energy over A0 E* g h_rms. A spectrum enters by its shares w(x) of h_rms^2 per d ln x. ::
-
-    A/A0    = erf(sqrt(2) F/sqrt(S)),  S = (s0 + t)/(1 + t),  t = F/t0,  s0 of Nayak's alpha (S = 1: Persson's)
-    P(x; F) = erf(sqrt(2) F g/g(x))                      g(x)^2: the squared gradient of wavenumbers below x
-    U(F)    = 1/(4 g^) integral x w(x) W(P) d ln x,      W(P) = a P + b P^3 + (1 - a - b) P^16,  g^ = g/(q0 h_rms)
-    u_P(F)  = integral from F to infinity of dU/F        so that F = -dU/du, and full contact is exact
-    F_G(u)  = F_P(u) exp(-c (1 - nu) u^3)                a Gaussian surface without end
-    F(u)    = F_G(u) (1 - r)^(3/2)/(1 + r), r = F_G(h_max)/F_G(u)     one that ends at h_max, as Hertz's contacts do
-
-W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a depends on the
-spectrum's narrowness nu = 1/(<x> <1/x>), which needs no Hurst exponent. The compiled core, spectrum_laws.c, keeps
-u_P(F) as polynomials of ln F.
+Force is over A0 E* g with g the rms gradient in two dimensions, lengths in h_rms, wavenumbers x = q/q0, energy over
+A0 E* g h_rms. The compiled core, spectrum_laws.c, keeps u_P(F) as polynomials of ln F.
 """
 
 from __future__ import annotations

@@ -1,21 +1,6 @@
-"""Flow through the gaps of a rough contact: an effective medium of gaps, a closed form, and rates of leakage.
+"""Flow through the gaps of a rough contact: an effective medium of gaps, a closed form; see docs/leakage.md.
 
-Reynolds' equation div(h^3 grad p) = 0 on the gaps h, no flow where bodies touch, small slopes, solids that the fluid's
-pressure does not move. Flow per length of seal is K (p1 - p2)/(12 viscosity width) with K = k h_rms^3. ::
-
-    k = u^3 (1 - 1.5/(u^2 + 4)) R(A)            u: mean gap over h_rms, A: A/A0; R = 1 without contact, 0 at blocking
-
-The factor beside u^3 is Bruggeman's effective medium of Gaussian gaps, exact to the second order in h_rms/u. R comes
-from the same medium with the gaps of the calibrated law, magnification by magnification: with wavenumbers below
-x resolved, the law's cover P(x) carries the load, and the mean gap there is that of those above x, ubar(x) with rms
-height s(x). The part that leaves contact between x and x + dx has mean gap u1 = d(ubar P)/dP and heights
-N(u1, s) + N(-u1, s) on h > 0, so that ::
-
-    integral over gaps of (h^3 - k)/(h^3 + k) dW = (1 - Ac) (A/Ac)^m
-
-For circular contacts the right side would be A. Real patches obstruct flow more, most at light load, and k vanishes at
-A = Ac: m and Ac are the two constants. Gaps are scaled so that their mean is u. Bruggeman 1935; Dapp, Luecke, Persson,
-Mueser, PRL 108 (2012) 244301 use n = 1/(1 - Ac) dimensions so that k vanishes at Ac.
+Lengths are in h_rms: flow per length of seal is k h_rms^3 (p1 - p2)/(12 viscosity width).
 """
 
 from __future__ import annotations

@@ -1,22 +1,4 @@
-"""Flow factors of a lubricated rough gap, before contact and in it: an anisotropic effective medium of gaps.
-
-Average flow between rough faces (N. Patir, H. S. Cheng, J. Lubrication Tech. 100 (1978) 12, 101 (1979) 220)::
-
-    q = -(phi u^3/(12 viscosity)) dp/dx + (U1 + U2) u/2 + (U1 - U2) h_rms phi_s/2,    u the mean gap
-
-Gaps are inclusions of one shape in a medium with conductivities k_x and k_y (Bruggeman 1935). An ellipse whose length
-along x over that along y is gamma, Peklenik's number, has in this medium the depolarisation factors L and 1 - L::
-
-    L = 1/(1 + gamma sqrt(k_y/k_x)),    integral of (h^3 - k)/(k + L (h^3 - k)) dW = (1 - Ac) (A/Ac)^m/(1 - L)
-
-for k_x, and with 1 - L for k_y; contact obstructs as in `mbma_tables.laws.effective_medium`, whose equation follows for
-gamma = 1. A face that slides over the rough one carries the gap h_c and phi_s = (u - h_c)/h_rms::
-
-    h_c = <h/(k + L (h^3 - k))>/<1/(k + L (h^3 - k))>
-
-For wide gaps phi = 1 + 3 (1 - 3 c) (h_rms/u)^2 and phi_s = 3 c h_rms/u with c = 1/(1 + gamma), which is exact (J. H.
-Tripp, J. Lubrication Tech. 105 (1983) 458). No constant was fitted to flow between anisotropic surfaces.
-"""
+"""Flow factors of a lubricated rough gap: an anisotropic effective medium of gaps; docs/lubrication.md."""
 
 from __future__ import annotations
 

@@ -1,19 +1,4 @@
-"""Conductance of a gas in the gaps of a contact, beside the solid spots, by the distribution of gaps.
-
-A gap g conducts k/(g + M): M is the temperature jump at both faces [length], by kinetic theory::
-
-    M = (sum (2 - a)/a) 2 gamma/((gamma + 1) Pr) L,    L = eta/P sqrt(pi R T/(2 m)) the mean free path
-
-The gaps are those of Gaussian heights z under a plane, bent where bodies deform::
-
-    g = s max(d - z, 0)^q,    q = 1 + 0.3 A/(A + 0.004) (1 - exp(-(eta/0.3)^1.2)),    eta = p_m/(E* g)
-
-with d from the contact's A/A0 and s from its mean gap u. q is fitted to boundary elements of 12 surfaces at three
-hardnesses from 0.3% to 75% contact. On ten others (H 0.2 to 0.9, zeta_1 5 to 64, one to six longest wavelengths a side,
-plateaus and filters; eta 0.05 to infinity), with their own A and u, it is within 4% at M = h_rms, 7% at 0.3 h_rms and
-13% at 0.1 h_rms (root mean square 1, 2 and 4%), and up to 27% off at 0.01 h_rms. k/(u + M) is off by up to 12%, 28% and
-52% even below 5% contact.
-"""
+"""Conductance of a gas in the gaps of a contact, by the distribution of gaps; docs/joints.md has the equations."""
 
 from __future__ import annotations
 

@@ -1,19 +1,7 @@
-"""Contact whose pressure cannot exceed a hardness p_m, from the elastic contact of the same surface.
+"""Contact whose pressure cannot exceed a hardness p_m, from the elastic contact of the same surface; docs/yield.md.
 
-With eta = p_m/(E* g), g the rms gradient, x = F/(p_m A0) and F in A0 E* g; psi = 1/eta is the plasticity index. ::
-
-    area        pressures diffuse as in Persson's theory, between walls at 0 and at p_m:
-                A       = x + (2/pi) sum        sin(n pi x)/n exp(-n^2 pi^2 tau)
-                A_yield = x + (2/pi) sum (-1)^n sin(n pi x)/n exp(-n^2 pi^2 tau),   tau = S/(8 eta^2)
-                S^-a = S_el^-a + (eta^1.5/b)^-a,   A_el = erf(sqrt(2) F/sqrt(S_el)) the elastic area at F,
-                a and b of their own for A and for A_yield
-    force       F(u)^-n = F_el(u)^-n + (eta Q(u))^-n,   n = n0 + c eta + d Q(u)
-                Q(u): share of heights above the level whose mean gap is u
-    stiffness   of the frozen contact, -dF_el/du(u) (1 + e exp(-eta/f)): yielded points unload elastically
-
-Hardness is constant, loading only, frictionless; yielded volume vanishes. The mean gap u has no negative gaps: points
-that yield are flattened. A, A_yield and F go over to the elastic contact as eta grows, and to the bearing curve,
-A = A_yield = x and F = eta Q(u), as it decreases.
+eta = p_m/(E* g), g the rms gradient, x = F/(p_m A0) and F in A0 E* g. Loading only, frictionless. The mean gap u has no
+negative gaps: points that yield are flattened.
 """
 
 from __future__ import annotations

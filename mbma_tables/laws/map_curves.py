@@ -1,17 +1,6 @@
-"""The calibrated law for a height map: its highest parts determine light loads, its valleys loads near full contact.
+"""The calibrated law for a height map, by its highest parts at light loads and its valleys near full contact.
 
-Lengths in h_rms, force over A0 E* g as in `calibrated`. The gap is zero where pressure is not, so the
-pressure-weighted height H_p = <p h>/<p> obeys H_p = u + 2 U/F exactly; with dU = -F du that is ::
-
-    u(F) = 2 F integral from F to infinity of H_p/F'^2 dF' - H_p(F)
-
-At light load H_p = M(c A), the mean height of the highest share c A of the map, weighted by gradient because pressures
-are proportional to it; c = 4/5 exactly for Hertzian contact. The area is the law's with the gradient of the highest
-share 1 - (1 - A)^2 of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
-
-Near full contact the map's valleys dominate: gaps remain where the pressures of full contact would be tensile. u is the
-spectrum's u_P at the force F_D at which Gaussian pressures of full contact have the same mean tension <max(-p, 0)>; the
-area is the law's at the force at which they are tensile on the same share. No constant is fitted there.
+Lengths in h_rms, force over A0 E* g as in `calibrated`; docs/calibrated.md has the equations.
 """
 
 from __future__ import annotations

@@ -191,8 +191,8 @@ class Table:
         F/(A0 E*), A/A0, u and U/(A0 E*).
     flow_gaps, flow : ndarray, shape (m,) and (m, 3)
         Mean gaps, falling, and flow coefficients xx, yy, xy [length^3].
-    points, elements : float
-        Sampling steps along the shortest wavelength, and elements of the map that do not repeat each other.
+    points : float
+        Sampling steps along the shortest wavelength.
     left_out : float
         As of `Press`.
     origin : str
@@ -203,9 +203,8 @@ class Table:
     flow_gaps: FloatArray
     flow: FloatArray
     points: float
-    elements: float
-    left_out: float = 0.0
-    origin: str = ""
+    left_out: float
+    origin: str
 
     def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
         """`flow_gaps` and `flow`."""

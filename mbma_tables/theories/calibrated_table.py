@@ -1,8 +1,6 @@
 """The calibrated law's table: ln F_G over Hurst exponent, zeta_1 and mean separation, and errors against simulations.
 
-F_G is the force of `mbma_tables.laws.calibrated` on a surface without end. The end at h_max and the area are closed
-forms, applied here. Below the table's least separation F^2 is linear in ln u, as near full contact; above its largest
-one ln F is linear in u.
+F_G is the force on a surface without end; the end at h_max and the area are closed forms, applied by the core.
 """
 
 from __future__ import annotations

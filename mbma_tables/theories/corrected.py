@@ -47,9 +47,10 @@ def applies(surface: AnySurface) -> bool:
     if whole.heights.size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or not resolved:
         return False
     try:
-        return of_map(Corrected.name, surface).ends_at_h_max
+        of_map(Corrected.name, surface)
     except (ConvergenceError, OutOfRangeError):
         return False
+    return True
 
 
 @functools.lru_cache(maxsize=8)

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
@@ -30,12 +29,6 @@ def sides(treated: Treated) -> tuple[float, float]:
 def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
     """Sampling steps along the shortest wavelength of a map."""
     return 2 * np.pi / float(surface.q1) / max(whole.steps)
-
-
-def unresolved(points: float, area: FloatArray) -> dict[str, NDArray[np.bool_]]:
-    """The reason against grids with too few sampling steps per shortest wavelength, and its mask."""
-    text = f"the map's shortest wavelength has {points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
-    return {text: np.full(area.shape, points < MIN_POINTS * (1 - ROUNDING))}
 
 
 def reduced(values: FloatArray, points: float, mirrored: bool) -> tuple[FloatArray, float, float]:

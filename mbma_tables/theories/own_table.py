@@ -25,7 +25,6 @@ ROWS = {
 }
 NUMBERS = {
     "points": "sampling steps along the shortest wavelength",
-    "elements": "independent elements of the map",
     "left_out": "wavelength below which a large map was cut off, 0 if it was not",
     "anisotropy": "root of the ratio of the gradient tensor's eigenvalues",
 }
@@ -43,16 +42,14 @@ def _fields(name: str) -> list[str]:
 
 def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
     """Write a simulated map; see `BoundaryElements.to_netcdf`."""
-    surface, pressed = theory.surface, theory.pressed
-    if not theory.own_loads or pressed is None or not isinstance(surface, MeasuredSurface) or surface.bands is None:
-        raise InputError("a table holds a map that was simulated at its default loads: BoundaryElements.of(surface)")
+    surface = theory.surface
     table: dict[str, Any] = {}
     for row, (name, (meaning, unit)) in zip(theory.rows, ROWS.items(), strict=True):
         table[name] = ("load",), row, meaning, unit
-    gaps, flow = theory._flows
+    gaps, flow = theory.flows
     table["flow_gaps"] = ("flow_load",), gaps, "u of a load whose flow is known", "{length}"
     table["flow"] = ("flow_load", "axis"), flow, "flow coefficients xx, yy and xy, 0 where blocked", "{length}^3"
-    numbers = (theory.points, theory.elements, pressed.left_out, surface.anisotropy)
+    numbers = (theory.points, theory.pressed.left_out, surface.anisotropy)
     for (name, meaning), value in zip(NUMBERS.items(), numbers, strict=True):
         table[name] = (), value, meaning, "{length}" if name == "left_out" else "1"
     table["q"] = ("wave",), surface.q, "wavenumber", "1/{length}"
@@ -98,8 +95,8 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         rows = np.stack([values[name] for name in ROWS])
         if values["flow"].shape != (*values["flow_gaps"].shape, 3) or rows.ndim != 2:
             raise InputError("has loads and flows that do not fit each other")
-        points, elements, left_out, anisotropy = numbers
-        table = Table(rows, values["flow_gaps"], values["flow"], points, elements, left_out, own["source"])
+        points, left_out, anisotropy = numbers
+        table = Table(rows, values["flow_gaps"], values["flow"], points, left_out, own["source"])
         return MeasuredSurface(
             values["q"], values["C"], values["h_max"].item(), **parts, bands=bands, table=table,
             samples=values["samples"], anisotropy=anisotropy, unit=own.get("length_unit"),

@@ -1,7 +1,6 @@
 """Persson's theory of area and average separation (Eqs. 18-21).
 
-The double integral (19) is the calibrated law's energy integral with the weight W = gamma P + (1 - gamma) P^3 and
-without its tail, u_P of `mbma_tables.laws.calibrated`; u0 and lambda of (21) are sums over the same wavenumbers.
+The double integral (19) is u_P of `mbma_tables.laws.calibrated` with the weight W = gamma P + (1 - gamma) P^3.
 """
 
 from __future__ import annotations

@@ -92,16 +92,6 @@ class Theory(abc.ABC):
         """End of the Gaussian heights over h_rms, or a map's own `laws.hardness.BearingCurve`; for a hardness."""
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if self.ends_at_h_max else np.inf
 
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Share of heights above the level whose mean gap is u, and its derivative by u."""
-        # needed with a hardness only
-        from mbma_tables.laws import hardness
-
-        h_rms, heights = np.asarray(surface.h_rms), self.heights(surface)
-        x = np.asarray(mean_separation) / h_rms
-        share, slope = heights(x) if callable(heights) else hardness.bearing_share(x, heights)
-        return share, slope / h_rms
-
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which "pressure" or "area" decreases: full compression and last contact."""
         high = np.asarray(surface.h_max, dtype=float)

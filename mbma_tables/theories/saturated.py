@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,6 @@ from mbma_tables.theories.simulated import BoundaryElements as BoundaryElements
 from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
 
 KEPT = 8  # hardnesses of maps whose simulations are kept
-TESTED_ETA = 0.1  # p_m/(E* g) down to which it was tested
 # standard deviations of ln of a quantity, by `python -m generate machined`
 SCATTER = {"area": 0.010, "pressure": 0.011, "stiffness": 0.033}
 
@@ -34,58 +33,45 @@ class Loaded(NamedTuple):
 
 
 class Plastic(BoundaryElements):
-    """The map of a simulated theory at one hardness."""
+    """The map of a simulated theory pressed to the loads of the same contact areas, p_m/E* = `cap`."""
 
-    @classmethod
-    @functools.lru_cache(KEPT)
-    def pressed_to(cls, theory: BoundaryElements, cap: float) -> Plastic:
-        """Pressed to the loads of the elastic theory's contact areas, p_m/E* = cap."""
+    def __init__(self, theory: BoundaryElements, cap: float) -> None:
         known, surface = theory.pressed, theory.surface
         assert isinstance(known, Press)
-        elastic = own_map.law_loads(surface, own_map.AREAS)  # type: ignore[arg-type]
+        elastic = own_map.law_loads(surface, own_map.AREAS)
         loads = ((cap * np.array(own_map.AREAS)) ** -2 + elastic**-2) ** -0.5
         press = Press(
             known.heights, known.sizes, known.gradient, TOLERANCE, known.mirrored, cap, left_out=known.left_out
         )
-        force, rows = press.loads(loads, True)
-        area, u, energy, plane, yielded, frozen, height = rows
+        force, (area, u, energy, plane, yielded, frozen, height) = press.loads(loads, True)
         # d(F H_p - U)/dF is the gap of the mean planes, to which what is flattened comes
         flattened = PchipInterpolator(force, u - plane).antiderivative()(force)
-        work = force * height - energy + flattened
-        stored = work - force * u
+        stored = force * height - energy + flattened - force * u
         stored = stored + 2 * np.abs(stored).max()
-        found = cls(surface, force, area, u, stored, theory.points, theory.elements, press, True, theory.origin)
-        found._more = PchipInterpolator(found.fit.x, np.array([yielded / area, np.log(frozen), u - plane]).T)
-        found._last = np.array([cap - force[-1], 1 - area[-1]])
-        found._power = float(found.fit.stiffness(found.fit.x[-1:])[0]) * u[-1] / (cap - force[-1])
-        found._cap = cap
-        return found
-
-    _more: Any  # yielded share, ln of the frozen stiffness and u less the gap of the mean planes, by ln F
-    _last: FloatArray  # what the heaviest load lacks of the hardness, and its area of full contact
-    _cap: float
-    _power: float  # of u, as which both vanish
+        super().__init__(surface, np.array([force, area, u, stored]), theory.points, press, theory.origin)
+        # yielded share, ln of the frozen stiffness and u less the gap of the mean planes, by ln F
+        self._more = PchipInterpolator(self.fit.x, np.array([yielded / area, np.log(frozen), u - plane]).T)
+        # what the heaviest load lacks of the hardness, and its area of full contact; both vanish as this power of u
+        self._ends, self._last = np.array([cap, 1.0]), np.array([cap - force[-1], 1 - area[-1]])
+        self._power = float(self.fit.stiffness(self.fit.x[-1:])[0]) * u[-1] / (cap - force[-1])
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness; heavier contacts go over to the hardness everywhere."""
         last = self.rows[2, -1]
-        inside, left = (
-            super().answer(surface, np.maximum(mean_separation, last)),
-            (mean_separation / last) ** self._power,
-        )
+        inside = super().answer(surface, np.maximum(mean_separation, last))
+        left, beyond = (mean_separation / last) ** self._power, mean_separation < last
+        pressure, area = (end - rest * left for end, rest in zip(self._ends, self._last, strict=True))
         with np.errstate(all="ignore"):
             steep = self._power * self._last[0] * left / mean_separation
-        beyond = mean_separation < last
-        pressure = np.where(beyond, self._cap - self._last[0] * left, inside.pressure)
-        area = np.where(beyond, 1 - self._last[1] * left, inside.area)
-        return TheoryAnswer(pressure, area, np.where(beyond, steep, inside.stiffness), inside.error)
+        heavy = pressure, area, steep, inside.error
+        return TheoryAnswer(*(np.where(beyond, one, other) for one, other in zip(heavy, inside, strict=True)))
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Mean separation [length] at a pressure over E* or an area."""
         row = 0 if quantity == "pressure" else 1
         end = self.rows[row, -1]
         u, missed = super().inverted(surface, quantity, np.minimum(wanted, end))
-        left = np.minimum(((self._cap, 1.0)[row] - wanted) / self._last[row], 1.0)
+        left = np.minimum((self._ends[row] - wanted) / self._last[row], 1.0)
         return np.where(wanted > end, self.rows[2, -1] * left ** (1 / self._power), u), missed
 
     def found(self, mean_separation: FloatArray) -> FloatArray:
@@ -98,8 +84,11 @@ class Plastic(BoundaryElements):
         return np.array([*answer, *more])
 
 
+plastic = functools.lru_cache(KEPT)(Plastic)
+
+
 class Saturated(Yielding):
-    """A simulated map whose pressures cannot exceed a hardness; lru_cache keeps the last simulations.
+    """A simulated map whose pressures cannot exceed a hardness.
 
     Parameters
     ----------
@@ -110,11 +99,7 @@ class Saturated(Yielding):
     """
 
     elastic: BoundaryElements
-
-    def at(self, shape: tuple[int, ...], place: Any) -> Theory:
-        """With the hardnesses at flat places of a broadcast shape."""
-        found = super().at(shape, place)
-        return found if found is self else Saturated(self.elastic, found.hardness)  # type: ignore[attr-defined]
+    tested_eta = 0.1
 
     def _each(self, ask: Callable[..., Any], *given: ArrayLike) -> Any:
         """What simulations answer at entries with their hardnesses; rows first."""
@@ -129,7 +114,7 @@ class Saturated(Yielding):
         return found
 
     def _simulation(self, cap: float) -> Any:
-        return self.elastic if np.isinf(cap) else Plastic.pressed_to(self.elastic, cap)
+        return self.elastic if np.isinf(cap) else plastic(self.elastic, cap)
 
     def loaded(self, surface: AnySurface, mean_separation: FloatArray, lighter: Any = None) -> Any:
         """The answer at mean separations u [length], and what follows from the simulation."""
@@ -192,16 +177,10 @@ class Saturated(Yielding):
         elastic = self.elastic.scatter(surface, quantity, area)
         return np.where(np.isinf(self.hardness), elastic, np.hypot(elastic, SCATTER.get(quantity, 0.0)))
 
-    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
-        """The elastic theory's reasons, and hardnesses below those that were tested."""
-        soft = np.broadcast_to(self._eta(surface) < TESTED_ETA * (1 - 1e-9), np.shape(answer.area))
-        own = {f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": soft}
-        return {**self.elastic.reasons(surface, answer, mean_separation), **own}
-
 
 def _with_hardness(theory: BoundaryElements, hardness: ArrayLike) -> Yielding:
-    """A map whose points are known is simulated anew; a table or loads of one's own go through the law of hardness."""
-    return (Saturated if theory.own_loads and isinstance(theory.pressed, Press) else Yielding)(theory, hardness)
+    """A map whose points are known is simulated anew; a table goes through the law of hardness."""
+    return (Saturated if isinstance(theory.pressed, Press) else Yielding)(theory, hardness)
 
 
 WITH_HARDNESS[BoundaryElements] = _with_hardness

@@ -23,7 +23,6 @@ from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer
 
 GROUP = "hardness"  # group of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "stiffness")
-TESTED_ETA = 0.025  # smallest p_m/(E* g) that was simulated
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) above which areas are those of full contact
 CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
@@ -122,6 +121,7 @@ class Yielding(Theory):
     """
 
     elastic: Any = None
+    tested_eta = 0.025  # smallest p_m/(E* g) that was simulated
 
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
         self.elastic, self.hardness, self.reached = theory, np.asarray(hardness, dtype=float), REACHED
@@ -134,7 +134,8 @@ class Yielding(Theory):
         """The theory with the hardnesses at flat indices of a broadcast shape."""
         if self.hardness.ndim == 0:
             return self
-        return Yielding(self.elastic, np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)])
+        chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
+        return type(self)(self.elastic, chosen)
 
     def _eta(self, surface: AnySurface) -> FloatArray:
         """p_m/(E* g)."""
@@ -178,13 +179,6 @@ class Yielding(Theory):
             sizes = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient), eta
             self._bound = surface, (eta, functools.partial(law.closed, self.elastic.heights(surface), *sizes))
         return self._bound[1]
-
-    def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Mean separations [length] of the elastic contact at the forces of this one."""
-        pressure = self.curve(surface, "pressure")(mean_separation)[0]
-        # theories without last contact have force at every gap
-        least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
-        return np.asarray(self.elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0])
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
@@ -261,8 +255,8 @@ class Yielding(Theory):
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
-        soft = np.broadcast_to(self._eta(surface) < TESTED_ETA * (1 - 1e-9), np.shape(answer.area))
-        own = {f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": soft}
+        soft = np.broadcast_to(self._eta(surface) < self.tested_eta * (1 - 1e-9), np.shape(answer.area))
+        own = {f"the hardness over E* times the rms gradient is below {self.tested_eta:g}": soft}
         return {**self.elastic.reasons(surface, answer, mean_separation), **own}
 
 
