@@ -200,13 +200,13 @@ def spectrum_of(surface: Any) -> Spectrum:
     return Spectrum.from_samples(*(np.ascontiguousarray(part, float) for part in (surface.q, surface.C)))
 
 
-def force_at_area(area: ArrayLike, light: ArrayLike) -> FloatArray:
+def force_at_area(area: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """F/(A0 E* g) at A/A0."""
     from scipy.special import erfinv
 
     share = np.asarray(area, float)
     require("area", share, (share >= 0) & (share < 1), "below 1, which is reached at infinite load")
-    return force_of(erfinv(share), light)
+    return force_of(erfinv(share), light, constants)
 
 
 def mean_top_height(share: ArrayLike) -> FloatArray:
