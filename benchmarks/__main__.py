@@ -34,8 +34,8 @@ from benchmarks.kernels import BEFORE, held_out, measured
 from benchmarks.maps import maps
 from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
+from generate import page
 from generate.files import ROOT
-from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.calibrated import Law, Spectrum

@@ -1,7 +1,5 @@
 """The file of the calibrated law: its table, the table's errors, and how far theories are from simulation."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import functools

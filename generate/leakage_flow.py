@@ -1,7 +1,5 @@
 """Flow through simulated contacts, and every law of it: what `generate.leakage_law` fits and compares."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -251,7 +251,7 @@ class Joint(Displayed):
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""
-        needed("xarray", "xarray")
+        needed("xarray")
         import xarray as xr
 
         held = self.quantities(self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist()))

@@ -161,7 +161,6 @@ test_conflicts_on_the_command_line = told(
     ),
     ("--hurst 0.8 --q0 0.1 --zeta-1 50 --h-rms 1 --h-max 3 -d 1mm", "give --length-unit"),
     ("--surface concrete -d 1 --stress-unit MPa", "no modulus"),
-    ("--surface concrete -d 1mm --over-h-rms", "multiples of h_rms"),
     ("--surface concrete -a 1mm", "area has no unit"),
 )
 

@@ -1,18 +1,16 @@
 """Surfaces of the evidence, with or without a hardness, as laws are fitted to them and tested on them."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from scipy.special import erf, erfinv
 
-from generate.boundary_elements.design import REFINEMENT, SPLITS
+from generate.boundary_elements.surfaces import REFINEMENT, SPLITS
 from mbma_tables import Surface
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness
@@ -126,7 +124,7 @@ class Case(Simulated):
     area: FloatArray
     u: FloatArray
 
-    def at(self, kept: Any) -> Case:
+    def at(self, kept: Any) -> Self:
         """The same at some of its loads."""
         return dataclasses.replace(self, force=self.force[kept], area=self.area[kept], u=self.u[kept])
 

@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import batch, cache, commands, export, joint, scene, tables
+from mbma_tables.cli import batch, commands, export, scene, tables
 from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
@@ -49,29 +49,29 @@ SAID = {
     "k1 must be": "--conductivity must be",
     "k2 must be": "--conductivity must be",
 }
-# contexts in which an English word is the name of an option: after a verb, and in lists of options
-BEFORE = r"^|\b(?:leave|give|got|one of|needs) |--[\w-]+(?:,|,? and|,? or) "
-AFTER = r"[,;:]| = | (?:must|has|is|are|and|or|out|without)\b|$"
 
 
 def _in_options(text: str, command: click.Command, words: list[str]) -> str:
-    """A message of the library with its argument names replaced by the options of a command."""
+    """A message of the library with its argument names replaced by the options of a command.
+
+    English words among them, such as pressure, stand for an option at the beginning and in lists of names.
+    """
     # messages of the command line itself, and messages on a file, which keep the file's own names
     if "--" in text or text.startswith(tuple(word + end for word in words for end in ":,")):
         return text
     for python, shell in SAID.items():
         text = text.replace(python, shell)
     options = {o.name: max(o.opts, key=len) for o in command.params if isinstance(o, click.Option) and o.name}
-    valued = options | {"unit": "--length-unit"}
-    signs = [name for name in options if re.search(r"[A-Z_\d]|^d[xy]$|^rtol$", name)]
-    plain = "|".join(options.keys() - set(signs)) or "^$"
-    text = re.sub(rf"\b({'|'.join(valued)})=(['\w.-]+)", lambda m: f"{valued[m[1]]} {m[2].strip(chr(39))}", text)
+    names = "|".join(options) or "^$"
+    text = re.sub(rf"\b({names})=(['\w.-]+)", lambda m: f"{options[m[1]]} {m[2].strip(chr(39))}", text)
+    signs = "|".join(name for name in options if re.search(r"[A-Z_\d]|^d[xy]$|^rtol$", name)) or "^$"
     # not in formulas, nor where a number was found
-    outside = r"(?<![\w/.*^'-])(?<![<>=] )({})(?![\w/(^*'.])(?! ?[<>]| ?=(?! '))".format("|".join(signs) or "^$")
+    outside = rf"(?<![\w/.*^'-])(?<![<>=] )({signs})(?![\w/(^*'.])(?! ?[<>]| ?=(?! '))"
     text = re.sub(outside, lambda m: options[m[1]], text)
+    text = re.sub(rf"^({names})(?= (?:must|has|is)\b|: )", lambda m: options[m[1]], text)
     for _ in options:
-        text = re.sub(rf"({BEFORE})({plain})(?={AFTER})", lambda m: m[1] + options[m[2]], text)
-        text = re.sub(rf"(?<![\w-])({plain})(?=,? (?:and |or )?--)", lambda m: options[m[1]], text)
+        text = re.sub(rf"(--[\w-]+(?:,|,? and|,? or) )({names})\b", lambda m: m[1] + options[m[2]], text)
+        text = re.sub(rf"(?<![\w-])({names})(?=,? (?:and |or )?--)", lambda m: options[m[1]], text)
     return text
 
 
@@ -131,8 +131,8 @@ for command in (
     commands.fit_command,
     batch.sensitivity_command,
     tables.tables_group,
-    cache.cache_command,
-    joint.joint_command,
+    tables.cache_command,
+    scene.joint_command,
     scene.plan_command,
     scene.run_command,
     commands.cost_command,

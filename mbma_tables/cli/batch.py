@@ -11,20 +11,12 @@ from typing import Any
 import click
 
 from mbma_tables.cli import options
-from mbma_tables.cli.commands import COLUMNS, contact_keywords
-from mbma_tables.cli.format import Column, Report, shown_unit, to_columns
+from mbma_tables.cli.commands import COLUMNS
+from mbma_tables.cli.format import Report, shown_unit
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
 from mbma_tables.common.progress import doing
-from mbma_tables.scenes.specimen import (
-    MATERIAL,
-    NUMBERS,
-    Specimen,
-    effective_modulus_of,
-    from_map,
-    from_name,
-    from_numbers,
-)
+from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, from_tables
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 
@@ -88,49 +80,46 @@ def batch_command(
         specimens.append(specimen)
     if len({specimen.units for specimen in specimens}) > 1:
         raise InputError(f"{file}: some lines have units and some do not: give --length-unit and --stress-unit")
-    first = specimens[0]
+    first, surfaces = specimens[0], [specimen.surface for specimen in specimens]
     moduli = [1.0 if specimen.E_star is None else specimen.E_star for specimen in specimens]
     doing(f"batch of {len(lines)} lines")
-    keywords = contact_keywords(model, first)
-    fields = (*COLUMNS[:-1], "stiffness", "scatter", "valid", "error")
+    keywords, fields = model.keywords(first), (*COLUMNS[:-1], "stiffness", "scatter", "valid", "error")
     found: dict[str, Any] = {"name": names}
-    if all(isinstance(specimen.surface, Surface) for specimen in specimens):
-        columns: dict[str, Any] = {
-            name: [getattr(specimen.surface, name) for specimen in specimens] for name in PARAMETERS
-        }
-        surface = Surface(**columns, unit=first.surface.unit)
-        answer = contact(surface, **keywords | {"E_star": moduli, load: values})
+    if all(isinstance(surface, Surface) for surface in surfaces):
+        numbers: dict[str, Any] = {name: [getattr(surface, name) for surface in surfaces] for name in PARAMETERS}
+        answer = contact(Surface(**numbers, unit=surfaces[0].unit), **keywords | {"E_star": moduli, load: values})
         found |= {name: getattr(answer, name) for name in fields}
     else:
         # one after the other: maps make no batch
-        rows = zip(specimens, moduli, values, strict=True)
-        each = [contact(one.surface, **keywords | {"E_star": modulus, load: at}) for one, modulus, at in rows]
+        rows = zip(surfaces, moduli, values, strict=True)
+        each = [contact(surface, **keywords | {"E_star": modulus, load: at}) for surface, modulus, at in rows]
         answer, found["theory"] = each[0], [one.theory for one in each]
         found |= {name: [getattr(one, name) for one in each] for name in fields}
+    made = f"theory {', theory '.join(dict.fromkeys(found.get('theory', [answer.theory])))}"
     notes = [
-        ", ".join(dict.fromkeys(f"theory {name}" for name in found.get("theory", [answer.theory])))
-        + (f", rtol {model.rtol:g}" if answer.theory == "mbma" else ""),
+        f"{made}, rtol {model.rtol:g}" if answer.theory == "mbma" else made,
         "scatter: of ln force at a separation, by simulations",
     ]
-    shown = {name: shown_unit(name, first.units) for name in found}
     facts = {"theory": answer.theory, "variant": answer.variant or None, "island_model": answer.island_model or None}
-    Report("batch", file.name, notes, facts, to_columns(found, shown)).write(output)
+    shown = {name: shown_unit(name, first.units) for name in found}
+    Report("batch", file.name, notes, facts, found, shown).write(output)
 
 
 def _lines(file: Path) -> Any:
     """Number and filled cells of each line below the header."""
     text = read_file(file, MAX_BYTES).decode("utf-8-sig", "replace")
-    if (count := text.partition("\n")[0].count(",") + 1) > MAX_COLUMNS:
-        raise InputError(f"{file}: {count} columns, more than {MAX_COLUMNS}")
-    if (count := text.count("\n")) > MAX_ROWS:
-        raise InputError(f"{file}: {count} lines, more than {MAX_ROWS}")
+    for what, count, most in (
+        ("columns", text.partition("\n")[0].count(",") + 1, MAX_COLUMNS),
+        ("lines", text.count("\n"), MAX_ROWS),
+    ):
+        if count > most:
+            raise InputError(f"{file}: {count} {what}, more than {most}")
     rows = csv.DictReader(io.StringIO(text, newline=""))
     known = {"name", "surface", "map", *OF_MAPS, *NUMBERS, *MATERIAL, *LOADS}
     names = [name.strip() for name in rows.fieldnames or ()]
     if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"{file}: more than one column {', '.join(repeated)}")
-    unknown = [name for name in names if name not in known]
-    if unknown:
+    if unknown := [name for name in names if name not in known]:
         raise InputError(f"{file}: unknown columns {', '.join(unknown)}; there are {', '.join(sorted(known))}")
     empty = True
     for row in rows:
@@ -147,21 +136,12 @@ def _lines(file: Path) -> Any:
 
 
 def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: str | None, folder: Path) -> Specimen:
-    numbers: dict[str, Any] = {name: row[name] for name in NUMBERS if name in row}
-    treatment: dict[str, Any] = {name: row[name] for name in OF_MAPS if name in row}
-    if "surface" in row and numbers:
-        raise InputError("a named surface and numbers: one of them")
-    if "map" in row and ("surface" in row or numbers):
-        raise InputError("a map and a named surface or numbers: one of them")
-    if treatment and "map" not in row:
-        raise InputError(f"{', '.join(treatment)}: for a map, which is missing")
-    if "map" in row:
-        specimen = from_map(folder / row["map"], treatment | {"unit": length})
-    else:
-        specimen = from_name(row["surface"]) if "surface" in row else from_numbers(numbers, length)
+    surface: dict[str, Any] = {name: row[name] for name in ("map", *OF_MAPS, *NUMBERS) if name in row}
+    surface |= {"name": row["surface"]} if "surface" in row else {}
     material = {name: row[name] for name in MATERIAL if name in row}
-    modulus, unit = effective_modulus_of(material or ({} if E_star is None else {"E_star": E_star}), stress)
-    return Specimen(specimen.surface, specimen.title, modulus, unit).in_units(length, stress)
+    material = material or ({} if E_star is None else {"E_star": E_star})
+    tables = {"surface": surface | {"length_unit": length}, "material": material | {"stress_unit": stress}}
+    return from_tables(tables, folder, "").in_units(length, stress)
 
 
 def _pair(text: str) -> tuple[str, tuple[str, str]]:
@@ -192,31 +172,26 @@ def sensitivity_command(
     from mbma_tables.answers.sensitivity import sensitivity
 
     model = model.of(specimen.surface)
-    asked = vars(model).copy()
-    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=dict(map(_pair, ranges)), **asked)
+    ends = dict(map(_pair, ranges))
+    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=ends, **vars(model))
     parameters = list(found.parameters)
-    columns = [
-        Column("parameter", "-", parameters),
-        Column("value", "-", list(found.parameters.values())),
-        Column("unit", "-", [shown_unit(name, found.units) for name in parameters]),
-    ]
-    columns += to_columns({answer: [found.slopes[name][answer] for name in parameters] for answer in found.answers}, {})
+    columns = {
+        "parameter": parameters,
+        "value": list(found.parameters.values()),
+        "unit": [shown_unit(name, found.units) for name in parameters],
+    }
+    columns |= {answer: [found.slopes[name][answer] for name in parameters] for answer in found.answers}
+    units = {name: shown_unit(name, found.units) for name in found.answers}
 
     def with_unit(answer: str, text: str) -> str:
-        return f"{answer} {text} {shown_unit(answer, found.units)}".removesuffix(" -")
+        return f"{answer} {text} {units[answer]}".removesuffix(" -")
 
     here = ", ".join(with_unit(name, f"{value:.6g}") for name, value in found.answers.items())
     notes = [f"theory {model.theory}; d ln(answer)/d ln(parameter) at given {found.by}", f"here: {here}"]
     notes.append("conductance is over the mean conductivity of the bodies")
     for name, spans in found.ranges.items():
-        ends = ", ".join(with_unit(answer, f"{low:.4g} to {high:.4g}") for answer, (low, high) in spans.items())
-        notes.append(f"range of {name}: {ends}")
-    facts = {
-        "theory": model.theory,
-        "by": found.by,
-        "answers": found.answers,
-        "ranges": found.ranges,
-        "errors": found.errors,
-        "answer_units": {name: shown_unit(name, found.units) for name in found.answers},
-    }
+        spread = ", ".join(with_unit(answer, f"{low:.4g} to {high:.4g}") for answer, (low, high) in spans.items())
+        notes.append(f"range of {name}: {spread}")
+    facts = {"theory": model.theory, "answer_units": units}
+    facts |= {name: getattr(found, name) for name in ("by", "answers", "ranges", "errors")}
     Report("sensitivity", specimen.title, notes, facts, columns).write(output)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +11,17 @@ import click
 import numpy as np
 
 from mbma_tables.cli import options
-from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns, to_json
+from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_json
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import unit_of
-from mbma_tables.materials import hardness_in
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.surface import Surface
 
 if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
-    from mbma_tables.scenes.steps import OtherTheory
 
 MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
@@ -35,26 +32,8 @@ MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotrop
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
-def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms: bool) -> Any:
-    """The numbers of an option in the specimen's units."""
-    if not over_h_rms:
-        return finite_array(name, specimen.units.number(name, given))
-    named = [text for text in given if isinstance(text, str)]
-    if named:
-        raise InputError(f"--over-h-rms is about multiples of h_rms, which have no unit, got {', '.join(named)}")
-    return finite_array(name, given) * specimen.surface.h_rms
-
-
-def contact_keywords(model: options.Model, specimen: Specimen) -> dict[str, Any]:
-    """Keywords for `contact`."""
-    asked = {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
-    cap = asked.pop("hardness")
-    return asked if cap is None else asked | {"hardness": hardness_in(specimen.units, cap)}
-
-
 @click.command("contact", short_help="Pressure and area at given gaps, pressures or areas.")
 @options.load_options(options.numbers_option)
-@options.over_h_rms
 @options.leakage_option
 @options.numbers_option(
     "--conductivity", help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'."
@@ -64,7 +43,6 @@ def contact_keywords(model: options.Model, specimen: Specimen) -> dict[str, Any]
 @options.output_options
 def contact_command(
     loads: dict[str, list[float | str]],
-    over_h_rms: bool,
     leakage: bool,
     conductivity: list[float | str] | None,
     specimen: Specimen,
@@ -82,13 +60,10 @@ def contact_command(
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
     ((name, numbers),) = loads.items()
-    if over_h_rms and name in ("pressure", "area"):
-        raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
     from mbma_tables.answers.contact import contact
 
-    asked = _numbers(name, numbers, specimen, over_h_rms)
-    keywords = contact_keywords(model, specimen) | {"E_star": specimen.modulus}
-    answer = contact(specimen.surface, **{name: asked}, **keywords)
+    known: dict[str, Any] = {name: finite_array(name, specimen.units.number(name, numbers))}
+    answer = contact(specimen.surface, **known, **model.keywords(specimen))
     yields = ("yielded", "unloading_stiffness") if model.yields else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
     values |= {"scatter": answer.scatter, "area_scatter": answer.area_scatter}
@@ -107,14 +82,6 @@ def _leakage(answer: Contact) -> dict[str, Any]:
     """Columns of the flow coefficient of the gaps."""
     found = answer.leakage
     return {"leakage": found.K, "leakage_scatter": found.scatter, "leakage_valid": found.valid}
-
-
-def curve_gaps(h_max: float, points: int) -> Any:
-    """Separations from h_max to -h_max: the first, then half geometric in h_max - d, then half even."""
-    light = (points - 1) // 2
-    deep = points - 1 - light
-    graded, even = np.geomspace(MIN_DEPTH, EVEN_FROM, light + 1)[:-1], np.linspace(EVEN_FROM, 2.0, deep)
-    return h_max * (1 - np.concatenate([[0.0], graded, even]))
 
 
 @click.command("curve", short_help="Pressure and area from first contact to full compression.")
@@ -145,19 +112,23 @@ def curve_command(
     """
     options.check_plot(plot, output.out)
     from mbma_tables.answers.contact import contact
+    from mbma_tables.common import plots
     from mbma_tables.scenes.problem import COMPARED
     from mbma_tables.scenes.steps import other_theory
 
-    model = model.of(specimen.surface)
-    surface, asked = specimen.surface, contact_keywords(model, specimen)
-    gap = curve_gaps(float(surface.h_max), points)
+    model, surface = model.of(specimen.surface), specimen.surface
+    asked, modulus = model.keywords(specimen), 1.0 if specimen.E_star is None else specimen.E_star
+    # half geometric in h_max - d, half even
+    light, deep = (points - 1) // 2, points // 2
+    graded, even = np.geomspace(MIN_DEPTH, EVEN_FROM, light + 1)[:-1], np.linspace(EVEN_FROM, 2.0, deep)
+    gap = float(surface.h_max) * (1 - np.concatenate([[0.0], graded, even]))
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
-    answer = contact(surface, separation=gap, **asked | {"E_star": specimen.modulus})
+    answer = contact(surface, separation=gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
     others = {
-        name: other_theory(name, surface, gap, asked["E_star"], asked.get("hardness", math.inf))
+        name: other_theory(name, surface, gap, modulus, asked.get("hardness", math.inf))
         for name in COMPARED
         if name != model.theory and (compare or (plot is not None and name in DRAWN))
     }
@@ -165,34 +136,27 @@ def curve_command(
         for quantity in ("pressure", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
-    title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
-    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage, title)
+    picture = b""
+    if plot is not None:
+        title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
+        own = np.asarray(answer.mean_separation / surface.h_rms)
+        curves = [answer.curve(leakage)]
+        for name, line in others.items():
+            known = np.isfinite(line.pressure)
+            curves.append(plots.Curve(plots.theory_label(name), own[known], *(field[known] for field in line)))
+        labels = plots.pressure_label(unit_of("pressure", specimen.units))
+        flow = plots.leakage_label(unit_of("leakage", specimen.units))
+        picture = plots.to_picture(plots.draw_compression(curves, title, labels, leakage_label=flow), plot.suffix[1:])
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
-
-
-def _draw(
-    specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
-) -> bytes:
-    from mbma_tables.common import plots
-
-    gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
-    curves = [answer.curve(leakage)]
-    for name, line in others.items():
-        known = np.isfinite(line.pressure)
-        curves.append(plots.Curve(plots.theory_label(name), gap[known], *(field[known] for field in line)))
-    pressure = plots.pressure_label(unit_of("pressure", specimen.units))
-    flow = plots.leakage_label(unit_of("leakage", specimen.units))
-    return plots.to_picture(plots.draw_compression(curves, title, pressure, leakage_label=flow), kind)
 
 
 @click.command("island", short_help="Contact islands at given approaches.")
 @options.numbers_option("--delta", help="Approach z_max - d of an island [length], positive; may be repeated.")
-@options.over_h_rms
 @options.specimen_options
 @options.model_options
 @options.output_options
 def island_command(
-    delta: list[float | str] | None, over_h_rms: bool, specimen: Specimen, model: options.Model, output: options.Output
+    delta: list[float | str] | None, specimen: Specimen, model: options.Model, output: options.Output
 ) -> None:
     """Band, radii, densities, force and area of contact islands at given approaches.
 
@@ -204,9 +168,8 @@ def island_command(
         raise InputError("approaches are needed: --delta")
     from mbma_tables.totals.island import island
 
-    asked = contact_keywords(model, specimen)
-    del asked["theory"]
-    answer = island(specimen.surface, _numbers("delta", delta, specimen, over_h_rms), **asked)
+    asked = {name: value for name, value in model.keywords(specimen).items() if name != "theory"}
+    answer = island(specimen.surface, finite_array("delta", specimen.units.number("delta", delta)), **asked)
     values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")}
     units = {name: unit_of(f"island_{name}", specimen.units) for name in ("force", "area")}
     report_answer("island", specimen, model, answer, values, units).write(output)
@@ -220,7 +183,7 @@ def surfaces_command(output: options.Output) -> None:
     values: dict[str, Any] = {"name": list(CASES), "length_unit": [case.length_unit for case in cases]}
     values |= {name: [getattr(surface, name) for surface in surfaces] for name in SURFACE_NUMBERS}
     values["title"] = [case.title for case in cases]
-    Report("surfaces", "the paper's cases", [], {}, to_columns(values, {})).write(output)
+    Report("surfaces", "the paper's cases", [], {}, values).write(output)
 
 
 @click.command("fit", short_help="Evaluate a measured map or line scan, and its contact.")
@@ -267,14 +230,14 @@ def fit_command(
     columns, told = table_of_loads(surface, scale, "simulated" if simulate else "calibrated")
     if simulate and output.out is not None and output.out.suffix == ".nc":
         BoundaryElements.of(surface).to_netcdf(output.out)
-        told, output = [*told, f"{output.out} has the simulation"], dataclasses.replace(output, out=None)
+        told, output = [*told, f"{output.out} has the simulation"], output._replace(out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
     facts: dict[str, Any] = {"length_unit": surface.unit, "stress_unit": stress_unit}
     facts |= {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
     facts |= {"provenance": surface.provenance, "notes": told}
     title = ", ".join(path.name for path in measurements)
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
-    report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
+    report = Report("fit", title, [*described(surface), *told], facts, columns, own)
     picture = b""
     if plot is not None:
         label = pressure_label(unit_of("pressure", units))
@@ -317,5 +280,5 @@ def _show(title: str, rows: Sequence[Any], unit: float, as_json: bool) -> None:
     if as_json:
         echo(to_json({"unit_seconds": unit, "rows": records}))
         return
-    columns = to_columns({name: [record[name] for record in records] for name in records[0]}, {})
+    columns = {name: [record[name] for record in records] for name in records[0]}
     echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)

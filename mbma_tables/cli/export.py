@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,7 @@ from mbma_tables.scenes.specimen import Specimen
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
-DEFAULTS = {"variant": "reported", "exponential": False, "leakage": False, "check": False}
+DEFAULTS = {"variant": "reported", "leakage": False, "check": False}
 
 
 class _Target(click.ParamType[str]):
@@ -61,7 +60,6 @@ class _Export(click.Command):
 @options.optional_specimen_options
 @click.option("--rows", type=int, help="Number of rows of a table; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
-@options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option(
@@ -86,7 +84,6 @@ class _Export(click.Command):
     type=click.Choice(["here", "all", "none"]),
     help="In an FMU: for this platform, for all by zig, or none.",
 )
-@click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @options.theory_option
 @options.hardness_option
 @options.variant_option
@@ -95,19 +92,20 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law), subroutines of solvers
-    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of FMI 2 (fmu) or 3 (fmu3); c, fortran and
-    javascript are the whole model as code, of the paper's variants reported and printed.
+    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of FMI 2 (fmu); c, fortran and javascript are
+    the whole model as code, of the paper's variants reported and printed.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
     given = {name: value for name, value in values.items() if value is not None and value != DEFAULTS.get(name)}
-    special = f"{target} --exponential" if "exponential" in given else target
-    kind = targets().get(special) or targets()[target]
-    _refuse_unused(kind, given)
-    given.pop("exponential", None)
+    kind, code = targets()[target], target in group("CODE")
+    words = {"specimen": "the surface", "kappa": "--nu"}
+    taken = kind.takes if code else kind.takes | {"specimen"}
+    if unused := [words.get(name, f"--{name.replace('_', '-')}") for name in given if name not in taken]:
+        raise InputError(f"without effect on {target}: leave {' and '.join(unused)} out")
     if "direction" in given and "leakage" not in given:
         raise InputError("--direction is of leakage: add --leakage or leave it out")
-    if target in group("CODE"):
+    if code:
         _export_code(target, out, values["variant"], "check" in given)
         return
     specimen: Specimen | None = given.pop("specimen", None)
@@ -117,77 +115,45 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
     if kind.units is not None:
         specimen = specimen.in_units(*kind.units)
+    if kind.end and out.suffix != kind.end:
+        raise InputError(f"--out of {target} must be NAME{kind.end}, got {out.name!r}")
     joint: dict[str, Any] = {name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")}
     ctx = click.get_current_context()
     joint["made_by"] = made_by(ctx.meta["words"], out, [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
-    _write(_law_files(kind, out, joint, given))
-
-
-def _write(files: Mapping[Path, bytes]) -> None:
-    for path, content in files.items():
-        write_file(path, content)
+    if kind.rows:
+        name = {"name": out.stem} if kind.end else {"name": given.pop("name")} if "name" in given else {}
+        files = kind.files(_rows(kind, joint | given), **name)
+    else:
+        files = kind.files(**joint, **given)
+    # files that the first one needs are written before it
+    for end in sorted(files, reverse=True) if str(out) != "-" else [""]:
+        path = out.with_name(f"{out.stem}{end}") if end else out
+        write_file(path, files[end])
         if str(path) != "-":
             echo(path)
 
 
-def _refuse_unused(target: Target, given: Mapping[str, Any]) -> None:
-    """Reject options that have no effect."""
-    taken = target.takes if target.name in group("CODE") else target.takes | {"specimen"}
-    unused = [
-        {"specimen": "the surface", "kappa": "--nu"}.get(name, f"--{name.replace('_', '-')}")
-        for name in given
-        if name not in taken
-    ]
-    if unused:
-        raise InputError(f"without effect on {target.name}: leave {' and '.join(unused)} out")
-
-
-def _law_files(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
-    """Contents of the files of one surface's law."""
-    if target.end and out.suffix != target.end:
-        raise InputError(f"--out of {target.name} must be NAME{target.end}, got {out.name!r}")
-    if str(out) == "-" and not target.alone:
-        raise InputError(f"{target.name} is two files: --out must be that of the first")
-    files = target.files(*_rows(target, out, joint, given), **given) if target.rows else target.files(**joint, **given)
-    if str(out) == "-":
-        return {out: files[""]}
-    # files that the first one needs are written before it
-    return {out.with_name(f"{out.stem}{end}") if end else out: files[end] for end in sorted(files, reverse=True)}
-
-
-def _rows(target: Target, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> tuple[Any, ...]:
-    """Rows of a law, and the names in their file; removed from `given`."""
+def _rows(target: Target, asked: dict[str, Any]) -> LawTable:
+    """Rows of a law; requested pressures at which it is not valid are reported."""
     from mbma_tables.export.law_rows import describe_law
 
-    name = (out.stem,) if target.end else (given.pop("name"),) if "name" in given else ()
-    asked = {option: given.pop(option) for option in (*given,)}
-    if "pressures" in asked:
-        asked["pressures"] = _pressures(asked["pressures"])
     heat = "conductance" if asked.keys() & {"conductivity", "conductivity_unit"} else target.quantity
     asked.setdefault("quantity", "leakage" if asked.pop("leakage", False) else heat)
     if target.quantity == "conductance":  # its numbers do not depend on the conductivity
         asked = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} | asked
-    law = describe_law(**joint, **asked)
-    if "pressures" in asked:
-        _warn(law)
-    return law, *name
-
-
-def _warn(law: LawTable) -> None:
-    """Report requested pressures at which the law is not valid."""
+    if "pressures" not in asked:
+        return describe_law(**asked)
+    asked["pressures"] = tuple(str(asked["pressures"]).split(":"))
+    if len(asked["pressures"]) != 2:
+        raise InputError(f"--pressures must be like 0.1:100 or 0.1MPa:100MPa, got {':'.join(asked['pressures'])!r}")
+    law = describe_law(**asked)
     rows = law.behaviour or law
     for line in rows.comments:
         # a limit below the smallest requested pressure does not matter
         below = line.startswith("not valid below") and rows.y_name == "pressure"
         if line.startswith("not valid") and not (below and float(line.split("p = ")[1].split()[0]) <= rows.floor):
             echo(line, err=True)
-
-
-def _pressures(text: str) -> tuple[float | str, ...]:
-    ends = text.split(":")
-    if len(ends) != 2:
-        raise InputError(f"--pressures must be like 0.1:100 or 0.1MPa:100MPa, got {text!r}")
-    return tuple(ends)
+    return law
 
 
 def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
@@ -197,16 +163,13 @@ def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
         echo(path)
     if check:
         found = code.check(target, folder)
-        if not found.ran:
-            raise InputError(f"not checked: {found.reason}")
         for kind, largest in found.largest.items():
             echo(f"{kind}: {found.points[kind]} points, largest relative difference {largest:.1e}")
-        if found.reason:
-            raise InputError(f"the check failed: {found.reason}")
+        if found.failed:
+            raise InputError(f"the check failed: {found.failed} answers are beyond their tolerance or were refused")
 
 
 @click.command("explore", short_help="A page to explore a surface in a browser.")
-@click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
 @options.specimen_options
 @click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")
@@ -223,7 +186,8 @@ def explore_command(
     """
     from mbma_tables.export.explorer import explorer_page
 
-    page = explorer_page(
-        specimen.surface, specimen.E_star, specimen.stress_unit, theory, variant, specimen.title, hardness
-    )
-    _write({out: page.encode()})
+    stress, title = specimen.stress_unit, specimen.title
+    page = explorer_page(specimen.surface, specimen.E_star, stress, theory, variant, title, hardness)
+    write_file(out, page.encode())
+    if str(out) != "-":
+        echo(out)

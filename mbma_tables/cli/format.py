@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import functools
 import io
 import json
 from collections.abc import Mapping
@@ -19,6 +20,7 @@ from mbma_tables.cli.options import Model, Output
 from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units, unit_of
+from mbma_tables.export.text import csv_cell
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.roughness import ASSUMED
 from mbma_tables.surfaces.surface import Surface
@@ -33,63 +35,53 @@ NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "theory", "variant", "islan
 
 
 @dataclasses.dataclass(frozen=True)
-class Column:
-    """A named column with its unit: texts, or numbers with None where there is none."""
-
-    name: str
-    unit: str
-    values: list[Any]
-
-
-@dataclasses.dataclass(frozen=True)
 class Report:
-    """Columns of one length, and their provenance.
-
-    `notes` are lines of text; `facts` contain the same and more in machine-readable form.
-    """
+    """Columns of one length by name, their units, and their provenance: lines of text, and the same in JSON."""
 
     command: str
     title: str
     notes: list[str]
     facts: dict[str, Any]
-    columns: list[Column]
+    values: Mapping[str, Any]
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @functools.cached_property
+    def columns(self) -> dict[str, list[Any]]:
+        """Entries of the columns, None in place of NaN."""
+        entries = {name: np.atleast_1d(array).ravel().tolist() for name, array in self.values.items()}
+        return {name: [None if entry != entry else entry for entry in column] for name, column in entries.items()}
+
+    @property
+    def all_units(self) -> dict[str, str]:
+        """The unit of each column, "-" where it has none."""
+        return {name: self.units.get(name, "-") for name in self.columns}
 
     def to_table(self) -> str:
         """Aligned columns under their names, and their units where they have any."""
-        with_units = any(c.unit != "-" for c in self.columns)
-        cells = [[c.name, *([c.unit] if with_units else []), *map(_rounded, c.values)] for c in self.columns]
-        widths = [max(map(len, column)) for column in cells]
-        texts = [any(isinstance(value, str) for value in c.values) for c in self.columns]
-        lines = [
-            "  ".join(
-                cell.ljust(width) if text else cell.rjust(width)
-                for cell, width, text in zip(row, widths, texts, strict=True)
-            ).rstrip()
-            for row in zip(*cells, strict=True)
-        ]
-        return "\n".join([f"mbma {self.command}: {self.title}", *self.notes, "", *lines]) + "\n"
+        units = self.all_units if set(self.all_units.values()) - {"-"} else {}
+        lines = []
+        for name, values in self.columns.items():
+            cells = [name, *([units[name]] if units else []), *map(_rounded, values)]
+            width, text = max(map(len, cells)), any(isinstance(value, str) for value in values)
+            lines.append([cell.ljust(width) if text else cell.rjust(width) for cell in cells])
+        table = ["  ".join(row).rstrip() for row in zip(*lines, strict=True)]
+        return "\n".join([f"mbma {self.command}: {self.title}", *self.notes, "", *table]) + "\n"
 
     def to_json(self) -> str:
         """One JSON object, its numbers with all their digits."""
-        content = {
-            "program": f"mbma {__version__}",
-            "command": self.command,
-            "title": self.title,
-            **self.facts,
-            "units": {c.name: c.unit for c in self.columns},
-            "columns": {c.name: c.values for c in self.columns},
-        }
-        return to_json(content) + "\n"
+        head = {"program": f"mbma {__version__}", "command": self.command, "title": self.title}
+        return to_json({**head, **self.facts, "units": self.all_units, "columns": self.columns}) + "\n"
 
     def to_csv(self) -> str:
         """Comment lines, the columns' names, then their numbers with all their digits."""
-        units = "; ".join(f"{c.name} [{c.unit}]" for c in self.columns)
-        head = [f"mbma {__version__} {self.command}: {self.title}", *self.notes, f"columns: {units}"]
+        units = "; ".join(f"{name} [{unit}]" for name, unit in self.all_units.items())
         content = io.StringIO()
-        content.writelines(f"# {line}\n" for line in head)
+        for line in (f"mbma {__version__} {self.command}: {self.title}", *self.notes, f"columns: {units}"):
+            content.write(f"# {line}\n")
         rows = csv.writer(content, lineterminator="\n")
-        rows.writerow(c.name for c in self.columns)
-        rows.writerows(map(_harmless, row) for row in zip(*(c.values for c in self.columns), strict=True))
+        rows.writerow(self.columns)
+        for row in zip(*self.columns.values(), strict=True):
+            rows.writerow(csv_cell(cell) if isinstance(cell, str) else cell for cell in row)
         return content.getvalue()
 
     def write(self, output: Output, plot: Path | None = None, picture: bytes = b"") -> None:
@@ -108,11 +100,6 @@ def to_json(content: Any) -> str:
     return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=2)
 
 
-def _harmless(cell: Any) -> Any:
-    """A cell of CSV; text that a spreadsheet would run as a formula begins with an apostrophe."""
-    return f"'{cell}" if isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell
-
-
 def _rounded(value: Any) -> str:
     if value is None:
         return "-"
@@ -123,15 +110,6 @@ def shown_unit(name: str, units: Units) -> str:
     """The unit of a column; "-" where it has none."""
     unit = "relative" if name == "error" else unit_of(name, units)
     return "-" if unit == "1" else unit
-
-
-def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Column]:
-    """One column for each array, scalars being arrays of one entry; NaN stands for missing numbers."""
-    columns = []
-    for name, array in values.items():
-        entries = np.atleast_1d(array).ravel().tolist()
-        columns.append(Column(name, units.get(name, "-"), [None if entry != entry else entry for entry in entries]))
-    return columns
 
 
 def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
@@ -161,11 +139,10 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
 
 def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     """Range in which a contact's theory was tested, and its scatter: lines of text, and machine-readable facts."""
-    valid = np.atleast_1d(answer.valid)
-    reasons = {reason: np.atleast_1d(mask) for reason, mask in answer.reasons.items()}
-    notes = []
+    valid, notes = np.atleast_1d(answer.valid), []
+    reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in answer.reasons.items()}
     if reasons:
-        listed = "; ".join(f"{reason} ({int(mask.sum())})" for reason, mask in reasons.items())
+        listed = "; ".join(f"{reason} ({len(places)})" for reason, places in reasons.items())
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
     texts = {
         "scatter": "ln force {} at a separation",
@@ -178,12 +155,7 @@ def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     said = [texts[name].format(f"{v.min():.2g} to {v.max():.2g}") for name, v in known.items() if v.size]
     if said:
         notes.append(f"scatter against simulations: {', '.join(said)}")
-    facts: dict[str, Any] = {
-        "valid": valid.tolist(),
-        "reasons": {reason: np.flatnonzero(mask).tolist() for reason, mask in reasons.items()},
-    }
-    facts |= {name: v.tolist() for name, v in scatter.items()}  # NaN is null in JSON
-    return notes, facts
+    return notes, {"valid": valid.tolist(), "reasons": reasons, **{name: v.tolist() for name, v in scatter.items()}}
 
 
 def report_answer(
@@ -196,23 +168,19 @@ def report_answer(
 ) -> Report:
     """The report of a command that evaluated the model; `units` are those that do not follow from names."""
     surface, notes = _surface_facts(specimen)
+    stress = specimen.stress_unit or ""
     scale = "forces are over E*, since no modulus was given"
     if specimen.E_star is not None:
-        scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
+        scale = f"E* is {specimen.E_star:.6g} {stress}".rstrip()
     made = (
         f", variant {answer.variant}, island model {answer.island_model}, rtol {model.rtol:g}" if answer.variant else ""
     )
     notes += [f"theory {model.theory}{made}; {scale}", "error: relative, numerical, beside the theory's scatter"]
-    if hasattr(answer, "elastic_hardness"):
-        limit = f"{answer.elastic_hardness:.4g} {specimen.stress_unit or ''}".rstrip()
-        if not model.yields:
-            notes.append(f"elastic: area within 5% for hardnesses from {limit} on")
-        else:
-            notes.append(f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to 1.1 (from {limit} on)")
+    context = click.get_current_context()
     facts = {
         "arguments": {
             key: str(value) if isinstance(value, Path) else value
-            for key, value in click.get_current_context().params.items()
+            for key, value in context.params.items()
             if key not in NOT_ARGUMENTS and value is not None and value is not False
         },
         "theory": model.theory,
@@ -225,8 +193,11 @@ def report_answer(
         "surface": surface,
     }
     if command != "island":
-        lines, known = _validity(answer)
-        notes += lines
-        facts |= known
-    own = {name: shown_unit(name, specimen.units) for name in values}
-    return Report(command, specimen.title, notes, facts, to_columns(values, {**own, **units}))
+        limit = f"{answer.elastic_hardness:.4g} {stress}".rstrip()
+        notes.append(f"elastic: area within 5% for hardnesses from {limit} on")
+        if model.yields:
+            notes[-1] = f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to 1.1 (from {limit} on)"
+        told, validity = _validity(answer)
+        notes, facts = notes + told, facts | validity
+    shown = {name: shown_unit(name, specimen.units) for name in values}
+    return Report(command, specimen.title, notes, facts, values, shown | dict(units))

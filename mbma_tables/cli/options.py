@@ -7,12 +7,13 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
+from mbma_tables.materials import hardness_in
 from mbma_tables.models import ISLAND_MODELS
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
@@ -50,18 +51,25 @@ class Model:
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
         return dataclasses.replace(self, theory=theory_name(surface, self.theory, **own))
 
+    def keywords(self, specimen: Specimen) -> dict[str, Any]:
+        """Keywords for `contact`."""
+        asked = vars(self) | {"E_star": specimen.modulus}
+        cap = asked.pop("hardness")
+        return asked if cap is None else asked | {"hardness": hardness_in(specimen.units, cap)}
 
-@dataclasses.dataclass(frozen=True)
-class Output:
+
+class Output(NamedTuple):
     """Destination and format of a report."""
 
     as_json: bool
     as_csv: bool
     out: Path | None
 
-    def __post_init__(self) -> None:
-        if self.as_json and self.as_csv:
-            raise InputError("one of --json and --csv, not both")
+
+def _output(given: Mapping[str, Any]) -> Output:
+    if given["as_json"] and given["as_csv"]:
+        raise InputError("one of --json and --csv, not both")
+    return Output(**given)
 
 
 def _parse_number(ctx: click.Context, param: click.Parameter, given: str | None) -> float | str | None:
@@ -135,10 +143,9 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
         specimen = specimens.read_specimen(given["file"])
     elif given["map"] is not None:
         specimen = specimens.from_map(given["map"], treatment | {"unit": length})
-    elif given["surface"] is not None:
-        specimen = specimens.from_name(given["surface"])
     else:
-        specimen = specimens.from_numbers(numbers, length)
+        named = given["surface"]
+        specimen = specimens.from_numbers(numbers, length) if named is None else specimens.from_name(named)
     material = {key: given[key] for key in specimens.MATERIAL if given[key] is not None}
     if material:
         modulus, unit = specimens.effective_modulus_of(material, stress)
@@ -176,7 +183,6 @@ length_unit = functools.partial(
     click.option, "--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."
 )
 stress_unit_option = _option("stress_unit", "Unit of plain moduli and of the answer, such as MPa.", metavar="UNIT")
-over_h_rms = _option("over_h_rms", "The lengths given are multiples of h_rms.", is_flag=True)
 
 _SPECIMEN_OPTIONS = (
     _option(
@@ -273,7 +279,7 @@ theory_options = _group("model", lambda given: Model(**_given(given)), theory_op
 
 output_options = _group(
     "output",
-    lambda given: Output(**given),
+    _output,
     json_option("a table"),
     click.option("--csv", "as_csv", is_flag=True, help="Print CSV with '#' comments instead of a table."),
     _option("out", "Write to a file instead.", type=PATH, metavar="FILE"),
@@ -284,7 +290,7 @@ plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PA
 
 # headings of help, and the options below them; others are below "Options"
 _SECTIONS = {
-    "What is known": "separation mean_separation pressure area over_h_rms",
+    "What is known": "separation mean_separation pressure area",
     "Surface": "surface file map",
     "Measured map": f"{' '.join(specimens.MAP_OPTIONS)} model",
     "Surface in numbers": "hurst q0 q1 zeta_1 h_rms h_max nominal_area m0 m2 m4",

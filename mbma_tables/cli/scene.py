@@ -1,4 +1,4 @@
-"""`mbma plan` and `mbma run`: scenes from TOML files."""
+"""`mbma plan`, `mbma run` and `mbma joint`: scenes and joints from TOML files."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
-from mbma_tables.cli.format import Report, to_columns, to_json
-from mbma_tables.cli.options import check_plot, json_option, plot_option
+from mbma_tables.cli.format import Report, to_json
+from mbma_tables.cli.options import Output, check_plot, json_option, numbers_option, output_options, plot_option
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.common.progress import doing, echo
@@ -19,39 +20,32 @@ if TYPE_CHECKING:
     import xarray
 
 SUFFIXES = (".nc", ".csv")
-scene_file = click.argument("file", type=click.Path(path_type=Path))
+toml_file = click.argument("file", type=click.Path(path_type=Path))
 
 
 @click.command("plan", short_help="Plan of a scene: steps, errors and computing times.")
-@scene_file
+@toml_file
 @json_option("text")
 def plan_command(file: Path, as_json: bool) -> None:
     """Plan of the scene in FILE: steps with the effects that need them, certified errors and measured costs.
 
     Example: mbma plan examples/scene_joint.toml
     """
-    from mbma_tables.scenes.scene import Scene, advice
+    from mbma_tables.scenes.scene import Scene
 
     scene = Scene.from_toml(file)
     if not as_json:
         echo(scene.explain(), nl=False)
         return
     plan = scene.plan()
-    content = {
-        "rtol": plan.rtol,
-        "error": plan.error,
-        "seconds": plan.seconds,
-        "first_use_seconds": plan.first_use,
-        "steps": [vars(step) | {"island_model": step.island_model_name} for step in plan.steps],
-        "left_out": plan.left_out,
-        "switched_off": plan.switched_off,
-        "advice": advice(scene).strip(),
-    }
-    echo(to_json(content))
+    content = {name: getattr(plan, name) for name in ("rtol", "error", "seconds", "left_out", "switched_off")}
+    content |= {"first_use_seconds": plan.first_use}
+    steps = [vars(step) | {"island_model": step.island_model_name} for step in plan.steps]
+    echo(to_json(content | {"steps": steps}))
 
 
 @click.command("run", short_help="Compute a scene.")
-@scene_file
+@toml_file
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -78,36 +72,30 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
     found = scene.run(lambda step, done, total: doing(f"{step}: {done} of {total}"))
     if plot is not None:
         write_file(plot, _picture(found, plot.suffix[1:]))
+    # the quantities at gaps, or at islands if there are none at gaps
+    dims = [field.dims for field in found.variables.values()]
+    lines = next((lines for lines in (("gap",), ("island", "node")) if lines in dims), ())
+    fields = {str(name): field for name, field in found.variables.items() if field.dims == lines}
+    facts = found.attrs
+    made = f"variant {facts['variant']}" if facts["variant"] else f"theory {facts['theory']}"
+    error = f"error at most {facts['error']:.2g}" if math.isfinite(facts["error"]) else "error not known"
+    notes, units = [f"{made}, rtol {facts['rtol']:.3g}, {error}"], {n: f.attrs["units"] for n, f in fields.items()}
+    values = {name: field.values for name, field in fields.items()}
+    report = Report("run", str(facts["title"]), notes, dict(facts), values, units)
     if out is not None:
+        netcdf = out.suffix == ".nc"
         write_file(
-            out,
-            written_bytes("scene.nc", lambda path: found.to_netcdf(path, engine="netcdf4"))
-            if out.suffix == ".nc"
-            else _report(found).to_csv().encode(),
-        )
+            out, written_bytes("scene.nc", lambda path: found.to_netcdf(path, engine="netcdf4"))
+            if netcdf else report.to_csv().encode(),
+        )  # fmt: skip
     if as_json:
         variables = {
             str(name): {"dims": list(field.dims), "units": field.attrs["units"], "values": field.values.tolist()}
             for name, field in found.variables.items()
         }
-        echo(to_json({"attributes": found.attrs, "variables": variables}))
+        echo(to_json({"attributes": facts, "variables": variables}))
     elif out is None:
-        echo(_report(found).to_table(), nl=False)
-
-
-def _report(found: xarray.Dataset) -> Report:
-    """The quantities at gaps, or at islands if there are none at gaps."""
-    lines = next((d for d in (("gap",), ("island", "node")) if any(v.dims == d for v in found.variables.values())), ())
-    fields = {str(name): field for name, field in found.variables.items() if field.dims == lines}
-    columns = to_columns(
-        {name: field.values for name, field in fields.items()},
-        {name: field.attrs["units"] for name, field in fields.items()},
-    )
-    facts = found.attrs
-    made = f"variant {facts['variant']}" if facts["variant"] else f"theory {facts['theory']}"
-    error = f"error at most {facts['error']:.2g}" if math.isfinite(facts["error"]) else "error not known"
-    notes = [f"{made}, rtol {facts['rtol']:.3g}, {error}"]
-    return Report("run", str(facts["title"]), notes, dict(facts), columns)
+        echo(report.to_table(), nl=False)
 
 
 def _picture(found: xarray.Dataset, kind: str) -> bytes:
@@ -122,3 +110,31 @@ def _picture(found: xarray.Dataset, kind: str) -> bytes:
     hardness = f", hardness {found.attrs['hardness']:.4g} {unit}" if "hardness" in found.attrs else ""
     drawn = draw_compression(curves, found.attrs["title"] + hardness, pressure_label(unit))
     return to_picture(drawn, kind)
+
+
+@click.command("joint", short_help="Stiffness, area, gap and conductance of two metal parts.")
+@toml_file
+@numbers_option("--pressure", "-p", help="Force over nominal area; plain numbers are in GPa.")
+@plot_option
+@output_options
+def joint_command(file: Path, pressure: list[float | str] | None, plot: Path | None, output: Output) -> None:
+    """Interface laws of the joint in FILE (TOML: materials, nominal_area, part_a, part_b) at pressures.
+
+    Example: mbma joint examples/joint.toml --pressure 1MPa,10MPa,50MPa
+    """
+    if not pressure:
+        raise InputError("pressures are needed: --pressure")
+    check_plot(plot, output.out)
+    from mbma_tables.common.plots import to_picture
+    from mbma_tables.joint import Joint
+
+    joint = Joint.from_toml(file)
+    found = joint.at_pressure(pressure)
+    held, facts = joint.quantities(found), joint.facts()
+    values = {name: kept.values for name, kept in held.items()} | {"valid": np.where(found.valid, "yes", "no")}
+    notes = [f"{name}: {text}" for name, text in facts.items()]
+    for reason, mask in found.reasons.items():
+        notes.append(f"not valid at {int(np.sum(mask))} of {np.size(mask)}: {reason}")
+    units = {name: kept.unit for name, kept in held.items() if kept.unit != "1"}
+    picture = b"" if plot is None else to_picture(joint.plot(), plot.suffix[1:])
+    Report("joint", file.name, notes, facts, values, units).write(output, plot, picture)

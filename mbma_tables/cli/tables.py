@@ -1,4 +1,4 @@
-"""The command group `mbma tables`: list tables, show their contents, verify their files."""
+"""`mbma tables`: list tables, show their contents, verify their files; and `mbma cache`, stored simulations."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import Any
 import click
 
 from mbma_tables.cli.options import json_option
+from mbma_tables.common import cache
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.progress import echo
-from mbma_tables.tablefiles.own import ADVICE, holds_own
+from mbma_tables.tablefiles.own import ADVICE, holds_own, read_own
 from mbma_tables.tablefiles.own import KIND as OWN
 from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL, TableContent
 
@@ -57,22 +58,11 @@ def list_command(as_json: bool) -> None:
         row |= {name: content.attributes[name] for name in ("variant", "data_version")}
         rows.append(row | {"largest_error": errors})
         largest = ", ".join(f"{f} {error:.2g}" for f, error in errors.items())
-        lines.append(
+        text = (
             "{kind}: {size}; variant {variant}; largest held-out error {largest}; {bytes} bytes; data {data_version}; "
-            "{path}".format(**row, largest=largest)
         )
+        lines.append(f"{text.format(**row, largest=largest)}{path}")
     _show({"tables": rows}, lines, as_json)
-
-
-def _show_own(path: str, as_json: bool) -> None:
-    """Variables and attributes of a table of a user's own surface."""
-    from mbma_tables.tablefiles.own import read_own
-
-    values, attributes = read_own(path)
-    ends = {name: [float(array.min()), float(array.max())] for name, array in values.items()}
-    lines = [f"variable {name}: {values[name].size} numbers, {low:g} to {high:g}" for name, (low, high) in ends.items()]
-    lines += [f"{name}: {value}" for name, value in attributes.items()]
-    _show({"variables": ends, "attributes": attributes}, lines, as_json)
 
 
 def _verified(table: str) -> tuple[dict[str, Any], str]:
@@ -102,17 +92,21 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
 @json_option("lines")
 def info_command(table: str, as_json: bool) -> None:
     """Axes or variables, and attributes, of TABLE (a kind or a file)."""
+    entries: dict[str, Any]
     if holds_own(table):
-        _show_own(table, as_json)
-        return
-    content = _read(table)
-    axes = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
-    # the universal table has cells, not nodes
-    nodes = "" if content.kind == UNIVERSAL else ", {nodes} nodes, {position_formula}"
-    text = "axis {name}: {long_name}, {first:g} to {last:g}" + nodes
-    lines = [text.format(name=name, **attributes) for name, attributes in axes.items()]
-    lines += [f"{name}: {value}" for name, value in content.attributes.items()]
-    _show({"axes": axes, "attributes": content.attributes}, lines, as_json)
+        values, attributes = read_own(table)
+        kind, entries = "variables", {name: [float(v.min()), float(v.max())] for name, v in values.items()}
+        lines = [f"variable {name}: {values[name].size} numbers, {a:g} to {b:g}" for name, (a, b) in entries.items()]
+    else:
+        content = _read(table)
+        kind, attributes = "axes", content.attributes
+        entries = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
+        # the universal table has cells, not nodes
+        text = "axis {name}: {long_name}, {first:g} to {last:g}"
+        text += "" if content.kind == UNIVERSAL else ", {nodes} nodes, {position_formula}"
+        lines = [text.format(name=name, **axis) for name, axis in entries.items()]
+    lines += [f"{name}: {value}" for name, value in attributes.items()]
+    _show({kind: entries, "attributes": attributes}, lines, as_json)
 
 
 @tables_group.command("verify")
@@ -126,3 +120,22 @@ def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     """
     verdicts, lines = zip(*map(_verified, tables or KINDS), strict=True)
     _show({"tables": verdicts}, lines, as_json)
+
+
+@click.command("cache", short_help="Simulations that are kept.")
+@click.option("--clear", is_flag=True, help="Remove them all.")
+@json_option("a line")
+def cache_command(clear: bool, as_json: bool) -> None:
+    """Folder in which loads and flows of simulated maps are stored, number of files, and their size.
+
+    The environment variable MBMA_TABLES_CACHE names another folder; "off" disables the cache. When it
+    exceeds 1 GiB, the files used longest ago are removed.
+
+    Example: mbma cache --clear
+    """
+    place, removed = cache.folder(), cache.trim(0) if clear else 0
+    kept = cache.files()
+    size = sum(stat.st_size for _, stat in kept)
+    facts = {"folder": None if place is None else str(place), "files": len(kept), "bytes": size, "removed": removed}
+    line = f"{place}: {len(kept)} files, {size} bytes" + (f"; {removed} removed" if clear else "")
+    _show(facts, [f"nothing is kept: {cache.VARIABLE} is off" if place is None else line], as_json)

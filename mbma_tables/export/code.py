@@ -6,13 +6,11 @@ The interfaces in these languages are generated from the C headers, whose commen
 from __future__ import annotations
 
 import base64
-import dataclasses
 import functools
 import importlib.util
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -137,15 +135,14 @@ def web_assembly(c_texts: dict[str, str], names: Iterable[str], *options: str) -
     """C sources compiled to WebAssembly, with the functions and variables that it exports."""
     if importlib.util.find_spec("ziglang") is None:
         raise InputError(
-            "javascript is compiled from C by the package ziglang, which is not installed: "
-            "pip install 'mbma_tables[javascript]'"
+            "javascript is compiled from C by the package ziglang, which is not installed: pip install ziglang"
         )
     exports = [f"-Wl,--export={name}" for name in names]
     return built_by([sys.executable, *ZIG, *options, *exports], c_texts, "mbma.wasm")
 
 
 class BuildError(InputError):
-    """A compiler that failed."""
+    """A compiler or program that is not installed, or failed."""
 
 
 def built_by(command: list[str], texts: Mapping[str, str], made: str, *last: str) -> bytes:
@@ -153,29 +150,26 @@ def built_by(command: list[str], texts: Mapping[str, str], made: str, *last: str
     with tempfile.TemporaryDirectory() as work:
         for name, text in texts.items():
             write_file(pathlib.Path(work, name), text.encode())
-        sources = [name for name in texts if name.endswith(".c")]
-        done = _run([*command, *sources, "-o", made, *last], work)
-        if done.returncode:
-            raise BuildError(
-                f"{' '.join(command[:3])} did not compile {' '.join(sources)}: {done.stderr.strip()[:500]}"
-            )
+        _run([*command, *(name for name in texts if name.endswith(".c")), "-o", made, *last], work, "did not compile")
         return pathlib.Path(work, made).read_bytes()
 
 
-@dataclasses.dataclass(frozen=True)
-class Replay:
-    """Result of a replay in the target."""
+class Replay(NamedTuple):
+    """Result of a replay in the target: by kind rows and largest relative difference; results that failed."""
 
-    program: str
-    points: dict[str, int]  # rows replayed, by kind
-    largest: dict[str, float]  # relative difference, by kind
-    failed: int  # results beyond their tolerance, and rows that were rejected
-    reason: str  # why it did not run or failed; empty if all is right
-    ran: bool = True  # False if the program is not installed
+    points: dict[str, int]
+    largest: dict[str, float]
+    failed: int  # beyond their tolerance, or rejected
 
 
 def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
-    """Build what `write_code` wrote where its compiler is installed, and replay the points beside it, or others."""
+    """Build what `write_code` wrote, and replay the points beside it, or others.
+
+    Raises
+    ------
+    BuildError
+        Where the compiler or the interpreter is not installed, and where it fails.
+    """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     place = pathlib.Path(folder).absolute()
@@ -183,42 +177,34 @@ def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] 
     if not csv.is_file():
         raise InputError(f"{csv} does not exist; write_code({target!r}, {str(place)!r}) makes it")
     language = LANGUAGES[target]
-    program = (language.build or language.run)[0]
-    if shutil.which(program) is None:
-        return Replay(program, {}, {}, 0, f"{program} is not installed", ran=False)
     with tempfile.TemporaryDirectory() as work:
         build, run = ([word.format(place, work) for word in command] for command in (language.build, language.run))
         if build:
-            done = _run(build, work)
-            if done.returncode:
-                return Replay(program, {}, {}, 0, f"{program} did not compile it: {done.stderr.strip()[:500]}")
-        return read_report(program, _run([*run, str(csv)], work))
+            _run(build, work, "did not compile")
+        return read_report(_run([*run, str(csv)], work))
 
 
-def _run(command: list[str], folder: str) -> subprocess.CompletedProcess[str]:
+def _run(command: list[str], folder: str, failure: str = "") -> str:
+    """What a program prints; with `failure` it must end without an error."""
     try:
-        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    except FileNotFoundError:
+        raise BuildError(f"{command[0]} is not installed") from None
     except subprocess.TimeoutExpired:
-        return subprocess.CompletedProcess(command, 1, "", f"no end within {TIMEOUT:g} s")
+        raise BuildError(f"{command[0]}: no end within {TIMEOUT:g} s") from None
+    if failure and done.returncode:
+        raise BuildError(f"{' '.join(command[:3])} {failure}: {done.stderr.strip()[:500]}")
+    return done.stdout
 
 
-def read_report(program: str, done: subprocess.CompletedProcess[str]) -> Replay:
+def read_report(text: str) -> Replay:
     """The output of a self-test: kind, rows, largest difference; then the number of failures."""
-    points: dict[str, int] = {}
-    largest: dict[str, float] = {}
-    failed = -1
-    for line in done.stdout.splitlines():
-        words = line.split()
-        if len(words) == 3 and words[0] in KINDS:
-            points[words[0]], largest[words[0]] = int(words[1]), float(words[2])
-        elif len(words) == 2 and words[0] == "failed":
-            failed = int(words[1])
-    reason = ""
-    if failed < 0:
-        reason = f"the self-test did not end: {done.stderr.strip()[:500]}"
-    elif failed or done.returncode:
-        reason = f"{failed} answers are beyond their tolerance or were refused"
-    return Replay(program, points, largest, max(failed, 0), reason)
+    rows = [line.split() for line in text.splitlines()]
+    failed = [int(words[1]) for words in rows if len(words) == 2 and words[0] == "failed"]
+    if not failed:
+        raise BuildError(f"the self-test did not end: {text[-500:]}")
+    kinds = [words for words in rows if len(words) == 3 and words[0] in KINDS]
+    return Replay({kind: int(n) for kind, n, _ in kinds}, {kind: float(most) for kind, _, most in kinds}, failed[0])
 
 
 DEFAULTS = {"E_star": "1", "rtol": "1e-8"}  # of arguments in JavaScript

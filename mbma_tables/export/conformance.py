@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.answers.contact import contact
-from mbma_tables.answers.result import Contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
@@ -37,7 +36,6 @@ KINDS = {
     "status": "X, mu; the status",
     "formula": "X, mu; phi_F, phi_A by the closed form, its error",
     "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, error",
-    "calibrated_by": f"the same; {CONTACT.replace('separation', 'mean separation')}",
     "separation": "hurst, q0, q1, h_rms, h_max, force, E_star; mean separation by the calibrated law",
 }
 TOLERANCE, SLOPE_TOLERANCE = 1e-11, 1e-8
@@ -86,37 +84,25 @@ def total_rows(surface: tuple[float, ...], separations: Any, variant: Variant, r
     """Totals of one surface and their derivatives by the compiled runtime."""
     gaps = np.asarray(separations)
     found = contact(Surface(*surface), separation=gaps, variant=variant, rtol=rtol, derivatives=True)
-    slopes = _slopes_of(found)
+    slopes = np.array([[by[name] for name in BY] for by in (found.pressure_by, found.area_by) if by])
     # at a maximum of force, stiffness is 0
-    stiffness = -2 * slopes[0, 0]
+    stiffness, given = -2 * slopes[0, 0], (*surface, gaps, 1.0, rtol)
     least = np.maximum(np.abs(stiffness), np.where(found.pressure == 0, 1.0, found.pressure) / surface[4])
-    values = (found.pressure, found.area, stiffness, 0.0), (found.pressure, found.area, least, ANY)
-    yield from _contact_rows("total", (*surface, gaps, 1.0, rtol), *values, slopes)
+    values, units = (found.pressure, found.area, stiffness, 0.0), (found.pressure, found.area, least, ANY)
+    yield from rows("total", given, values, units)
+    # relative to themselves or the value over the parameter; by the gap over h_rms
+    over = np.divide.outer(np.array(values[:2]), [surface[3], *surface]).swapaxes(1, 2)
+    scales = np.maximum(np.abs(slopes), over).reshape(12, -1)
+    yield from rows("total_by", given, (*values, *slopes.reshape(12, -1)), (*units, *scales), SLOPE_TOLERANCE)
 
 
 def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0) -> Rows:
-    """The calibrated law of one surface at shares of h_max by the library, and its derivatives at given u."""
+    """The calibrated law of one surface at shares of h_max by the library."""
     u = surface[4] * np.asarray(shares)
-    found = contact(Surface(*surface), mean_separation=u, theory="calibrated", E_star=E_star, derivatives=True)
-    slopes = _slopes_of(found)
-    slopes[:, 5] -= slopes[:, 0]  # h_max at given u = (h_max + d)/2
-    slopes[:, 0] *= 2
+    found = contact(Surface(*surface), mean_separation=u, theory="calibrated", E_star=E_star)
     values = found.pressure, found.area, found.stiffness
-    yield from _contact_rows("calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY), slopes)
+    yield from rows("calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY))
     yield from rows("separation", (*surface, found.pressure, E_star), (u,))
-
-
-def _slopes_of(found: Contact) -> FloatArray:
-    """Derivatives of force and area by `BY`."""
-    return np.array([[slopes[name] for name in BY] for slopes in (found.pressure_by, found.area_by) if slopes])
-
-
-def _contact_rows(kind: str, given: tuple[Any, ...], values: Any, units: Any, slopes: FloatArray) -> Rows:
-    """A contact, and its derivatives, relative to themselves or the value over the parameter; by the gap over h_rms."""
-    scales = np.maximum(np.abs(slopes), np.divide.outer(np.array(values[:2]), [given[3], *given[:5]]).swapaxes(1, 2))
-    yield from rows(kind, given, values, units)
-    numbers = (*values, *slopes.reshape(12, -1)), (*units, *scales.reshape(12, -1))
-    yield from rows(f"{kind}_by", given, *numbers, SLOPE_TOLERANCE)
 
 
 def status_rows(model: UniversalModel) -> Rows:

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import finite_array, needed, number_in
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.arguments import needed
 from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import Target
@@ -64,31 +63,6 @@ def _content(law: LawTable) -> dict[str, Any]:
     return content if law.behaviour is None else content | {"behaviour": _content(law.behaviour)}
 
 
-def from_json(content: str | bytes) -> LawTable:
-    """The law in a file of `to_json`; other files are rejected."""
-    try:
-        return _law_of(json.loads(content))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
-        raise InputError(f"this is no law as `mbma export json` writes it: {type(fault).__name__}: {fault}") from None
-
-
-def _law_of(held: dict[str, Any]) -> LawTable:
-    columns = {str(name): finite_array(str(name), values) for name, values in held["columns"].items()}
-    x_name, y_name, x_unit, y_unit = (str(held[name]) for name in ("x", "y", "x_unit", "y_unit"))
-    x, y = columns.pop(x_name), columns.pop(y_name)
-    if x.ndim != 1 or any(x.shape != other.shape for other in (y, *columns.values())) or not (np.diff(x) > 0).all():
-        raise ValueError("two columns of one length are needed, the first of them rising")
-    more = {name: (values, str(held["units"][name])) for name, values in columns.items()}
-    facts = {
-        str(name): (number_in(name, value, 0, 1e300), str(unit))
-        for name, (value, unit) in held.get("facts", {}).items()
-    }
-    comments, behaviour = tuple(map(str, held["comments"])), _law_of(held["behaviour"]) if "behaviour" in held else None
-    error, floor = (number_in(name, held[name], 0, 1e300) for name in ("largest_error", "floor"))
-    theory = str(held["theory"])
-    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, theory, floor, behaviour, more, facts)
-
-
 def to_matlab(law: LawTable) -> bytes:
     """A MATLAB file of version 5: x, y, and the header as text."""
     from scipy.io import savemat
@@ -126,7 +100,7 @@ def to_netcdf(law: LawTable) -> bytes:
 
 def to_hdf5(law: LawTable) -> bytes:
     """A plain HDF5 file: two datasets with units, the header as attributes."""
-    h5py = needed("h5py", "hdf5")
+    h5py = needed("h5py")
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, (values, unit) in law.columns.items():
@@ -140,7 +114,7 @@ def to_hdf5(law: LawTable) -> bytes:
 
 def to_parquet(law: LawTable) -> bytes:
     """A Parquet file: two columns, the header as metadata of the schema."""
-    pyarrow, parquet = (needed(module, "parquet") for module in ("pyarrow", "pyarrow.parquet"))
+    pyarrow, parquet = (needed(module) for module in ("pyarrow", "pyarrow.parquet"))
     table = pyarrow.table({name: values for name, (values, _) in law.columns.items()})
     table = table.replace_schema_metadata({name: json.dumps(value) for name, value in _header(law).items()})
     stream = io.BytesIO()

@@ -13,11 +13,11 @@ import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.answers.contact import chosen_theory, contact
-from mbma_tables.answers.result import Contact
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import Units, factor, in_unit, resolve
+from mbma_tables.common.units import factor, in_unit, modulus_and_units
+from mbma_tables.law import block as at
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.leakage import LeakageLaw
@@ -40,7 +40,7 @@ OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a
 
 @dataclasses.dataclass(frozen=True)
 class ExportedLaw:
-    """One surface's law, whose units are known."""
+    """One surface's law, whose units are known; with `force` of a rough body, in place of pressure."""
 
     surface: AnySurface  # in the units of the law
     law: ContactLaw
@@ -48,28 +48,67 @@ class ExportedLaw:
     modulus: float  # E*
     hardness: float  # infinite where the contact is elastic
     length: str  # unit of length,
-    stress: str  # and of stress
+    stress: str  # and of stress, or of force
     made_by: tuple[str, ...] = ()  # header lines with the command that writes the file again
     direction: str | float | None = None  # of a simulated map's leakage
+    force: ForceLaw | None = None
 
     @property
-    def units(self) -> Units:
-        """Both units."""
-        return Units(self.length, self.stress)
+    def ends(self) -> bool:
+        """Whether contact ends at c = 0, and pressure is zero below."""
+        return self.law.highest == np.inf
+
+    @property
+    def c_least(self) -> float:
+        """Begin of the range of overclosures."""
+        return -np.inf if self.ends else (self.law.h_max - float(self.law.block[at.HIGHEST])) / 2
+
+    @property
+    def c_most(self) -> float:
+        """End of the range of overclosures."""
+        return (self.law.h_max - float(self.law.block[at.LOWEST])) / 2
+
+    @property
+    def c_turn(self) -> float:
+        """Overclosure at the maximum of pressure, or at full compression."""
+        law = self.law
+        return (law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 2
+
+    @property
+    def facts(self) -> dict[str, tuple[float, str]]:
+        """Numbers of a joint required by some programs, with their units."""
+        own = {"h_rms": (float(self.surface.h_rms), self.length)}
+        return own | {"rms_gradient": (float(self.surface.rms_gradient), "1"), "E_star": (self.modulus, self.stress)}
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:
         """The law's leakage, in its direction."""
         return self.law.leakage if self.direction is None else self.law.leakage.along(self.direction)
 
-    def answer(self, u: FloatArray) -> Contact:
-        """The theory itself at mean separations."""
+    def answer(self, u: FloatArray) -> Any:
+        """The theory itself at mean separations; of a body the contacts at approaches that are left to the largest."""
+        if self.force is not None:
+            return pressed(self.force.body, self.law.h_max + self.force.first - u)
         return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
         """Lines of a file's header: contents, range, error, validity up to `end`, and with `leakage` those of flow."""
         law, stress = self.law, self.stress
-        model = f"MBMA model, variant {law.variant!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
+        title = f"MBMA model, variant {law.variant!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
+        title = f"Contact law of a rough surface, {title}"
+        meaning = (
+            "pressure is force over nominal area;",
+            "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
+            "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
+        )
+        if self.force is not None:
+            body, stress = self.force.body, self.force.body.units["pressure"]
+            title = f"Force law of a rough {body.name} on a flat, theory {law.theory!r}"
+            meaning = (
+                f"here pressure is the force [{self.stress}], and A/A0 the real area [{body.units['area']}]",
+                f"overclosure c = approach - ({self.force.first:.10g}), zero at first contact; approach is zero where",
+                "the mean planes of the faces touch",
+            )
         gradient = self.modulus * float(self.surface.rms_gradient)
         plastic = f"elastic: within 5% in area for hardnesses from {gradient / ELASTIC_PSI:.4g} {stress} on"
         if self.hardness < np.inf:
@@ -77,50 +116,61 @@ class ExportedLaw:
                 f"hardness = {self.hardness:.10g} {stress}, plasticity index {gradient / self.hardness:.3g}: "
                 "loading only, not for unloading, which is stiffer"
             )
+        names = self.surface.parameters or OWN_NUMBERS
+        numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
         return (
-            f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
+            f"{title}; mbma_tables {__version__}",
             what,
-            *self._of_surface(),
+            f"surface: {numbers}; lengths in {self.length}",
+            *filter(None, [self.surface.resolution, self.theory.origin]),
             f"E* = {self.modulus:.10g} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
-            "pressure is force over nominal area;",
-            "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
-            "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
+            *meaning,
             f"range: {range_}",
             *more,
             f"the law is within {law.error:.1e} of its theory, in pressure and area",
             plastic,
             *self._validity(end, leakage),
+            *self._hashes(),
             *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
         )
 
-    def _of_surface(self) -> Iterator[str]:
-        names = self.surface.parameters or OWN_NUMBERS
-        numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
-        yield f"surface: {numbers}; lengths in {self.length}"
-        yield from filter(None, [self.surface.resolution, self.theory.origin])
-
-    def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
-        """Lines on the valid range of the law, its scatter against simulations, and the origin of its numbers."""
-        law, stress_unit = self.law, self.stress
+    def _validity(self, end: float, leakage: bool) -> Iterator[str]:
+        """Lines on the valid range of the law, and its scatter against simulations."""
+        law, unit = self.law, self.stress
         # small overclosures by their logarithm, larger ones evenly
         small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
         u = law.h_max - end * np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
-        found = self.answer(u)
-        pressure = np.asarray(law.pressure(u))
-        reasons = (found.leakage if leakage else found).reasons
-        lines = [line for reason, bad in reasons.items() for line in self._not_valid(reason, u, bad, leakage)]
+        found, pressure = self.answer(u), np.asarray(law.pressure(u))
+        for reason, bad in (found.leakage if leakage else found).reasons.items():
+            for first, last in np.flatnonzero(np.diff(bad, prepend=False, append=False)).reshape(-1, 2):
+                low = first and self._last_valid(reason, u[first - 1], u[first], leakage, ROUND_FLOOR)
+                high = last < u.size and self._last_valid(reason, u[last], u[last - 1], leakage, ROUND_CEILING)
+                where = (
+                    f"from p = {low} to {high}" if low and high else f"above p = {low}" if low else f"below p = {high}"
+                )
+                yield f"not valid {f'{where} {unit}' if low or high else 'at any pressure of the range'}: {reason}"
         if law.softening is not None:
-            lines.append(
+            yield (
                 f"softening: stiffness falls with compression from c = {law.h_max - law.softening:.4g}, "
-                f"p = {float(law.pressure(law.softening)):.4g} {stress_unit} on, which no simulation shows"
+                f"p = {float(law.pressure(law.softening)):.4g} {unit} on, which no simulation shows"
             )
-        if law.highest < np.inf:
-            lines.append(f"no last contact: pressure is {float(law.pressure(law.h_max)):.4g} {stress_unit} at c = 0")
+        if not self.ends:
+            yield f"no last contact: pressure is {float(law.pressure(law.h_max)):.4g} {unit} at c = 0"
         spread = self._spread("one standard deviation of ln p at a given c", found.scatter, pressure)
-        lines.append(f"scatter of simulations about the theory, {spread}")
+        yield f"scatter of simulations about the theory, {spread}"
         if leakage:
-            lines += self._of_leakage(found.leakage.scatter, pressure)
-        return (*lines, *self._hashes())
+            yield from self._of_leakage(found.leakage.scatter, pressure)
+
+    def _last_valid(self, reason: str, good: float, bad: float, leakage: bool, rounding: str) -> str:
+        """Pressure, rounded outward, at the last separation where a reason does not apply, by bisection between two."""
+        for _ in range(ROUNDS):
+            u = np.linspace(good, bad, PARTS + 1)
+            found = self.answer(u[1:-1])
+            mask = (found.leakage if leakage else found).reasons.get(reason, np.zeros(PARTS - 1, bool))
+            k = 1 + int(np.argmax(np.append(mask, True)))
+            good, bad = u[k - 1], u[k]
+        four_digits = Context(prec=4, rounding=rounding)
+        return f"{float(four_digits.create_decimal(float(self.law.pressure(good)))):.4g}"
 
     def _hashes(self) -> Iterator[str]:
         """Lines on the table that the theory uses, and on a surface not given by five numbers."""
@@ -133,32 +183,6 @@ class ExportedLaw:
         if isinstance(self.surface, MeasuredSurface):
             values = hashlib.sha256(np.stack([self.surface.q, self.surface.C]).tobytes())
             yield f"spectrum: values {values.hexdigest()[:16]}"
-
-    def _not_valid(self, reason: str, u: FloatArray, bad: Any, leakage: bool) -> list[str]:
-        """Ranges of pressure in which a reason applies, by the outermost valid pressures, rounded outward."""
-        lines = []
-        steps = np.flatnonzero(np.diff(bad)) + 1
-        for first, last in zip(np.append(0, steps), np.append(steps, bad.size), strict=True):
-            if not bad[first]:
-                continue
-            begin = None if first == 0 else self._last_valid(reason, u[first - 1], u[first], leakage)
-            end = None if last == bad.size else self._last_valid(reason, u[last], u[last - 1], leakage)
-            low = "" if begin is None else outward(begin, ROUND_FLOOR)
-            high = "" if end is None else outward(end, ROUND_CEILING)
-            where = f"from p = {low} to {high}" if low and high else f"above p = {low}" if low else f"below p = {high}"
-            where = f"{where} {self.stress}" if low or high else "at any pressure of the range"
-            lines.append(f"not valid {where}: {reason}")
-        return lines
-
-    def _last_valid(self, reason: str, good: float, bad: float, leakage: bool) -> float:
-        """Pressure at the last mean separation where a reason does not apply, by bisection between two separations."""
-        for _ in range(ROUNDS):
-            u = np.linspace(good, bad, PARTS + 1)
-            found = self.answer(u[1:-1])
-            mask = (found.leakage if leakage else found).reasons.get(reason, np.zeros(PARTS - 1, bool))
-            k = 1 + int(np.argmax(np.append(mask, True)))
-            good, bad = u[k - 1], u[k]
-        return float(self.law.pressure(good))
 
     def _spread(self, what: str, scatter: Numbers, pressure: FloatArray) -> str:
         """A scatter at five pressures where it is known."""
@@ -187,48 +211,6 @@ class ExportedLaw:
         )
 
 
-@dataclasses.dataclass(frozen=True)
-class ExportedForce(ExportedLaw):
-    """The force of a rough sphere or cylinder in place of a pressure, its unit in place of that of stress."""
-
-    _: dataclasses.KW_ONLY
-    force: ForceLaw
-
-    def answer(self, u: FloatArray) -> Any:
-        """The contacts themselves at approaches that are left to the largest one."""
-        return pressed(self.force.body, self.law.h_max + self.force.first - u)
-
-    def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """See `ExportedLaw`; a body has no leakage."""
-        body, law = self.force.body, self.law
-        return (
-            f"Force law of a rough {body.name} on a flat, theory {law.theory!r}; mbma_tables {__version__}",
-            what,
-            f"here pressure is the force [{self.stress}], and A/A0 the real area [{body.units['area']}]",
-            *self._of_surface(),
-            f"E* = {self.modulus:.10g} {body.units['pressure']}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
-            f"overclosure c = approach - ({self.force.first:.10g}), zero at first contact; approach is zero where the",
-            "mean planes of the faces touch",
-            f"range: {range_}",
-            *more,
-            f"the law is within {law.error:.1e} of its theory, in force and area",
-            *([f"hardness = {self.hardness:.10g} {body.units['pressure']}: loading"] if self.hardness < np.inf else []),
-            *self._validity(end, leakage),
-            *(self.made_by or (f"written from Python by mbma_tables {__version__}",)),
-        )
-
-
-def outward(value: float, rounding: str) -> str:
-    """Four digits of a number, rounded in the given direction.
-
-    Examples
-    --------
-    >>> outward(13.2231, ROUND_CEILING), outward(13.2231, ROUND_FLOOR)
-    ('13.23', '13.22')
-    """
-    return f"{float(Context(prec=4, rounding=rounding).create_decimal(value)):.4g}"
-
-
 def exported_law(
     surface: AnySurface | ForceLaw,
     E_star: float | str = 1.0,
@@ -244,27 +226,23 @@ def exported_law(
     if isinstance(surface, ForceLaw):
         if E_star != 1.0 or hardness != np.inf or any((length_unit, stress_unit, theory)) or variant != "reported":
             raise InputError("a force law has its modulus, hardness, units and theory: give no others")
-        return _exported_force(surface, made_by)
+        body, layer = surface.body, surface.body.law
+        length = _known("length_unit", body.surface.unit)
+        _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
+        numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
+        return ExportedLaw(body.surface, surface.law, body.theory, *numbers, force=surface)
     one: AnySurface = in_unit(surface, length_unit)
-    plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
-    length, stress = _known("length_unit", one.unit), _known("stress_unit", stress_unit)
+    modulus, units = modulus_and_units(E_star, one, stress_unit)
+    length = _known("length_unit", units.length)
+    stress = _known("stress_unit", None if units.stress == "1" else units.stress)
     if one.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
-    modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
-    cap = hardness_in(Units(length, stress), hardness)
+    modulus = number_in("E_star", modulus, 1e-300, 1e300)
+    cap = float(hardness_in(units, hardness))
     own = chosen_theory(one, theory, variant=variant)
     law = contact_law(one, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
-    law = dataclasses.replace(law, units=Units(length, stress))
-    return ExportedLaw(one, law, own, modulus, float(cap), length, stress, made_by, direction)
-
-
-def _exported_force(force: ForceLaw, made_by: tuple[str, ...]) -> ExportedForce:
-    """The force law of a body in known units."""
-    body, layer = force.body, force.body.law
-    length = _known("length_unit", body.surface.unit)
-    _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
-    numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
-    return ExportedForce(body.surface, force.law, body.theory, *numbers, force=force)
+    law = dataclasses.replace(law, units=units)
+    return ExportedLaw(one, law, own, modulus, cap, length, stress, made_by, direction)
 
 
 def _known(name: str, unit: str | None) -> str:

@@ -15,16 +15,8 @@ from mbma_tables.export.law_table import LawTable
 from mbma_tables.laws.calibrated import TESTED_AREA
 
 RANGE = (0.2 * (1 + 1e-9), 10.0)  # u/h_rms
-LOOKED_AT = 20  # intervals between whose rows the error is measured
 NEAREST = 1e-9  # smallest overclosure evaluated, over h_max
 NAMES = ("phi_x", "phi_y", "shear_x", "shear_y", "pressure")
-
-
-def facts_of(exported: ExportedLaw, **more: tuple[float, str]) -> dict[str, tuple[float, str]]:
-    """Numbers of a joint required by some programs, with their units."""
-    surface = exported.surface
-    own = {"h_rms": (float(surface.h_rms), exported.length), "rms_gradient": (float(surface.rms_gradient), "1")}
-    return own | {"E_star": (exported.modulus, exported.stress)} | more
 
 
 def film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float, peklenik: float | None) -> LawTable:
@@ -51,28 +43,20 @@ def film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float,
         *_of_film(found, length),
         end=h_max - min(u[0], h_max * (1 - NEAREST)),
     )
-    facts = facts_of(exported, peklenik=(found.peklenik, "1"))
+    facts = exported.facts | {"peklenik": (found.peklenik, "1")}
     y, unit = columns.pop("phi_x")
     names, theory = ("mean_separation", "phi_x"), exported.law.theory
     return LawTable(u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts)
 
 
 def _film_error(at: Callable[[FloatArray], FlowFactors], found: FlowFactors, floor: float) -> float:
-    """Largest relative error of linear interpolation, in the middle of the intervals with the largest curvature."""
-    u = found.mean_separation
-    rows = np.stack([np.maximum(getattr(found, name), floor if name == "pressure" else 0.0) for name in NAMES])
-    bend = np.zeros(u.size)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = (u[1:-1] - u[:-2]) / (u[2:] - u[:-2])
-        bend[1:-1] = np.nan_to_num(np.abs((1 - share) * rows[:, :-2] + share * rows[:, 2:]) / rows[:, 1:-1] - 1).max(0)
-    bend *= found.valid
-    most = np.sort(np.argsort(np.maximum(bend[1:], bend[:-1]))[-LOOKED_AT:])
-    middle = at((u[1:] + u[:-1])[most] / 2)
-    error = 0.0
+    """Largest relative error of linear interpolation, in the middle of the intervals."""
+    u, error = found.mean_separation, 0.0
+    middle = at((u[1:] + u[:-1]) / 2)
     for name in NAMES:
         value, between = getattr(found, name), getattr(middle, name)
         kept = middle.valid & (between > (floor if name == "pressure" else 0))
-        error = max(error, *np.abs((value[1:] + value[:-1])[most][kept] / (2 * between[kept]) - 1), 0.0)
+        error = max(error, *np.abs((value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1), 0.0)
     return float(error)
 
 

@@ -13,74 +13,26 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, hinted, number_in, one_number, whole_number_in
+from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import Units
 from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
 from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
-from mbma_tables.export.film_rows import facts_of, film_rows
+from mbma_tables.export.film_rows import film_rows
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.law.force_law import ForceLaw
-from mbma_tables.law.law import ROUNDING, ContactLaw
+from mbma_tables.law.law import ROUNDING
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 QUANTITIES = ("pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film")
+FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
 LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # mean separations of the last points, over h_max
 FILM_ROWS = 200
-
-
-def _curve(exported: ExportedLaw, quantity: str, max_overclosure: float, scale: float) -> tuple[FloatArray, FloatArray]:
-    """The law on fine points; what follows the unloading stiffness is `scale` times that."""
-    law = exported.law
-    # squares: fine where p is a high power of the overclosure
-    c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
-    # near full compression pressure may diverge with the logarithm of the mean separation
-    u = law.h_max * np.geomspace(max(1 - max_overclosure / law.h_max, NEAREST_END), LAST_SHARE, LAST)
-    c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
-    d = law.h_max - 2 * c
-    pressure, stiffness = np.asarray(law.pressure(separation=d)), np.asarray(law.stiffness(separation=d))
-    pressure[0] = stiffness[0] = 0.0
-    if quantity == "pressure":
-        return c, pressure
-    if quantity in ("leakage", "hydraulic_aperture"):
-        flow = np.asarray(exported.leakage(separation=d))
-        # the first row that is blocked is the last
-        open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
-        return pressure[open_], flow[open_] if quantity == "leakage" else np.cbrt(flow[open_])
-    if exported.hardness < np.inf:
-        stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
-    rises = np.concatenate([[True], np.diff(pressure) > 0])
-    return pressure[rises], scale * stiffness[rises]
-
-
-def _friction(
-    exported: ExportedLaw, friction: float, kappa: Any, pressure: Any, pressures: tuple[Any, Any] | None
-) -> tuple[dict[str, tuple[float, str]], str]:
-    """Facts for friction cards, by the stiffness of a small unloading, and what these mean."""
-    law, units = exported.law, exported.units
-    if kappa is None or (pressure is None and pressures is None):
-        raise InputError("friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures")
-    ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
-    at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
-    ratio = checked_kappa(kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa)
-
-    def stiffness(p: float) -> float:
-        return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
-
-    stick, unit = stiffness(at), f"{exported.stress}/{exported.length}"
-    places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
-    facts = {"friction": (number_in("friction", friction, 1e-12, 1e12), "1")}
-    return facts | {"stick": (stick, unit), "stick_pressure": (at, exported.stress)}, (
-        f"friction coefficient {friction:.10g}; shear stress over displacement before slip, the stiffness of a small "
-        f"unloading over kappa = {ratio:.4g}: {stick:.4g} {unit} at {at:.4g} {exported.stress}, where the friction "
-        f"card holds; {', '.join(f'{stiffness(p):.4g} at {p:.4g}' for p in places)} {exported.stress}"
-    )
 
 
 @hinted
@@ -93,7 +45,6 @@ def describe_law(
     quantity: str = "pressure",
     rows: int | None = None,
     rtol: float | None = None,
-    largest_overclosure: float | str | None = None,
     pressures: tuple[float | str, float | str] | None = None,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
@@ -129,11 +80,9 @@ def describe_law(
     rtol : float, optional
         Largest relative error of the interpolation where the result is above a thousandth of its largest, or
         between `pressures`; of leakage from its largest down to that at 30% contact, or at the largest of `pressures`.
-    largest_overclosure : float or str, optional
-        Where the rows end, in the rows' unit or with its own; else at full compression, or where the force turns down.
     pressures : pair of float or str, optional
         Smallest and largest pressure of the user's problem: rows end at the largest, and the error holds from the
-        smallest on. Not with `largest_overclosure`.
+        smallest on. Else they end at full compression, or where the force turns down.
     conductivity : float, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
     kappa : float or callable, optional
@@ -173,54 +122,92 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-    of_body = isinstance(surface, ForceLaw)
-    if of_body and quantity != "pressure":
-        raise InputError(f"a force law has no {quantity}")
-    if film := quantity == "film":
-        theory = "calibrated" if theory is None else theory
-        if any(given is not None for given in (rtol, largest_overclosure)):
-            raise InputError("rtol and largest_overclosure are not of a film: give rows and pressures")
-    elif peklenik is not None:
-        raise InputError("peklenik belongs to quantity='film': leave it out")
+    of_body, heat, film = isinstance(surface, ForceLaw), quantity == "conductance", quantity == "film"
+    for given, needs, names in (
+        (of_body, quantity == "pressure", "a force law"),
+        (peklenik is not None, film, "peklenik"),
+        (conductivity is not None or conductivity_unit is not None, heat, "conductivity"),
+        (film, rtol is None, "rtol"),
+    ):
+        if given and not needs:
+            raise InputError(f"{names} does not belong to quantity={quantity!r}: leave it out")
+    if film and theory is None:
+        theory = "calibrated"
     exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by, direction)
-    law = exported.law
-    units = law.units
-    least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    scale, names, facts = (
-        1.0,
-        (own := ("overclosure", "force" if of_body else "pressure", exported.length, exported.stress)),
-        facts_of(exported),
-    )
-    if quantity == "conductance":
-        k_s, unit = checked_conductivity(conductivity, conductivity_unit)
-        scale, facts = k_s / exported.modulus, facts | {"conductivity": (k_s, unit)}
-        names = ("pressure", "conductance", exported.stress, f"{unit}/{exported.length}")
-    elif quantity == "tangential_stiffness":
-        names = ("pressure", quantity, exported.stress, f"{exported.stress}/{exported.length}")
-        scale = 1 / checked_kappa(kappa)
-    elif quantity == "leakage":
-        names = ("pressure", "leakage", exported.stress, f"{exported.length}^3")
-    elif quantity == "hydraulic_aperture":
-        names = ("pressure", quantity, exported.stress, exported.length)
-    if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
-        raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
+    least, end = _range(exported, pressures)
     if film:
         count = whole_number_in("rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS)
         return film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
-    heat = quantity == "conductance"
-    behaviour = _table(exported, "pressure", own, least, end, choose, 1.0, facts_of(exported)) if heat else None
+    scale, unit, facts, behaviour = 1.0, exported.stress, exported.facts, None
     said: list[str] = []
+    if heat:
+        behaviour = _table(exported, "pressure", unit, least, end, choose, 1.0, facts)
+        k_s, k_unit = checked_conductivity(conductivity, conductivity_unit)
+        scale, unit = k_s / exported.modulus, f"{k_unit}/{exported.length}"
+        facts = facts | {"conductivity": (k_s, k_unit)}
+    elif quantity == "tangential_stiffness":
+        scale, unit = 1 / checked_kappa(kappa), f"{unit}/{exported.length}"
+    elif quantity != "pressure":
+        unit = exported.length if quantity == "hydraulic_aperture" else f"{exported.length}^3"
     if friction is not None:
-        more, *said = _friction(exported, friction, kappa, friction_pressure, pressures)
-        facts |= more
-    return _table(exported, quantity, names, least, end, choose, scale, facts, behaviour, *said)
+        of_friction, *said = _friction(exported, friction, kappa, friction_pressure, pressures)
+        facts |= of_friction
+    return _table(exported, quantity, unit, least, end, choose, scale, facts, behaviour, *said)
+
+
+def _curve(exported: ExportedLaw, quantity: str, end: float, scale: float) -> tuple[FloatArray, FloatArray]:
+    """The law on fine points; what follows the unloading stiffness is `scale` times that."""
+    law = exported.law
+    # squares: fine where p is a high power of the overclosure
+    c = end * np.linspace(0, 1, FINE) ** (2 if exported.ends else 1)
+    # near full compression pressure may diverge with the logarithm of the mean separation
+    u = law.h_max * np.geomspace(max(1 - end / law.h_max, NEAREST_END), LAST_SHARE, LAST)
+    c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
+    d = law.h_max - 2 * c
+    pressure, stiffness = np.asarray(law.pressure(separation=d)), np.asarray(law.stiffness(separation=d))
+    pressure[0] = stiffness[0] = 0.0
+    if quantity == "pressure":
+        return c, pressure
+    rises = np.append(True, np.diff(pressure) > 0)
+    if quantity in FLOWS:
+        flow = np.asarray(exported.leakage(separation=d))
+        # the first row that is blocked is the last
+        open_ = rises & np.append(True, flow[:-1] > 0)
+        return pressure[open_], flow[open_] ** FLOWS[quantity]
+    if exported.hardness < np.inf:
+        stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
+    return pressure[rises], scale * stiffness[rises]
+
+
+def _friction(
+    exported: ExportedLaw, friction: float, kappa: Any, pressure: Any, pressures: tuple[Any, Any] | None
+) -> tuple[dict[str, tuple[float, str]], str]:
+    """Facts for friction cards, by the stiffness of a small unloading, and what these mean."""
+    law, units = exported.law, exported.law.units
+    if kappa is None or (pressure is None and pressures is None):
+        raise InputError("friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures")
+    ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
+    at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
+    ratio = checked_kappa(kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa)
+
+    def stiffness(p: float) -> float:
+        return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
+
+    stick, unit = stiffness(at), f"{exported.stress}/{exported.length}"
+    places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
+    facts = {"friction": (number_in("friction", friction, 1e-12, 1e12), "1")}
+    return facts | {"stick": (stick, unit), "stick_pressure": (at, exported.stress)}, (
+        f"friction coefficient {friction:.10g}; shear stress over displacement before slip, the stiffness of a small "
+        f"unloading over kappa = {ratio:.4g}: {stick:.4g} {unit} at {at:.4g} {exported.stress}, where the friction "
+        f"card holds; {', '.join(f'{stiffness(p):.4g} at {p:.4g}' for p in places)} {exported.stress}"
+    )
 
 
 def _table(
     exported: ExportedLaw,
     quantity: str,
-    names: tuple[str, str, str, str],
+    y_unit: str,
     least: float | None,
     end: float,
     choose: Callable[..., tuple[FloatArray, FloatArray, float]],
@@ -230,14 +217,15 @@ def _table(
     *said: str,
 ) -> LawTable:
     """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
-    law = exported.law
+    law, length, stress = exported.law, exported.length, exported.stress
     fine_x, fine_y = _curve(exported, quantity, end, scale)
+    x_name, x_unit = ("overclosure", length) if quantity == "pressure" else ("pressure", stress)
+    y_name = quantity if exported.force is None else "force"
     floor = FLOOR * float(fine_y[-1])
-    aperture, flow = quantity == "hydraulic_aperture", quantity in ("leakage", "hydraulic_aperture")
-    if flow:
+    if quantity in FLOWS:
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
-            floor = float(exported.leakage(separation=law.separation(area=LARGEST_AREA))) ** (1 / 3 if aperture else 1)
+            floor = float(exported.leakage(separation=law.separation(area=LARGEST_AREA))) ** FLOWS[quantity]
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
@@ -246,54 +234,37 @@ def _table(
         # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
-    x, y, error = choose(fine_x, fine_y, floor, jump=slope or law.highest < np.inf)
+    x, y, error = choose(fine_x, fine_y, floor, jump=slope or not exported.ends)
+    why = "where the law ends" if law.turning_point is None else "where the force of this surface has its maximum"
+    if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - 2 * end:
+        why = "where contact blocks the gaps"
+    elif end < exported.c_turn * (1 - ROUNDING):
+        why = "the largest asked for"
     comments = exported.header(
-        f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
-        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(exported, end, quantity)}",
+        f"{y_name} [{y_unit}] against {x_name} [{x_unit}]",
+        f"{x_name} from 0 to {x[-1]:.10g} {x_unit}, {why}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
-        f"above {names[1]} {floor:.4g} {names[3]}",
-        *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
+        f"above {y_name} {floor:.4g} {y_unit}",
+        *([] if exported.ends else ["the first row is zero, whatever the theory has up to the second"]),
         *said,
         end=end,
-        leakage=flow,
+        leakage=quantity in FLOWS,
     )
     more = {}
-    if aperture:
+    if quantity == "hydraulic_aperture":
         found = law.at_pressure(x)
-        fine_u = np.asarray(law.at_pressure(fine_x).mean_separation)
-        by_u = np.interp(-np.asarray(found.mean_separation), -fine_u, np.gradient(fine_y, fine_u))
-        more = {
-            "aperture": (np.asarray(found.mean_separation), exported.length), "derivative": (by_u, "1"),
-            "stiffness": (np.asarray(found.stiffness), f"{exported.stress}/{exported.length}"),
-        }  # fmt: skip
-    return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour, more, facts)
+        u, fine_u = np.asarray(found.mean_separation), np.asarray(law.at_pressure(fine_x).mean_separation)
+        by_u = np.interp(-u, -fine_u, np.gradient(fine_y, fine_u))
+        stiffness = np.asarray(found.stiffness), f"{stress}/{length}"
+        more = {"aperture": (u, length), "derivative": (by_u, "1"), "stiffness": stiffness}
+    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, law.theory, floor, behaviour, more, facts)
 
 
-def _why_there(exported: ExportedLaw, end: float, quantity: str) -> str:
-    """The reason for the end of the rows."""
-    law = exported.law
-    if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - 2 * end:
-        return "where contact blocks the gaps"
-    if end < _last(law) * (1 - ROUNDING):
-        return "the largest asked for"
-    if law.turning_point is None:
-        return "where the law ends"
-    return "where the force of this surface has its maximum; the law ends there"
-
-
-def _last(law: ContactLaw) -> float:
-    """Overclosure at full compression, or where the force has its maximum."""
-    return (law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 2
-
-
-def _range(
-    law: ContactLaw, end: float | None, pressures: tuple[float | str, float | str] | None, units: Units
-) -> tuple[float | None, float]:
-    """Smallest pressure for the error, and largest overclosure, from a range of pressures or an overclosure."""
+def _range(exported: ExportedLaw, pressures: tuple[float | str, float | str] | None) -> tuple[float | None, float]:
+    """Smallest pressure for the error, and largest overclosure, from a range of pressures."""
+    law, units = exported.law, exported.law.units
     if pressures is None:
-        return None, _range_end(law, end)
-    if end is not None:
-        raise InputError("largest_overclosure and pressures are both given: give one of them")
+        return None, exported.c_turn
     if not isinstance(pressures, tuple | list | np.ndarray) or len(pressures) != 2:
         raise InputError(f"pressures must be two rising numbers, got {pressures!r}")
     low, high = (number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in pressures)
@@ -304,13 +275,3 @@ def _range(
         least = f"{float(law.pressure(law.h_max)):.4g} {units.stress}"
         raise InputError(f"pressures must reach above {least}, that at c = 0, where rows begin, got {high:g}")
     return low, found
-
-
-def _range_end(law: ContactLaw, asked: float | None) -> float:
-    """The largest overclosure: as requested, or at full compression, or where the force has its maximum."""
-    end = _last(law)
-    found = end if asked is None else one_number("largest_overclosure", asked)
-    if not 0 < found <= end:
-        why = "full compression" if law.turning_point is None else "where the force of this surface has its maximum"
-        raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {found:g}")
-    return found

@@ -10,20 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables import __version__
 from mbma_tables.common.arguments import whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import in_unit, modulus_and_units
 from mbma_tables.export.law_rows import QUANTITIES
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import Grammar, Target
-from mbma_tables.export.text import DIGITS, checked_name, comment, number, opening
-from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.export.targets import Grammar
+from mbma_tables.export.text import DIGITS, checked_name, number, opening
 
 MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
 MAX_ID = 99_999_999  # largest id in a card: eight columns
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
-DEPARTURES = (0.01, 0.1)  # deviations of the exponential law from Persson's theory whose pressures are stated
 PAIR = "*CONTACT PAIR, INTERACTION={name}, TYPE="
 CALCULIX_TABULAR = (
     f"Use this interaction with {PAIR}NODE TO SURFACE",
@@ -55,11 +51,6 @@ def _interaction(name: str, *cards: str) -> str:
 def _card(head: str, law: LawTable) -> str:
     """A card with the columns swapped: pressure, overclosure, or conductance, pressure."""
     return f"{head}\n" + "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True))
-
-
-def _exponential_card(u0: float, p0: float) -> str:
-    """CalculiX's p = p0 exp(c/u0), by the distance over which the pressure falls to a hundredth."""
-    return f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{number(u0 * math.log(100))}, {number(p0)}\n"
 
 
 def _friction(law: LawTable) -> tuple[float, float, float]:
@@ -94,7 +85,9 @@ def _calculix_heat(law: LawTable, name: str) -> str:
     middle, spread = (off.max() + off.min()) / 2, (off.max() - off.min()) / 2
     said = {"low": f"{p[0]:.4g}", "high": f"{p[-1]:.4g}", "by_p": math.expm1(spread), "by_c": f"{spread * u0:.2g}"}
     said |= {"slope": number(p[-1] / c[-1]), "name": name, "stress": rows.y_unit, "length": rows.x_unit}
-    cards = _exponential_card(u0, math.exp(middle)), _stick(law), _card("*GAP CONDUCTANCE", law)
+    # p = p0 exp(c/u0), by the distance over which the pressure falls to a hundredth
+    closure = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{number(u0 * math.log(100))}, "
+    cards = f"{closure}{number(math.exp(middle))}\n", _stick(law), _card("*GAP CONDUCTANCE", law)
     return _notes(CALCULIX_HEAT, **said) + _interaction(name, *cards)
 
 
@@ -106,48 +99,6 @@ def _abaqus(law: LawTable, name: str) -> str:
     if law.behaviour is not None:
         cards.append(_card("*GAP CONDUCTANCE, PRESSURE", law))
     return _interaction(name, *cards)
-
-
-def exponential(
-    surface: AnySurface,
-    E_star: float | str,
-    *,
-    length_unit: str | None = None,
-    stress_unit: str | None = None,
-    name: str = "ROUGH",
-    made_by: tuple[str, ...] = (),
-) -> str:
-    """CalculiX's card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20).
-
-    Its header states the pressures up to which it is within 1% and 10% of Persson's theory. In Abaqus the card of that
-    name defines another curve, which ends at a clearance.
-    """
-    from mbma_tables.theories import Persson
-
-    surface = in_unit(surface, length_unit)
-    modulus, units = modulus_and_units(E_star, surface, stress_unit)
-    for kind in ("length", "stress"):
-        if getattr(units, kind) in (None, "1"):
-            raise InputError(f"{kind}_unit is missing: a law without units is easily misread")
-    h_rms = float(surface.h_rms)
-    near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).pressure
-    u0 = h_rms / math.log(near / far)
-    p0 = near * math.exp((h_rms - float(surface.h_max)) / u0)
-    u = float(surface.h_max) * np.geomspace(1e-3, 1, 2000)[::-1]
-    full = modulus * Persson().answer(surface, u).pressure
-    off = np.abs(p0 * np.exp((float(surface.h_max) - u) / u0) / full - 1)
-    up_to = (f"{share:.0%} up to p = {full[np.argmax(off > share)]:.3g}" for share in DEPARTURES)
-    numbers = ", ".join(f"{key} = {float(getattr(surface, key)):.10g}" for key in surface.parameters)
-    notes = (
-        f"Contact law of a rough surface by Persson's theory for light loads; mbma_tables {__version__}",
-        f"p = p0 exp(c/u0), p0 = {number(p0)} {units.stress}, u0 = {number(u0)} {units.length}; u0 ln 100, p0 follow",
-        f"surface: {numbers}; lengths in {units.length}; E* = {modulus:.10g} {units.stress}",
-        "overclosure c = h_max - u with the mean separation u: bodies touch where the mean planes are h_max apart;",
-        "this law has no last contact: at c = 0 its pressure is p0. It holds for light loads alone:",
-        f"within {', '.join(up_to)} {units.stress} of Persson's theory for all loads at the same overclosure.",
-        *made_by,
-    )
-    return comment(notes, "**") + _interaction(name, _exponential_card(u0, p0))
 
 
 def _lsdyna(law: LawTable, curve: int = 1) -> str:
@@ -222,7 +173,4 @@ modelica = Grammar(
     first="#1\n",
 )
 SOLVERS = calculix, abaqus, lsdyna, optistruct, comsol, moose, modelica
-TARGETS = (
-    *(grammar.target(grammar.program.lower().replace("-", "")) for grammar in SOLVERS),
-    Target("calculix --exponential", exponential, frozenset({"name", "exponential"}), rows=False),
-)
+TARGETS = tuple(grammar.target(grammar.program.lower().replace("-", "")) for grammar in SOLVERS)

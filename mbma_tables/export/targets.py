@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
 LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"})
-ROWS = LAW | {"rows", "rtol", "largest_overclosure", "pressures", "leakage", "quantity", "peklenik", "direction"}
+ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "direction"}
 CODE = LAW | {"name", "leakage", "direction"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
@@ -53,8 +53,6 @@ class Target:
         Options of the command.
     end : str
         Of the first file's name, where it must be that; functions are then called by the rest of it.
-    alone : bool
-        Whether the first file is of use without the others.
     quantity : str
         Of the rows, where none is asked for; "pressure" by default.
     units : pair of str, optional
@@ -66,7 +64,6 @@ class Target:
     takes: frozenset[str] = ROWS
     rows: bool = True
     end: str = ""
-    alone: bool = True
     quantity: str = "pressure"
     units: tuple[str, str] | None = None
 
@@ -100,31 +97,26 @@ class Grammar:
             For a quantity or units that the program does not take, more rows than it holds, and a name that it cannot
             read.
         """
-        if law.quantity not in self.body:
-            taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
-            raise InputError(f"{self.program} takes {taken} here, got {law.y_name} against {law.x_name}")
-        if self.units and (own := tuple(law.facts[fact][1] for fact in ("h_rms", "E_star"))) != self.units:
-            raise InputError(f"{self.program} is written in {' and '.join(self.units)}, got {' and '.join(own)}")
-        if law.x.size > (most := self.most.get(law.y_name, law.x.size)):
-            raise InputError(
-                f"{self.program} holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows"
-            )
-        if "friction" in law.facts and not self.friction:
-            raise InputError(f"{self.program} takes no friction here")
+        own, most = tuple(law.facts[fact][1] for fact in ("h_rms", "E_star")), self.most.get(law.y_name, law.x.size)
+        taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
+        for allowed, takes, got in (
+            (law.quantity in self.body, taken, f"{law.y_name} against {law.x_name}"),
+            (self.units in (None, own), " and ".join(self.units or ()), " and ".join(own)),
+            (law.x.size <= most, f"{most} rows of {law.y_name} at most", f"{law.x.size}"),
+            ("friction" not in law.facts or self.friction, "no friction", "friction"),
+        ):
+            if not allowed:
+                raise InputError(f"{self.program} takes {takes} here, got {got}")
         named = {} if self.named is None else {"name": self.named if name is None else name}
         said = [self.friction] if "friction" in law.facts else []
-        return (
-            self.first
-            + comment([*law.comments, *said, self.beyond], self.mark)
-            + self.body[law.quantity](law, **named, **numbers)
-        )
+        head = comment([*law.comments, *said, self.beyond], self.mark)
+        return self.first + head + self.body[law.quantity](law, **named, **numbers)
 
     def target(self, name: str) -> Target:
         """The target of this name."""
-        takes = ROWS if self.named is None else ROWS | {"name"}
+        takes = ROWS | ({"name"} if self.named else set()) | (FRICTION if self.friction else set())
         for quantity, options in OPTIONS.items():
-            takes -= options if quantity not in self.body else set()
-        takes |= FRICTION if self.friction else set()
+            takes -= options if quantity not in self.body and not (self.friction and "kappa" in options) else set()
         return Target(name, self, takes, quantity=next(iter(self.body)), units=self.units)
 
 
@@ -142,5 +134,5 @@ def targets() -> dict[str, Target]:
 
 
 def names(*groups: str) -> tuple[str, ...]:
-    """Names that a user may give, of some groups or of all; targets with a space in the name belong to an option."""
-    return tuple(name for key in groups or GROUPS for name in group(key) if " " not in name)
+    """Names of the targets of some groups, or of all."""
+    return tuple(name for key in groups or GROUPS for name in group(key))

@@ -41,9 +41,6 @@ def test_fortran_writes_its_c_too(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["own.c", "own.f90", "own.h", "own_c.c"]
     beside, own = ((tmp_path / name).read_text().partition("*/")[2] for name in ("own_c.c", "own.c"))
     assert beside == own
-    result = run("fortran-law", *law, "-")
-    assert result.exit_code == 2
-    assert "fortran-law is two files: --out must be that of the first" in result.stderr
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="cc is not installed")
@@ -53,19 +50,11 @@ def test_code_is_written_and_replayed(tmp_path):
     assert "largest relative difference" in result.output
 
 
-@pytest.mark.parametrize(
-    ("replay", "said"),
-    [
-        (code.Replay("cc", {}, {}, 0, "cc is not installed", ran=False), "not checked: cc is not installed"),
-        (code.Replay("cc", {"phi": 7}, {"phi": 0.5}, 2, "2 answers are wrong"), "check failed: 2 answers are wrong"),
-        (code.Replay("cc", {}, {}, 0, "cc did not compile it"), "check failed: cc did not compile it"),
-    ],
-)
-def test_a_check_that_fails(replay, said, tmp_path, monkeypatch):
-    monkeypatch.setattr(code, "check", lambda target, folder: replay)
+def test_a_check_that_fails(tmp_path, monkeypatch):
+    monkeypatch.setattr(code, "check", lambda target, folder: code.Replay({"phi": 7}, {"phi": 0.5}, 2))
     result = run("c", "--out", tmp_path, "--check")
     assert result.exit_code == 2
-    assert said in result.output.splitlines()[-1]
+    assert "check failed: 2 answers are beyond their tolerance" in result.output.splitlines()[-1]
     assert run("c", "--out", tmp_path).exit_code == 0
 
 
@@ -74,7 +63,7 @@ def test_javascript_without_its_compiler(tmp_path, monkeypatch):
     result = run("javascript", "--out", tmp_path / "code")
     assert result.exit_code == 2
     assert result.output.count("\n") == 1
-    assert "pip install 'mbma_tables[javascript]'" in result.output
+    assert "pip install ziglang" in result.output
     assert list(tmp_path.iterdir()) == []
 
 
@@ -91,12 +80,13 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c_law", "--out", "law", *LAW], "no target is called 'c_law': did you mean 'c-law'?"),
-        (["c", "--out", "code", "--rows", "3", "--exponential"], "leave --rows and --exponential out"),
-        (["calculix", "--out", "law", *LAW, "--exponential"], "leave --rows out"),
-        (["calculix", "--out", "law", *LAW[:-2], "--exponential", "--theory", "persson"], "leave --theory out"),
+        (["c", "--out", "code", "--rows", "3", "--rtol", "0.1"], "leave --rows and --rtol out"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"], "pressure must be at most 2.02721 MPa, at d ="),
-        (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "needs --conductivity, which is missing"),
+        (
+            ["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"],
+            "conductance needs conductivity, which is missing",
+        ),
     ],
 )
 def test_bad_requests(arguments, said, tmp_path, monkeypatch):
@@ -112,12 +102,10 @@ BASE = ["--surface", "concrete", "--E-star", "13.3MPa"]
 ANY = {
     "--rows": ["7"],
     "--rtol": ["0.01"],
-    "--largest-overclosure": ["0.5mm"],
     "--pressures": ["1kPa:0.5MPa"],
     "--conductivity": ["3", "--conductivity-unit", "mW/(mm K)"],
     "--leakage": [],
     "--name": ["OTHER"],
-    "--exponential": [],
     "--binaries": ["none"],
     "--theory": ["calibrated"],
     "--hardness": ["2MPa", "--theory", "calibrated"],
@@ -149,7 +137,7 @@ KINDS.remove(("abaqus", "--leakage"))  # refused by its interaction
     ("target", "option"), [pair for pair in KINDS if pair[1].strip("-").replace("-", "_") in targets()[pair[0]].takes]
 )
 def test_an_option_has_an_effect(target, option, tmp_path, monkeypatch):
-    monkeypatch.setattr(code, "check", lambda target, folder: code.Replay("cc", {"phi": 7}, {"phi": 0.0}, 0, ""))
+    monkeypatch.setattr(code, "check", lambda target, folder: code.Replay({"phi": 7}, {"phi": 0.0}, 0))
     base = [] if target in CODE else BASE
     plain = run(target, "--out", tmp_path / "plain", *base)
     given = run(target, "--out", tmp_path / "given", *base, option, *ANY[option])

@@ -18,10 +18,10 @@ ROAD = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_road.toml")
 
 def test_plan_as_text_and_json():
     text = run("plan", JOINT)
-    assert "-> law by" in text
+    assert "-> contact by" in text
     assert "left out: pressure, energy" in text
     content = json.loads(run("plan", JOINT, "--json"))
-    assert [step["name"] for step in content["steps"]] == ["law"]
+    assert [step["name"] for step in content["steps"]] == ["contact"]
 
 
 def test_run_to_netcdf_and_csv(tmp_path):
@@ -127,7 +127,7 @@ def test_named_surfaces_loads_in_columns_and_other_kinds_of_numbers():
         ("hurst,q0,q1,h_rms,h_max\n0.8,1,9,1,3,4\n", "line 2: more cells than the header has"),
         ("hurst,q0,q1,h_rms,h_max,hurst\n0.8,1,9,1,3,0.7\n", "more than one column hurst"),
         pytest.param("surface\n" + "x" * 200_000, "bad.csv cannot be read: field larger than field limit", id="long"),
-        ("surface,hurst\nconcrete,0.8\n", "line 2: a named surface and numbers"),
+        ("surface,hurst\nconcrete,0.8\n", "line 2: [surface]: name and numbers (hurst) are given"),
         ("surface,pressure\nconcrete,1\n", "one of --separation, --mean-separation, --pressure and --area"),
         ("surface,E_star\nconcrete,1\nasphalt,\n", "some lines have units"),
     ],

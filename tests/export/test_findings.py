@@ -15,7 +15,7 @@ import pytest
 from law_points import needs, points
 
 from mbma_tables import InputError, Surface, contact, contact_law
-from mbma_tables.export import FMUS, solvers
+from mbma_tables.export import solvers
 from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.fmu import fmu
 from mbma_tables.export.law_code import law_files
@@ -135,16 +135,6 @@ def test_calculix_does_not_read_tabular_surface_to_surface(rows, tmp_path):
     assert "no force at up to 41 rows, without a message, and from 50 rows on it aborts" in text
 
 
-def test_the_exponential_card_states_its_limits():
-    text = solvers.exponential(Surface.named("concrete"), "13.3 MPa")
-    for share, p in re.findall(r"(\d+)% up to p = ([\d.e-]+)", text):
-        c0, p0 = map(float, text.splitlines()[-1].split(", "))
-        found = contact(Surface.named("concrete"), pressure=float(p), E_star="13.3 MPa", theory="persson")
-        written = p0 * np.exp((1.1 - found.mean_separation) / (c0 / np.log(100)))
-        assert abs(written / float(p) - 1) == pytest.approx(float(share) / 100, rel=0.05)
-    assert text.count("up to p") == 2
-
-
 JAX = """
 import json
 import jax
@@ -244,10 +234,9 @@ def test_units_of_modelica(tmp_path):
 
 
 @needs("cc")
-@pytest.mark.parametrize("target", FMUS)
-def test_an_fmu_runs_as_it_is(target, tmp_path):
+def test_an_fmu_runs_as_it_is(tmp_path):
     fmpy = pytest.importorskip("fmpy")
-    file = fmu(target, law_points.ROAD, "13.3 MPa", name="road", leakage=True)
+    file = fmu(law_points.ROAD, "13.3 MPa", name="road", leakage=True)
     (tmp_path / "road.fmu").write_bytes(file)
     law = points("mbma").law
     for c in (0.5, 2.0):
@@ -260,7 +249,7 @@ def test_an_fmu_runs_as_it_is(target, tmp_path):
     folders = {name.split("/")[1] for name in zipfile.ZipFile(tmp_path / "road.fmu").namelist() if "binaries/" in name}
     assert f"binaries: {', '.join(sorted(folders))}" in said
     assert len(folders) == 1
-    assert fmu(target, law_points.ROAD, "13.3 MPa", name="road", leakage=True) == file
+    assert fmu(law_points.ROAD, "13.3 MPa", name="road", leakage=True) == file
 
 
 @pytest.mark.parametrize("fails", [False, True])
@@ -269,25 +258,22 @@ def test_an_fmu_without_a_compiler(fails, tmp_path, monkeypatch):
     (tmp_path / "cc").write_text("#!/bin/sh\nexit 1\n")
     (tmp_path / "cc").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path / ("" if fails else "none")))
-    file = fmu("fmu", law_points.ROAD, "13.3 MPa")
+    file = fmu(law_points.ROAD, "13.3 MPa")
     archive = zipfile.ZipFile(io.BytesIO(file))
     assert archive.namelist() == ["modelDescription.xml", "sources/law.c"]
     assert "binaries: none, sources only" in archive.read("modelDescription.xml").decode()
     with pytest.raises(InputError, match="compiled by ziglang: pip install"):
-        fmu("fmu", law_points.ROAD, "13.3 MPa", binaries="all")
+        fmu(law_points.ROAD, "13.3 MPa", binaries="all")
     with pytest.raises(InputError, match="binaries must be one of"):
-        fmu("fmu", law_points.ROAD, "13.3 MPa", binaries="linux")
+        fmu(law_points.ROAD, "13.3 MPa", binaries="linux")
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang")
 def test_an_fmu_for_all_platforms():
-    archive = zipfile.ZipFile(io.BytesIO(fmu("fmu3", law_points.ROAD, "13.3 MPa", binaries="all")))
-    begins = {name.split("/")[1]: archive.read(name)[:4] for name in archive.namelist() if "binaries/" in name}
-    elf, mach, dll = b"\x7fELF", b"\xcf\xfa\xed\xfe", b"MZ"
-    expected = {"x86_64-linux": elf, "aarch64-linux": elf, "x86_64-darwin": mach, "aarch64-darwin": mach}
-    assert {name: begin for name, begin in begins.items() if "windows" not in name} == expected
-    assert begins["x86_64-windows"].startswith(dll)
+    archive = zipfile.ZipFile(io.BytesIO(fmu(law_points.ROAD, "13.3 MPa", binaries="all")))
+    begins = {name.split("/")[1]: archive.read(name)[:2] for name in archive.namelist() if "binaries/" in name}
+    assert begins == {"linux64": b"\x7fE", "darwin64": b"\xcf\xfa", "win64": b"MZ"}
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])

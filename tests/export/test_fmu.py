@@ -8,8 +8,7 @@ import pytest
 from helpers import refusals
 from law_points import ASKED, CONDUCTIVITY, KAPPA, needs, points
 
-from mbma_tables.export import FMUS
-from mbma_tables.export.fmu import STANDARDS, fmu
+from mbma_tables.export.fmu import fmu
 
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 QUANTITIES = ["pressure", "tangent", "area", "energy", "conductance", "tangential_stiffness", "leakage"]
@@ -19,15 +18,15 @@ KINDS = ("ModelExchange", "CoSimulation")
 REFUSED = r"failed with status 3 \(error\)"  # as FMPy says it
 
 
-def made(target, law, **options):
+def made(law, **options):
     surface, asked = ASKED[law]
-    return fmu(target, surface, "13.3 MPa", **({"name": "road", "binaries": "none"} | asked | options))
+    return fmu(surface, "13.3 MPa", **({"name": "road", "binaries": "none"} | asked | options))
 
 
-def built(target, name, folder):
+def built(name, folder):
     validation, build = pytest.importorskip("fmpy.validation"), pytest.importorskip("fmpy.build")
     (folder / "build").mkdir()
-    (folder / "road.fmu").write_bytes(made(target, name, **MORE))
+    (folder / "road.fmu").write_bytes(made(name, **MORE))
     assert validation.validate_fmu(str(folder / "road.fmu")) == []
     with zipfile.ZipFile(folder / "road.fmu") as archive:
         archive.extractall(folder / "road")
@@ -46,10 +45,9 @@ def simulated(path, kind, c, logger=None):
 
 @pytest.mark.slow
 @needs("cmake", "gcc")
-@pytest.mark.parametrize("target", FMUS)
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson", "turning", "hardened"])
-def test_simulation(target, name, tmp_path):
-    path, known = built(target, name, tmp_path), points(name)
+def test_simulation(name, tmp_path):
+    path, known = built(name, tmp_path), points(name)
     for kind in KINDS:
         found = simulated(path, kind, np.append(known.c, known.c[-1]))
         # co-simulation answers after a step, by the input before it
@@ -66,23 +64,20 @@ def test_simulation(target, name, tmp_path):
 
 @pytest.mark.slow
 @needs("cmake", "gcc")
-@pytest.mark.parametrize("target", FMUS)
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
-def test_directional_derivatives(target, name, tmp_path):
+def test_directional_derivatives(name, tmp_path):
     fmpy = pytest.importorskip("fmpy")
-    path, known = built(target, name, tmp_path), points(name)
+    path, known = built(name, tmp_path), points(name)
     said = []
     # FMPy's own logger may call that of a model before, which is gone
     description, logger = fmpy.read_model_description(path), lambda *words: said.append(words[-1])
     model = fmpy.instantiate_fmu(path, description, "CoSimulation", logger=logger)
-    if target == "fmu":
-        model.setupExperiment()
+    model.setupExperiment()
     model.enterInitializationMode()
     model.exitInitializationMode()
-    put = model.setReal if target == "fmu" else model.setFloat64
 
     def slopes(c):
-        put([1], [c])
+        model.setReal([1], [c])
         return list(model.getDirectionalDerivative([2, 3, 4, 5, 6, 7, 8], [1], [2.0]))
 
     far = (known.c > 1e-3) & (known.c < 0.97 * known.law.h_max)
@@ -113,10 +108,9 @@ def test_directional_derivatives(target, name, tmp_path):
     model.freeInstance()
 
 
-@pytest.mark.parametrize("target", FMUS)
-def test_description(target):
+def test_description():
     fmpy = pytest.importorskip("fmpy")
-    read = fmpy.read_model_description(io.BytesIO(made(target, "calibrated", **MORE)), validate=True)
+    read = fmpy.read_model_description(io.BytesIO(made("calibrated", **MORE)), validate=True)
     assert [variable.name for variable in read.modelVariables] == ["time", "overclosure", *QUANTITIES]
     units = {variable.name: variable.unit for variable in read.modelVariables}
     assert units["tangent"] == "MPa/mm"
@@ -126,24 +120,21 @@ def test_description(target):
     assert {unit: float(factor) for unit, factor in size.items()} == pytest.approx(expected)
     for words in ("theory 'calibrated'", "range:", "within", "scatter"):
         assert words in read.description
-    # FMPy does not read the plural, which the schema of FMI 3 has
-    text = zipfile.ZipFile(io.BytesIO(made(target, "calibrated"))).read("modelDescription.xml").decode()
-    assert text.count(f'providesDirectionalDerivative{"s" if target == "fmu3" else ""}="true"') == 2
+    assert read.modelExchange.providesDirectionalDerivative
+    assert read.coSimulation.providesDirectionalDerivative
 
 
 def test_the_same_law_is_the_same_file():
-    assert made("fmu", "calibrated") == made("fmu", "calibrated")
+    assert made("calibrated") == made("calibrated")
     tokens = set()
-    for target, options in (("fmu", {}), ("fmu3", {}), ("fmu", {"theory": "mbma"}), ("fmu", HEAT)):
-        text = zipfile.ZipFile(io.BytesIO(made(target, "calibrated", **options))).read("sources/road.c").decode()
+    for options in ({}, {"theory": "mbma"}, HEAT):
+        text = zipfile.ZipFile(io.BytesIO(made("calibrated", **options))).read("sources/road.c").decode()
         tokens.add(text.split('TOKEN[] = "')[1][:38])
-    assert len(tokens) == 4
-    assert tuple(STANDARDS) == FMUS
+    assert len(tokens) == 3
 
 
 test_requests_that_are_refused = refusals(
-    lambda target, law, options: made(target, law, **options),
-    ("fmu4", "mbma", {}, "target must be one of"),
-    ("fmu", "mbma", {"name": "1 x"}, "a name must be a letter"),
-    ("fmu", "mbma", {"conductivity_unit": "W"}, "conductance needs conductivity"),
+    lambda law, options: made(law, **options),
+    ("mbma", {"name": "1 x"}, "a name must be a letter"),
+    ("mbma", {"conductivity_unit": "W"}, "conductance needs conductivity"),
 )

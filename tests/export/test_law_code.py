@@ -15,10 +15,10 @@ import pytest
 from helpers import refusals
 from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 
-from mbma_tables import InputError, Surface, contact_law
+from mbma_tables import Surface, contact_law
 from mbma_tables.core import core
 from mbma_tables.export import LAWS, SUBROUTINES
-from mbma_tables.export.law_code import code_name, core_text, law_text
+from mbma_tables.export.law_code import core_text, law_text
 from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.text import core_file
 
@@ -471,23 +471,6 @@ def test_c_of_a_polynomial_over_many_decades(tmp_path):
     u = 0.125 * (1 - np.geomspace(1e-12, 1, 500)[:-1])
     found = c_function(ctypes.CDLL(str(tmp_path / "law.so")), "pressure")(0.125 - u)
     np.testing.assert_allclose(found, contact_law(surface, E_star="1 MPa", **asked).pressure(u), rtol=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("target", "names"),
-    [
-        ("fortran-law", ("dp", "H_MAX", "c_double", "elemental", "value")),
-        ("matlab-law", ("numbers", "end", "while", "zeros")),
-        ("modelica-law", ("Real", "piece", "model", "equation")),
-    ],
-)
-def test_a_name_that_stands_for_something_else(target, names):
-    for name in names:
-        with pytest.raises(InputError, match=f"{name}' stands for something else in {target}"):
-            code_name(name, target)
-    for name in (*names, "law", "contact", "Surface"):
-        assert code_name(name, "c-law") == name
-    assert code_name("contact", target) == "contact"
 
 
 @pytest.mark.parametrize("target", LAWS)

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import erf
 
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.boundary_elements.evidence import cases
-from generate.boundary_elements.light import BINS, compared, each
+from generate.boundary_elements.run import surfaces
+from generate.boundary_elements.studies import LIGHT_BINS, compared
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.calibrated import errors
 from generate.files import dataset, evidence
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
@@ -488,9 +489,9 @@ def test_light_loads_are_those_of_boundary_elements():
     rows = dataset("light_loads")
     assert rows.sizes["surface"] >= 20
     errors = []
-    for recipe, own in each(rows):
-        area, stiffness, _ = compared(recipe, own)
-        seen = (area > BINS[0]) & (area < BINS[-1]) & np.isfinite(stiffness)
+    for own in surfaces(rows):
+        area, stiffness, _ = compared(own)
+        seen = (area > LIGHT_BINS[0]) & (area < LIGHT_BINS[-1]) & np.isfinite(stiffness)
         errors.append(stiffness[seen])
     assert abs(np.mean(np.concatenate(errors))) < 0.1
     assert np.std(np.concatenate(errors)) < 0.3

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from generate.boundary_elements.capped import load_at
+from generate.boundary_elements.solve import load_at
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
 from mbma_tables.laws.boundary_elements import Contact
