@@ -14,7 +14,7 @@ from mbma_tables.surfaces.areal import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.wrapped import answer_where_finite
+from mbma_tables.theories.numerical import answer_where_finite
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
