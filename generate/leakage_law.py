@@ -20,7 +20,7 @@ from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 from mbma_tables.laws import effective_medium as leakage
-from mbma_tables.laws.calibrated import Constants, Law, Spectrum
+from mbma_tables.laws.calibrated import Constants, Law, Spectrum, force_at_area, light_factor
 from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.calibrated_table import load
@@ -106,7 +106,8 @@ class Flow:
         self.one = one
         self.area, self.u = one.law(constants)
         # gaps of contacts that yield are taken for those of elastic ones of equal area
-        load = leakage.load_of(one.spectrum, self.area, constants) if one.kind == "yielded" else one.force
+        at_area = force_at_area(self.area, light_factor(one.spectrum.alpha, constants), constants)
+        load = at_area if one.kind == "yielded" else one.force
         self._gaps = leakage.gaps(one.spectrum, load, constants)
         self._known: dict[FlowConstants, FloatArray] = {}
 

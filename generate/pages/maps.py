@@ -24,8 +24,8 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories import BoundaryElements, get_theory
 from mbma_tables.theories.calibrated_curves import own_law
+from mbma_tables.theories.numerical import answer_where_finite
 from mbma_tables.theories.protocol import Theory
-from mbma_tables.theories.wrapped import answer_where_finite
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"
@@ -92,7 +92,7 @@ def gallery() -> Measured:
             continue
         treated, surface = measured(path, options)
         if label not in rows and treated.heights.ndim == 2:
-            rows[label] = BoundaryElements.from_map(path, **options).rows if label == name else refined(treated)
+            rows[label] = BoundaryElements.of(surface).rows if label == name else refined(treated, surface)
             frames = [pd.DataFrame(own.T, columns=COLUMNS).assign(map=of) for of, own in sorted(rows.items())]
             # at once: what comes after may be stopped
             write_file(ROOT / ROWS, to_csv(HEAD, pd.concat(frames)[["map", *COLUMNS]], "%.9g"))
