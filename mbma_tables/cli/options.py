@@ -175,7 +175,6 @@ _MAP_OPTIONS = (
     _option("l_filter", "and of an L-filter [length]."),
     _option("tip_radius", "Of the probe or stylus [length]: keep wavelengths that it can follow."),
     _option("reliable/--all-waves", "Whether to use the resolution stated in the file.", default=None),
-    _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
     _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
     _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
 )

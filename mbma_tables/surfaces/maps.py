@@ -99,9 +99,9 @@ def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:
     return {
         "q": q,
         "C": C,
-        "counts": waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP),
+        "counts": waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP),
         "variances": C * waves * (steps[0] * steps[1]),
-        "low": float(q[0]) if treated.plain else max(WINDOW_LOBE * max(steps), float(q[0])),
+        "low": float(q[0]) if treated.periodic else max(WINDOW_LOBE * max(steps), float(q[0])),
     }
 
 
@@ -205,7 +205,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     scale = float(np.abs(treated.heights).max())
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
     q, C, waves = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
-    bins = log_bins(q, C, waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP))
+    bins = log_bins(q, C, waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP))
     # for ridges, or a few cosines, some bins have no wavelength
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
@@ -218,7 +218,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
 
     notes: list[dict[str, Any]] = []
     C_bins, variance, whole = np.exp(bins.log_c), own.h_rms**2, slopes(0.0)
-    if treated.plain:
+    if treated.periodic:
         changed = raised(bins.q, C_bins, variance, whole)
         # a tilt if there are many long wavelengths, as for a step
         C_bins = matched(bins.q, C_bins, variance, whole / variance) if changed is C_bins else changed

@@ -146,7 +146,6 @@ class Surface(SelfAffine):
         l_filter: Any = None,
         tip_radius: Any = None,
         reliable: bool = True,
-        window: str | None = None,
         unit: str | None = None,
         channel: int | None = None,
     ) -> Surface | MeasuredSurface:
@@ -176,7 +175,7 @@ class Surface(SelfAffine):
         extrapolate_to, extrapolate_hurst : float, optional
             Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; its
             influence is recorded.
-        outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter, tip_radius, reliable, window : optional
+        outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter, tip_radius, reliable : optional
             As in `mbma_tables.surfaces.treatment.Treatment`; the treatment is recorded in `provenance`.
         unit : str, optional
             Unit of the result and of plain lengths; lengths of a file are converted to it, or taken to be in it if the

@@ -9,14 +9,13 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.surfaces.filters import gaussian, last_wave, without_polynomial
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
@@ -30,9 +29,14 @@ MIN_POWER = 1e-24  # power over that of the strongest wavelength: lower values a
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter")  # options that are lengths
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
 USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier; share of points up to which they are reported
-CUTS = {"long_cutoff": "longcut", "short_cutoff": "shortcut"}  # by that library
-CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
-CALLED |= {"s_filter": "an S-filter", "l_filter": "an L-filter"}
+CALLED = {
+    "long_cutoff": "a long cut-off",
+    "short_cutoff": "a short cut-off",
+    "s_filter": "an S-filter",
+    "l_filter": "an L-filter",
+}
+GAUSSIAN = math.log(2)  # factor in the filter's exponent: wavelengths equal to the nesting index are halved
+LAST_WAVES = 0.01  # amplitude below which wavelengths count as removed by an S-filter
 Provenance = tuple[Mapping[str, Any], ...]
 
 
@@ -61,8 +65,6 @@ class Treatment:
         wavelengths that such a tip cannot follow.
     reliable : bool, optional
         Whether a resolution or tip radius that the file states counts as given, the default.
-    window : str, optional
-        Of the power spectrum, as in `scipy.signal.get_window`; a Hann window by default, none where periodic.
     """
 
     outliers: float | None = None
@@ -74,7 +76,6 @@ class Treatment:
     l_filter: float | None = None
     tip_radius: float | None = None
     reliable: bool = True
-    window: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("outliers", *LENGTHS):
@@ -99,7 +100,6 @@ class Treated:
     unit: str | None  # of length, that the file names
     waves: tuple[float, float] = (0.0, math.inf)  # smallest and largest wavenumber kept
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
-    window: str | None = None
     uncut: Any = None  # heights before the short cut-off, where there is one
 
     def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
@@ -107,41 +107,23 @@ class Treated:
         record = {"step": step, **numbers, "told": told}
         return dataclasses.replace(self, heights=heights, provenance=(*self.provenance, record))
 
-    @property
-    def read(self) -> dict[str, Any]:
-        """The record of the data read, which precedes those of the treatment."""
+    def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
+        """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
         shape, unit = self.heights.shape, f" {self.unit}" if self.unit else ""
         sides = " x ".join(f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True))
         told = (
             f"{'map' if len(shape) == 2 else 'line scan'} of {' x '.join(map(str, shape))} points, {sides}{unit}, "
             f"heights read in {self.unit or 'the same unit, which is not known'}"
         )
-        record = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit}
-        return record | {"told": told}
-
-    def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
-        """All steps of a surface made of it: variant, treatment, what was done at the edges, and notes."""
-        edges = ("periodic" if self.plain else "under a window for the spectrum") + more
-        return (self.read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
-
-    @property
-    def plain(self) -> bool:
-        """Whether the spectrum is taken without a window: where periodic, unless one is asked for."""
-        return self.periodic and self.window is None
+        read = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit, "told": told}
+        edges = ("periodic" if self.periodic else "under a window for the spectrum") + more
+        return (read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
 
     def windowed(self) -> FloatArray:
-        """Heights under a window of unit mean square, their mean under it removed; as they are where `plain`."""
-        if self.plain:
+        """Heights under a Hann window of unit mean square, their mean under it removed; as they are where periodic."""
+        if self.periodic:
             return np.asarray(self.heights)
-        if self.window is None:
-            windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
-        else:
-            from scipy.signal import get_window
-
-            try:
-                windows = [get_window(self.window, count) for count in self.heights.shape]
-            except ValueError:
-                raise InputError(f"window must be one of scipy.signal.get_window, got {self.window!r}") from None
+        windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
         values = self.heights - np.average(self.heights, weights=window)
         return np.asarray(values * (window / math.sqrt(np.mean(window**2))))
@@ -162,7 +144,7 @@ def treat(
             f"{' x '.join(map(str, heights.shape))} points have too few wavelengths; needed are at least "
             f"{' x '.join([str(MIN_GRID)] * heights.ndim)}"
         )
-    known = Treated(heights, steps, periodic, unit, window=treatment.window)
+    known = Treated(heights, steps, periodic, unit)
     with warnings.catch_warnings():
         # warnings of numpy inside that library are ignored
         warnings.simplefilter("ignore")
@@ -284,7 +266,7 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
         )
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
-    asked = {"long_cutoff": long, "short_cutoff": short, "s_filter": treatment.s_filter, "l_filter": treatment.l_filter}
+    asked = {name: getattr(treatment, name) for name in CALLED} | {"short_cutoff": short}
     own = {name: wavelength for name, wavelength in asked.items() if wavelength is not None}
     values = known.heights if known.periodic or not own else mirrored(known.heights)
     whole = tuple(slice(count) for count in known.heights.shape)
@@ -292,11 +274,7 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
         if name == "short_cutoff":
             known = dataclasses.replace(known, uncut=values[whole])
         before = squares(values, known.steps)
-        if name in CUTS:
-            scan = wrapped(values, known.steps, True, known.unit)
-            values = np.asarray(getattr(scan, CUTS[name])(cutoff_wavelength=wavelength).heights(), float)
-        else:
-            values = gaussian(values, known.steps, name, wavelength)
+        values = filtered(values, known.steps, name, wavelength)
         after = squares(values, known.steps)
         if not after[0] > MIN_POWER * before[0]:
             raise InputError(f"{name} {wavelength:g} leaves no wavelength of the measurement")
@@ -308,6 +286,42 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
         told += f"; it removes {of_variance:.0%} of the height variance"
         known = known.after(values, name, told, wavelength=wavelength, of_gradient=of_gradient, of_variance=of_variance)
     return dataclasses.replace(known, heights=values[whole]) if own else known
+
+
+def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
+    """Heights less their least-squares polynomial of that total degree: same as SurfaceTopography's modes."""
+    bases = [
+        np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), degree))[0] for count in heights.shape
+    ]
+    if heights.ndim == 1:
+        return np.asarray(heights - bases[0] @ (bases[0].T @ heights))
+    along, across = bases
+    wanted = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree
+    return np.asarray(heights - along @ (wanted * (along.T @ heights @ across)) @ across.T)
+
+
+def last_wave(nesting: float) -> float:
+    """Wavenumber above which an S-filter leaves less than `LAST_WAVES` of the amplitude."""
+    return 2 * math.pi / nesting * math.sqrt(-math.log(LAST_WAVES) / GAUSSIAN)
+
+
+def _squared_waves(shape: tuple[int, ...], steps: tuple[float, ...]) -> Any:
+    """Squares of the wavenumbers of a grid's Fourier components."""
+    waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(shape, steps, strict=True)]
+    return np.add.outer(waves[0] ** 2, waves[1] ** 2) if len(shape) == 2 else waves[0] ** 2
+
+
+def filtered(values: FloatArray, steps: tuple[float, ...], name: str, wavelength: float) -> FloatArray:
+    """Periodic heights after a cut-off or a filter, an option of `Treatment`, at a wavelength."""
+    q2, cut = _squared_waves(values.shape, steps), (2 * math.pi / wavelength) ** 2
+    if name == "short_cutoff":
+        left = q2 <= cut * (1 + 1e-12)
+    elif name == "long_cutoff":
+        left = q2 >= cut * (1 - 1e-12)
+    else:
+        left = np.exp(-GAUSSIAN * q2 / cut)
+        left = 1 - left if name == "l_filter" else np.where(q2 < last_wave(wavelength) ** 2, left, 0.0)
+    return np.asarray(np.fft.ifftn(np.fft.fftn(values) * left).real)
 
 
 def mirrored(values: FloatArray) -> FloatArray:
@@ -323,8 +337,6 @@ def squares(
     """Mean squares of periodic heights and of their gradient, of the wavelengths between two wavenumbers."""
     power = np.abs(np.fft.fftn(values) / values.size) ** 2
     power.flat[0] = 0.0
-    waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(values.shape, steps, strict=True)]
-    squared: Callable[..., FloatArray] = np.add.outer
-    q2 = squared(waves[0] ** 2, waves[1] ** 2) if values.ndim == 2 else waves[0] ** 2
+    q2 = _squared_waves(values.shape, steps)
     power = power * ((q2 >= band[0] ** 2) & (q2 <= band[1] ** 2))
     return float(power.sum()), float((power * q2).sum())

@@ -376,13 +376,6 @@ def test_waves_that_one_axis_alone_samples_are_told(periodic):
     assert "are left out of the spectrum: with them the rms gradient would be 1." in entry["told"]
 
 
-def test_a_window_leaves_a_periodic_map_its_gradient():
-    plain, found = (Surface.from_map(BASE, STEP, periodic=True, window=window) for window in (None, "hann"))
-    assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-5)
-    assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=0.01)
-    assert found.bearing.gradient == plain.bearing.gradient
-
-
 @pytest.mark.parametrize("shape", [(64, 64), (63, 64), (64, 45)])
 def test_which_way_a_periodic_map_is_turned_does_not_matter(shape):
     heights = np.random.default_rng(8).standard_normal(shape)  # up to the shortest wave

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.signal
 from helpers import refusals, topographies
 
 from mbma_tables import Surface
@@ -244,12 +245,11 @@ class TestReading:
             read_measurement(tmp_path / "w.csv")
 
 
-@pytest.mark.parametrize("window", ["hann", "blackman", "tukey"])
-def test_a_window_is_the_librarys(window):
-    found = treated(MAP[3], steps=(STEP,), window=window)
-    scan = library.UniformLineScan(found.heights, SIDE).window(window)
-    weights = np.asarray(scan.window_data)
-    expected = scan.heights() - weights * np.average(found.heights, weights=weights)
+def test_the_window_is_hanns():
+    found = treated(MAP[3], steps=(STEP,))
+    weights = scipy.signal.windows.hann(2 * POINTS + 1)[1::2]  # at the middle of each step
+    weights = weights / np.sqrt(np.mean(weights**2))
+    expected = weights * (found.heights - np.average(found.heights, weights=weights))
     np.testing.assert_allclose(found.windowed(), expected, atol=1e-12)
 
 
