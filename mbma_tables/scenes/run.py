@@ -12,7 +12,7 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.plan import TABLES, Plan
-from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
+from mbma_tables.scenes.problem import INVERTED, Problem
 from mbma_tables.scenes.steps import STEPS, Progress, Run, comparison
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.variants import get_variant
@@ -81,9 +81,7 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
     for name in problem.theories:
         quantities |= {f"{name}_pressure": ("pressure", f"F/A0 by {name}"), f"{name}_area": ("area", f"A/A0 by {name}")}
     units = {name: (unit_of(like, problem.units), meaning) for name, (like, meaning) in quantities.items()}
-    unit = problem.conductance_unit
-    correlations = {f"{name}_conductance": (unit, f"conductance by {name}") for name in CORRELATIONS}
-    return units | correlations | {"conductance": (unit, "conductance per nominal area")}
+    return units | {"conductance": (problem.conductance_unit, "conductance per nominal area")}
 
 
 def to_dataset(run: Run, plan: Plan) -> xr.Dataset:

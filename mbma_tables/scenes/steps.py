@@ -11,7 +11,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Step
-from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, OF_CONTACT, Problem
+from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
 from mbma_tables.surfaces.any_surface import AnySurface
 
 if TYPE_CHECKING:
@@ -158,18 +158,9 @@ def other_theory(
 
 
 def comparison(run: Run, step: Step) -> None:
-    """Another theory, or a correlation of conductance, beside the scene's own."""
+    """Another theory beside the scene's own."""
     problem = run.problem
     cap = math.inf if problem.hardness is None else problem.hardness
-    if step.name in CORRELATIONS:
-        from mbma_tables.totals import conductance
-
-        assert problem.conductivities is not None
-        pressure = problem.gaps if problem.prescribed == "pressures" else run.found["pressure"][1]
-        k_s = conductance.mean_conductivity(*problem.conductivities)
-        found = getattr(conductance, step.name)(problem.surface, pressure, k_s, problem.E_star, cap)
-        run.found[f"{step.name}_conductance"] = (("gap",), found)
-        return
     other = other_theory(step.name, problem.surface, run.gap, problem.E_star, cap)
     run.found |= {f"{step.name}_pressure": (("gap",), other.pressure), f"{step.name}_area": (("gap",), other.area)}
 

@@ -56,18 +56,18 @@ def radial_spectrum(heights: FloatArray, dx: float, dy: float) -> tuple[FloatArr
 def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2) -> Treated:
     """A map or line scan, treated, with options of `Surface.from_map`; without `dimensions` a file decides which."""
     given = {name: value for name, value in options.items() if value is not None}
-    for name in given.keys() & {"periodic", "reliable"}:
-        require_flag(name, given[name])
+    for name in given.keys() - set(OPTIONS):
+        raise TypeError(f"there is no option {name!r}: {nearest(name, OPTIONS)}")
+    if "periodic" in given:
+        require_flag("periodic", given["periodic"])
     lengths, unit = resolve({name: given.pop(name) for name in ("dx", "dy") if name in given}, given.pop("unit", None))
     channel, periodic = given.pop("channel", None), given.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
         source, lengths = read_measurement(source, **lengths, unit=unit, channel=channel), {}
     elif channel is not None:
         raise InputError("channel belongs to a file")
-    for name in given.keys() - set(OPTIONS):
-        raise TypeError(f"there is no option {name!r}: {nearest(name, OPTIONS)}")
     dimensions = source.dim if dimensions is None else dimensions
-    grid, steps, whole, own, info = grid_of(source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions)
+    grid, steps, whole, own = grid_of(source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions)
     own = unit if own is None else known(own)
     if own is not None and unit not in (None, own):
         by, own = factor(own, unit), unit
@@ -75,7 +75,7 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
         grid, steps = grid * by, steps if lengths else tuple(step * by for step in steps)
     units = Units(own)
     given |= {name: units.number(name, given[name]) for name in given.keys() & {*LENGTHS, "outliers"}}
-    return treat(grid, steps, whole, Treatment(**given), own, info)
+    return treat(grid, steps, whole, Treatment(**given), own)
 
 
 def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """Measured maps and line scans, treated by SurfaceTopography (the extra `maps`), each step on record.
 
-Terms are those of that library: detrend modes, windows, harmonic filling of undefined data, short and long cut-off,
-tip radius. Only the search for outliers is added here.
+Terms are those of that library: detrend modes, harmonic filling of undefined data, short and long cut-off.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ FREE_HOLES = 0.05  # share of undefined points that is filled without being requ
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
 MIN_POWER = 1e-24  # power over that of the strongest wavelength: lower values are rounding
-LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter")  # options that are lengths
+LENGTHS = ("short_cutoff", "long_cutoff", "s_filter", "l_filter")  # options that are lengths
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
 USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier; share of points up to which they are reported
 CALLED = {
@@ -60,11 +59,6 @@ class Treatment:
     s_filter, l_filter : float, optional
         Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve this wavelength. An
         S-filter removes shorter ones, completely below 0.39 times the index, an L-filter longer ones.
-    tip_radius : float, optional
-        Of a scanning probe or stylus [length]: sets `short_cutoff` where `scanning_probe_reliability_cutoff` finds
-        wavelengths that such a tip cannot follow.
-    reliable : bool, optional
-        Whether a resolution or tip radius that the file states counts as given, the default.
     """
 
     outliers: float | None = None
@@ -74,8 +68,6 @@ class Treatment:
     long_cutoff: float | None = None
     s_filter: float | None = None
     l_filter: float | None = None
-    tip_radius: float | None = None
-    reliable: bool = True
 
     def __post_init__(self) -> None:
         for name in ("outliers", *LENGTHS):
@@ -135,9 +127,8 @@ def treat(
     periodic: bool,
     treatment: Treatment,
     unit: str | None = None,
-    info: Mapping[str, Any] | None = None,
 ) -> Treated:
-    """Heights [length] made ready for their spectrum; NaN and masked points are undefined, `info` is the file's."""
+    """Heights [length] made ready for their spectrum; NaN and masked points are undefined."""
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
         raise InputError(
@@ -150,12 +141,9 @@ def treat(
         warnings.simplefilter("ignore")
         known = _without_outliers(known, treatment.outliers)
         known = _flattened(_filled(known, treatment.fill), treatment.detrend)
-        known, short = _resolution(known, treatment, info or {})
-        known = _within(known, short, treatment)
-    shortest = min(
-        2 * math.pi / short if short else math.inf,
-        last_wave(treatment.s_filter) if treatment.s_filter else math.inf,
-    )
+        known = _within(known, treatment)
+    shortest = 2 * math.pi / treatment.short_cutoff if treatment.short_cutoff else math.inf
+    shortest = min(shortest, last_wave(treatment.s_filter) if treatment.s_filter else math.inf)
     return dataclasses.replace(known, waves=(2 * math.pi / (treatment.long_cutoff or math.inf), shortest))
 
 
@@ -234,31 +222,9 @@ def _filled(known: Treated, fill: str | None) -> Treated:
     return known.after(_harmonic(known), "fill", told, method="harmonic", points=count, share=share)
 
 
-def _resolution(known: Treated, treatment: Treatment, info: Mapping[str, Any]) -> tuple[Treated, float | None]:
-    """Shortest wavelength kept: the largest of those given, resolved by the tip and stated by the file; None: all."""
-    found = [(treatment.short_cutoff, "as given")] if treatment.short_cutoff is not None else []
-    tip, stated = treatment.tip_radius, (info.get("instrument") or {}).get("parameters") or {}
-    if tip is None and not (treatment.reliable and known.unit and {"tip_radius", "resolution"} & set(stated)):
-        return known, found[0][0] if found else None
-    origin = "the file's instrument" if tip is None else f"a tip of radius {tip:g}"
-    own = {"instrument": info["instrument"]} if tip is None else {}
-    try:
-        scan = wrapped(known.heights, known.steps, False, known.unit, **own)
-        limit = scan.short_reliability_cutoff() if tip is None else scan.scanning_probe_reliability_cutoff(tip)
-    except (ValueError, KeyError, TypeError) as fault:
-        raise InputError(f"the reliability cut-off by {origin} cannot be found: {fault}") from None
-    if limit is None or limit <= 2 * max(known.steps):
-        known = known.after(known.heights, "reliability", f"{origin} follows every wavelength that was sampled")
-    else:
-        told = f"{origin} follows no wavelength below {limit:.4g} {known.unit or ''}".rstrip()
-        known = known.after(known.heights, "reliability", told, wavelength=float(limit))
-        found.append((float(limit), origin))
-    return known, max(found)[0] if found else None
-
-
-def _within(known: Treated, short: float | None, treatment: Treatment) -> Treated:
+def _within(known: Treated, treatment: Treatment) -> Treated:
     """Heights whose wavelengths lie between both cut-offs, or filters."""
-    long = treatment.long_cutoff
+    long, short = treatment.long_cutoff, treatment.short_cutoff
     if short is not None and not short > 2 * min(known.steps):
         raise InputError(
             f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wavelength "
@@ -266,8 +232,7 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
         )
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
-    asked = {name: getattr(treatment, name) for name in CALLED} | {"short_cutoff": short}
-    own = {name: wavelength for name, wavelength in asked.items() if wavelength is not None}
+    own = {name: getattr(treatment, name) for name in CALLED if getattr(treatment, name) is not None}
     values = known.heights if known.periodic or not own else mirrored(known.heights)
     whole = tuple(slice(count) for count in known.heights.shape)
     for name, wavelength in own.items():
