@@ -85,29 +85,14 @@ def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, 
 
 @dataclasses.dataclass(frozen=True)
 class Metal:
-    """Ranges of a metal's constants at room temperature.
-
-    Attributes
-    ----------
-    name : str
-    E : float
-        Young's modulus [GPa].
-    nu : float
-        Poisson's ratio.
-    hardness : tuple of float
-        Of soft and of hard tempers [GPa], as mean pressure of an indentation; equal where only one was found.
-    conductivity : tuple of float
-        Thermal, lowest and highest of what was found [W/(m K)].
-    source : str
-        Titles and addresses of the pages on which the numbers were read.
-    """
+    """Ranges of a metal's constants at room temperature."""
 
     name: str
-    E: float
-    nu: float
-    hardness: tuple[float, float]
-    conductivity: tuple[float, float]
-    source: str
+    E: float  # Young's modulus [GPa]
+    nu: float  # Poisson's ratio
+    hardness: tuple[float, float]  # of soft and of hard tempers [GPa], mean pressure of an indentation; may be equal
+    conductivity: tuple[float, float]  # thermal, lowest and highest of what was found [W/(m K)]
+    source: str  # titles and addresses of the pages on which the numbers were read
 
 
 def _mean_pressure(scale: str, number: float) -> float:
@@ -124,10 +109,8 @@ def _metals() -> dict[str, Metal]:
     lines = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
     for row in csv.DictReader(line for line in lines if not line.startswith("#")):
         soft, hard = (round(_mean_pressure(row["scale"], float(row[end])), 2) for end in ("soft", "hard"))
-        conductivity = float(row["low"]), float(row["high"])
-        found[row["name"]] = Metal(
-            row["name"], float(row["E"]), float(row["nu"]), (soft, hard), conductivity, row["source"]
-        )
+        E, nu, low, high = (float(row[name]) for name in ("E", "nu", "low", "high"))
+        found[row["name"]] = Metal(row["name"], E, nu, (soft, hard), (low, high), row["source"])
     return found
 
 

@@ -19,7 +19,7 @@ from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import SCATTER, log_bins
-from mbma_tables.surfaces.spectral import SpectralSurface, resolution
+from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface, resolution
 from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
@@ -284,8 +284,7 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
     # the curves of the map do not include the added wavelengths
     C = np.append(surface.C, np.exp(level - slope * np.log(q)))
-    plain = dataclasses.replace(surface, bearing=None, bands=None, map=None, table=None, scans=())
-    longer = dataclasses.replace(plain, q=np.append(surface.q, q), C=C, samples=samples)
+    longer = dataclasses.replace(surface, **NO_MAP, q=np.append(surface.q, q), C=C, samples=samples)
     area = float(surface.rms_gradient / longer.rms_gradient)
     stiffness = float(surface.h_rms / longer.h_rms)
     told = (
