@@ -129,7 +129,7 @@ class Scene(Problem):
         ------
         InputError, OutOfRangeError, ConvergenceError
         """
-        needed("xarray", "xarray")
+        needed("xarray")
         from mbma_tables.scenes.run import run_plan
 
         return run_plan(self, self.plan(), progress)
