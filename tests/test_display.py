@@ -57,7 +57,7 @@ def test_without_matplotlib_the_table_stands_alone(monkeypatch, thing):
 def test_without_xarray_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     for ask in (ROAD.to_dataset, Scene(ROAD, separations=[0.5], effects=["pressure"]).run):
-        with pytest.raises(MbmaError, match=r"this needs xarray: pip install 'mbma_tables\[xarray\]'"):
+        with pytest.raises(MbmaError, match=r"this needs xarray: pip install xarray"):
             ask()
 
 

@@ -256,7 +256,7 @@ class Charge:
 class TestFiles:
     def test_without_the_reader_says_what_to_install(self, monkeypatch, tmp_path):
         monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-        with pytest.raises(MbmaError, match=r"pip install 'mbma_tables\[maps\]'"):
+        with pytest.raises(MbmaError, match=r"pip install SurfaceTopography"):
             read_measurement(tmp_path / "a.sur")
 
     def test_no_file_and_no_map(self, tmp_path):
