@@ -235,14 +235,7 @@ class SpectralSurface(AnySurface):
             moved |= dict.fromkeys(("gradient", "tension_force", "tension"), slope)
             known = dataclasses.replace(known, **{name: by * getattr(known, name) for name, by in moved.items()})
         if bands is not None:
-            bands = dataclasses.replace(
-                bands,
-                q=bands.q / along,
-                q2_mean_inverse=bands.q2_mean_inverse * along**2,
-                variance=bands.variance * up**2,
-                gradient=bands.gradient * slope**2,
-                curvature=bands.curvature * (slope / along) ** 2,
-            )
+            bands = dataclasses.replace(bands, q=bands.q / along, variance=bands.variance * up**2)
         if whole is not None:
             steps = tuple(along * step for step in whole.steps)
             whole = dataclasses.replace(whole, heights=up * whole.heights, steps=steps)
