@@ -99,7 +99,7 @@ class Tangential:
         return array
 
     def _known(self) -> tuple[Any, ...]:
-        """The normal law and f kappa, tangential over normal displacement."""
+        """The normal law, and f kappa."""
         if isinstance(self._normal, str):
             raise InputError(self._normal)
         if self.friction is None:

@@ -74,12 +74,8 @@ class LeakageLaw:
 def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -> LeakageLaw:
     """Leakage of a contact law's surface, as polynomials of the gap that begin where contact blocks it.
 
-    Of a simulated map in a `direction`, in degrees from x, or the geometric mean of both axes.
-
-    Raises
-    ------
-    InputError
-        For a simulated map that is blocked in this direction at the lightest load.
+    Of a simulated map in a `direction`, in degrees from x, or the geometric mean of both axes; InputError where it is
+    blocked at the lightest load.
     """
     h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
     top = min(law.h_max, law.highest) if law.block.view(np.int64)[at.ENDS] else law.highest

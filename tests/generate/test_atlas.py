@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from generate.page import svg
 
+from generate.page import svg
 from generate.pages import stability as cases
 from mbma_tables import InputError
 from mbma_tables.islands.greenwood_tripp import rigid_sphere

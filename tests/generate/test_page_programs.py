@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from generate.page import MARKED, fill
 
 from generate.__main__ import main
 from generate.files import ROOT
+from generate.page import MARKED, fill
 from generate.pages import library, maps
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
