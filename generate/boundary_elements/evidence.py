@@ -168,7 +168,7 @@ class Capped(Simulated):
     def elastic(self) -> tuple[FloatArray, FloatArray]:
         """Simulated force and stiffness at these gaps; by the law, fitted at its end, where not pressed so far."""
         u, found = self.bare["u"], []
-        laws = self.by_law, self.law.force_and_stiffness(u[-1:])
+        laws = self.by_law, self.law.contact(u[-1:])[::2]
         for name, beyond, end in zip(("force", "frozen"), *laws, strict=True):
             known = PchipInterpolator(u[::-1], np.log(self.bare[name][::-1]))
             inside = np.exp(known(np.maximum(self.u, u[-1])))
@@ -178,7 +178,7 @@ class Capped(Simulated):
     @functools.cached_property
     def by_law(self) -> tuple[FloatArray, FloatArray]:
         """Elastic force and stiffness at these gaps, by the spectrum's law."""
-        return self.law.force_and_stiffness(self.u)
+        return self.law.contact(self.u)[::2]
 
     @functools.cached_property
     def elastic_areas(self) -> dict[str, FloatArray]:
@@ -233,7 +233,7 @@ def capped(data: xr.Dataset) -> list[Capped]:
         heights = hardness.BearingCurve(curves["mean_height"], known.h_max)
         force, _, stiffness = by_map.answer(u)
         levels = {
-            "calibrated": (*law.force_and_stiffness(u), hardness.bearing_share(u, known.h_max)[0]),
+            "calibrated": (*law.contact(u)[::2], hardness.bearing_share(u, known.h_max)[0]),
             "calibrated_map": (force, stiffness, heights(u)[0]),
         }
         rows = {own: one[name].values.astype(float) for own, name in names.items()}

@@ -25,8 +25,8 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories import BoundaryElements, get_theory
 from mbma_tables.theories.calibrated_curves import own_law
+from mbma_tables.theories.numerical import answer_where_finite
 from mbma_tables.theories.protocol import Theory
-from mbma_tables.theories.wrapped import answer_where_finite
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"

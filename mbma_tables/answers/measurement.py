@@ -14,7 +14,7 @@ from mbma_tables.surfaces.areal import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.wrapped import answer_where_finite
+from mbma_tables.theories.numerical import answer_where_finite
 
 DRAWN = ("calibrated", "mbma")
 AREAS = np.array([0.002, 0.01, 0.03, 0.1, 0.3, 0.6])  # contact of a table of loads

@@ -24,7 +24,7 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import OF_MAPS, theory_name
 from mbma_tables.theories.calibrated import Calibrated
-from mbma_tables.theories.differences import differences
+from mbma_tables.theories.numerical import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # step of the logarithm of a parameter

@@ -139,7 +139,7 @@ def other_theory(
 ) -> OtherTheory:
     """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories import get_theory
-    from mbma_tables.theories.wrapped import answer_where_finite
+    from mbma_tables.theories.numerical import answer_where_finite
 
     if name == "persson_simplified":
         from mbma_tables.theories.persson import Persson

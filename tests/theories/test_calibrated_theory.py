@@ -40,7 +40,7 @@ ROLLOFF = {0: 0.041954782, 1: 0.037331897}  # highest points of two maps of h_rm
 
 def quadrature(surface, u):
     law = Law(Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1)), float(surface.h_max / surface.h_rms))
-    force, stiffness = law.force_and_stiffness(u / surface.h_rms)
+    force, stiffness = law.contact(u / surface.h_rms)[::2]
     g = surface.rms_gradient
     return force * g, law.area(force), stiffness * g / surface.h_rms
 
@@ -330,7 +330,7 @@ def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
     found = contact(surface, mean_separation=u, theory="calibrated")
     # stiffness, which nothing cancels in, integrated over the root of the depth, which it begins with
     depth, root = (top - u)[:, None], (1 + nodes) / 2
-    stiffness = law.force_and_stiffness((top - depth * root**2).ravel())[1].reshape(u.size, -1)
+    stiffness = law.contact((top - depth * root**2).ravel())[2].reshape(u.size, -1)
     exact = surface.rms_gradient * (stiffness * depth * root) @ weights
     assert (np.abs(found.pressure / exact - 1) <= found.error).all()
 
