@@ -13,6 +13,7 @@ import click
 from mbma_tables.cli import options
 from mbma_tables.cli.commands import COLUMNS
 from mbma_tables.cli.format import Report, shown_unit
+from mbma_tables.cli.options import LOADS
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
 from mbma_tables.common.progress import doing
@@ -23,7 +24,6 @@ from mbma_tables.surfaces.surface import Surface
 MAX_BYTES = 64 * 2**20
 MAX_COLUMNS, MAX_ROWS, MAX_CELL = 100, 1_000_000, 1000  # limits of a file of surfaces; letters of a cell
 OF_MAPS = ("dx", "dy", "detrend", "short_cutoff", "long_cutoff", "s_filter", "l_filter")
-LOADS = ("separation", "mean_separation", "pressure", "area")
 
 
 @click.command("batch", short_help="Many surfaces from a CSV file.")
@@ -173,7 +173,7 @@ def sensitivity_command(
 
     model = model.of(specimen.surface)
     ends = dict(map(_pair, ranges))
-    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=ends, **vars(model))
+    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=ends, **model._asdict())
     parameters = list(found.parameters)
     columns = {
         "parameter": parameters,

@@ -260,7 +260,10 @@ def test_bad_files(folder, content, message):
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        (FileNotFoundError(2, "No such file or directory", "a.txt"), "mbma: a.txt: No such file or directory\n"),
+        (
+            FileNotFoundError(2, "No such file or directory", "a.txt"),
+            "mbma: [Errno 2] No such file or directory: 'a.txt'\n",
+        ),
         (OSError("odd\nfault"), "mbma: odd fault\n"),
     ],
 )
