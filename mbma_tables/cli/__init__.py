@@ -113,7 +113,7 @@ def main(context: click.Context) -> None:
 
 for command in (
     *(commands.contact_command, commands.curve_command, batch.batch_command, commands.island_command),
-    *(commands.surfaces_command, commands.fit_command, batch.sensitivity_command, tables.tables_group),
+    *(commands.fit_command, batch.sensitivity_command, tables.tables_group),
     *(tables.cache_command, scene.joint_command, scene.plan_command, scene.run_command, commands.cost_command),
     *(export.export_command, export.explore_command),
 ):

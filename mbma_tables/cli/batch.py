@@ -12,11 +12,11 @@ import click
 
 from mbma_tables.cli import options
 from mbma_tables.cli.commands import COLUMNS
-from mbma_tables.cli.format import Report, shown_unit
+from mbma_tables.cli.format import Report, shown_unit, to_json
 from mbma_tables.cli.options import LOADS
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
-from mbma_tables.common.progress import doing
+from mbma_tables.common.progress import doing, echo
 from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, from_tables
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
@@ -157,15 +157,16 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
 @click.option("--range", "ranges", multiple=True, metavar="NAME=X:X", help="Range of a parameter; may be repeated.")
 @options.specimen_options
 @options.theory_options
-@options.output_options
+@options.json_option("a table")
 def sensitivity_command(
-    loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: options.Model, output: options.Output
+    loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: options.Model, as_json: bool
 ) -> None:
     """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
     and lengths, h_max, cut-offs and the exponent of an extrapolation. With --range also the smallest and largest
-    result while one runs over its range, and over the ends of all ranges together.
+    result while one runs over its range, and over the ends of all ranges together. Conductance is over the mean
+    conductivity of the bodies.
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa --range h_max=1:1.5 --range hurst=0.6:0.8
     """
@@ -174,24 +175,9 @@ def sensitivity_command(
     model = model.of(specimen.surface)
     ends = dict(map(_pair, ranges))
     found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=ends, **model._asdict())
-    parameters = list(found.parameters)
-    columns = {
-        "parameter": parameters,
-        "value": list(found.parameters.values()),
-        "unit": [shown_unit(name, found.units) for name in parameters],
-    }
-    columns |= {answer: [found.slopes[name][answer] for name in parameters] for answer in found.answers}
-    units = {name: shown_unit(name, found.units) for name in found.answers}
-
-    def with_unit(answer: str, text: str) -> str:
-        return f"{answer} {text} {units[answer]}".removesuffix(" -")
-
-    here = ", ".join(with_unit(name, f"{value:.6g}") for name, value in found.answers.items())
-    notes = [f"theory {model.theory}; d ln(answer)/d ln(parameter) at given {found.by}", f"here: {here}"]
-    notes.append("conductance is over the mean conductivity of the bodies")
-    for name, spans in found.ranges.items():
-        spread = ", ".join(with_unit(answer, f"{low:.4g} to {high:.4g}") for answer, (low, high) in spans.items())
-        notes.append(f"range of {name}: {spread}")
-    facts = {"theory": model.theory, "answer_units": units}
-    facts |= {name: getattr(found, name) for name in ("by", "answers", "ranges", "errors")}
-    Report("sensitivity", specimen.title, notes, facts, columns).write(output)
+    units = {name: shown_unit(name, found.units) for name in (*found.parameters, *found.answers)}
+    if as_json:
+        echo(to_json(vars(found) | {"theory": model.theory, "units": units}))
+        return
+    here = ", ".join(f"{name} {value:.6g} {units[name]}".removesuffix(" -") for name, value in found.answers.items())
+    echo(f"mbma sensitivity: {specimen.title}, theory {model.theory}\nhere: {here}\n\n{found}")

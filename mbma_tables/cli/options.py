@@ -73,7 +73,7 @@ def _output(given: Mapping[str, Any]) -> Output:
     return Output(**given)
 
 
-def _parse_number(ctx: click.Context, param: click.Parameter, given: Any) -> float | str | None:
+def _parse_number(ctx: click.Context, param: click.Parameter, given: Any) -> Any:
     """A number, or a number with its unit as text, which is converted later."""
     try:
         return None if given is None else float(given)
@@ -186,7 +186,7 @@ stress_unit_option = _option("stress_unit", "Unit of plain moduli and of the ans
 _SPECIMEN_OPTIONS = (
     _option(
         "surface",
-        "Surface: a case of the paper; `mbma surfaces` lists them.",
+        f"Surface: a case of the paper, {', '.join(CASES)}.",
         type=click.Choice([*CASES]),
         metavar="NAME",
     ),

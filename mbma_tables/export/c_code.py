@@ -18,7 +18,7 @@ import numpy as np
 from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.again import written_by
+from mbma_tables.export.made_by import written_by
 from mbma_tables.export.text import braces, core_file, filled, numerals, opening
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES

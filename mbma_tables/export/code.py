@@ -21,8 +21,8 @@ from typing import NamedTuple
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
-from mbma_tables.export.again import written_by
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
+from mbma_tables.export.made_by import written_by
 from mbma_tables.export.targets import Target
 from mbma_tables.export.text import filled, opening, wrapped
 from mbma_tables.models.tables import open_table

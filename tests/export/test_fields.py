@@ -271,7 +271,7 @@ def test_columns_of_a_film(name):
         ),
     ],
 )
-def test_the_command_writes_them_again(words, ends, tmp_path, monkeypatch):
+def test_the_command_writes_them(words, ends, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = CliRunner()
     asked = ["export", *words, "--surface", "concrete", "--E-star", "13.3MPa", "--out", "made.txt"]
@@ -281,10 +281,6 @@ def test_the_command_writes_them_again(words, ends, tmp_path, monkeypatch):
     assert ends in text
     assert ("lengths in m\n" in text.replace(" -->", "")) == (targets()[words[0]].units is not None)
     assert ("E* = 13300000 Pa" in text) == (targets()[words[0]].units is not None)
-    (tmp_path / "made.txt").write_text(text[:-50])
-    ran = run.invoke(main, ["export", "--again", "made.txt"])
-    assert ran.exit_code == 0, ran.output
-    assert (tmp_path / "made.txt").read_text() == text
 
 
 @pytest.mark.parametrize(

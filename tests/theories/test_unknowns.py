@@ -98,8 +98,8 @@ def test_the_command():
     arguments = ["--surface", "challenge", "--E-star", "25MPa", "-p", "100kPa", "--range", "h-max=2um:4um"]
     answer = json.loads(run("sensitivity", *arguments, "--json"))
     found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa", ranges={"h_max": (2.0, 4.0)})
-    assert answer["columns"]["area"] == [row["area"] for row in found.slopes.values()]
-    assert answer["columns"]["unit"] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
+    assert answer["slopes"] == found.slopes
+    assert [answer["units"][name] for name in found.parameters] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
     assert answer["ranges"]["h_max"]["stiffness"] == list(found.ranges["h_max"]["stiffness"])
     text = run("sensitivity", *arguments)
     assert "range of h_max: mean_separation" in text
