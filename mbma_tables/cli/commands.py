@@ -210,7 +210,6 @@ def fit_command(
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
     scans = [measured(path, treatment) for path in measurements]
-    treated = scans[0][0]
     surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
     columns, told = table_of_loads(surface, scale, "simulated" if simulate else "calibrated")
@@ -218,17 +217,15 @@ def fit_command(
         BoundaryElements.of(surface).to_netcdf(output.out)
         told, output = [*told, f"{output.out} has the simulation"], output._replace(out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
-    facts: dict[str, Any] = {"length_unit": surface.unit, "stress_unit": stress_unit}
-    facts |= {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
-    facts |= {"provenance": surface.provenance, "notes": told}
+    facts: dict[str, Any] = {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
+    facts |= {"length_unit": surface.unit, "stress_unit": stress_unit, "provenance": surface.provenance, "notes": told}
     title = ", ".join(path.name for path in measurements)
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
-    report = Report("fit", title, [*described(surface), *told], facts, columns, own)
     picture = b""
     if plot is not None:
         label = pressure_label(unit_of("pressure", units))
-        picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
-    report.write(output, plot, picture)
+        picture = to_picture(draw(scans[0][0], surface, curves(surface, scale), title, label), plot.suffix[1:])
+    Report("fit", title, [*described(surface), *told], facts, columns, own).write(output, plot, picture)
 
 
 @click.command("cost", short_help="Computing time against accuracy.")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,16 +12,17 @@ import click
 from mbma_tables.cli import options
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import write_file
+from mbma_tables.common.files import read_file, write_file
 from mbma_tables.common.progress import echo
-from mbma_tables.export.made_by import made_by
 from mbma_tables.export.targets import AGAINST, Target, group, names, targets
+from mbma_tables.export.text import written_by
 from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
+MAX_BYTES = 1 << 30  # of an input file
 DEFAULTS = {"variant": "reported", "leakage": False, "check": False}
 
 
@@ -111,7 +114,12 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         raise InputError(f"--out of {target} must be NAME{kind.end}, got {out.name!r}")
     joint: dict[str, Any] = {name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")}
     ctx = click.get_current_context()
-    joint["made_by"] = made_by(ctx.meta["words"], [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
+    inputs = [ctx.params[key] for key in ("file", "map") if ctx.params[key]]
+    for path in [path for path in inputs if path.suffix == ".toml"]:
+        table = tomllib.loads(read_file(path, MAX_BYTES).decode()).get("surface", {})
+        inputs += [path.parent / table[name] for name in ("map", "psd") if name in table]
+    digests = (f"input {path}: sha256 {hashlib.sha256(read_file(path, MAX_BYTES)).hexdigest()}" for path in inputs)
+    joint["made_by"] = *digests, written_by(ctx.meta["words"])
     if kind.rows:
         name = {"name": out.stem} if kind.end else {"name": given.pop("name")} if "name" in given else {}
         files = kind.files(_rows(kind, joint | given), **name)
