@@ -72,9 +72,7 @@ def _limits() -> dict[str, Any]:
     return {
         "log_area": table.log_area.tolist(),
         "scatter": {
-            name: dict(
-                zip(calibrated_table.QUANTITIES, np.where(np.isfinite(rows), rows, NOTHING).tolist(), strict=True)
-            )
+            name: dict(zip(quantities, np.where(np.isfinite(rows), rows, NOTHING).tolist(), strict=True))
             for name, rows in table.scatter.items()
         },
         "gradient": source.MAX_GRADIENT,
