@@ -61,7 +61,7 @@ def scenes(rng: np.random.Generator) -> None:
             found = scene.run()
             spent = time.process_time() - start
         except InputError:
-            refused += 1  # a tolerance too tight for a law
+            refused += 1  # a tolerance too tight for the energy
             continue
         if number >= WARMED:
             ratios.append(spent / plan.seconds)
@@ -70,7 +70,7 @@ def scenes(rng: np.random.Generator) -> None:
         names += ["stiffness"] * ("stiffness" in found and rtol > 1e-6)
         above += [np.abs(found[name].values / truth(surface, gaps, name) - 1).max() / rtol for name in names]
     ratio = np.array(ratios)
-    click.echo(f"\n{SCENES} random scenes, {refused} of them refused as too tight for a law")
+    click.echo(f"\n{SCENES} random scenes, {refused} of them refused as too tight")
     report("largest error over the tolerance asked", max(above), "x", at_most=1)
     report("time over the plan's, median", float(np.median(ratio)), "x")
     report("within a factor 2 of the plan's time", float(np.mean((ratio > 0.5) & (ratio < 2))), "")

@@ -6,7 +6,7 @@ pressure LOAD. A smooth face does not reach into its track, a rough one has wide
 and q1 end at their bounds: less fine roughness is always better here. The best design is then pressed by boundary
 elements, under the loads of its two halves, and Reynolds' equation solved on the gaps.
 
-Run with ``python examples/seal.py``; the simulation needs ``pip install 'mbma_tables[simulate]'``. Lengths in um,
+Run with ``python examples/seal.py``; the simulation needs ``pip install tamaas``. Lengths in um,
 stresses in MPa.
 """
 

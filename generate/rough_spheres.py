@@ -4,18 +4,15 @@ Gaussian roughness on spheres of radius `RADIUS` against a rigid flat, on a half
 the convolution of DC-FFT), E* = 1, lengths in sampling steps. Their rows are a group of docs/data/boundary_elements.nc.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 from collections.abc import Iterator
 
 import click
 import numpy as np
-import xarray as xr
 
-from generate.boundary_elements.collect import attributes
-from generate.calibrated_file import variable, write_part
+from generate.boundary_elements.run import of_contacts
+from generate.calibrated_file import write_part
 from generate.machined.makers import rough
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.data import FILE
@@ -24,16 +21,6 @@ from mbma_tables.laws.boundary_elements import CORRECTION
 POINTS, SHORTEST, RADIUS, TOLERANCE = 320, 6.0, 3000.0, 1e-5
 HURSTS, LONGEST, HEIGHTS, EACH, FIRST_SEED = (0.5, 0.8), (24.0, 48.0), (0.1, 0.3, 1.0), 2, 71
 SMOOTH_RADII = (10.0, 20.0, 35.0, 60.0)  # of Hertz's contact at the loads
-COLUMNS = {
-    "hurst": "Hurst exponent",
-    "longest": "longest wavelength in sampling steps",
-    "h_rms": "root mean square height in sampling steps",
-    "seed": "of numpy.random.default_rng, which draws the phases",
-    "force": "F/E*, in squared sampling steps",
-    "approach": "displacement of the mean sphere from touching the flat, in sampling steps",
-    "area": "real contact area in squared sampling steps, corrected for its edges",
-    "mean_radius": "mean distance from the axis, weighted by pressure, in sampling steps",
-}
 
 
 def heights(hurst: float, longest: float, h_rms: float, seed: int) -> FloatArray:
@@ -45,7 +32,7 @@ def heights(hurst: float, longest: float, h_rms: float, seed: int) -> FloatArray
 def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
     """Force over E*, approach, real area, and the mean distance from the axis, weighted by pressure."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    tamaas = needed("tamaas", "simulate")
+    tamaas = needed("tamaas")
     tamaas.set_log_level(tamaas.LogLevel.error)
     x = np.arange(POINTS) - (POINTS - 1) / 2
     r = np.hypot(x[:, None], x)
@@ -69,18 +56,9 @@ def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
         yield force, float(approach), float(area), float(np.mean(pressure * r) / pressure.mean())
 
 
-def data_of(rows: FloatArray) -> xr.Dataset:
-    """The group of rows of `COLUMNS`, a contact each."""
-    data = xr.Dataset({n: variable("contact", v, m) for (n, m), v in zip(COLUMNS.items(), rows.T, strict=True)})
-    title = f"Rough spheres of radius {RADIUS:g} sampling steps on a rigid flat, E* = 1"
-    source = f"Tamaas, DC-FFT, {POINTS} x {POINTS} points, not periodic; generate.rough_spheres.heights makes the maps"
-    data.attrs = attributes(title, source, "rough_spheres", ("generate.rough_spheres", "generate.machined.makers"))
-    return data
-
-
 if __name__ == "__main__":
     rows = []
     for seed, design in enumerate(itertools.product(HURSTS, LONGEST, HEIGHTS, range(EACH)), FIRST_SEED):
         rows += [[*design[:-1], seed, *row] for row in simulated(heights(*design[:-1], seed))]
-    write_part(FILE, data_of(np.array(rows)), "rough_spheres")
+    write_part(FILE, of_contacts("rough_spheres", np.transpose(rows)), "rough_spheres")
     click.echo(FILE)

@@ -1,4 +1,4 @@
-"""``python -m generate wheels``: a wheel for each platform, built here by zig's compiler, and a look into it."""
+"""``python -m generate wheels``: a wheel for each platform, built by zig's compiler, the sources, and what is wrong."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pathlib
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import zipfile
 from collections.abc import Iterator
@@ -30,6 +31,7 @@ PLATFORMS = {
     "macosx_11_0_arm64": ("aarch64-macos.11.0", MACOS),
     "win_amd64": ("x86_64-windows-gnu", ("python3.dll", "KERNEL32.dll", "api-ms-win-crt-")),
 }
+SOURCE = "source"
 PYTHON, GLIBC, LARGEST = (3, 11), (2, 17), 9_000_000
 
 
@@ -78,12 +80,18 @@ def _stable(name: str) -> bool:
 
 
 def faults(wheel: pathlib.Path, platform: str) -> Iterator[str]:
-    """What is wrong with a wheel, or would keep it from being loaded somewhere on its platform."""
+    """What is wrong with a wheel, or would keep it from being loaded somewhere on its platform; or with the sources."""
+    if wheel.stat().st_size > LARGEST:
+        yield f"{wheel.stat().st_size} bytes are more than {LARGEST}"
+    if platform == SOURCE:
+        with tarfile.open(wheel) as archive:
+            held = {name.partition("/")[2] for name in archive.getnames()}
+        tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+        yield from (f"{name} is missing" for name in tracked.splitlines() if name[0] != "." and name not in held)
+        return
     target, allowed = PLATFORMS[platform]
     levels = ["plain", "x86_64_v3", "x86_64_v4"] if target.startswith("x86_64") else ["plain"]
     suffix = ".pyd" if "windows" in target else ".abi3.so"
-    if wheel.stat().st_size > LARGEST:
-        yield f"{wheel.stat().st_size} bytes are more than {LARGEST}"
     with zipfile.ZipFile(wheel) as packed:
         files = {name: packed.read(name) for name in packed.namelist()}
     (about,) = (text.decode() for name, text in files.items() if name.endswith(".dist-info/WHEEL"))
@@ -112,27 +120,28 @@ def faults(wheel: pathlib.Path, platform: str) -> Iterator[str]:
 
 
 def build(platform: str, out: pathlib.Path) -> pathlib.Path:
-    """Build a wheel of the checkout for a platform."""
+    """Build a wheel of the checkout for a platform, or its source distribution."""
     with tempfile.TemporaryDirectory() as folder:
         # nothing of another platform's build gets in
         where = ["build", "--build-base", folder, "egg_info", "--egg-base", folder]
-        to = ["bdist_wheel", "--plat-name", platform, "--bdist-dir", f"{folder}/wheel", "--dist-dir", f"{folder}/dist"]
+        to = ["bdist_wheel", "--plat-name", platform, "--bdist-dir", f"{folder}/wheel"]
+        to = [*(["sdist"] if platform == SOURCE else to), "--dist-dir", f"{folder}/dist"]
         # what zig makes of each platform's C library is kept, Windows' takes a minute
         kept = {f"ZIG_{name}_CACHE_DIR": str(ROOT / "build" / "zig") for name in ("GLOBAL", "LOCAL")}
-        environment = kept | os.environ | {"MBMA_TABLES_TARGET": PLATFORMS[platform][0]}
+        environment = kept | os.environ | {"MBMA_TABLES_TARGET": PLATFORMS.get(platform, ("",))[0]}
         command = [sys.executable, "-W", "ignore", "setup.py", "--quiet", *where, *to]
         subprocess.run(command, cwd=ROOT, env=environment, check=True)
-        (wheel,) = pathlib.Path(folder, "dist").glob("*.whl")
+        (wheel,) = pathlib.Path(folder, "dist").iterdir()
         out.mkdir(parents=True, exist_ok=True)
         return pathlib.Path(shutil.move(wheel, out / wheel.name))
 
 
 @click.command()
-@click.argument("platforms", nargs=-1, type=click.Choice([*PLATFORMS, "all"]), required=True)
+@click.argument("platforms", nargs=-1, type=click.Choice([*PLATFORMS, SOURCE, "all"]), required=True)
 @click.option("--out", type=click.Path(path_type=pathlib.Path, file_okay=False), default=ROOT / "dist", help="Folder.")
 def wheels(platforms: tuple[str, ...], out: pathlib.Path) -> None:
-    """Build wheels and look into them; needs the extra "wheels"."""
-    for platform in PLATFORMS if "all" in platforms else platforms:
+    """Build wheels and the source distribution, and look into them; needs the extra "wheels"."""
+    for platform in [*PLATFORMS, SOURCE] if "all" in platforms else platforms:
         wheel = build(platform, out)
         click.echo(f"{wheel} {wheel.stat().st_size / 1e6:.2f} MB")
         if found := list(faults(wheel, platform)):

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from mbma_tables.totals.island import Island as Island
     from mbma_tables.totals.island import island as island
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {

@@ -20,7 +20,7 @@ FILE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "boundary_elements.
 
 def read_groups(path: pathlib.Path) -> dict[str, Any]:
     """The groups of a file with a checksum as `xarray.Dataset`, its root as "/"."""
-    xarray = needed("xarray", "xarray")
+    xarray = needed("xarray")
     read_sealed(path)
     with HDF5_LOCK:
         with netCDF4.Dataset(path) as opened:
@@ -64,5 +64,5 @@ def boundary_elements(path: os.PathLike[str] | str | None = None) -> xr.DataTree
             f"{source} does not exist: wheels do not contain the BEM data set; "
             "give the path of docs/data/boundary_elements.nc in a clone or the source distribution of mbma_tables"
         )
-    tree: xr.DataTree = needed("xarray", "xarray").DataTree.from_dict(read_groups(source))
+    tree: xr.DataTree = needed("xarray").DataTree.from_dict(read_groups(source))
     return tree

@@ -176,9 +176,9 @@ class Joint(Displayed):
     def _law(self) -> ContactLaw:
         return contact_law(self.surface, **self._asked)
 
-    def sensitivity(self, pressure: float | str, ranges: Mapping[str, tuple[Any, Any]] | None = None) -> Sensitivity:
+    def sensitivity(self, pressure: float | str) -> Sensitivity:
         """Sensitivity to each parameter of the joint at a pressure, from `sensitivity`."""
-        return sensitivity(self.surface, pressure=pressure, ranges=ranges, **self._asked)
+        return sensitivity(self.surface, pressure=pressure, **self._asked)
 
     def export(
         self,
@@ -251,7 +251,7 @@ class Joint(Displayed):
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""
-        needed("xarray", "xarray")
+        needed("xarray")
         import xarray as xr
 
         held = self.quantities(self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist()))

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import warnings
@@ -13,6 +14,15 @@ from click.testing import CliRunner
 from mbma_tables import InputError
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))  # multiplies the counts of random tests
+
+
+NUMBER = re.compile(r"-?\d+\.?\d*(?:e[+-]?\d+)?")
+
+
+def assert_same_output(output, shown, rtol=1e-3):
+    """The same words, and numbers that agree; spaces do not count."""
+    assert NUMBER.sub("#", " ".join(output.split())) == NUMBER.sub("#", " ".join(shown.split()))
+    np.testing.assert_allclose(*(np.array(NUMBER.findall(text), float) for text in (output, shown)), rtol=rtol)
 
 
 def difference_weights(offsets):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import refusals
 
-from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, open_table, sensitivity
+from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, sensitivity
 from mbma_tables.common.plots import Curve, draw_compression, to_picture
 from mbma_tables.export.law_rows import describe_law
 
@@ -25,8 +25,6 @@ DISPLAYED = (
     lambda: contact_law(ROAD, E_star="13.3 MPa"),
     lambda: contact_law(ROAD, theory="calibrated"),
     lambda: describe_law(ROAD, "13.3 MPa", rows=20),
-    lambda: open_table("universal"),
-    lambda: open_table("island4d"),
 )
 
 

@@ -13,32 +13,40 @@ import tomllib
 import click
 import netCDF4
 import pytest
+from helpers import assert_same_output
 
 import mbma_tables
 from generate.files import ROOT
-from generate.pages import introduction
-from generate.pages import tables as table_page
-from generate.pages.architecture import rooms
-from generate.pages.page import MARKED, fill, svg
+from generate.page import MARKED, fill, printed, svg
+from generate.pages import library
 from mbma_tables.models.tables import shipped
 from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS
 
 PATHS = [*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")]
 PAGES = {str(path.relative_to(ROOT)).removeprefix("docs/"): path.read_text(encoding="utf-8") for path in PATHS}
-BLOCKS = {name: re.findall(r"```(?:python|\{code-cell\})\n(.*?)```", text, re.DOTALL) for name, text in PAGES.items()}
+# code with the output below it, if shown; commands after "$" with theirs
+FENCE = re.compile(r"^```(python|\{code-cell\}|console)\n(.*?)^```\n(?:```text\n(.*?)^```)?", re.DOTALL | re.MULTILINE)
+BLOCKS = {name: blocks for name, text in PAGES.items() if (blocks := FENCE.findall(MARKED.sub("", text)))}
 MODULES = [m.name for m in pkgutil.walk_packages(mbma_tables.__path__, "mbma_tables.") if "__main__" not in m.name]
 README, TABLES = PAGES["README.md"], PAGES["tables.md"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", [name for name, blocks in BLOCKS.items() if blocks])
-def test_code_of_a_page_runs(page, monkeypatch):
-    pytest.importorskip("dask")
-    pytest.importorskip("tamaas")
+@pytest.mark.parametrize(
+    "page", [pytest.param(name, marks=[] if name == "README.md" else pytest.mark.slow) for name in sorted(BLOCKS)]
+)
+def test_a_page_runs_and_prints_what_it_shows(page, monkeypatch, capsys):
+    for package in ("dask", "tamaas", "SurfaceTopography"):
+        pytest.importorskip(package)
     monkeypatch.chdir(ROOT)
     names = {"__name__": "__main__"}
-    for block in BLOCKS[page]:
+    for kind, block, shown in BLOCKS[page]:
+        if kind == "console":
+            assert_same_output(printed(block.splitlines()[0][2:]), f"```\n{block}```")
+            continue
         exec(block, names)
+        output = capsys.readouterr().out
+        if shown:
+            assert_same_output(output, shown)
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -56,11 +64,33 @@ def test_readme_quotes_the_audit():
     assert f"compared {sum(int(row.replace(',', '')) for row in rows):,} answers" in (ROOT / "README.md").read_text()
 
 
+def test_every_place_has_the_same_version():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    latest = re.search(r"^## (\S+) \((\S+)\)$", PAGES["CHANGELOG.md"], re.M)
+    assert settings["project"]["version"] == mbma_tables.__version__ == latest[1]
+    assert f"version: {latest[1]}\ndate-released: {latest[2]}\n" in citation
+
+
 def test_public_names_and_first_pages_have_examples():
     finder = doctest.DocTestFinder()
     public = ("Surface", "contact", "contact_law", "island", "open_table", "Scene", "height_integral")
     assert [n for n in public if not any(test.examples for test in finder.find(getattr(mbma_tables, n), n))] == []
-    assert {"README.md", "lookup.md", "scenes.md"} <= {name for name, blocks in BLOCKS.items() if blocks}
+    assert {"README.md", "lookup.md", "scenes.md"} <= set(BLOCKS)
+
+
+def test_links_and_figures_of_pages_exist():
+    def anchors(page):
+        return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in re.findall(r"^#+ (.*)", page, re.M)}
+
+    links = 0
+    for path in PATHS:
+        for target in re.findall(r"\]\((?!https?:)([^)\s]*)\)", path.read_text(encoding="utf-8")):
+            file, _, anchor = target.partition("#")
+            found, links = (path.parent / file).resolve() if file else path, links + 1
+            assert found.exists(), f"{path.name}: {target}"
+            assert not anchor or anchor in anchors(found.read_text(encoding="utf-8")), f"{path.name}: {target}"
+    assert links > 100
 
 
 def test_every_named_test_exists():
@@ -86,7 +116,7 @@ def test_every_module_of_the_architecture_exists():
 def test_layers_of_the_picture_are_those_of_the_import_contract():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     layers = {name for layer in settings["contracts"][0]["layers"] for name in layer.split(" : ")}
-    assert {*rooms()[0], "__main__"} == layers
+    assert {*library.rooms()[0], "__main__"} == layers
 
 
 NUMBER = r"(?:[BCD]\.)?\d+[ab]?"
@@ -121,7 +151,7 @@ def test_every_cited_equation_is_on_the_page_of_the_model_once(package):
 
 
 def test_measured_parts_are_what_the_table_files_hold():
-    assert fill(TABLES, table_page.measure()[0]) == TABLES, "python -m generate pages tables"
+    assert fill(TABLES, library.tables()[0]) == TABLES, "python -m generate pages tables"
 
 
 def test_marks_that_do_not_fit_are_refused():
@@ -146,25 +176,25 @@ def test_page_of_tables_names_what_files_hold():
 
 
 def test_readme_is_short_and_begins_with_results():
-    assert len(README.splitlines()) <= 90
+    assert len(README.splitlines()) <= 100
     first = README.index("print(")
     assert all(README.index(word) > first for word in ("island_model", "variant"))
     assert len(BLOCKS["README.md"]) == 3
+    assert all(shown for *_, shown in BLOCKS["README.md"])
 
 
 def test_measured_parts_of_the_readme_are_the_generators():
-    parts, files = introduction.readme()
+    parts, files = library.readme()
     assert {match[2]: match[0] for match in MARKED.finditer(README)} == {
         name: f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->" for name, part in parts.items()
     }
     for name, figure in files.items():
         assert (ROOT / name).read_bytes()[:5] == svg(figure)[:5] == b"<?xml"
-    assert fill(PAGES["formula.md"], introduction.formula()[0]) == PAGES["formula.md"]
+    assert fill(PAGES["formula.md"], library.formula()[0]) == PAGES["formula.md"]
 
 
-@pytest.mark.parametrize("page", ["README.md", "formula.md"])
-def test_pocket_laws_are_printed_as_they_are_computed(page):
-    pocket = PAGES[page][PAGES[page].index("    t = p/(E* g)/") :]
+def test_pocket_laws_are_printed_as_they_are_computed():
+    pocket = PAGES["formula.md"][PAGES["formula.md"].index("    t = p/(E* g)/") :]
     names = {name: getattr(math, name) for name in ("log", "erf", "exp", "sqrt")}
     names |= {"p": 0.04, "alpha": 30.0, "nu": 0.6, "x": 1.3}
     for line in pocket.splitlines()[:4]:
@@ -174,5 +204,5 @@ def test_pocket_laws_are_printed_as_they_are_computed(page):
         text = re.sub(r"([\d.]) (log|x|\()", r"\1*\2", text).replace("p/1 sqrt", "p*sqrt")
         names[name] = eval(text, {}, names)
         if name == "A/A0":
-            assert abs(names[name] / float(introduction.pocket_area(0.04, 30.0)) - 1) < 1e-12
-    assert abs(names["p"] / float(introduction.pocket_pressure(1.3, 0.6)) - 1) < 1e-12
+            assert abs(names[name] / float(library.pocket_area(0.04, 30.0)) - 1) < 1e-12
+    assert abs(names["p"] / float(library.pocket_pressure(1.3, 0.6)) - 1) < 1e-12

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers import assert_same_output
 from test_examples import load
 
 from mbma_tables import contact
@@ -20,18 +21,13 @@ def worked(name):
     return load(name)
 
 
-def numbers(text):
-    return np.array(re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", text), float)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_prints_what_its_page_shows(name, tmp_path):
     module = worked(name)
     ran = CliRunner().invoke(module.command, ["--out", str(tmp_path / "own.svg")], catch_exceptions=False)
     shown = re.search(rf"`python examples/{name}\.py`.*?\n\n((?:    [^\n]*\n)+)", PAGE, re.S)[1]
-    assert len(ran.output.splitlines()) == len(shown.splitlines())
-    np.testing.assert_allclose(numbers(ran.output), numbers(shown), rtol=0.02)
+    assert_same_output(ran.output, shown, rtol=0.02)
     assert b"<svg" in (tmp_path / "own.svg").read_bytes()
 
 

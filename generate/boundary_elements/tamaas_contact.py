@@ -1,7 +1,5 @@
 """Boundary elements by Tamaas (the extra `simulate`): the reference of laws, and of the library's own simulation."""
 
-from __future__ import annotations
-
 import os
 import time
 
@@ -24,7 +22,7 @@ class Contact:
 
     def __init__(self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE) -> None:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
-        tamaas = needed("tamaas", "simulate")
+        tamaas = needed("tamaas")
         tamaas.set_log_level(tamaas.LogLevel.error)
         self.surface = np.ascontiguousarray(surface, dtype=float)
         self.model = tamaas.ModelFactory.createModel(

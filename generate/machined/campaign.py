@@ -11,10 +11,10 @@ import click
 import numpy as np
 import xarray as xr
 
-from generate.boundary_elements.collect import TEXTS, attributes
-from generate.boundary_elements.design import Task
+from generate.boundary_elements import run as campaigns
 from generate.boundary_elements.run import run
 from generate.boundary_elements.solve import simulate_to
+from generate.boundary_elements.surfaces import Task
 from generate.calibrated_file import variable, write_part
 from generate.machined.hardness import ETA, WAYS, yielded
 from generate.machined.makers import FAMILIES, Part
@@ -28,31 +28,7 @@ LARGE, SMOOTHEST = (
 )  # points a side of one more of each family, and its number: of the longest shortest wavelength
 EVERY = 3  # part that is pressed with a hardness, too
 FORMS = ("calibrated", "corrected", "simulated")
-MODULES = ("generate.machined.makers", "generate.machined.solve", "generate.boundary_elements.tamaas_contact")
-MEANINGS = {
-    "pressure": "F/(A0 E*)",
-    "area": "A/A0",
-    "mean_separation": "u, the mean gap",
-    "energy": "elastic energy over A0 E*",
-    "stiffness": "-dF/du over A0 E*, by a step of 3% of the pressure",
-    "flow_x": "flow coefficient along the first axis; 0: blocked, NaN: not solved",
-    "flow_y": "flow coefficient along the second axis",
-    "pressure_scatter": "stated standard deviation of ln F at equal u",
-    "area_scatter": "of ln A at equal F",
-    "stiffness_scatter": "of ln of the stiffness at equal F",
-    "flow_scatter": "of ln of the flow coefficient",
-    "valid": "1 where the contact is stated to be like those tested",
-    "flow_valid": "1 where its flow is",
-}
-
-HARD = {
-    "pressure": "F/(A0 E*) of contacts with a hardness eta E* g",
-    "stiffness": "-dF/du over A0 E* of their loading",
-    "area": "A/A0, by way: boundary elements at a tolerance of 1e-6, the theory simulated, the law of hardness on it",
-    "mean_separation": "u, the mean gap",
-    "yielded": "share of the contact area at the hardness",
-    "unloading_stiffness": "-dF/du over A0 E* of the frozen contact",
-}
+TEXTS = campaigns.TEXTS["groups"]["machined"]
 
 
 def parts() -> list[Part]:
@@ -75,38 +51,29 @@ def answers(part: Part, form: str, folder: pathlib.Path) -> dict[str, Any]:
 def gathered(folder: pathlib.Path) -> xr.Dataset:
     """All parts that are solved and answered."""
     have = [p for p in parts() if all((folder / form / f"{p.name}.npz").exists() for form in FORMS)]
-    data = xr.Dataset(coords={"surface": [part.name for part in have], "family": ("surface", [p.family for p in have])})
+    hard = {p.name: dict(np.load(folder / "hardness" / f"{p.name}.npz")) for p in yielding_parts() if p in have}
+    names: dict[str, Any] = {"surface": [part.name for part in have], "family": [part.family for part in have]}
+    names |= {"yielding": [*hard], "eta": list(ETA), "way": list(WAYS)}
+    over = {name: "surface" if name == "family" else name for name in names}
+    data = xr.Dataset(coords={n: variable(over[n], values, TEXTS["names"][n]) for n, values in names.items()})
     engine = ""
     for prefix, place in (("", folder), *((f"{form}_", folder / form) for form in FORMS)):
         read = [dict(np.load(place / f"{part.name}.npz")) for part in have]
         engine = engine or str(read[0]["engine"])
-        for name in (name for name in MEANINGS if name in read[0]):
-            data[prefix + name] = variable(("surface", "load"), np.array([one[name] for one in read]), MEANINGS[name])
-    hard = {p.name: dict(np.load(folder / "hardness" / f"{p.name}.npz")) for p in yielding_parts() if p in have}
-    data = data.assign_coords(yielding=[*hard], eta=list(ETA), way=list(WAYS))
-    for name, meaning in HARD.items():
-        values: Any = np.array([one[f"hard_{name}"] for one in hard.values()])
-        over = ("yielding", "way", "eta", "hard_load") if values.ndim == 4 else ("yielding", "eta", "hard_load")
-        data[f"hard_{name}"] = variable(over, values, meaning)
+        for name in (name for name in TEXTS["columns"] if name in read[0]):
+            values: Any = np.array([one[name] for one in read], "f4")
+            data[prefix + name] = variable(("surface", "load"), values, TEXTS["columns"][name])
+    for name, meaning in TEXTS["hard"].items():
+        values = np.array([one[f"hard_{name}"] for one in hard.values()], "f4")
+        ways = ("way",) if values.ndim == 4 else ()
+        data[f"hard_{name}"] = variable(("yielding", *ways, "eta", "hard_load"), values, meaning)
     surfaces = [surface_of(part)[1] for part in have]
-    for name, (meaning, values) in {
-        "shortest": ("shortest wavelength in sampling steps", [part.shortest for part in have]),
-        "h_rms": ("root mean square height in sampling steps", [float(one.h_rms) for one in surfaces]),
-        "skewness": ("of heights", [one.skewness for one in surfaces]),
-        "kurtosis": ("of heights: 3 if Gaussian", [one.kurtosis for one in surfaces]),
-        "anisotropy": (TEXTS["surface"]["anisotropy"], [one.bearing.anisotropy for one in surfaces]),
-        "slope_kurtosis": (TEXTS["surface"]["slope_kurtosis"], [one.bearing.slope_kurtosis for one in surfaces]),
-    }.items():
-        data[name] = variable("surface", values, meaning)
-    data.attrs = attributes(
-        "Maps of machined surfaces pressed flat by boundary elements, and what theories answer",
-        f"{engine}, tolerance 1e-6; periodic, frictionless; flow by Reynolds' equation on the gaps",
-        "machined",
-        MODULES,
-        comment="Lengths in sampling steps, rms gradient 0.1. generate.machined.makers.heights makes the maps anew. "
-        f"Names with {' or '.join(FORMS)} in front are answers of these theories.",
-    )
-    return data
+    known = {name: [getattr(one, name) for one in surfaces] for name in ("h_rms", "skewness", "kurtosis")}
+    known |= {name: [getattr(one.bearing, name) for one in surfaces] for name in ("anisotropy", "slope_kurtosis")}
+    known["shortest"] = [part.shortest for part in have]
+    for name, meaning in TEXTS["surface"].items():
+        data[name] = variable("surface", np.array(known[name], float), meaning)
+    return data.assign_attrs(campaigns.attributes(TEXTS, {"engine": engine}))
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -119,13 +86,13 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     Stopped and called again, it goes on where it was. Answers of theories are kept in folders of their own: remove
     these to ask a changed library again.
     """
-    from generate.tables.commands import executor
+    from generate.workers import executor
 
     tasks: list[Any] = [Task(cast(Any, part), "") for part in parts()]
     solvers: dict[str, Callable[[Part], dict[str, Any]]] = {"": solved}
     solvers |= {form: functools.partial(answers, form=form, folder=folder) for form in FORMS}
     hard: list[Any] = [Task(cast(Any, part), "") for part in yielding_parts()]
-    with executor(workers, None) as pool:
+    with executor(workers) as pool:
         run(hard, folder / "hardness", pool, functools.partial(simulate_to, solve=cast(Any, yielded)))
         for form, solve in solvers.items():
             run(tasks, folder / form, pool, functools.partial(simulate_to, solve=cast(Any, solve)))

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import click
 import numpy as np
-import xarray as xr
 from scipy.optimize import least_squares
 
-from generate.boundary_elements.collect import attributes
+from generate.boundary_elements.run import of_contacts
 from generate.boundary_elements.tamaas_contact import Contact
-from generate.calibrated_file import variable, write_part
+from generate.calibrated_file import write_part
 from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
@@ -26,18 +25,6 @@ from mbma_tables.laws.lay import CONSTANTS, stress_shares
 POINTS, SHORTEST, LONGEST = 256, 8.0, 64.0
 LOADS = (0.008, 0.02, 0.05, 0.11, 0.2)  # F/(A0 E* g): 2% to 40% contact
 NUS = (0.3, 0.5)
-COLUMNS = {
-    "lay": "factor by which the recipe stretches the map along its first axis",
-    "hurst": "Hurst exponent",
-    "seed": "of numpy.random.default_rng, which draws the phases",
-    "force": "F/(A0 E* g), g the rms gradient in two dimensions",
-    "fitted": "1 where the constants of mbma_tables.laws.lay were fitted, 0 where they were tested",
-    "anisotropy": "root of the ratio of the gradient tensor's eigenvalues",
-    "area": "A/A0",
-    "nu": "Poisson's ratio of both bodies",
-    "ratio_along": "tangential stiffness along the lay over the normal one of the same contact area",
-    "ratio_across": "tangential stiffness across the lay over the normal one",
-}
 SETS = {
     "fitted": [(lay, hurst, seed) for lay in (1.0, 2.0, 4.0, 8.0) for hurst in (0.5, 0.8) for seed in (1, 2)],
     "held out": [(lay, hurst, 10 + n) for n, lay in enumerate((1.0, 1.5, 3.0, 6.0, 8.0)) for hurst in (0.4, 0.65, 0.9)],
@@ -113,23 +100,12 @@ def errors(constants: FloatArray, known: FloatArray) -> FloatArray:
     return np.concatenate(both)
 
 
-def data_of(known: dict[str, FloatArray]) -> xr.Dataset:
-    """The group of all sets."""
-    recipes = [(*one, load, kind == "fitted") for kind in SETS for one in SETS[kind] for load in LOADS for _ in NUS]
-    anisotropy, area, nu, *shares = np.concatenate(list(known.values()), axis=1)
-    ratios = [(1 - nu) / (1 - nu * c) for c in shares]
-    columns = [*np.transpose(recipes), anisotropy, area, nu, *ratios]
-    data = xr.Dataset({n: variable("contact", v, m) for (n, m), v in zip(COLUMNS.items(), columns, strict=True)})
-    title = "Tangential over normal stiffness of stuck contacts of random surfaces with a lay"
-    source = "Contact area by Tamaas, tolerance 1e-5; stiffness of that area by conjugate gradients; periodic"
-    modules = ("generate.machined.tangential", "generate.machined.makers")
-    data.attrs = attributes(title, source, "tangential", modules)
-    return data
-
-
 if __name__ == "__main__":
     known = {kind: rows(kind) for kind in SETS}
-    write_part(FILE, data_of(known), "tangential")
+    recipes = [(*one, load, kind == "fitted") for kind in SETS for one in SETS[kind] for load in LOADS for _ in NUS]
+    anisotropy, area, nu, *stresses = np.concatenate([*known.values()], axis=1)
+    columns = [*np.transpose(recipes), anisotropy, area, nu, *((1 - nu) / (1 - nu * c) for c in stresses)]
+    write_part(FILE, of_contacts("tangential", columns), "tangential")
     fitted = least_squares(errors, CONSTANTS, args=(known["fitted"],)).x
     click.echo(f"constants {' '.join(f'{value:.3f}' for value in fitted)}; kept {CONSTANTS}")
     for kind, each in known.items():

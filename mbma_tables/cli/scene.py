@@ -31,7 +31,7 @@ def plan_command(file: Path, as_json: bool) -> None:
 
     Example: mbma plan examples/scene_joint.toml
     """
-    from mbma_tables.scenes.scene import Scene, advice
+    from mbma_tables.scenes.scene import Scene
 
     scene = Scene.from_toml(file)
     if not as_json:
@@ -39,7 +39,7 @@ def plan_command(file: Path, as_json: bool) -> None:
         return
     plan = scene.plan()
     content = {name: getattr(plan, name) for name in ("rtol", "error", "seconds", "left_out", "switched_off")}
-    content |= {"first_use_seconds": plan.first_use, "advice": advice(scene).strip()}
+    content |= {"first_use_seconds": plan.first_use}
     steps = [vars(step) | {"island_model": step.island_model_name} for step in plan.steps]
     echo(to_json(content | {"steps": steps}))
 

@@ -92,12 +92,13 @@ def require_flag(name: str, value: Any) -> None:
         raise InputError(f"{name} must be True or False, got {value!r}")
 
 
-def needed(module: str, extra: str) -> Any:
-    """A module of an extra; if it is missing, the error has the command that installs it."""
+def needed(module: str) -> Any:
+    """A module of another package; if it is missing, the error has the command that installs it."""
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise MbmaError(f"this needs {module.partition('.')[0]}: pip install 'mbma_tables[{extra}]'") from None
+        package = module.partition(".")[0]
+        raise MbmaError(f"this needs {package}: pip install {package}") from None
 
 
 def is_labelled(value: Any) -> bool:

@@ -126,7 +126,7 @@ class Displayed:
 
     def to_dataset(self) -> xr.Dataset:
         """Its quantities as an xarray Dataset, each with unit and description."""
-        needed("xarray", "xarray")
+        needed("xarray")
         import xarray as xr
 
         variables = {}

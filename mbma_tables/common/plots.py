@@ -72,7 +72,7 @@ class Curve:
 
 def new_figure(width: float, height: float) -> Figure:
     """A figure [inches] that is independent of pyplot and that notebooks show."""
-    figure: Any = needed("matplotlib.figure", "plot").Figure(figsize=(width, height), layout="constrained")
+    figure: Any = needed("matplotlib.figure").Figure(figsize=(width, height), layout="constrained")
     figure._repr_png_ = lambda: to_picture(figure, dpi=72)
     made: Figure = figure
     return made

@@ -118,8 +118,7 @@ def web_assembly(c_texts: dict[str, str], names: Iterable[str], *options: str) -
     """C sources compiled to WebAssembly, with the functions and variables that it exports."""
     if importlib.util.find_spec("ziglang") is None:
         raise InputError(
-            "javascript is compiled from C by the package ziglang, which is not installed: "
-            "pip install 'mbma_tables[javascript]'"
+            "javascript is compiled from C by the package ziglang, which is not installed: pip install ziglang"
         )
     exports = [f"-Wl,--export={name}" for name in names]
     return built_by([sys.executable, *ZIG, *options, *exports], c_texts, "mbma.wasm")

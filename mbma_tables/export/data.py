@@ -100,7 +100,7 @@ def to_netcdf(law: LawTable) -> bytes:
 
 def to_hdf5(law: LawTable) -> bytes:
     """A plain HDF5 file: two datasets with units, the header as attributes."""
-    h5py = needed("h5py", "hdf5")
+    h5py = needed("h5py")
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, (values, unit) in law.columns.items():
@@ -114,7 +114,7 @@ def to_hdf5(law: LawTable) -> bytes:
 
 def to_parquet(law: LawTable) -> bytes:
     """A Parquet file: two columns, the header as metadata of the schema."""
-    pyarrow, parquet = (needed(module, "parquet") for module in ("pyarrow", "pyarrow.parquet"))
+    pyarrow, parquet = (needed(module) for module in ("pyarrow", "pyarrow.parquet"))
     table = pyarrow.table({name: values for name, (values, _) in law.columns.items()})
     table = table.replace_schema_metadata({name: json.dumps(value) for name, value in _header(law).items()})
     stream = io.BytesIO()

@@ -99,7 +99,7 @@ def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
         raise InputError(f"binaries must be one of {('here', 'all', 'none')}, got {asked!r}")
     zig, system = importlib.util.find_spec("ziglang"), f"{platform.machine()} {sys.platform}".lower()
     if asked == "all" and zig is None:
-        raise InputError("binaries for all platforms are compiled by ziglang: pip install 'mbma_tables[javascript]'")
+        raise InputError("binaries for all platforms are compiled by ziglang: pip install ziglang")
     here = {"x86_64 linux": "linux64", "x86_64 darwin": "darwin64", "amd64 win32": "win64"}.get(system)
     found = {}
     for target, (folder, end) in PLATFORMS.items():

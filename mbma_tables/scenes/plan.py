@@ -1,9 +1,9 @@
 """The plan of a scene: steps from effects and tolerance.
 
 The plan depends on the scene only: the island model is the universal table where its certificate suffices, else the
-exact solver, and many gaps are evaluated by a contact law. The tolerance is divided as follows. A step whose results
-amplify the error of force and area by a factor (`AMPLIFICATION`) has the tolerance over that factor; one half of it is
-for the islands, the other for the quadrature or the polynomials of a law.
+exact solver, and many gaps of other theories are evaluated by a contact law. A step whose results amplify the error of
+force and area by a factor (`AMPLIFICATION`) has the tolerance over that factor; one half of it is for the islands, the
+other for the quadrature.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ import numpy as np
 from mbma_tables.common.errors import InputError
 from mbma_tables.models import AnyModel
 from mbma_tables.scenes.costs import Costs, shipped_costs
-from mbma_tables.scenes.problem import INVERTED, OF_LAW, OUTPUTS, REFINEMENTS, Problem
+from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, OUTPUTS, REFINEMENTS, Problem
 
-ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature or law
-# inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
-# p(r) at a point converges later than its integrals
-AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
-# gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: profiles of
-# islands answer a further gap in half a microsecond
-MIN_LAW_GAPS, MIN_LAW_GAPS_OF_OTHERS = 4000, 150  # of MBMA, and of other theories
-MIN_THEORY_LAW_RTOL = 1e-9
+TABLES = ("universal", "island4d")  # island models that are tables
+ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
+# gaps found from pressures add their error to that of the values; the elastic errors of force and of area at that force
+# add up where points yield; p(r) at a point converges later than its integrals
+AMPLIFICATION = {"inverse": 2.0, "slopes": 2.0, "yield": 2.0, "profile": 10.0}
+MIN_ENERGY_RTOL = 2e-9  # of an integral to 1e-9
+MIN_LAW_GAPS, MIN_LAW_RTOL = 150, 1e-9  # gaps from which a law pays where costs were not measured
+# of MBMA, over the fixed piece of work: once and for each gap, besides the totals
+OF_MBMA = {"inverse": (2.1, 3e-3), "slopes": (0.3, 5e-4), "energy": (7.0, 0.28)}
 YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # over an elastic call, and over one of many elastic gaps (docs/yield.md)
 LAST = 0.95  # largest share of h_max at which the error of a theory is looked up
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
@@ -45,7 +46,7 @@ class Step:
     count: int  # gaps, islands or points evaluated
     error: float  # certified beforehand; NaN if known from the results only
     seconds: float  # by the measured costs, without first use; NaN where nothing was measured
-    theory: str | None = None  # name of the scene's theory if it is not MBMA, in steps that use it
+    theory: str | None = None  # name of the scene's theory, in steps that use it
 
     @property
     def island_model_name(self) -> str | None:
@@ -80,7 +81,7 @@ class Plan:
         times = f"time={duration(self.seconds)}, first use in a process {duration(self.first_use)} more"
         lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})", f"  theory: {self.theory}"]
         for step in self.steps:
-            source = step.theory or step.island_model_name
+            source = step.island_model_name or step.theory
             by = "" if source is None else f" by {source}"
             asked = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
             numbers = f"(count={step.count}{asked}, {_bound(step.error)}, time={duration(step.seconds)})"
@@ -114,7 +115,7 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
         try:
             plan = _Planner(problem, rtol, measured).plan()
         except InputError:
-            continue  # too tight for a law
+            continue  # too tight for the energy
         if plan.error > rtol:
             continue  # too tight for the theory
         if math.isnan(plan.seconds):
@@ -125,12 +126,6 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
             return plan
         least = plan.seconds
     raise InputError(f"seconds = {problem.seconds:g} is too little: the cheapest plan takes about {least:.3g} s")
-
-
-def seconds_by_theory(costs: Costs, theory: str, count: int, inverse: bool, energy: bool = False) -> float:
-    """Seconds of a theory other than MBMA without a law, by mean separation, pressure or area."""
-    each = costs.of(theory, "invert" if inverse else "gap") + (costs.of(theory, "energy") if energy else 0.0)
-    return costs.of(theory, "call") + count * each
 
 
 def certified_error(island_model: str | AnyModel, asked: float) -> float:
@@ -156,6 +151,35 @@ class _Planner:
     def count(self) -> int:
         return 0 if self.problem.gaps is None else int(self.problem.gaps.size)
 
+    def plan(self) -> Plan:
+        problem, outputs, dropped = self.problem, self.problem.outputs, self.problem.dropped
+        hertz = "area" in outputs and "subscale_area" in dropped
+        wanted = [name for name in OF_CONTACT if name in outputs and not (name == "area" and hertz)]
+        if problem.prescribed in INVERTED:
+            wanted.append(f"{problem.prescribed} prescribed")
+        steps = [self.contact(wanted)] if wanted else []
+        if hertz:
+            what = "adaptive sum over islands with eta = 1, the Hertz area"
+            steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
+        if "island_statistics" in outputs:
+            what = f"number of islands at {self.count} gaps, {problem.points} islands of the distribution (Eq. 42)"
+            steps.append(self.summed("island statistics", "island_statistics", what, "rigid"))
+        if "pressure_profile" in outputs:
+            islands, asked = int(np.size(problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
+            what, seconds = "the island problem solved with p(r) and d(r)", self.costs.of("exact", "profile", asked)
+            steps.append(Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, islands * seconds))
+        for name in problem.theories:
+            closed = name == "greenwood_williamson"
+            error, seconds = 1e-14 if closed else 1e-9, self.costs.of(name if closed else "persson", "gap")
+            what = "another theory at the same gaps"
+            steps.append(Step(name, "comparison", what, None, None, self.count, error, self.count * seconds))
+        left_out = tuple(name for name in OUTPUTS if name not in outputs)
+        switched_off = tuple(name for name in REFINEMENTS if name in dropped)
+        island_models = {step.island_model for step in steps if isinstance(step.island_model, str)}
+        first_use = max((self.costs.of(island_model, "import") for island_model in island_models), default=0.0)
+        overhead = self.costs.of("scene", "call")
+        return Plan(tuple(steps), left_out, switched_off, self.rtol, overhead, first_use, problem.theory_name)
+
     def island_model(self, tolerance: float) -> str | AnyModel:
         """The island model for a step with that tolerance."""
         if self.problem.island_model is not None:
@@ -165,148 +189,59 @@ class _Planner:
         share = ISLAND_SHARE * tolerance
         return "universal" if certified_error("universal", share) <= share else "exact"
 
-    def plan(self) -> Plan:
-        outputs, dropped = self.problem.outputs, self.problem.dropped
-        hertz = "area" in outputs and "subscale_area" in dropped
-        totals = [name for name in ("pressure", "area") if name in outputs and not (name == "area" and hertz)]
-        of_law = sorted(outputs & set(OF_LAW))
-        if self.problem.prescribed in INVERTED:
-            of_law.append(f"{self.problem.prescribed} prescribed")
-        steps = []
-        if "yield" in outputs:
-            steps.append(self.yielding([*totals, *of_law, "yield"]))
-        elif self.problem.theory != "mbma":
-            if of_law or totals:
-                steps.append(self.by_theory([*totals, *of_law]))
-        elif of_law:
-            steps.append(self.law(of_law))
-        elif totals:
-            what = f"sum over islands at {self.count} gaps (Eqs. 48, 49)"
-            steps.append(self.law(totals) if self.many_gaps() else self.summed("totals", ", ".join(totals), what, None))
-        if hertz:
-            what = "adaptive sum over islands with eta = 1, the Hertz area"
-            steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
-        if "island_statistics" in outputs:
-            what = f"number of islands at {self.count} gaps, {self.problem.points} islands of the distribution (Eq. 42)"
-            steps.append(self.summed("island statistics", "island_statistics", what, "rigid"))
-        if "pressure_profile" in outputs:
-            steps.append(self.profiles())
-        followed = {
-            "validity": f"validity and scatter of the theory at {self.count} gaps",
-            "leakage": f"flow through the gaps of contacts at {self.count} gaps",
+    def contact(self, why: Sequence[str]) -> Step:
+        """One contact at all gaps; of theories other than MBMA a law, if force and area suffice and it costs less."""
+        outputs, theory = self.problem.outputs, self.problem.theory_name
+        parts = {
+            "inverse": self.problem.prescribed in INVERTED,
+            "slopes": bool(outputs & {"stiffness", "conductance"}),
+            "energy": "energy" in outputs,
+            "yield": "yield" in outputs,
         }
-        steps += [
-            Step(name, name, what, None, None, self.count, 0.0, self.seconds_of_slopes())
-            for name, what in followed.items()
-            if name in outputs
-        ]
-        steps += [self.other_theory(name) for name in self.problem.theories]
-        theory = self.problem.theory_name
-        left_out = tuple(name for name in OUTPUTS if name not in outputs)
-        switched_off = tuple(name for name in REFINEMENTS if name in dropped)
-        island_models = {step.island_model for step in steps if isinstance(step.island_model, str)}
-        first_use = max((self.costs.of(island_model, "import") for island_model in island_models), default=0.0)
-        return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use, theory)
+        factor = math.prod(by for part, by in AMPLIFICATION.items() if parts.get(part))
+        what = f"pressure, area and derived quantities at {self.count} gaps"
+        if self.problem.theory == "mbma":
+            if parts["energy"] and self.rtol < MIN_ENERGY_RTOL:
+                raise InputError(f"rtol = {self.rtol:g} is too tight for energy: {MIN_ENERGY_RTOL:.0e} at best")
+            step = self.summed("contact", ", ".join(why), f"sum over islands (Eqs. 48, 49): {what}", None, factor)
+            more = [self.costs.seconds * (a + b * self.count) for part, (a, b) in OF_MBMA.items() if parts[part]]
+            seconds = math.nan if parts["yield"] else step.seconds + sum(more)
+            return dataclasses.replace(step, seconds=seconds, theory=theory)
+        name, asked, error = "contact", None, factor * self.own_error() if parts["yield"] else self.own_error()
+        call, each = (self.costs.of(theory, of) for of in ("call", "invert" if parts["inverse"] else "gap"))
+        each += self.costs.of(theory, "energy") if parts["energy"] else 0.0
+        weights = (YIELDING_CALL, YIELDING_GAP) if parts["yield"] else (1.0, 1.0)
+        seconds = weights[0] * call + weights[1] * self.count * each
+        if outputs & set(OF_CONTACT) <= {"pressure", "area"}:
+            rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL)
+            found = self.costs.of("law", "lookup") + (self.costs.of("law", "invert") if parts["inverse"] else 0.0)
+            by_law = self.costs.of(theory, "law", rtol) + self.count * found
+            if self.count >= MIN_LAW_GAPS if math.isnan(seconds) else by_law < seconds:
+                name, asked, error, seconds = "law", rtol, factor * (rtol + error), by_law
+        return Step(name, ", ".join(why), what, None, asked, self.count, error, seconds, theory)
 
-    def many_gaps(self) -> bool:
-        """Whether totals at the prescribed gaps cost more than a law, if one can be made."""
-        if self.count < MIN_LAW_GAPS or "finite_height" in self.problem.dropped:
-            return False
-        from mbma_tables.law.make import MIN_LAW_RTOL
-
-        return (1 - ISLAND_SHARE) * self.rtol >= MIN_LAW_RTOL
-
-    def law(self, why: Sequence[str]) -> Step:
-        from mbma_tables.law.make import MIN_LAW_RTOL
-
-        inverse = self.problem.prescribed in INVERTED
-        slopes = self.problem.outputs & {"stiffness", "conductance"}
-        factor = AMPLIFICATION["slopes"] if slopes else AMPLIFICATION["inverse"] if inverse else 1.0
-        tolerance = self.rtol / factor
-        asked = (1 - ISLAND_SHARE) * tolerance
-        if asked < MIN_LAW_RTOL:
-            best = factor * MIN_LAW_RTOL / (1 - ISLAND_SHARE)
-            raise InputError(f"rtol = {self.rtol:g} is too tight for {', '.join(why)}: a law meets {best:.0e} at best")
-        island_model = self.island_model(tolerance)
-        seconds = self.costs.of(_name(island_model), "law", asked) + self.seconds_of_law(inverse)
-        error = factor * (asked + certified_error(island_model, asked))
-        what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
-        return Step("law", ", ".join(why), what, island_model, asked, self.count, error, seconds)
-
-    def summed(self, name: str, why: str, what: str, priced_as: str | None) -> Step:
+    def summed(self, name: str, why: str, what: str, priced_as: str | None, factor: float = 1.0) -> Step:
         """A sum over islands at every gap; `priced_as` is an island model whose totals cost about the same."""
-        island_model = self.island_model(self.rtol)
-        asked = (1 - ISLAND_SHARE) * self.rtol
+        tolerance = self.rtol / factor
+        island_model, asked = self.island_model(tolerance), (1 - ISLAND_SHARE) * tolerance
         priced = priced_as or _name(island_model)
         # its islands are answered once, as for a law
         seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked)
         seconds = min(seconds, self.costs.of(priced, "law", asked))
-        error = asked + certified_error(island_model, asked)
+        error = factor * (asked + certified_error(island_model, asked))
         return Step(name, why, what, island_model, asked, self.count, error, seconds)
-
-    def profiles(self) -> Step:
-        islands, asked = int(np.size(self.problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
-        seconds = islands * self.costs.of("exact", "profile", asked)
-        what = "the island problem solved with p(r) and d(r)"
-        return Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, seconds)
-
-    def by_theory(self, why: Sequence[str]) -> Step:
-        """Results of another theory: computed directly, or by its law if that costs less and force and area suffice."""
-        outputs, theory = self.problem.outputs, self.problem.theory_name
-        inverse = self.problem.prescribed in INVERTED
-        rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
-        direct = seconds_by_theory(self.costs, theory, self.count, inverse, "energy" in outputs)
-        by_law = self.costs.of(theory, "law", rtol) + self.seconds_of_law(inverse)
-        pays = self.count >= MIN_LAW_GAPS_OF_OTHERS if math.isnan(direct) else by_law < direct
-        own = self.own_error()
-        name, asked, error, seconds = "contact", None, own, direct
-        if pays and not outputs & set(OF_LAW):
-            name, asked, seconds = "law", rtol, by_law
-            error = (AMPLIFICATION["inverse"] if inverse else 1.0) * (rtol + own)
-        what = f"pressure, area and derived quantities at {self.count} gaps"
-        return Step(name, ", ".join(why), what, None, asked, self.count, error, seconds, theory=theory)
-
-    def yielding(self, why: Sequence[str]) -> Step:
-        """A theory's elastic results, corrected for a hardness."""
-        theory, inverse = self.problem.theory_name, self.problem.prescribed in INVERTED
-        mbma = self.problem.theory == "mbma"
-        call = self.costs.of(theory, "call")
-        each = seconds_by_theory(self.costs, theory, self.count, inverse) - call
-        seconds = math.nan if mbma else YIELDING_CALL * call + YIELDING_GAP * each
-        # the elastic errors of force and of area at that force may add up
-        island_model, asked = (self.island_model(self.rtol / 2), ISLAND_SHARE * self.rtol / 2) if mbma else (None, None)
-        error = 2 * (asked + certified_error(island_model, asked) if island_model and asked else self.own_error())
-        what = f"pressure, area and yielded share at {self.count} gaps"
-        return Step("contact", ", ".join(why), what, island_model, asked, self.count, error, seconds, theory=theory)
 
     def own_error(self) -> float:
         """Bound of the scene's theory on its numerical error."""
         from mbma_tables.theories import get_theory
 
-        surface = self.problem.surface
-        h_max, gaps = float(surface.h_max), self.problem.gaps
-        known = gaps is not None and self.problem.prescribed not in INVERTED
-        # the farther from the mid-plane, the larger
-        farthest = np.max(gaps if self.problem.prescribed == "mean_separations" else (h_max + gaps) / 2) if known else 0
+        surface, gaps = self.problem.surface, self.problem.gaps
+        h_max, farthest = float(surface.h_max), 0.0
+        if self.problem.prescribed not in INVERTED:
+            # the farther from the mid-plane, the larger
+            farthest = np.max(gaps if self.problem.prescribed == "mean_separations" else (h_max + gaps) / 2)
         u = min(max(farthest, 0.5 * h_max), LAST * h_max)
         return float(get_theory(self.problem.theory, surface).answer(surface, np.asarray(u)).error)
-
-    def seconds_of_law(self, inverse: bool) -> float:
-        """Seconds of a law's evaluations at the gaps."""
-        found = self.costs.of("law", "invert") if inverse else 0.0
-        return self.count * (self.costs.of("law", "lookup") + found)
-
-    def seconds_of_slopes(self) -> float:
-        """Seconds of totals with derivatives, about four times those without."""
-        if self.problem.theory != "mbma":
-            return self.count * self.costs.of(self.problem.theory_name, "gap")
-        return 4 * self.count * self.costs.of("universal", "gap", self.rtol)
-
-    def other_theory(self, name: str) -> Step:
-        closed = name == "greenwood_williamson"
-        seconds = self.count * self.costs.of(name if closed else "persson", "gap")
-        what = "another theory at the same gaps"
-        return Step(name, "comparison", what, None, None, self.count, 1e-14 if closed else 1e-9, seconds)
 
 
 def _name(island_model: Any) -> str:

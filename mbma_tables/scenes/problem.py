@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,67 +17,26 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
 
-# effects, described in docs/scenes.md
-OUTPUTS = (
-    "pressure",
-    "area",
-    "stiffness",
-    "energy",
-    "conductance",
-    "leakage",
-    "island_statistics",
-    "pressure_profile",
-    "comparison",
-    "validity",
-    "yield",
-)
+# effects, described in docs/scenes.md: those that are read from one contact, and others
+OF_CONTACT = ("pressure", "area", "stiffness", "energy", "conductance", "leakage", "validity", "yield")
+OF_ISLANDS = ("island_statistics", "pressure_profile")  # available for MBMA only
+OUTPUTS = (*OF_CONTACT[:6], *OF_ISLANDS, "comparison", *OF_CONTACT[6:])
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 EFFECTS = (*OUTPUTS, *REFINEMENTS)
-OF_ISLANDS = ("island_statistics", "pressure_profile")  # available for MBMA only
-OF_LAW = ("stiffness", "energy", "conductance")
 ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
 COMPARED = (*THEORIES, "persson_simplified")
 CORRELATIONS = ("cooper_mikic_yovanovich", "mikic")  # for conductance
 PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
 INVERTED = ("pressures", "areas")  # gaps follow from them
-MIN_RTOL, MAX_RTOL = 1e-10, 0.1
-DEFAULT_RTOL = 1e-6
-DEFAULT_RTOL_OF_OTHERS = 1e-4  # theories without a certified table
-MAX_SECONDS = 1e6
-
-
-def chosen(on: Iterable[str], off: Iterable[str]) -> tuple[frozenset[str], frozenset[str]]:
-    """Requested outputs and disabled refinements, checked against each other."""
-    wanted, without = list(on), list(off)
-    for name in (*wanted, *without):
-        if name not in EFFECTS:
-            raise InputError(f"no effect is named {name!r}; {nearest(str(name), EFFECTS)}")
-    both = sorted(set(wanted) & set(without))
-    if both:
-        raise InputError(f"effect {both[0]!r} is both on and off: leave it in one of the two lists")
-    for name in without:
-        if name in OUTPUTS:
-            raise InputError(
-                f"{name!r} is off unless it is asked for: leave it out; off takes {', '.join(REFINEMENTS)}"
-            )
-    outputs = frozenset(wanted) & frozenset(OUTPUTS)
-    if not outputs:
-        raise InputError(f"no effect is requested: on needs at least one of {', '.join(OUTPUTS)}")
-    dropped = frozenset(without)
-    if "yield" in outputs and (dropped or outputs & set(ELASTIC)):
-        name = sorted(dropped | outputs & set(ELASTIC))[0]
-        raise InputError(f"{name!r} is for elastic contacts, and effect 'yield' is on: leave one of the two out")
-    if "finite_height" in dropped and outputs & set(OF_LAW):
-        name = sorted(outputs & set(OF_LAW))[0]
-        raise InputError(f"{name!r} comes from a law, which ends at h_max: leave finite_height on, or {name!r} out")
-    if outputs == {"pressure_profile"} and "finite_height" in dropped:
-        raise InputError("finite_height does not affect single islands: leave it out of off")
-    if "pressure_profile" in outputs and "sphere_deformation" in dropped:
-        raise InputError(
-            "pressure_profile is that of the deformed sphere: leave sphere_deformation on, or pressure_profile out"
-        )
-    return outputs, dropped
+MIN_RTOL, MAX_RTOL, MAX_SECONDS = 1e-10, 0.1, 1e6
+DEFAULT_RTOL, DEFAULT_RTOL_OF_OTHERS = 1e-6, 1e-4  # of MBMA, and of theories without a certified table
+NEEDS = {  # what an effect needs and no other uses
+    "yield": ("hardness", "the largest pressure that the softer body bears"),
+    "conductance": ("conductivities", "k1 and k2 of the two bodies"),
+    "pressure_profile": ("deltas", "the approaches of the islands"),
+    "comparison": ("theories", f"one or more of {', '.join(COMPARED)}"),
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -115,12 +74,11 @@ class Problem:
         for name in ("effects", "without", "theories"):
             if isinstance(getattr(self, name), str):
                 raise InputError(f"{name} must be a list of names: write [{getattr(self, name)!r}]")
-        outputs, dropped = chosen(self.effects, self.without)
+        self._choose_effects()
+        outputs, dropped = self.outputs, self.dropped
         if self.surface.labelled or self.surface.shape != ():
             raise InputError("a scene has one surface, not a batch: make a scene for each")
         self._set_units()
-        if self.rtol is not None and self.seconds is not None:
-            raise InputError("rtol and seconds are both given: give the accuracy or the time budget, one of them")
         number_in("E_star", self.E_star, 1e-300, 1e300)
         if self.theory is None:
             of_mbma = bool(dropped) or bool(outputs.intersection(OF_ISLANDS)) or self.island_model is not None
@@ -130,15 +88,41 @@ class Problem:
         if self.rtol is not None:
             rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)
         if self.seconds is not None:
+            if self.rtol is not None:
+                raise InputError("rtol and seconds are both given: give the accuracy or the time budget, one of them")
             number_in("seconds", self.seconds, 1e-9, MAX_SECONDS)
             rtol = None
         whole_number_in("points", self.points, 2, 10_000)
         vars(self).update(rtol=rtol, variant=get_variant(self.variant), theories=tuple(self.theories))
-        vars(self).update(outputs=outputs, dropped=dropped)
-        vars(self).update(gaps=self._checked_gaps(outputs - {"pressure_profile"}))
+        vars(self).update(gaps=self._checked_gaps())
         self._check_parameters_of_effects()
-        self._check_island_model()
-        self._check_theory()
+        self._check_theories()
+
+    def _choose_effects(self) -> None:
+        """Set the requested outputs and the refinements switched off, checked against each other."""
+        wanted, without = list(self.effects), list(self.without)
+        for name in (*wanted, *without):
+            if name not in EFFECTS:
+                raise InputError(f"no effect is named {name!r}; {nearest(str(name), EFFECTS)}")
+        both = sorted(set(wanted) & set(without))
+        if both:
+            raise InputError(f"effect {both[0]!r} is both on and off: leave it in one of the two lists")
+        outputs, dropped = frozenset(wanted) & frozenset(OUTPUTS), frozenset(without)
+        for name in sorted(dropped & set(OUTPUTS)):
+            raise InputError(
+                f"{name!r} is off unless it is asked for: leave it out; off takes {', '.join(REFINEMENTS)}"
+            )
+        if not outputs:
+            raise InputError(f"no effect is requested: on needs at least one of {', '.join(OUTPUTS)}")
+        for name in sorted(dropped | outputs & set(ELASTIC)) if "yield" in outputs else ():
+            raise InputError(f"{name!r} is for elastic contacts, and effect 'yield' is on: leave one of the two out")
+        for name in sorted(outputs & set(OF_CONTACT[2:])) if "finite_height" in dropped else ():
+            raise InputError(f"{name!r} needs a surface that ends at h_max: leave finite_height on, or {name!r} out")
+        if "pressure_profile" in outputs and "sphere_deformation" in dropped:
+            raise InputError(
+                "pressure_profile is that of the deformed sphere: leave sphere_deformation on, or pressure_profile out"
+            )
+        vars(self).update(outputs=outputs, dropped=dropped)
 
     def _set_units(self) -> None:
         """Lengths in the surface's unit, stresses in that of E*."""
@@ -157,45 +141,37 @@ class Problem:
             derived["conductivities"], derived["conductance_unit"] = units.conductivities(*self.conductivities)
         vars(self).update(derived)
 
-    def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:
+    def _checked_gaps(self) -> Any:
         """The prescribed numbers; None if no effect needs gaps."""
         given = [name for name in PRESCRIBED if getattr(self, name) is not None]
         if len(given) > 1:
             raise InputError(f"{' and '.join(given)} are given: prescribe one of {', '.join(PRESCRIBED)}")
-        if not at_gaps:
+        if self.outputs == {"pressure_profile"}:
             if given:
                 raise InputError(f"{given[0]} are not needed by any effect: leave them out, or request 'pressure'")
             return None
         if not given:
             raise InputError(f"nothing is prescribed: give one of {', '.join(PRESCRIBED)}")
-        numbers = finite_array(given[0], getattr(self, given[0]))
+        name, h_max = given[0], float(self.surface.h_max)
+        numbers = finite_array(name, getattr(self, name))
         if numbers.ndim > 1:
-            raise InputError(f"{given[0]} must be one number or a list, got shape {numbers.shape}")
-        h_max = float(self.surface.h_max)
-        if given[0] == "separations":
-            require(given[0], numbers, numbers >= -h_max, f"at least -h_max = {-h_max:.6g}, where the model ends")
-        elif given[0] == "mean_separations":
-            require(given[0], numbers, numbers >= 0, "at least 0, where the model ends (d = -h_max)")
-        else:
-            require(given[0], numbers, numbers >= 0, "at least 0: there is no adhesion in the model")
-            if "finite_height" in self.dropped:
-                raise InputError(
-                    f"{given[0]} need a law, which ends at h_max: leave finite_height on, or give separations"
-                )
+            raise InputError(f"{name} must be one number or a list, got shape {numbers.shape}")
+        least, why = {
+            "separations": (-h_max, f"at least -h_max = {-h_max:.6g}, where the model ends"),
+            "mean_separations": (0.0, "at least 0, where the model ends (d = -h_max)"),
+        }.get(name, (0.0, "at least 0: there is no adhesion in the model"))
+        require(name, numbers, numbers >= least, why)
+        if name in INVERTED and "finite_height" in self.dropped:
+            raise InputError(f"{name} need a surface that ends at h_max: leave finite_height on, or give separations")
         return np.atleast_1d(numbers).astype(float)
 
     def _check_parameters_of_effects(self) -> None:
         """Parameters that one effect needs and no other uses."""
-        needs = (
-            ("yield", "hardness", self.hardness is not None, "the largest pressure that the softer body bears"),
-            ("conductance", "conductivities", self.conductivities is not None, "k1 and k2 of the two bodies"),
-            ("pressure_profile", "deltas", self.deltas is not None, "the approaches of the islands"),
-            ("comparison", "theories", bool(self.theories), f"one or more of {', '.join(COMPARED)}"),
-        )
-        for effect, name, given, meaning in needs:
-            if effect in self.outputs and not given:
+        for effect, (name, meaning) in NEEDS.items():
+            is_given = getattr(self, name) not in (None, ()) if name == "theories" else getattr(self, name) is not None
+            if effect in self.outputs and not is_given:
                 raise InputError(f"effect {effect!r} needs {name}: {meaning}")
-            if effect not in self.outputs and given:
+            if effect not in self.outputs and is_given:
                 raise InputError(
                     f"{name} given and effect {effect!r} is off: add it to the effects, or leave {name} out"
                 )
@@ -203,59 +179,48 @@ class Problem:
             cap = number_in("hardness", self.hardness, 1e-300, 1e300)
             if self.prescribed == "pressures":
                 require("pressures", self.gaps, self.gaps <= cap, f"at most the hardness, {cap:.6g}")
-        if self.conductivities is not None:
-            pair = finite_array("conductivities", self.conductivities)
-            if pair.shape != (2,):
-                raise InputError(f"conductivities are two numbers, k1 and k2, got shape {pair.shape}")
-            require("conductivities", pair, pair > 0, "positive")
-        if self.deltas is not None:
-            deltas = finite_array("deltas", self.deltas)
-            require("deltas", deltas, deltas > 0, "positive")
-        for name in self.theories:
-            if name in CORRELATIONS:
-                if "conductance" not in self.outputs or not (
-                    "pressure" in self.outputs or self.prescribed == "pressures"
-                ):
-                    raise InputError(
-                        f"{name!r} is of conductance at a pressure: add effects 'conductance' and 'pressure'"
-                    )
-                if name == CORRELATIONS[0] and self.hardness is None:
-                    raise InputError(f"{name!r} needs a hardness: add effect 'yield'")
-            elif name not in COMPARED:
-                raise InputError(f"no theory is named {name!r}; {nearest(str(name), (*COMPARED, *CORRELATIONS))}")
+        for name in ("conductivities", "deltas"):
+            if getattr(self, name) is not None:
+                numbers = finite_array(name, getattr(self, name))
+                require(name, numbers, numbers > 0, "positive")
 
-    def _check_island_model(self) -> None:
-        if self.island_model is None:
-            return
-        if "sphere_deformation" in self.dropped:
-            raise InputError("sphere_deformation is off, which is the rigid sphere: leave island model out")
+    def _check_theories(self) -> None:
+        """Names of theories and island models, and options of MBMA beside other theories."""
         if isinstance(self.island_model, str) and self.island_model not in ISLAND_MODELS:
-            raise InputError(
-                f"no island model is named {self.island_model!r}; {nearest(self.island_model, ISLAND_MODELS)}"
-            )
-        if self.seconds is not None and not isinstance(self.island_model, str):
+            hint = nearest(self.island_model, ISLAND_MODELS)
+            raise InputError(f"no island model is named {self.island_model!r}; {hint}")
+        if self.island_model is not None and "sphere_deformation" in self.dropped:
+            raise InputError("sphere_deformation is off, which is the rigid sphere: leave island model out")
+        if self.seconds is not None and not isinstance(self.island_model, str | None):
             raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
-
-    def _check_theory(self) -> None:
-        """Reject options of MBMA beside other theories."""
-        if isinstance(self.theory, str) and self.theory not in (*THEORIES, *OF_MAPS):
-            raise InputError(f"no theory is named {self.theory!r}; {nearest(self.theory, (*THEORIES, *OF_MAPS))}")
-        if not isinstance(self.theory, str):
+        own = () if not isinstance(self.theory, str) else ((self.theory, (*THEORIES, *OF_MAPS)),)
+        for name, named in (*own, *((other, (*COMPARED, *CORRELATIONS)) for other in self.theories)):
+            if name not in named:
+                raise InputError(f"no theory is named {name!r}; {nearest(str(name), named)}")
+        if not own:
             get_theory(self.theory)
-        for name in self.theories:
-            if name == self.theory_name:
-                raise InputError(f"the scene is by theory {name!r} itself: leave it out of theories")
-        if self.theory == "mbma":
-            return
-        own = {
+        if self.theory_name in self.theories:
+            raise InputError(f"the scene is by theory {self.theory_name!r} itself: leave it out of theories")
+        correlations = [name for name in CORRELATIONS if name in self.theories]
+        if correlations and ("conductance" not in self.outputs or not self.has_pressure):
+            raise InputError(
+                f"{correlations[0]!r} is of conductance at a pressure: add effects 'conductance' and 'pressure'"
+            )
+        if CORRELATIONS[0] in correlations and self.hardness is None:
+            raise InputError(f"{CORRELATIONS[0]!r} needs a hardness: add effect 'yield'")
+        options = {
             "island_model": self.island_model is not None,
             "variant": self.variant != get_variant("reported"),
             "without": bool(self.dropped),
-        }
-        own |= {f"effect {name!r}": name in self.outputs for name in OF_ISLANDS}
-        given = [name for name, is_given in own.items() if is_given]
-        if given:
+        } | {f"effect {name!r}": name in self.outputs for name in OF_ISLANDS}
+        given = [name for name, is_given in options.items() if is_given]
+        if given and self.theory != "mbma":
             raise InputError(f"{' and '.join(given)}: of theory 'mbma', not of {self.theory_name!r}: leave out")
+
+    @property
+    def has_pressure(self) -> bool:
+        """Whether pressures are known, as prescribed or computed."""
+        return "pressure" in self.outputs or self.prescribed == "pressures"
 
     @property
     def theory_name(self) -> str:

@@ -11,9 +11,9 @@ from mbma_tables.answers.source import MEANINGS
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.scenes.plan import Plan
+from mbma_tables.scenes.plan import TABLES, Plan
 from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
-from mbma_tables.scenes.steps import STEPS, TABLES, Progress, Run, comparison
+from mbma_tables.scenes.steps import STEPS, Progress, Run, comparison
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.variants import get_variant
 
@@ -27,13 +27,16 @@ def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> 
     if "finite_height" in problem.dropped:
         plain: Any = surface
         surface = dataclasses.replace(plain, h_max=height_without_end(problem, 0.1 * plan.rtol))
-    run = Run(problem, surface, plan.rtol, progress or (lambda *_: None))
-    if problem.gaps is not None and problem.prescribed not in INVERTED:
+    run, report = Run(problem, surface), progress or (lambda *_: None)
+    if problem.prescribed in INVERTED:
+        name = "nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"
+        run.found[name] = (("gap",), problem.gaps)
+    elif problem.gaps is not None:
         run.gap = problem.gaps if problem.prescribed == "separations" else 2 * problem.gaps - h_max
     for step in plan.steps:
-        run.progress(step.name, 0, step.count)
+        report(step.name, 0, step.count)
         STEPS.get(step.name, comparison)(run, step)
-        run.progress(step.name, step.count, step.count)
+        report(step.name, step.count, step.count)
     error = max(run.errors.values(), default=0.0)
     if error > plan.rtol:
         raise ConvergenceError(

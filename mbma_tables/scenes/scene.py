@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
 import pathlib
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from mbma_tables.common.arguments import finite_array, needed
 from mbma_tables.common.errors import InputError
-from mbma_tables.scenes.costs import shipped_costs
-from mbma_tables.scenes.plan import Plan, duration, make_plan, seconds_by_theory
+from mbma_tables.scenes.plan import Plan, make_plan
 from mbma_tables.scenes.problem import INVERTED, PRESCRIBED, Problem
 from mbma_tables.scenes.specimen import check, from_tables, read_toml, schema
 
 if TYPE_CHECKING:
     import xarray
-
-MAX_AREA = 0.99
-CANDIDATES = ("calibrated", "persson", "greenwood_williamson")
-# effect: the quantity of tables/calibrated.nc whose deviation from simulation is compared
-QUANTITIES = {"stiffness": "stiffness", "conductance": "stiffness", "pressure": "pressure", "energy": "pressure"}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -83,7 +74,7 @@ class Scene(Problem):
     >>> from mbma_tables import Scene, Surface
     >>> scene = Scene(Surface.named("concrete"), effects=["pressure"], separations=[0.2, 0.5], rtol=1e-5)
     >>> [step.name for step in scene.plan().steps]
-    ['totals']
+    ['contact']
     >>> found = scene.run()
     >>> [f"{pressure:.3e}" for pressure in found["pressure"].values]
     ['1.754e-03', '1.292e-04']
@@ -117,8 +108,8 @@ class Scene(Problem):
         return make_plan(self)
 
     def explain(self) -> str:
-        """The plan as text, with a line on the theory that is closer to simulation, if there is one."""
-        return self.plan().text() + advice(self)
+        """The plan as text."""
+        return self.plan().text()
 
     def run(self, progress: Callable[[str, int, int], None] | None = None) -> xarray.Dataset:
         """Compute the requested effects.
@@ -138,7 +129,7 @@ class Scene(Problem):
         ------
         InputError, OutOfRangeError, ConvergenceError
         """
-        needed("xarray", "xarray")
+        needed("xarray")
         from mbma_tables.scenes.run import run_plan
 
         return run_plan(self, self.plan(), progress)
@@ -179,62 +170,3 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
     if "conductance" in content:
         found["conductivities"] = (content["conductance"]["k1"], content["conductance"]["k2"])
     return found
-
-
-def advice(problem: Problem) -> str:
-    """Advice if a gap, stiffness or conductance is requested of MBMA; else empty."""
-    asked = {name: quantity for name, quantity in QUANTITIES.items() if name in problem.outputs}
-    if problem.prescribed in INVERTED:
-        asked = {"gap": "pressure"} | {name: quantity for name, quantity in asked.items() if quantity == "stiffness"}
-    contacts = _contacts(problem) if problem.theory == "mbma" and asked else np.empty(0)
-    if not contacts.size:
-        return ""
-    from mbma_tables.answers.contact import contact
-    from mbma_tables.theories.calibrated_table import shipped
-    from mbma_tables.theories.mbma import Mbma
-
-    # stiffness first, if both are requested
-    name, quantity = next((pair for pair in asked.items() if pair[1] == "stiffness"), next(iter(asked.items())))
-    # deviations at the contact fraction by the calibrated law, in the middle of the prescribed range
-    area = float(np.median(contacts))
-    rows = {"mbma": Mbma(variant=problem.variant).scatter_name(problem.surface), **{row: row for row in CANDIDATES}}
-    spread = {
-        theory: float(shipped().standard_deviation(row, quantity, np.asarray(area))) for theory, row in rows.items()
-    }
-    # NaN: not compared, or no such contact is reached
-    nearest = min(CANDIDATES, key=lambda theory: np.nan_to_num(spread[theory], nan=math.inf))
-    if not spread[nearest] < np.nan_to_num(spread["mbma"], nan=math.inf):
-        return ""
-    measured = shipped_costs()
-    price = seconds_by_theory(measured, nearest, problem.gaps.size, problem.prescribed in INVERTED)
-    reasons = contact(problem.surface, area=min(area, MAX_AREA), theory=nearest).reasons
-    return (
-        f"  advice: for {name} theory {nearest!r} is closer to boundary elements, {_size(spread[nearest])} instead of "
-        f"{_size(spread['mbma'])} at {area:.2%} contact, in {duration(price)} instead of "
-        f"{duration(make_plan(problem, measured).seconds)}{'; not tested there: ' if reasons else ''}"
-        f"{', '.join(reasons)}\n"
-    )
-
-
-def _size(spread: float) -> str:
-    """A standard deviation of a logarithm in words."""
-    if math.isnan(spread):
-        return "an unknown distance"
-    return f"{spread:.1%}" if spread < 0.3 else f"a factor {math.exp(spread):.2g}"
-
-
-def _contacts(problem: Problem) -> Any:
-    """Contact fractions by the calibrated law where surfaces touch."""
-    from mbma_tables.laws.calibrated import area
-    from mbma_tables.theories import get_theory
-
-    surface, known = problem.surface, problem.gaps
-    if problem.prescribed == "areas":
-        found = known
-    elif problem.prescribed == "pressures":
-        found = area(known / problem.E_star / float(surface.rms_gradient), float(surface.alpha))
-    else:
-        h_max = float(surface.h_max)
-        u = known if problem.prescribed == "mean_separations" else (h_max + known) / 2
-        found = get_theory("calibrated").answer(surface, np.minimum(u, h_max)).area
-    return found[found > 0]

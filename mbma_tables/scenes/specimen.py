@@ -218,11 +218,9 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
     if columns.shape[1] != 2:
         raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")
     h_max = Units(unit).number("h_max", numbers["h_max"])
-    # the spectrum of a profile is not isotropic: five numbers are fitted to it
-    model = "self-affine" if convention == "profile" else "measured"
     q, C = columns.T
-    surface = Surface.from_spectrum(q, C, h_max=h_max, convention=convention, unit=unit, model=model)
-    return Specimen(surface, f"fitted to {path.name}" if convention == "profile" else f"spectrum {path.name}")
+    surface = Surface.from_spectrum(q, C, h_max=h_max, convention=convention, unit=unit)
+    return Specimen(surface, f"spectrum {path.name}")
 
 
 def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:

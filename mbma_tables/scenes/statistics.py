@@ -8,9 +8,9 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import AnyModel, RigidModel, answer_islands, island_model_name
+from mbma_tables.models import RigidModel, answer_islands
 from mbma_tables.models.named import get_model
-from mbma_tables.scenes.plan import Step
+from mbma_tables.scenes.plan import TABLES, Step
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
@@ -21,32 +21,22 @@ from mbma_tables.totals.profile import profile, source_of
 Fields = dict[str, tuple[tuple[str, ...], Any]]
 
 
-def _asked(problem: Problem, step: Step) -> tuple[Variant, float, str | AnyModel]:
-    """Variant, tolerance and island model of a step."""
+def _asked(surface: AnySurface, problem: Problem, step: Step) -> tuple[Any, Variant, float, Any, str]:
+    """The surface as profiles take it, variant, tolerance and island model of a step; islands outside are solved."""
     assert step.rtol is not None
-    assert step.island_model is not None
-    return get_variant(problem.variant), step.rtol, step.island_model
-
-
-def _outside(island_model: str | AnyModel) -> str:
-    """Option for islands outside a table: solve them."""
-    return "exact" if island_model_name(island_model) in ("universal", "island4d") else "raise"
-
-
-def _shape(surface: AnySurface) -> Any:
-    """The surface as an argument of profiles: its numbers, or itself."""
-    if not isinstance(surface, Surface):
-        return surface
-    return float(surface.hurst), float(surface.zeta_1), float(surface.h_max / surface.h_rms)
+    shape: Any = surface
+    if isinstance(surface, Surface):
+        shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max / surface.h_rms)
+    variant = get_variant(problem.variant)
+    model = None if step.island_model is None else get_model(step.island_model, step.rtol, variant)
+    return shape, variant, step.rtol, model, "exact" if step.island_model_name in TABLES else "raise"
 
 
 def hertz_area(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """A/A0 with eta = 1 in Eq. 38 (C.1), and the bound on its relative error."""
-    variant, rtol, island_model = _asked(problem, step)
+    shape, variant, rtol, model, outside = _asked(surface, problem, step)
     depth = (float(surface.h_max) - gap) / float(surface.h_rms)
-    kept = profile(
-        _shape(surface), get_model(island_model, rtol, variant), variant, rtol, _outside(island_model), rows=4
-    )
+    kept = profile(shape, model, variant, rtol, outside, rows=4)
     area = np.zeros(depth.shape)
     area[depth > 0] = kept.totals(depth[depth > 0])[3]
     return {"area": (("gap",), area)}, kept.error
@@ -54,10 +44,9 @@ def hertz_area(problem: Problem, surface: AnySurface, gap: FloatArray, step: Ste
 
 def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """Number of islands at every gap; load, area, density along their approach (Eqs. 40, 42), and the error's bound."""
-    variant, rtol, island_model = _asked(problem, step)
-    model, h_rms = get_model(island_model, rtol, variant), float(surface.h_rms)
+    shape, variant, rtol, model, outside = _asked(surface, problem, step)
+    h_rms = float(surface.h_rms)
     depth = np.asarray(surface.h_max - gap) / h_rms
-    shape = _shape(surface)
     source, deepest = source_of(shape, variant), max(float(depth.max()), 0.0)
     # approaches up to the deepest, graded towards first contact
     t = np.linspace(0, 1, problem.points + 1)[1:] * np.arcsinh(np.sqrt(deepest / source.layer))
@@ -70,7 +59,7 @@ def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, st
         kept = profile(shape, RigidModel(), variant, rtol, rows=3)
         number[depth > 0] = kept.totals(depth[depth > 0])[2]
         g, s, q0 = islands_of(surface, grid * h_rms, variant)
-        phi = answer_islands(model, g, _outside(island_model))
+        phi = answer_islands(model, g, outside)
         pressure = problem.E_star * s / q0 * scale_force(g) * phi.phi_F
         share = g["eta"] if "subscale_area" in problem.dropped else 1.0
         area = scale_area(g) * phi.phi_A / share / q0**2
@@ -89,10 +78,10 @@ def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, st
 
 def profiles(problem: Problem, surface: AnySurface, gap: Any, step: Step) -> tuple[Fields, float]:
     """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
-    variant, rtol, _ = _asked(problem, step)
+    assert step.rtol is not None
     delta = np.atleast_1d(np.asarray(problem.deltas, dtype=float)).ravel()
-    g, s, q0 = islands_of(surface, delta, variant)
-    solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=rtol)
+    g, s, q0 = islands_of(surface, delta, get_variant(problem.variant))
+    solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=step.rtol)
     radius = np.sqrt(2 * g["R_d"] * g["sigma"])
     dims = ("island", "node")
     fields: Fields = {

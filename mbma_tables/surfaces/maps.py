@@ -9,20 +9,18 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, number_in, require_flag
+from mbma_tables.common.arguments import FloatArray, nearest, number_in, require_flag
 from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
-from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.profiles import measured_profile
-from mbma_tables.surfaces.psd import check_band, fit_spectrum
+from mbma_tables.surfaces.psd import SCATTER, log_bins
 from mbma_tables.surfaces.spectral import SpectralSurface, resolution
-from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, Treated, Treatment, mirrored, squares, treat
+from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
@@ -30,22 +28,18 @@ WINDOW_OVERLAP = (35 / 18) ** 2  # Fourier components under that window that cou
 MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
 S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
-MAX_ANISOTROPY = 0.3  # amplitude of a cosine around the circle: four times the power one way than across it
 
 
-def radial_spectrum(
-    heights: FloatArray, dx: float, dy: float
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.complex128]]:
+def radial_spectrum(heights: FloatArray, dx: float, dy: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """C(q) of a map, averaged over narrow rings up to the Nyquist circle pi/max(dx, dy) (Eqs. 4, 5).
 
-    Returns each ring's mean wavenumber, mean C, number of wavevectors, and power-weighted means of exp(2 i theta) and
-    exp(4 i theta), shape (2, n). C times that number times (2 pi)^2/(nx dx ny dy) is the ring's variance of height.
+    Returns each ring's mean wavenumber, mean C, and number of wavevectors, which times C (2 pi)^2/(nx dx ny dy) is the
+    ring's variance of height.
     """
     nx, ny = heights.shape
     step_x, step_y = 2 * math.pi / (nx * dx), 2 * math.pi / (ny * dy)
     power = np.abs(np.fft.fft2(heights)) ** 2 / (nx * ny) ** 2 / (step_x * step_y)
-    qx, qy = np.meshgrid(step_x * nx * np.fft.fftfreq(nx), step_y * ny * np.fft.fftfreq(ny), indexing="ij")
-    q = np.hypot(qx, qy)
+    q = np.hypot(step_x * nx * np.fft.fftfreq(nx)[:, None], step_y * ny * np.fft.fftfreq(ny))
     inside = (q > 0) & (q <= math.pi / max(dx, dy) * (1 + 1e-12))
     measured = q[inside & (power > MIN_POWER * power.max())]
     if measured.size == 0:
@@ -55,26 +49,8 @@ def radial_spectrum(
     ring = np.rint(RINGS * q / min(step_x, step_y)).astype(int)
     waves: FloatArray = np.bincount(ring).astype(float)
     filled = waves > 0
-    total = np.bincount(ring, strength)[filled]
-    waves = waves[filled]
-    turn = ((qx + 1j * qy)[inside] / q) ** 2
-    sums = [[np.bincount(ring, strength * part)[filled] for part in (t.real, t.imag)] for t in (turn, turn**2)]
-    directions: NDArray[np.complex128] = np.array([real + 1j * imaginary for real, imaginary in sums])
-    directions /= np.where(total > 0, total, 1.0)
-    return np.bincount(ring, q)[filled] / waves, total / waves, waves, directions
-
-
-def _refuse_edges(heights: FloatArray) -> None:
-    """Reject a map of facets (steps, ridges or spikes), whose spectrum alone can look self-affine."""
-    scale = float(np.abs(heights).max())
-    steps = [np.diff(heights / scale, axis=axis).ravel() for axis in (0, 1)]
-    squares, fourths = (sum(float(np.mean(step**power)) for step in steps) / 2 for power in (2, 4))
-    kurtosis = fourths / squares**2
-    if kurtosis > MAX_KURTOSIS:
-        raise NotSelfAffineError(
-            f"the map's slopes lie in a few edges or spikes: the kurtosis of neighbouring heights' differences is "
-            f"{kurtosis:.3g}, more than {MAX_KURTOSIS:g} (3: Gaussian)"
-        )
+    total, waves = np.bincount(ring, strength)[filled], waves[filled]
+    return np.bincount(ring, q)[filled] / waves, total / waves, waves
 
 
 def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2) -> Treated:
@@ -88,9 +64,8 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
         source, lengths = read_measurement(source, **lengths, unit=unit, channel=channel), {}
     elif channel is not None:
         raise InputError("channel belongs to a file")
-    unknown = given.keys() - {field.name for field in dataclasses.fields(Treatment)}
-    if unknown:
-        raise TypeError(f"there is no option {', '.join(sorted(unknown))}: see mbma_tables.surfaces.treatment")
+    for name in given.keys() - set(OPTIONS):
+        raise TypeError(f"there is no option {name!r}: {nearest(name, OPTIONS)}")
     dimensions = source.dim if dimensions is None else dimensions
     grid, steps, whole, own, info = grid_of(source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions)
     own = unit if own is None else known(own)
@@ -103,32 +78,36 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     return treat(grid, steps, whole, Treatment(**given), own, info)
 
 
-def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> dict[str, Any]:
-    """Arguments of the `Surface` fitted to a height map; see `Surface.from_map`."""
-    top = None if h_max is None else one_height(h_max)
-    _refuse_edges(treated.heights)
+def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:
+    """Arguments of `fit_spectrum`: rings of a map's spectrum, else the samples."""
+    treated, known = surface.map, surface.bearing
+    if known is not None and known.slope_kurtosis > MAX_KURTOSIS:
+        raise NotSelfAffineError(
+            f"the map's slopes lie in a few edges or spikes: their kurtosis is {known.slope_kurtosis:.3g}, "
+            f"more than {MAX_KURTOSIS:g} (3: Gaussian)"
+        )
+    if treated is None:
+        q, C = surface.q, surface.C
+        width = np.diff(q, prepend=q[0]) + np.diff(q, append=q[-1])
+        counts = np.ones(q.size) if surface.samples is None else surface.samples
+        given = {"q": q, "C": C, "counts": counts, "variances": np.pi * C * q * width}
+        return {name: values[C > 0] for name, values in given.items()} | {"low": float(q[0])}
     # heights of order one, so that their squares neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
-    q, C, waves, directions = _within_band(treated, 1.0, radial_spectrum(treated.windowed() / scale, *treated.steps))
-    C = C * scale**2
-    steps = [2 * math.pi / (n * d) for n, d in zip(treated.heights.shape, treated.steps, strict=True)]
-    independent = 1.0 if treated.plain else WINDOW_OVERLAP
-    low = float(q[0]) if treated.plain else max(WINDOW_LOBE * max(steps), float(q[0]))
-    fitted = fit_spectrum(
-        q,
-        C,
-        waves / (2.0 * independent),
-        C * waves * (steps[0] * steps[1]),
-        h_max=float(treated.heights.max()) if top is None else top,
-        usable=(low, float(q[-1])),
-        band=check_band(band, float(q[0]), float(q[-1])),
-        power=float(np.mean((treated.windowed() / scale) ** 2)) * scale**2,
-        convention="paper",
-        windowed=not treated.plain,
-        detrend=next(step["mode"] for step in treated.provenance if step["step"] == "detrend"),
-        length_unit=treated.unit,
-    )
-    return _with_anisotropy(fitted, q, C * waves, directions)
+    q, C, waves = _within_band(treated, 1.0, radial_spectrum(treated.windowed() / scale, *treated.steps))
+    C, steps = C * scale**2, _grid(treated)
+    return {
+        "q": q,
+        "C": C,
+        "counts": waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP),
+        "variances": C * waves * (steps[0] * steps[1]),
+        "low": float(q[0]) if treated.plain else max(WINDOW_LOBE * max(steps), float(q[0])),
+    }
+
+
+def _grid(treated: Treated, scale: float = 1.0) -> list[float]:
+    """Steps of wavenumber along both axes, lengths over `scale`."""
+    return [2 * math.pi * scale / (n * d) for n, d in zip(treated.heights.shape, treated.steps, strict=True)]
 
 
 # grid steps in wavenumber; a window weights the few wavelengths below at random; none lies on this limit
@@ -225,13 +204,13 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
-    q, C, waves, _ = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
+    q, C, waves = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
     bins = log_bins(q, C, waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP))
     # for ridges, or a few cosines, some bins have no wavelength
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
     values = values if treated.periodic else mirrored(values)
-    grid = [2 * math.pi / (n * step) for n, step in zip(treated.heights.shape, (unit_x, unit_y), strict=True)]
+    grid = _grid(treated, scale)
 
     def slopes(low: float) -> float:
         """Mean squared gradient of the map itself from a wavenumber to the spectrum's last ring."""
@@ -272,23 +251,6 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     more = "" if treated.periodic else ", mirrored for the curves"
     kept = dataclasses.replace(treated, uncut=None)
     return dataclasses.replace(known, map=kept, provenance=treated.history(*notes, more=more))
-
-
-def _with_anisotropy(
-    fitted: dict[str, Any], q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
-) -> dict[str, Any]:
-    """The fitted surface with its anisotropy; an error if its fitted wavelengths have a preferred direction."""
-    fit = fitted["fit"]
-    inside = (q >= fit.q_low) & (q <= fit.q_high)
-    # whitened by the law; weights between equal ones of each wavevector and of each octave
-    weight = strength[inside] * q[inside] ** (1 + 2 * fitted["hurst"])
-    anisotropy = float(np.abs(directions[:, inside] @ weight).max() / weight.sum())
-    if anisotropy > MAX_ANISOTROPY:
-        raise NotSelfAffineError(
-            f"the map is not isotropic: an anisotropy of {anisotropy:.2g} between q = {fit.q_low:.4g} and "
-            f"{fit.q_high:.4g}, more than {MAX_ANISOTROPY} (1: all power in one direction)"
-        )
-    return fitted | {"fit": dataclasses.replace(fit, anisotropy=anisotropy), "unit": fit.length_unit}
 
 
 def measured_surface(

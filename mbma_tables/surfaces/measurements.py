@@ -28,7 +28,7 @@ def library() -> Any:
     """SurfaceTopography, without its warnings on missing optional parts."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return needed("SurfaceTopography", "maps")
+        return needed("SurfaceTopography")
 
 
 def read_measurement(

@@ -37,12 +37,12 @@ def two_columns(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def sorted_spectrum(q: ArrayLike, C: ArrayLike, convention: str) -> tuple[FloatArray, FloatArray]:
-    """An isotropic spectrum in the order of its wavenumbers and in the paper's convention."""
+    """An isotropic spectrum in the order of its wavenumbers and in the paper's convention, without masked entries."""
     if convention not in ("paper", "isotropic"):
-        raise InputError(
-            f"convention must be 'paper' or 'isotropic', got {convention!r}: a profile's spectrum can be fitted, "
-            "with model='self-affine'"
-        )
+        raise InputError(f"convention must be 'paper' or 'isotropic', got {convention!r}")
+    if np.ma.is_masked(C) and np.shape(q) == np.shape(C):
+        shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
+        q, C = np.asarray(q)[shown], np.asarray(C)[shown]
     wavenumber, spectrum = two_columns(q, C)
     order = np.argsort(wavenumber, kind="stable")
     return wavenumber[order], spectrum[order] * (1.0 if convention == "paper" else 1 / (4 * math.pi**2))

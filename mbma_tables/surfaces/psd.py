@@ -1,39 +1,30 @@
-"""The self-affine surface fitted to a power spectrum, and the quality of the fit."""
+"""The self-affine surface fitted to a power spectrum, with or without a roll-off before it and a departure after it."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.special import beta
 
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError, NotSelfAffineError
-from mbma_tables.surfaces.heights import one_height
-from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH
-from mbma_tables.surfaces.power_law import (
-    HURST_TOLERANCE,
-    MIN_PIECE,
-    MIN_POINTS,
-    Bins,
-    PowerLaw,
-    band_of,
-    find_law,
-    log_bins,
-    with_end_of_profile,
-)
-from mbma_tables.surfaces.power_laws import two_columns
-from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
-CONVENTIONS = ("paper", "isotropic", "profile")
+BINS_PER_DECADE = 20  # 12% wide: accuracy of a break's position; bins of a dense spectrum still average many entries
+MIN_POINTS = 6  # two define the line, four test it
+MIN_PIECE = 3  # bins in a roll-off or in what follows a cut; fewer would fit noise
+SCATTER = 0.1  # scatter of ln C of real surfaces about a power law, besides counting statistics
+HURST_TOLERANCE = 0.05  # bias of H on small windowed maps: fitted values up to this far above 1 are set to 1
+MARGIN = 6.0  # differences of Bayesian information above this count as strong evidence
+TYPICAL_SLOPE = 3.5  # C q^3.5 is nearly flat for every H, so that averages within a bin do not depend on its filling
 MAX_RESIDUAL = 0.2  # deviation of log10 C, a factor 1.6: larger ones make the fit meaningless at single wavelengths
 MAX_HURST_ERROR = 0.1  # the model's results at H and H +- 0.1 differ by tens of percent
 MAX_EXCESS = 10.0  # C over the law in a single bin; random with a probability below 1e-4
 MAX_PEAK = 100.0  # C over both its neighbourhoods; random in single samples with a probability of 2e-4
+MAX_ANISOTROPY = 1.36  # twice the mean squared gradient one way than across it
 MIN_VARIANCE_SHARE = 0.1  # a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
 
 
@@ -46,14 +37,13 @@ class SpectrumFit:
     >>> import numpy as np
     >>> from mbma_tables import Surface
     >>> q = np.geomspace(1, 100, 40)
-    >>> Surface.from_spectrum(q, 1e-3 * q**-3.4, h_max=0.3, unit="um", model="self-affine").fit
-    SpectrumFit(hurst=0.7, hurst_error=..., hurst_held=False, q0=1, q1=100, q_low=1, q_high=100, points=40,
-    residual=..., roll_off=None, cut_off=None, variance_share=1, convention='paper', windowed=False, detrend=None, ...)
+    >>> found = Surface.from_spectrum(q, 1e-3 * q**-3.4, h_max=0.3, unit="um", model="self-affine").fit
+    >>> f"H = {found.hurst:.2f} +- {found.hurst_error:.2f} of {found.points} points, roll-off {found.roll_off}"
+    'H = 0.70 +- 0.00 of 40 points, roll-off None'
     """
 
-    hurst: float  # fitted,
-    hurst_error: float  # and its standard error
-    hurst_held: bool  # whether `hurst` lies above 1 within its uncertainty and the surface therefore has 1
+    hurst: float  # fitted: where it lies above 1 within its uncertainty, the surface has 1
+    hurst_error: float  # its standard error
     q0: float  # the surface's band
     q1: float
     q_low: float  # least and largest wavenumber of the points that the line was fitted to
@@ -63,21 +53,113 @@ class SpectrumFit:
     roll_off: float | None  # wavenumber below which the spectrum is flat; None if it is not
     cut_off: float | None  # wavenumber above which it departs from the law, likewise
     variance_share: float  # of the measured variance of height, inside [q0, q1]
-    convention: str  # convention of the given spectrum; 'paper' for a map
-    windowed: bool = False
-    detrend: str | None = None  # what was subtracted from the map; None for a spectrum
-    anisotropy: float | None = None  # 0: all directions carry the same power, 1: one carries all; None for a spectrum
-    length_unit: str | None = None  # the map's, where it named one
-
-    def __repr__(self) -> str:
-        def shown(value: Any) -> str:
-            return f"{value:.4g}" if isinstance(value, float) else repr(value)
-
-        fields = (f"{field.name}={shown(getattr(self, field.name))}" for field in dataclasses.fields(self))
-        return f"SpectrumFit({', '.join(fields)})"
 
 
-def check_band(band: Any, low: float, high: float) -> tuple[float, float] | None:
+@dataclasses.dataclass(frozen=True)
+class Bins:
+    """Spectral points: wavenumber, spectrum, and the weight 1/variance of its logarithm."""
+
+    q: FloatArray
+    log_c: FloatArray
+    weight: FloatArray
+
+    def __getitem__(self, chosen: Any) -> Bins:
+        return Bins(self.q[chosen], self.log_c[chosen], self.weight[chosen])
+
+
+@dataclasses.dataclass(frozen=True)
+class PowerLaw:
+    """ln C = log_k - slope ln(q/unit) over bins[start:stop], after a roll-off of that level if it is flat."""
+
+    start: int
+    stop: int
+    log_k: float
+    slope: float
+    slope_error: float
+    level: float | None
+    criterion: float
+
+
+def log_bins(q: FloatArray, C: FloatArray, counts: FloatArray) -> Bins:
+    """Averages of C over logarithmic bins of the wavenumber, weighted by independent samples."""
+    # half a bin ahead, so that the first wavenumbers of a grid do not lie on an edge
+    place = np.floor(BINS_PER_DECADE * np.log10(q / q.min()) + 0.5).astype(int)
+    total = np.bincount(place, counts)
+    filled = total > 0
+    total = total[filled]
+    log_q = np.bincount(place, counts * np.log(q))[filled] / total
+    relative = q / np.exp(log_q)[np.cumsum(filled)[place] - 1]
+    mean = np.bincount(place, counts * C * relative**TYPICAL_SLOPE)[filled] / total
+    floor = np.finfo(float).tiny  # a gap in the spectrum: as a logarithm, far off any law
+    return Bins(np.exp(log_q), np.log(np.maximum(mean, floor)), 1 / (1 / total + SCATTER**2))
+
+
+def _straight(x: FloatArray, bins: Bins, start: int, stop: int) -> tuple[float, float, float, float]:
+    """Weighted line through bins[start:stop]: (intercept, slope, chi^2, weighted spread of x)."""
+    w, x, y = bins.weight[start:stop], x[start:stop], bins.log_c[start:stop]
+    x_mean, y_mean = np.average(x, weights=w), np.average(y, weights=w)
+    spread = float(w @ (x - x_mean) ** 2)
+    slope = float(w @ ((x - x_mean) * (y - y_mean))) / spread
+    intercept = float(y_mean - slope * x_mean)
+    return intercept, slope, float(w @ (y - intercept - slope * x) ** 2), spread
+
+
+def _roll_off(x: FloatArray, bins: Bins, stop: int) -> tuple[float, int, float | None]:
+    """A flat or else a rising line through bins[:stop]: (chi^2, parameters with the break, level if flat)."""
+    if stop == 0:
+        return 0.0, 0, None
+    w, y = bins.weight[:stop], bins.log_c[:stop]
+    level = float(np.average(y, weights=w))
+    flat = float(w @ (y - level) ** 2)
+    _, slope, rising, _ = _straight(x, bins, 0, stop)
+    return (rising, 3, None) if slope > 0 and rising + math.log(len(x)) < flat else (flat, 2, level)
+
+
+def find_law(bins: Bins, unit: float, breaks: bool) -> PowerLaw:
+    """The best of: a power law, with or without a roll-off before it and a departure after it."""
+    x, count = np.log(bins.q / unit), len(bins.q)
+    starts, stops = [0], [count]
+    if breaks:
+        starts += range(MIN_PIECE, count - MIN_POINTS + 1)
+        stops += range(MIN_POINTS, count - MIN_PIECE + 1)
+    roll_offs = {start: _roll_off(x, bins, start) for start in starts}
+    departures = {stop: _straight(x, bins, stop, count)[2] if stop < count else 0.0 for stop in stops}
+    laws = []
+    for start, stop in itertools.product(starts, stops):
+        if stop - start < MIN_POINTS:
+            continue
+        log_k, slope, chi2, spread = _straight(x, bins, start, stop)
+        before, more, level = roll_offs[start]
+        # each piece by its own scatter, or a tail that no line fits would hide the misfit of the law; the scatter
+        # expected anyway, 1, is not fitted
+        pieces = ((before, start), (chi2, stop - start), (departures[stop], count - stop))
+        information = sum(size * math.log(1 + misfit / size) for misfit, size in pieces if size)
+        information += (2 + more + 3 * (stop < count)) * math.log(count)
+        error = math.sqrt(chi2 / (stop - start - 2) / spread)
+        laws.append(PowerLaw(start, stop, log_k, -slope, error, level, information))
+    best = min(laws, key=lambda law: law.criterion)
+    # a roll-off and its law can also be described as a law and its departure: only one of them is self-affine
+    likely = [
+        law
+        for law in laws
+        if 0 < law.slope / 2 - 1 <= 1 + HURST_TOLERANCE and bins.q[law.stop - 1] > MIN_ZETA_1 * bins.q[law.start]
+    ]
+    chosen = min(likely, key=lambda law: law.criterion, default=best)
+    return chosen if chosen.criterion <= best.criterion + MARGIN else best
+
+
+def _band_of(bins: Bins, law: PowerLaw, unit: float, ends: tuple[float, float]) -> tuple[float, float]:
+    """The band that the law holds in, within `ends`."""
+    (q0, q1), q = ends, bins.q
+    if law.start:
+        q0 = math.sqrt(q[law.start - 1] * q[law.start])
+        if law.level is not None:
+            crossing = unit * math.exp((law.log_k - law.level) / law.slope)
+            q0 = crossing if q[law.start - 1] <= crossing <= q[law.start] else q0
+    return q0, q1 if law.stop == len(q) else math.sqrt(q[law.stop - 1] * q[law.stop])
+
+
+def _checked(band: Any, low: float, high: float) -> tuple[float, float] | None:
     """A forced band as two numbers inside [low, high], the range that the measurement holds."""
     if band is None:
         return None
@@ -89,211 +171,98 @@ def check_band(band: Any, low: float, high: float) -> tuple[float, float] | None
     return float(pair[0]), float(pair[1])
 
 
-def fit_psd(q: ArrayLike, C: ArrayLike, h_max: Any, convention: str, band: Any) -> dict[str, Any]:
-    """Arguments of the `Surface` fitted to a measured spectrum; see `Surface.from_spectrum`.
-
-    Notes
-    -----
-    C_1D of Eq. (6) is 2 pi B(H + 1/2, 1/2) q C(q), exactly so where q1 is infinite; towards q1 it drops (by 7%
-    at q1/2, to zero at q1). Where that drop describes the spectrum better than a plain power law it is fitted
-    too; the surface's q1 is where it ends if that is within 1.25 of the largest wavenumber, which else is q1.
-    Oblique wavelengths appear longer in a profile: its roll-off is determined within a factor of 1.5 only.
-    """
-    if h_max is None:
-        raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
-    if convention not in CONVENTIONS:
-        raise InputError(f"convention must be one of {', '.join(CONVENTIONS)}, got {convention!r}")
-    height = one_height(h_max)
-    wavenumber, spectrum = _positive_spectrum(q, C)
-    if convention == "isotropic":
-        spectrum = spectrum / (4 * math.pi**2)
-    # (4)-(6): h_rms^2 = 2 pi integral C q dq; of a profile, integral C dq / pi
-    density = spectrum / math.pi if convention == "profile" else 2 * math.pi * spectrum * wavenumber
-    variances = density * _steps(wavenumber) / 2
-    ends = float(wavenumber[0]), float(wavenumber[-1])
-    return fit_spectrum(
-        wavenumber,
-        spectrum,
-        np.ones(len(wavenumber)),
-        variances,
-        h_max=height,
-        usable=ends,
-        band=check_band(band, *ends),
-        power=float(variances.sum()),
-        convention=convention,
-    )
-
-
-def _steps(q: FloatArray) -> FloatArray:
-    """Twice the width of wavenumbers that each sample stands for."""
-    return np.asarray(np.diff(q, prepend=q[0]) + np.diff(q, append=q[-1]))
-
-
-def fit_samples(surface: SpectralSurface, band: Any) -> dict[str, Any]:
-    """Arguments of the `Surface` fitted to a surface's own spectrum; see `MeasuredSurface.fit`."""
-    q, C, ends = surface.q, surface.C, (float(surface.q0), float(surface.q1))
-    positive = C > 0
-    return fit_spectrum(
-        q[positive],
-        C[positive],
-        (np.ones(q.size) if surface.samples is None else surface.samples)[positive],
-        (math.pi * C * q * _steps(q))[positive],
-        h_max=float(surface.h_max),
-        usable=ends,
-        band=check_band(band, *ends),
-        power=float(surface.m0),
-        convention="paper",
-    )
-
-
-def _positive_spectrum(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Wavenumbers in rising order and positive C, without masked entries and without zeros at either end."""
-    if np.ma.isMaskedArray(q) or np.ma.isMaskedArray(C):
-        if np.shape(q) != np.shape(C):
-            raise InputError(f"q and C must be of one length, got shapes {np.shape(q)} and {np.shape(C)}")
-        shown = ~(np.ma.getmaskarray(np.ma.asanyarray(q)) | np.ma.getmaskarray(np.ma.asanyarray(C)))
-        q, C = np.asarray(q)[shown], np.asarray(C)[shown]
-    wavenumber, spectrum = two_columns(q, C)
-    require("q", wavenumber, wavenumber > 0, "positive (leave q = 0 out)")
-    require("q", wavenumber, (wavenumber >= MIN_LENGTH) & (wavenumber <= MAX_LENGTH), "in [1e-30, 1e30]")
-    require("C", spectrum, spectrum >= 0, "zero or positive")
-    order = np.argsort(wavenumber, kind="stable")
-    wavenumber, spectrum = wavenumber[order], spectrum[order]
-    positive = np.flatnonzero(spectrum > 0)
-    if positive.size == 0:
-        raise NotSelfAffineError("C is zero everywhere: the surface is flat")
-    inside = slice(positive[0], positive[-1] + 1)
-    wavenumber, spectrum = wavenumber[inside], spectrum[inside]
-    require("C", spectrum, spectrum > 0, "positive between its first and last positive entries")
-    require("C", spectrum, (spectrum >= 1e-200) & (spectrum <= 1e200), "in [1e-200, 1e200], its unit well chosen")
-    return wavenumber, spectrum
-
-
 def fit_spectrum(
     q: FloatArray,
     C: FloatArray,
     counts: FloatArray,
     variances: FloatArray,
-    *,
-    h_max: float,
-    usable: tuple[float, float],
-    band: tuple[float, float] | None,
-    power: float,
-    convention: str,
-    **known: Any,
+    low: float,
+    band: Any,
+    anisotropy: float | None,
 ) -> dict[str, Any]:
-    """Arguments of the `Surface` whose band fits C, in the paper's convention or a profile's.
+    """Numbers of the `Surface` whose band fits C of the paper's convention, with their `fit`.
 
-    `counts` and `variances` are independent samples and variance of height of each entry; `power` is the sum of all
-    variances, `usable` the range to be trusted, `known` further fields of `SpectrumFit`.
+    `counts` and `variances` are independent samples and variance of height of each entry; wavenumbers below `low` are
+    not fitted.
     """
-    profile = convention == "profile"
-    unit = float(q.min())
-    every, bins = _binned(q, C, counts, band or usable)
-    _refuse_peak(bins)
-    law, hurst, error = _law_of(bins, unit, profile, breaks=band is None)
-    used = bins[law.start : law.stop]
-    residual = math.sqrt(np.average((used.log_c - law.log_at(used.q, unit)) ** 2, weights=used.weight))
-    # without roll-off the band extends to the map's size, though the longest wavelengths are too few to be fitted
-    q0, q1 = band or band_of(bins, law, unit, (unit, float(q.max())))
-    fit = SpectrumFit(
-        hurst=hurst,
-        hurst_error=error,
-        hurst_held=hurst > 1,
-        q0=q0,
-        q1=q1,
-        q_low=float(used.q[0]),
-        q_high=float(used.q[-1]),
-        points=law.stop - law.start,
-        residual=residual / math.log(10),
-        roll_off=q0 if law.start else None,
-        cut_off=q1 if law.stop < len(bins.q) else None,
-        variance_share=float(variances[(q >= q0) & (q <= q1)].sum() / power),
-        convention=convention,
-        **known,
-    )
-    below = every.q <= fit.q_high
-    _refuse_poor(fit, every, below, every.log_c - law.log_at(every.q, unit), forced=band is not None)
-    exponent = min(hurst, 1.0)
-    # C_1D is 2 pi B(H + 1/2, 1/2) q C(q), and h_rms^2 the integral of (6) between q0 and q1
-    scale = math.exp(law.log_k) / (2 * math.pi * beta(exponent + 0.5, 0.5) * unit if profile else 1.0)
-    z0, z1 = q0 / unit, q1 / unit
-    growth = -math.expm1(-2 * exponent * math.log(z1 / z0)) * z0 ** (-2 * exponent)
-    h_rms = unit * math.sqrt(math.pi * scale * growth / exponent)
-    return {"hurst": exponent, "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": h_max, "fit": fit}
-
-
-def _law_of(bins: Bins, unit: float, profile: bool, breaks: bool) -> tuple[PowerLaw, float, float]:
-    """The law with 0 < H <= 1 that fits best, and the fitted H, which may lie above 1 by its error, with that error."""
-    offset = 1.0 if profile else 2.0
-    law = find_law(bins, unit, offset, breaks)
-    if profile and breaks:
-        law = with_end_of_profile(bins, unit, law)
-    hurst, error = (law.slope - offset) / 2, law.slope_error / 2
-    used = bins[law.start : law.stop]
+    unit, last = float(q.min()), float(q.max())
+    band = _checked(band, unit, last)
+    least, most = band or (low, last)
+    every = log_bins(q, C, counts)
+    bins = every[(every.q >= least * (1 - 1e-9)) & (every.q <= most * (1 + 1e-9))]
+    if len(bins.q) < MIN_POINTS:
+        raise NotSelfAffineError(
+            f"only {len(bins.q)} spectral points between q = {least:.6g} and {most:.6g}; "
+            f"a power law needs at least {MIN_POINTS}"
+        )
+    y, side = bins.log_c, MIN_PIECE
+    rise = y[side:-side] - np.maximum(y[: -2 * side], y[2 * side :])
+    _refuse_peak(bins.q[side:-side], rise, MAX_PEAK, "what it is on either side")
+    law = find_law(bins, unit, breaks=band is None)
+    hurst, error, used = law.slope / 2 - 1, law.slope_error / 2, bins[law.start : law.stop]
     if not 0 < hurst <= 1 + max(HURST_TOLERANCE, 2 * error):
         raise NotSelfAffineError(
             f"between q = {used.q[0]:.4g} and {used.q[-1]:.4g} the spectrum goes like "
             f"q^{-law.slope:.3g}: a Hurst exponent of {hurst:.3g} +- {error:.2g}, "
             + ("above 1 (a smooth surface)" if hurst > 0 else "not above 0 (white noise has -1)")
         )
+    exponent, log_k = min(hurst, 1.0), law.log_k
     if hurst > 1:
-        law = dataclasses.replace(law, slope=2.0 + offset, log_k=0.0)
-        shift = used.log_c - law.log_at(used.q, unit)
-        law = dataclasses.replace(law, log_k=float(np.average(shift, weights=used.weight)))
-    return law, hurst, error
+        log_k = float(np.average(used.log_c + 4 * np.log(used.q / unit), weights=used.weight))
+
+    def beyond(points: Bins) -> FloatArray:
+        return np.asarray(points.log_c - log_k + (2 + 2 * exponent) * np.log(points.q / unit))
+
+    # without roll-off the band extends to the map's size, though the longest wavelengths are too few to be fitted
+    q0, q1 = band or _band_of(bins, law, unit, (unit, last))
+    fit = SpectrumFit(
+        hurst=hurst,
+        hurst_error=error,
+        q0=q0,
+        q1=q1,
+        q_low=float(used.q[0]),
+        q_high=float(used.q[-1]),
+        points=law.stop - law.start,
+        residual=math.sqrt(np.average(beyond(used) ** 2, weights=used.weight)) / math.log(10),
+        roll_off=q0 if law.start else None,
+        cut_off=q1 if law.stop < len(bins.q) else None,
+        variance_share=float(variances[(q >= q0) & (q <= q1)].sum() / variances.sum()),
+    )
+    below = every[every.q <= fit.q_high]
+    _refuse_peak(below.q, beyond(below), MAX_EXCESS, f"the power law between {fit.q_low:.4g} and {fit.q_high:.4g}")
+    _refuse_poor(fit, anisotropy or 1.0, forced=band is not None)
+    # h_rms^2 is the integral of (6) between q0 and q1
+    z0, z1 = q0 / unit, q1 / unit
+    growth = -math.expm1(-2 * exponent * math.log(z1 / z0)) * z0 ** (-2 * exponent)
+    h_rms = unit * math.sqrt(math.pi * math.exp(log_k) * growth / exponent)
+    return {"hurst": exponent, "q0": q0, "q1": q1, "h_rms": h_rms, "fit": fit}
 
 
-def _binned(q: FloatArray, C: FloatArray, counts: FloatArray, usable: tuple[float, float]) -> tuple[Bins, Bins]:
-    """Every logarithmic bin, and those between the usable wavenumbers."""
-    low, high = usable
-    every = log_bins(q, C, counts)
-    bins = every[(every.q >= low * (1 - 1e-9)) & (every.q <= high * (1 + 1e-9))]
-    if len(bins.q) < MIN_POINTS:
+def _refuse_peak(q: FloatArray, excess: FloatArray, limit: float, over: str) -> None:
+    """Raise an error for a wavelength whose ln C exceeds something by more than a factor."""
+    if excess.size and excess.max() > math.log(limit):
+        worst = int(np.argmax(excess))
         raise NotSelfAffineError(
-            f"only {len(bins.q)} spectral points between q = {low:.6g} and {high:.6g}; "
-            f"a power law needs at least {MIN_POINTS}"
-        )
-    return every, bins
-
-
-def _refuse_peak(bins: Bins) -> None:
-    """Raise an error for a wavelength so strong that a break would be fitted beside it."""
-    y, side = bins.log_c, MIN_PIECE
-    rise = y[side:-side] - np.maximum(y[: -2 * side], y[2 * side :])
-    if rise.size and rise.max() > math.log(MAX_PEAK):
-        worst = int(np.argmax(rise))
-        raise NotSelfAffineError(
-            f"a wavelength stands out: at q = {bins.q[side + worst]:.4g} the spectrum is {math.exp(rise[worst]):.3g} "
-            f"times what it is on either side, more than {MAX_PEAK:g}"
+            f"a wavelength stands out: at q = {q[worst]:.4g} the spectrum is {math.exp(excess[worst]):.3g} "
+            f"times {over}, more than {limit:g}"
         )
 
 
-def _refuse_poor(fit: SpectrumFit, every: Bins, below: NDArray[np.bool_], excess: FloatArray, *, forced: bool) -> None:
+def _refuse_poor(fit: SpectrumFit, anisotropy: float, *, forced: bool) -> None:
     band = f"between q = {fit.q_low:.4g} and {fit.q_high:.4g}"
-    if not fit.q1 > MIN_ZETA_1 * fit.q0:
-        raise NotSelfAffineError(
-            f"the band q0 = {fit.q0:.6g}, q1 = {fit.q1:.6g} is too narrow: q1/q0 = {fit.q1 / fit.q0:.4g}, "
-            "and the model needs more than 3"
-        )
-    if fit.residual > MAX_RESIDUAL:
-        raise NotSelfAffineError(
-            f"no power law: log10 C scatters by {fit.residual:.3g} about the best one {band}, more than {MAX_RESIDUAL}"
-        )
-    if fit.hurst_error > MAX_HURST_ERROR:
-        raise NotSelfAffineError(
-            f"the Hurst exponent {fit.hurst:.3g} +- {fit.hurst_error:.2g} is not determined to "
-            f"{MAX_HURST_ERROR} by {fit.points} points {band}"
-        )
-    strong = below & (excess > math.log(MAX_EXCESS))
-    if strong.any():
-        worst = int(np.argmax(np.where(strong, excess, -np.inf)))
-        raise NotSelfAffineError(
-            f"a wavelength stands out: at q = {every.q[worst]:.4g} the spectrum is {math.exp(excess[worst]):.3g} "
-            f"times the power law {band}, more than {MAX_EXCESS:g}"
-        )
-    if not forced and fit.variance_share < MIN_VARIANCE_SHARE:
-        raise NotSelfAffineError(
-            f"the self-affine band holds {fit.variance_share:.2%} of the variance of height, less than "
-            f"{MIN_VARIANCE_SHARE:.0%}: the rest is form or waviness; remove it, or choose the band yourself"
-        )
+    faults = {
+        f"the band q0 = {fit.q0:.6g}, q1 = {fit.q1:.6g} is too narrow: q1/q0 = {fit.q1 / fit.q0:.4g}, and the model "
+        f"needs more than {MIN_ZETA_1:g}": not fit.q1 > MIN_ZETA_1 * fit.q0,
+        f"no power law: log10 C scatters by {fit.residual:.3g} about the best one {band}, more than "
+        f"{MAX_RESIDUAL}": fit.residual > MAX_RESIDUAL,
+        f"the Hurst exponent {fit.hurst:.3g} +- {fit.hurst_error:.2g} is not determined to {MAX_HURST_ERROR} by "
+        f"{fit.points} points {band}": fit.hurst_error > MAX_HURST_ERROR,
+        f"the self-affine band holds {fit.variance_share:.2%} of the variance of height, less than "
+        f"{MIN_VARIANCE_SHARE:.0%}: the rest is form or waviness; remove it, or choose the band "
+        "yourself": not forced and fit.variance_share < MIN_VARIANCE_SHARE,
+        f"the map is not isotropic: its anisotropy is {anisotropy:.3g}, more than {MAX_ANISOTROPY} (rms gradient along "
+        "over across)": anisotropy > MAX_ANISOTROPY,
+    }
+    for fault, found in faults.items():
+        if found:
+            raise NotSelfAffineError(fault)

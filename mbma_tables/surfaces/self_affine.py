@@ -275,14 +275,6 @@ class SelfAffine(AnySurface):
         return np.where(inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0)[()]
 
 
-def check_model(model: str, band: Any) -> None:
-    """Reject an unknown model of a measurement, and a band without a fit."""
-    if model not in ("measured", "self-affine"):
-        raise InputError(f"model must be 'measured' or 'self-affine', got {model!r}")
-    if model == "measured" and band is not None:
-        raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
-
-
 def _shown(value: Any) -> str:
     """A number as Python prints it, a DataArray by its sizes."""
     if is_labelled(value):

@@ -12,8 +12,8 @@ from mbma_tables.common.arguments import hinted
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.power_laws import sorted_spectrum
-from mbma_tables.surfaces.self_affine import SelfAffine, check_model
-from mbma_tables.surfaces.spectral import SpectralSurface, resolution
+from mbma_tables.surfaces.self_affine import SelfAffine
+from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
 
 
@@ -84,36 +84,31 @@ class Surface(SelfAffine):
         q : array_like, shape (n,)
             Wavenumber, 1/length, positive, in any order and spacing.
         C : array_like, shape (n,)
-            Spectrum [length^4; a profile's length^3], not negative; a power law is taken between neighbours. A fit
-            omits masked entries.
+            Spectrum [length^4], not negative; a power law is taken between neighbours. Masked entries are left out.
         h_max, nominal_area : float, optional
             As for `Surface`; h_max is that of `heights` if neither is given.
         heights : array_like, optional
             Heights measured anywhere on the surface [length], of any shape; their mean is taken off. A Gaussian that
             ends at h_max if not given.
-        convention : {"paper", "isotropic", "profile"}, optional
-            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), = integral C q dq / (2 pi), or, for a fit alone,
-            = integral C dq / pi.
+        convention : {"paper", "isotropic"}, optional
+            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi).
         unit : str, optional
             The unit of length.
         model : {"measured", "self-affine"}, optional
-            The spectrum itself, or five numbers fitted to it.
+            The spectrum itself, or the five numbers of its `MeasuredSurface.fit(band)`.
         band : tuple of float, optional
-            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
-            and left out.
+            (q0, q1) of that fit.
 
         Returns
         -------
         MeasuredSurface or Surface
-            Of the first, `fit()` is the self-affine surface nearest to it. The second has a `fit`, a `SpectrumFit`; its
-            h_rms is that of the fitted law between q0 and q1.
 
         Raises
         ------
         InputError, OutOfRangeError
             For input that is no spectrum.
         NotSelfAffineError
-            Where five numbers are asked for and no power law with 0 < H <= 1 describes it; the message has the numbers.
+            As `MeasuredSurface.fit`.
 
         Examples
         --------
@@ -124,16 +119,9 @@ class Surface(SelfAffine):
         >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}, alpha = {surface.alpha:.1f}")
         h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
         """
-        check_model(model, band)
-        if model == "self-affine":
-            from mbma_tables.surfaces.psd import fit_psd
-
-            top = Heights.of(heights).h_max if h_max is None and heights is not None else h_max
-            numbers = fit_psd(q, C, top if nominal_area is None else 1.0, convention, band)
-            numbers |= {} if nominal_area is None else {"h_max": h_max, "nominal_area": nominal_area}
-            return cls(**numbers, unit=unit)
         known = None if heights is None else Heights.of(heights)
-        return MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit, nominal_area=nominal_area)
+        found = MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit, nominal_area=nominal_area)
+        return _modelled(found, model, band)
 
     @classmethod
     @hinted
@@ -181,10 +169,10 @@ class Surface(SelfAffine):
             mean of a periodic map, the plane of any other.
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; by default the map's, after detrending.
-        band : tuple of float, optional
-            (q0, q1) to fit and to take; else a flat roll-off below and a departure above are found and left out.
         model : {"measured", "self-affine"}, optional
-            The map's own spectrum, heights and curves, without a fit, or five numbers fitted to it.
+            The map's own spectrum, heights and curves, or the five numbers of its `MeasuredSurface.fit(band)`.
+        band : tuple of float, optional
+            (q0, q1) of that fit.
         extrapolate_to, extrapolate_hurst : float, optional
             Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; its
             influence is recorded.
@@ -199,16 +187,14 @@ class Surface(SelfAffine):
         Returns
         -------
         Surface or MeasuredSurface
-            In a topography's unit. Five numbers come with `fit`, a `SpectrumFit`. h_rms is that of the fitted law
-            between q0 and q1. Without a roll-off q0 is the map's own lowest wavenumber, though under a window the line
-            is fitted from twice that on; without a cut q1 is the largest measured wavenumber, at most pi/max(dx, dy).
+            In a topography's unit.
 
         Raises
         ------
         InputError, OutOfRangeError
             For an invalid map: holes, a missing or negative step, an unknown trend, nothing but a plane.
         NotSelfAffineError
-            With model="self-affine", where the map is not self-affine; the message has the reason and the numbers.
+            As `MeasuredSurface.fit`.
 
         Examples
         --------
@@ -223,40 +209,23 @@ class Surface(SelfAffine):
         H = 0.80, q0 = 6.283, fitted at 32 points
         """
         treatment = {name: value for name, value in locals().items() if name in OPTIONS}
-        from mbma_tables.surfaces.maps import fit_map, measured_surface, prepared
+        from mbma_tables.surfaces.maps import measured_surface, prepared
 
-        check_model(model, band)
         if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
             raise InputError("extrapolate_to and extrapolate_hurst belong to model='measured'")
-        treated = prepared(heights, treatment)
-        if model == "measured":
-            return MeasuredSurface.of(measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst))
-        surface = cls(**fit_map(treated, h_max, band))
-        return dataclasses.replace(surface, provenance=(*treated.provenance, resolution(surface.sampled())))
+        known = measured_surface(prepared(heights, treatment), h_max, extrapolate_to, extrapolate_hurst)
+        return _modelled(MeasuredSurface.of(known), model, band)
 
     @staticmethod
-    @hinted
     def from_profile(
         heights: Any,
         dx: Any = None,
         *,
-        periodic: bool | None = None,
-        detrend: str | None = None,
         h_max: float | None = None,
         nominal_area: float | str | None = None,
         extrapolate_to: Any = None,
         extrapolate_hurst: float | None = None,
-        outliers: float | None = None,
-        fill: str | None = None,
-        short_cutoff: Any = None,
-        long_cutoff: Any = None,
-        s_filter: Any = None,
-        l_filter: Any = None,
-        tip_radius: Any = None,
-        reliable: bool = True,
-        window: str | None = None,
-        unit: str | None = None,
-        channel: int | None = None,
+        **treatment: Any,
     ) -> MeasuredSurface:
         """The isotropic surface from a measured line scan, for example by a stylus.
 
@@ -267,8 +236,8 @@ class Surface(SelfAffine):
             instance; or such a line scan.
         dx : float, optional
             Sampling step [length], of an array.
-        periodic, detrend, extrapolate_to, extrapolate_hurst, outliers ... channel
-            As for `from_map`; `tip_radius` is the stylus's.
+        extrapolate_to, extrapolate_hurst, **treatment : optional
+            As for `from_map`: periodic, detrend, outliers, ... channel; `tip_radius` is the stylus's.
         h_max, nominal_area : float, optional
             As for `Surface`; by default h_max is that of the line, which is lower than that of a surface.
 
@@ -292,10 +261,10 @@ class Surface(SelfAffine):
         >>> print(surface.provenance[-3]["told"])
         h_rms is known to 5.2% and the rms gradient to 1.4% (one standard error, of a Gaussian surface)
         """
-        treatment = {name: value for name, value in locals().items() if name in OPTIONS}
         from mbma_tables.surfaces.maps import measured_surface, prepared
 
-        known = measured_surface(prepared(heights, treatment, 1), h_max, extrapolate_to, extrapolate_hurst)
+        treated = prepared(heights, treatment | {"dx": dx}, 1)
+        known = measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst)
         given = known.h_max if nominal_area is None else h_max
         return dataclasses.replace(MeasuredSurface.of(known), h_max=given, nominal_area=nominal_area)
 
@@ -322,7 +291,9 @@ class MeasuredSurface(SpectralSurface):
         Parameters
         ----------
         band : tuple of float, optional
-            (q0, q1) to fit and to take as a plain power law; else without a roll-off below and a departure above.
+            (q0, q1) to fit and to take as a plain power law; else a roll-off below and a departure above are found and
+            left out. Without a roll-off q0 is the lowest wavenumber, though of a map under a window the line is fitted
+            from twice that on; without a departure q1 is the largest.
 
         Returns
         -------
@@ -332,7 +303,8 @@ class MeasuredSurface(SpectralSurface):
         Raises
         ------
         NotSelfAffineError
-            Where no power law with 0 < H <= 1 describes it; the message has the numbers.
+            Where no power law with 0 < H <= 1 describes it, and for maps of edges or with a lay; the message has the
+            numbers.
 
         Examples
         --------
@@ -342,9 +314,22 @@ class MeasuredSurface(SpectralSurface):
         >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
         H = 0.80 from q = 1.00
         """
-        from mbma_tables.surfaces.psd import fit_samples
+        from mbma_tables.surfaces.maps import points_of_fit
+        from mbma_tables.surfaces.psd import fit_spectrum
 
-        return Surface(**fit_samples(self, band), unit=self.unit)
+        numbers = fit_spectrum(**points_of_fit(self), band=band, anisotropy=self.anisotropy)
+        return Surface(**numbers, h_max=self.h_max, unit=self.unit, provenance=self.provenance)
+
+
+def _modelled(surface: MeasuredSurface, model: str, band: Any) -> Surface | MeasuredSurface:
+    """A measured surface, or the five numbers fitted to it."""
+    if model not in ("measured", "self-affine"):
+        raise InputError(f"model must be 'measured' or 'self-affine', got {model!r}")
+    if model == "self-affine":
+        return surface.fit(band)
+    if band is not None:
+        raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
+    return surface
 
 
 Surface.__init__ = hinted(Surface.__init__)  # type: ignore[method-assign]

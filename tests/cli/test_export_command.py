@@ -68,7 +68,7 @@ def test_javascript_without_its_compiler(tmp_path, monkeypatch):
     result = run("javascript", "--out", tmp_path / "code")
     assert result.exit_code == 2
     assert result.output.count("\n") == 1
-    assert "pip install 'mbma_tables[javascript]'" in result.output
+    assert "pip install ziglang" in result.output
     assert list(tmp_path.iterdir()) == []
 
 

@@ -18,10 +18,10 @@ ROAD = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_road.toml")
 
 def test_plan_as_text_and_json():
     text = run("plan", JOINT)
-    assert "-> law by" in text
+    assert "-> contact by" in text
     assert "left out: pressure, energy" in text
     content = json.loads(run("plan", JOINT, "--json"))
-    assert [step["name"] for step in content["steps"]] == ["law"]
+    assert [step["name"] for step in content["steps"]] == ["contact"]
 
 
 def test_run_to_netcdf_and_csv(tmp_path):

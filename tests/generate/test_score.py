@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
 from scipy.special import erf
 
-from generate.score import OTHERS, score, theories_of
+from generate.pages.score import OTHERS, score, theories_of
 from generate.theories_of_others import FORCES, Corrected
 from mbma_tables import InputError, Surface
 from mbma_tables.data import boundary_elements

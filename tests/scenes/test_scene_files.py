@@ -1,22 +1,17 @@
 """Mistakes in scene files: one message each, that says what to write instead."""
 
-import dataclasses
 import json
 import math
 import pathlib
-import re
 
-import numpy as np
 import pytest
 
-from mbma_tables import Scene, Surface, contact
+from mbma_tables import Scene
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
 from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
-from mbma_tables.scenes.scene import advice
 from mbma_tables.scenes.specimen import schema
-from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import THEORIES
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
@@ -105,7 +100,7 @@ def test_what_only_a_plan_or_a_run_can_know(tmp_path):
     for text, words in (
         (scene("[accuracy]\nseconds = 1e-8"), "the cheapest plan takes"),
         (scene("[accuracy]\nrtol = 1e-10", effects='on = ["energy"]'), "at best"),
-        (scene(at="pressures = [1e6]"), "where the branch ends"),
+        (scene(at="pressures = [1e6]"), "pressure must be at most what theory 'mbma' reaches on this surface"),
     ):
         with pytest.raises(MbmaError, match=words):
             Scene.from_toml(write(tmp_path, text)).run()
@@ -184,51 +179,3 @@ def test_shipped_costs_have_what_plans_need():
     assert 0 < max(errors) <= 1e-8
     assert costs.of("exact", "gap", 1e-8) > 3 * costs.of("universal", "gap", 1e-8)
     assert read_costs(shipped_file("cost.csv")) == costs
-
-
-SURFACE = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=3.3)
-
-
-def stated(theory, quantity, area):
-    found = contact(SURFACE, area=area, theory=theory)
-    return found.stiffness_scatter if quantity == "stiffness" else found.scatter
-
-
-@pytest.mark.parametrize(
-    ("effects", "prescribed", "name", "quantity"),
-    [
-        (["stiffness"], {"areas": [0.05]}, "stiffness", "stiffness"),
-        (["area"], {"areas": [0.05]}, "gap", "force"),
-        (["area", "energy"], {"areas": [0.02, 0.05, 0.9]}, "gap", "force"),
-        (["pressure"], {"mean_separations": [1.0, 4.0]}, "pressure", "force"),
-    ],
-)
-def test_it_tells_what_the_shipped_file_states(effects, prescribed, name, quantity):
-    text = Scene(SURFACE, effects=effects, **prescribed).explain()
-    (line,) = re.findall("advice: .*", text)
-    found = re.search(r"for (\w+) theory '(\w+)' .* elements, (\S+)% instead of (.+) at (\S+)% contact, in", line)
-    assert found.group(1, 2) == (name, "calibrated")
-    area = float(found[5]) / 100
-    if "areas" in prescribed:
-        assert area == 0.05
-    assert float(found[3]) / 100 == pytest.approx(stated("calibrated", quantity, area), rel=0.02)
-    other = re.fullmatch(r"a factor (\S+)", found[4])
-    own = np.log(float(other[1])) if other else float(found[4].rstrip("%")) / 100
-    assert own == pytest.approx(stated("mbma", quantity, area), rel=0.1)
-
-
-def test_what_else_is_advised_and_where_there_is_nothing_to_say():
-    said = advice(Scene(SURFACE, effects=["conductance"], conductivities=(1.0, 1.0), pressures=[1e-4]))
-    assert "for conductance theory 'calibrated' is closer" in said
-    assert said.count("\n") == 1
-    own = dataclasses.replace(get_variant("printed"), name="own", beta=0.3)
-    said = advice(Scene(SURFACE, effects=["stiffness"], areas=[1e-4], variant=own))
-    assert "instead of an unknown distance at 0.01% contact" in said
-    assert "not tested there: A/A0 is below" in said
-    quiet = [
-        Scene(SURFACE, theory="persson", pressures=[1e-4]),
-        Scene(SURFACE, effects=["area"], mean_separations=[1.0]),
-        Scene(SURFACE, effects=["pressure"], mean_separations=[4.0]),
-        Scene(SURFACE, effects=["pressure_profile"], deltas=[0.1]),
-    ]
-    assert [advice(scene) for scene in quiet] == [""] * 4

@@ -16,7 +16,7 @@ from mbma_tables import ConvergenceError, OutOfRangeError, Scene, Surface, conta
 from mbma_tables.models import answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import statistics as islands
-from mbma_tables.scenes.problem import ELASTIC, OUTPUTS
+from mbma_tables.scenes.problem import ELASTIC, OF_CONTACT, OUTPUTS
 from mbma_tables.scenes.run import run_plan
 from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Persson
@@ -121,7 +121,7 @@ def test_island_statistics_add_up():
 def test_explain_names_steps_and_what_is_left_out():
     text = scene_of("pressure", "area", without=("subscale_area",)).explain()
     assert text.startswith("Scene  (rtol=1.0e-06, error=")
-    steps = "first use in a process", "-> totals by universal", "-> hertz area by universal"
+    steps = "first use in a process", "-> contact by universal", "-> hertz area by universal"
     for part in (*steps, "left out: stiffness, energy", "switched off: subscale_area\n"):
         assert part in text
 
@@ -199,6 +199,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
 
     count(importlib.import_module("mbma_tables.answers.contact"), "contact", "contact")
     count(importlib.import_module("mbma_tables.law.make"), "contact_law", "contact_law")
+    count(importlib.import_module("mbma_tables.answers.leakage"), "leakage_of", "leakage")
     for name in ("island_statistics", "profiles", "hertz_area"):
         count(islands, name, name)
     for theory in (GreenwoodWilliamson, Persson):
@@ -206,11 +207,9 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     count(Yielding, "__init__", "yield")
     Scene(CONCRETE, **arguments_of(effects)).run()
     asked, yields = set(effects), "yield" in effects
-    of_law = bool(asked & {"stiffness", "energy", "conductance"}) and not yields
-    totals = bool(asked & {"pressure", "area"}) and not of_law
     expected = {
-        "contact": int(yields or totals) + len(asked & {"validity", "leakage"}),
-        "contact_law": int(of_law),
+        "contact": int(bool(asked & set(OF_CONTACT))),
+        "leakage": int("leakage" in asked),
         "island_statistics": int("island_statistics" in asked),
         "profiles": int("pressure_profile" in asked),
         "greenwood_williamson": int("comparison" in asked),
@@ -277,31 +276,10 @@ def test_beyond_a_table_totals_are_solved(island_model):
     np.testing.assert_allclose(found["pressure"], truth, rtol=1e-3, atol=0)
 
 
-def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
-    made = []
-
-    def law(surface, rtol, island_model, **rest):
-        made.append(island_model)
-        if island_model != "exact":
-            raise OutOfRangeError("islands outside", True)
-        return contact_law(surface, rtol=rtol, island_model="universal", **rest)
-
-    monkeypatch.setattr("mbma_tables.law.make.contact_law", law)
-    scene = scene_with(effects=("energy",), rtol=1e-2)
-    found = run_plan(scene, with_island_model(scene, "universal"))
-    assert made == ["universal", "exact"]
-    assert found.attrs["island_models"] == '{"law": "exact"}'
-    np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2, atol=0)
-
-
 test_contradictions = refusals(
     lambda given: scene_with(**given),
     ({"without": ("pressure",)}, "is both on and off"),
     ({"without": ("energy",)}, "'energy' is off unless it is asked for"),
-    (
-        {"effects": ("pressure_profile",), "separations": None, "deltas": (0.1,), "without": ("finite_height",)},
-        "does not affect single islands",
-    ),
     (
         {"effects": ("pressure", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
         "pressure_profile is that of the deformed sphere",
@@ -319,7 +297,7 @@ test_contradictions = refusals(
 
 def test_an_island_model_of_choice():
     found = scene_with(island_model="island4d", rtol=1e-3).run()
-    assert found.attrs["island_models"] == '{"totals": "island4d"}'
+    assert found.attrs["island_models"] == '{"contact": "island4d"}'
     alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4)
     np.testing.assert_array_equal(found["pressure"], alone.pressure)
     with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):

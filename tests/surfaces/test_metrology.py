@@ -148,7 +148,7 @@ class TestBatchOfMaps:
 
     def test_mistakes(self, folder):
         for text, message in (
-            ("map,surface\n1.npy,challenge\n", "a map and a named surface or numbers"),
+            ("map,surface\n1.npy,challenge\n", "name and map are given: one of"),
             ("map,dx\nabsent.npy,1um\n", "there is no file"),
             ("surface,dx\nchallenge,1um\n", "for a map, which is missing"),
         ):

@@ -6,15 +6,14 @@ import functools
 import pathlib
 import runpy
 import types
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
 
-from generate.boundary_elements.evidence import Case, TheoryCurve
+from generate.boundary_elements.evidence import TheoryCurve
 from generate.distances import RANGES, distances, held_out, summed_up
 from generate.files import ROOT
-from generate.pages.page import percent, table
+from generate.page import percent, table
 from mbma_tables.common.errors import InputError
 
 HEADER = "theory | area at given pressure | pressure at given gap | stiffness at given pressure | loads reached"
@@ -27,11 +26,6 @@ def theories_of(path: pathlib.Path) -> dict[str, Any]:
 
     A theory has ``answer(surface, mean_separation)``, which returns F/(A0 E*) and A/A0, or
     ``at_pressure(surface, pressure)``, which returns A/A0 and the mean separation.
-
-    Raises
-    ------
-    InputError
-        If the file has neither.
     """
     content = runpy.run_path(str(path))
     found = {
@@ -49,21 +43,15 @@ def theories_of(path: pathlib.Path) -> dict[str, Any]:
     return found
 
 
-def row(name: str, theory: Callable[[Case], Any], seen: Sequence[Case]) -> list[str]:
-    """Root mean square deviations in percent at light and deep contact, and the share of loads that is reached."""
-    sums = [[summed_up(seen, found, *ends) for ends in RANGES] for found in distances(seen, theory).values()]
-    rows = [[rms for rms, _ in own] for own in sums] + [[reached for _, reached in sums[0]]]
-    return [name, *(" / ".join(map(percent, values)) for values in rows)]
-
-
 def scores(theories: dict[str, Any]) -> str:
     """A table of theories, as objects or as functions of a `Case`, on all held-out self-affine surfaces."""
-    seen = held_out()
-    of_case = {
-        n: one if isinstance(one, types.FunctionType) else functools.partial(TheoryCurve, one)
-        for n, one in theories.items()
-    }
-    return table(HEADER, [row(name, theory, seen) for name, theory in of_case.items()])
+    seen, rows = held_out(), []
+    for name, one in theories.items():
+        found = distances(seen, one if isinstance(one, types.FunctionType) else functools.partial(TheoryCurve, one))
+        sums = [[summed_up(seen, values, *ends) for ends in RANGES] for values in found.values()]
+        cells = [[rms for rms, _ in own] for own in sums] + [[reached for _, reached in sums[0]]]
+        rows.append([name, *(" / ".join(map(percent, values)) for values in cells)])
+    return table(HEADER, rows)
 
 
 @click.command()
