@@ -107,7 +107,7 @@ class Metal:
     nu: float
     hardness: tuple[float, float]
     conductivity: tuple[float, float]
-    source: str
+    source: str = ""
 
 
 def _mean_pressure(scale: str, number: float) -> float:
@@ -159,7 +159,7 @@ def get(name: str) -> Metal:
         return dataclasses.replace(_METALS[plain], name=name, hardness=(one, one))
     if str(name) not in _METALS:
         near = difflib.get_close_matches(str(name), METALS, 3, 0.4) or METALS
-        raise InputError(f"no metal is named {name!r}: there are {', '.join(near)}, each also with ' soft' or ' hard'")
+        raise InputError(f"no metal is named {name!r}: give a Metal, or {', '.join(near)}, or with ' soft', ' hard'")
     return _METALS[name]
 
 

@@ -216,6 +216,7 @@ class Calibrated(Theory):
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons why results lie outside the range tested against boundary elements."""
+        broad = f"the longest wavelength is more than {TESTED_ZETA_1:g} times the shortest"
         if isinstance(surface, MeasuredSurface):
             law = _own_law(surface)
             straight = np.zeros(answer.area.shape, dtype=bool)
@@ -225,12 +226,13 @@ class Calibrated(Theory):
                 "the light-load and near-full-contact approximations disagree for this map: stiffness is constant "
                 "over a range of forces"
             )
-            return {text: straight & (answer.area >= TESTED_AREA[0])} | area_reasons(answer.area)
+            wide = np.full(answer.area.shape, surface.q1 / surface.longest > TESTED_ZETA_1 * (1 + 1e-9))
+            return {text: straight & (answer.area >= TESTED_AREA[0]), broad: wide} | area_reasons(answer.area)
         assert isinstance(surface, Surface)
         heights = np.asarray(surface.h_max / surface.h_rms)
         reasons = {
             f"the Hurst exponent is below {TESTED_HURST:g}": np.asarray(surface.hurst) < TESTED_HURST * (1 - 1e-9),
-            f"zeta_1 is above {TESTED_ZETA_1:g}": np.asarray(surface.zeta_1) > TESTED_ZETA_1 * (1 + 1e-9),
+            broad: np.asarray(surface.zeta_1) > TESTED_ZETA_1 * (1 + 1e-9),
             f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < TESTED_HEIGHTS[0]) | (heights > TESTED_HEIGHTS[1]),
         }
         found = {text: np.broadcast_to(mask, answer.area.shape) for text, mask in reasons.items()}
