@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 
 from mbma_tables import Surface, contact, materials
 from mbma_tables.common.plots import to_picture
-from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
+from mbma_tables.totals.conductance import cooper_mikic_yovanovich, mean_conductivity, mikic
 
 # both faces' roughness in one
 JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6)
@@ -61,7 +61,7 @@ def conductance_curve(points: int = 200) -> Curve:
         hardness: contact(JOINT, pressure=pressure, E_star=E_STAR, theory="calibrated", hardness=hardness)
         for hardness in (SOFT, middle, HARD, np.inf)
     }
-    h = {p_m: conductance(found.unloading_stiffness, K_MEAN, E_STAR) for p_m, found in joints.items()}
+    h = {p_m: K_MEAN / E_STAR * found.unloading_stiffness for p_m, found in joints.items()}
     spread = np.exp(joints[middle].scatter)
     return Curve(
         pressure,
@@ -70,7 +70,7 @@ def conductance_curve(points: int = 200) -> Curve:
         h[HARD] / spread,
         h[SOFT] * spread,
         h[np.inf],
-        conductance(joints[middle].stiffness, K_MEAN, E_STAR),
+        K_MEAN / E_STAR * joints[middle].stiffness,
         cooper_mikic_yovanovich(JOINT, pressure, K_MEAN, E_STAR, middle),
         mikic(JOINT, pressure, K_MEAN, E_STAR),
     )

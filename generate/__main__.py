@@ -1,7 +1,5 @@
 """``python -m generate``: remake what the library ships, and the pages of its documentation."""
 
-from __future__ import annotations
-
 import importlib
 import pathlib
 import sys
@@ -10,18 +8,16 @@ from typing import Any
 import click
 
 from generate.files import ROOT
-from generate.pages.page import PAGES, measured, write
+from generate.page import PAGES, measured, write
 from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
-GROUPS = {
+COMMANDS = {
     **{
         name: f"generate.{name}"
         for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
     },
-    **dict.fromkeys(("gaps", "grids", "measured_maps"), "generate.boundary_elements.studies"),
-    "score": "generate.pages.score",
-    "light": "generate.boundary_elements.light",
+    **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas.fit",
     "machined": "generate.machined.campaign",
@@ -33,13 +29,11 @@ class Generator(click.Group):
     """A group of which every known error ends in one line and exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the commands."""
-        return [*GROUPS, *super().list_commands(ctx)]
+        return [*COMMANDS, *super().list_commands(ctx)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a command."""
-        if cmd_name in GROUPS:
-            command: click.Command = getattr(importlib.import_module(GROUPS[cmd_name]), cmd_name)
+        if cmd_name in COMMANDS:
+            command: click.Command = getattr(importlib.import_module(COMMANDS[cmd_name]), cmd_name)
             return command
         return super().get_command(ctx, cmd_name)
 

@@ -3,8 +3,6 @@
 README and docs/guarantees.md quote the counts.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import reprlib
@@ -21,7 +19,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from generate.files import ROOT, evidence
-from generate.pages import page
+from generate.page import table
+from generate.page import write as write_page
 from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
 from mbma_tables.laws.calibrated import self_affine_law
 
@@ -329,8 +328,6 @@ def audit(seed: int, scale: float, only: str, write: bool) -> None:
     if write:
         block = f"```\npython -m generate audit --seed {seed} --scale {scale:g} --write\n```\n\n"
         header = "search | answers | refused | beyond | largest"
-        page.write(
-            "guarantees", {"audit": block + page.table(header, (found[:-1] for found in rows), FORMATS)}, {}, ROOT
-        )
+        write_page("guarantees", {"audit": block + table(header, (found[:-1] for found in rows), FORMATS)}, {}, ROOT)
     if any(found.beyond for found in rows):
         raise SystemExit(1)

@@ -1,7 +1,5 @@
 """``python -m generate calibrated``: the calibrated law's constants, from the training set and no other surface."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import pathlib
@@ -14,8 +12,8 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from generate import calibrated_hardness
-from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, TheoryCurve, cases
+from generate.boundary_elements.surfaces import SPLITS, TRAINING
 from generate.calibrated_bars import measure
 from generate.calibrated_file import QUANTITIES, by_bin, cross_validated, fitted, within
 from generate.calibrated_table import write as write_table

@@ -1,13 +1,11 @@
 """What the calibrated law is held to on surfaces that no fit saw, and what two surfaces of one spectrum differ by."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from generate.boundary_elements.design import TRAINING
+from generate.boundary_elements.surfaces import TRAINING
 
 LARGE = 512  # points a side from which on surfaces are told apart
 PLAIN, FILTERED, EVERY = ("self_affine",), ("plateau", "filtered"), ("self_affine", "plateau", "filtered")

@@ -1,7 +1,5 @@
 """What fits of calibrated laws share, and their file tables/calibrated.nc: a root, and groups of other commands."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import itertools

@@ -1,7 +1,5 @@
 """Constants of contacts with a hardness from capped boundary elements, and errors on surfaces that no fit saw."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import functools
@@ -15,8 +13,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
+from generate.boundary_elements.surfaces import SPLITS, TRAINING
 from generate.calibrated_file import by_bin, cross_validated, fitted, made_by, rms, variable, within, write_part
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray

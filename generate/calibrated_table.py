@@ -1,7 +1,5 @@
 """The file of the calibrated law: its table, the table's errors, and how far theories are from simulation."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import functools
@@ -80,9 +78,9 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
         top = rng.uniform(*HIGHEST)
         low, far = COVERED["log_separation"][0], NEAREST * top
         u = np.concatenate([rng.uniform(0, far, points // 2), np.exp(rng.uniform(low, np.log(far), points // 2))])
-        out = table.fill(np.array([[hurst], [log_zeta], [top]]), np.zeros(u.size, np.int64), u)
+        out = table.prepared(np.array([[hurst], [log_zeta], [top]]), u.size)[0]((np.zeros(u.size, np.int64), u))
         law = Law(Spectrum.self_affine(hurst, float(np.exp(log_zeta))), top, table.constants)
-        force, stiffness = law.force_and_stiffness(u)
+        force, stiffness = law.contact(u)[::2]
         misses.append(np.abs(out[[0, 2, 1]] / np.stack([force, stiffness, law.area(force)]) - 1))
     values = dict(zip(("force", "stiffness", "area"), np.concatenate(misses, axis=1), strict=True))
     largest = {f"largest_error_{name}": float(row.max()) for name, row in values.items()}

@@ -4,8 +4,6 @@ Rings of equal width, the pressure taken constant over each, and w <- w + dampin
 (Eqs. 34, 36, 37). It slows down and then diverges as mu grows.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``python -m generate cost``: time, error and evaluations of every way to answer an island, a gap or a surface."""
 
-from __future__ import annotations
-
 import functools
 import json
 import platform

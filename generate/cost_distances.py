@@ -1,7 +1,5 @@
 """Rows of tables/distance.csv: deviation of theories from boundary elements, and processor time."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """``python -m generate coverage``: which lines of the compiled core tests run, by gcov."""
 
-from __future__ import annotations
-
 import collections
 import json
 import os

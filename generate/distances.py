@@ -4,8 +4,6 @@ Deviations are ln(theory/simulation) of three quantities: area at equal force, f
 at equal force. They are model errors: the theories are solved to 1e-6 or better, except for the map's law.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 from collections.abc import Callable, Sequence
@@ -13,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve, curves_of
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.calibrated import errors
 from generate.calibrated_file import QUANTITIES, rms
 from generate.files import DATA, dataset, evidence, read_csv

@@ -1,7 +1,5 @@
 """``python -m generate explorer``: compile the C of the page of `mbma explore` to WebAssembly."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import pathlib

@@ -1,7 +1,5 @@
 """Files of a checkout: data of docs/data, and what several programs read of them."""
 
-from __future__ import annotations
-
 import functools
 import pathlib
 from typing import Any

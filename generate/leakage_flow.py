@@ -1,7 +1,5 @@
 """Flow through simulated contacts, and every law of it: what `generate.leakage_law` fits and compares."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -10,7 +8,7 @@ import xarray as xr
 from generate.boundary_elements.evidence import Simulated, TheoryCurve, simulated
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import effective_medium as leakage
-from mbma_tables.laws.calibrated import Constants, Law
+from mbma_tables.laws.calibrated import Constants, Law, force_at_area, light_factor
 from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.yielding import Yielding
@@ -68,7 +66,8 @@ class Flow:
         self.one = one
         self.area, self.u = one.law(constants)
         # gaps of contacts that yield are taken for those of elastic ones of equal area
-        load = leakage.load_of(one.spectrum, self.area, constants) if one.kind == "yielded" else one.force
+        at_area = force_at_area(self.area, light_factor(one.spectrum.alpha, constants), constants)
+        load = at_area if one.kind == "yielded" else one.force
         self._gaps = leakage.gaps(one.spectrum, load, constants)
         self._known: dict[FlowConstants, FloatArray] = {}
 

@@ -1,7 +1,5 @@
 """The law of leakage: its constants from the training set, its errors on held-out surfaces, its table."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import pathlib
@@ -15,8 +13,8 @@ import xarray as xr
 from scipy.interpolate import RegularGridInterpolator
 
 from generate import files
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import TheoryCurve
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.calibrated_file import FOLDS, by_bin, coordinates, fitted, made_by, rms, variable, within, write_part
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
 from generate.splines import coefficients
@@ -240,7 +238,7 @@ def write(path: pathlib.Path, evidence: pathlib.Path = FILE) -> xr.Dataset:
     return made
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE)
 @click.option(
     "--table", type=click.Path(path_type=pathlib.Path, exists=True), default=TABLE, help="The library's file."

@@ -1,7 +1,5 @@
 """Where values came from: versions, arithmetic, source files."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import pathlib

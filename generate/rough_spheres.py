@@ -4,8 +4,6 @@ Gaussian roughness on spheres of radius `RADIUS` against a rigid flat, on a half
 the convolution of DC-FFT), E* = 1, lengths in sampling steps. Their rows are a group of docs/data/boundary_elements.nc.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 from collections.abc import Iterator
@@ -13,7 +11,7 @@ from collections.abc import Iterator
 import click
 import numpy as np
 
-from generate.boundary_elements.collect import of_contacts
+from generate.boundary_elements.run import of_contacts
 from generate.calibrated_file import write_part
 from generate.machined.makers import rough
 from mbma_tables.common.arguments import FloatArray, needed

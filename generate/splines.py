@@ -4,8 +4,6 @@ On an axis of n equally spaced nodes a spline of odd degree k has n + k - 1 coef
 centred at the nodes and at (k - 1)/2 places beyond either end. Interpolation and not-a-knot conditions fix them.
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,6 +1,4 @@
-"""Where jobs run: here, in processes of this machine, or on a dask scheduler."""
-
-from __future__ import annotations
+"""Where jobs run: here, or in processes of this machine."""
 
 import concurrent.futures
 import contextlib
@@ -12,38 +10,27 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
-from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.errors import MbmaError
 
 Pool = concurrent.futures.Executor | None
 Key = TypeVar("Key")
 
 
 class WorkerError(MbmaError, RuntimeError):
-    """Worker processes that died, or that a scheduler lost."""
+    """Worker processes that died."""
 
 
 @contextlib.contextmanager
-def executor(workers: int, scheduler: str | None) -> Iterator[Pool]:
-    """Processes, a dask scheduler's workers, or None for one worker: here."""
-    if scheduler is not None:
-        try:
-            from distributed import Client
-
-            client = Client(scheduler)
-        except ImportError:
-            raise InputError("--scheduler needs dask: pip install 'dask[distributed]'") from None
-        except (OSError, ValueError) as fault:
-            raise WorkerError(f"no dask scheduler at {scheduler}: {fault}") from None
-        with client:
-            yield client.get_executor()
-    elif workers == 1:
+def executor(workers: int) -> Iterator[Pool]:
+    """Processes, or None for one worker: here."""
+    if workers == 1:
         yield None
-    else:
-        # started afresh: threads and forks do not mix
-        start = multiprocessing.get_context("spawn")
-        ends = functools.partial(_end_with, os.getpid())
-        with concurrent.futures.ProcessPoolExecutor(workers, start, initializer=ends) as pool:
-            yield pool
+        return
+    # started afresh: threads and forks do not mix
+    start = multiprocessing.get_context("spawn")
+    ends = functools.partial(_end_with, os.getpid())
+    with concurrent.futures.ProcessPoolExecutor(workers, start, initializer=ends) as pool:
+        yield pool
 
 
 def _end_with(parent: int) -> None:

@@ -176,9 +176,9 @@ class Joint(Displayed):
     def _law(self) -> ContactLaw:
         return contact_law(self.surface, **self._asked)
 
-    def sensitivity(self, pressure: float | str, ranges: Mapping[str, tuple[Any, Any]] | None = None) -> Sensitivity:
+    def sensitivity(self, pressure: float | str) -> Sensitivity:
         """Sensitivity to each parameter of the joint at a pressure, from `sensitivity`."""
-        return sensitivity(self.surface, pressure=pressure, ranges=ranges, **self._asked)
+        return sensitivity(self.surface, pressure=pressure, **self._asked)
 
     def export(
         self,

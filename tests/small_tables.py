@@ -9,10 +9,8 @@ import netCDF4
 import numpy as np
 
 from generate.tables.chunks import ChunkedSolver
-from generate.tables.commands import built
+from generate.tables.commands import KINDS
 from generate.tables.configuration import load
-from generate.tables.island4d import Island4d
-from generate.tables.universal import Universal
 from mbma_tables.tablefiles.netcdf import SEAL, SEAL_LENGTH
 
 SMALL = {
@@ -38,7 +36,6 @@ low = 1e-6
 high = 100.0
 """,
 }
-KINDS = {"universal": Universal, "island4d": Island4d}
 
 
 def small(folder, kind, extra=""):
@@ -52,7 +49,8 @@ def small(folder, kind, extra=""):
 def small_build(kind):
     with tempfile.TemporaryDirectory() as folder:
         configuration = load(kind, small(pathlib.Path(folder), kind))
-    return KINDS[kind](configuration), built(configuration, ChunkedSolver())
+    made = KINDS[kind](configuration)
+    return made, made.build(ChunkedSolver())
 
 
 def small_table(kind):

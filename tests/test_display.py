@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import refusals
 
-from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, open_table, sensitivity
+from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, sensitivity
 from mbma_tables.common.plots import Curve, draw_compression, to_picture
 from mbma_tables.export.law_rows import describe_law
 
@@ -25,8 +25,6 @@ DISPLAYED = (
     lambda: contact_law(ROAD, E_star="13.3 MPa"),
     lambda: contact_law(ROAD, theory="calibrated"),
     lambda: describe_law(ROAD, "13.3 MPa", rows=20),
-    lambda: open_table("universal"),
-    lambda: open_table("island4d"),
 )
 
 
@@ -38,7 +36,7 @@ def thing(request):
 def test_a_line_is_short_and_plain(thing):
     line = repr(thing)
     assert "\n" not in line
-    assert len(line) < 360
+    assert len(line) < 400
     assert line.startswith(type(thing).__name__)
     assert not re.search(r"np\.|array|object at", line)
 
@@ -59,7 +57,7 @@ def test_without_matplotlib_the_table_stands_alone(monkeypatch, thing):
 def test_without_xarray_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     for ask in (ROAD.to_dataset, Scene(ROAD, separations=[0.5], effects=["pressure"]).run):
-        with pytest.raises(MbmaError, match=r"this needs xarray: pip install 'mbma_tables\[xarray\]'"):
+        with pytest.raises(MbmaError, match=r"this needs xarray: pip install xarray"):
             ask()
 
 
@@ -119,7 +117,7 @@ def test_batches_are_summed_up():
     assert "hurst=<100 numbers, 0.2 to 0.9>" in repr(batch)
     answer = contact(batch, separation=1.0)
     assert "valid 0 of 100" in repr(answer)
-    assert len(repr(answer)) < 360
+    assert len(repr(answer)) < 400
     for single in (batch, answer, contact(ROAD, separation=0.1)):
         assert "<img" not in single._repr_html_()
         with pytest.raises(InputError):

@@ -17,10 +17,8 @@ from helpers import assert_same_output
 
 import mbma_tables
 from generate.files import ROOT
-from generate.pages import introduction
-from generate.pages import tables as table_page
-from generate.pages.architecture import rooms
-from generate.pages.page import MARKED, fill, printed, svg
+from generate.page import MARKED, fill, printed, svg
+from generate.pages import library
 from mbma_tables.models.tables import shipped
 from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS
 
@@ -118,7 +116,7 @@ def test_every_module_of_the_architecture_exists():
 def test_layers_of_the_picture_are_those_of_the_import_contract():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     layers = {name for layer in settings["contracts"][0]["layers"] for name in layer.split(" : ")}
-    assert {*rooms()[0], "__main__"} == layers
+    assert {*library.rooms()[0], "__main__"} == layers
 
 
 NUMBER = r"(?:[BCD]\.)?\d+[ab]?"
@@ -153,7 +151,7 @@ def test_every_cited_equation_is_on_the_page_of_the_model_once(package):
 
 
 def test_measured_parts_are_what_the_table_files_hold():
-    assert fill(TABLES, table_page.measure()[0]) == TABLES, "python -m generate pages tables"
+    assert fill(TABLES, library.tables()[0]) == TABLES, "python -m generate pages tables"
 
 
 def test_marks_that_do_not_fit_are_refused():
@@ -186,13 +184,13 @@ def test_readme_is_short_and_begins_with_results():
 
 
 def test_measured_parts_of_the_readme_are_the_generators():
-    parts, files = introduction.readme()
+    parts, files = library.readme()
     assert {match[2]: match[0] for match in MARKED.finditer(README)} == {
         name: f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->" for name, part in parts.items()
     }
     for name, figure in files.items():
         assert (ROOT / name).read_bytes()[:5] == svg(figure)[:5] == b"<?xml"
-    assert fill(PAGES["formula.md"], introduction.formula()[0]) == PAGES["formula.md"]
+    assert fill(PAGES["formula.md"], library.formula()[0]) == PAGES["formula.md"]
 
 
 def test_pocket_laws_are_printed_as_they_are_computed():
@@ -206,5 +204,5 @@ def test_pocket_laws_are_printed_as_they_are_computed():
         text = re.sub(r"([\d.]) (log|x|\()", r"\1*\2", text).replace("p/1 sqrt", "p*sqrt")
         names[name] = eval(text, {}, names)
         if name == "A/A0":
-            assert abs(names[name] / float(introduction.pocket_area(0.04, 30.0)) - 1) < 1e-12
-    assert abs(names["p"] / float(introduction.pocket_pressure(1.3, 0.6)) - 1) < 1e-12
+            assert abs(names[name] / float(library.pocket_area(0.04, 30.0)) - 1) < 1e-12
+    assert abs(names["p"] / float(library.pocket_pressure(1.3, 0.6)) - 1) < 1e-12

@@ -180,9 +180,7 @@ def test_valid_of_data_arrays_knows_the_metals():
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_sensitivities_hold_the_hardness(theory):
     numbers = {"pressure": 0.1, "E_star": 115.0, "hardness": 3.0}
-    found = sensitivity(
-        FACE, pressure="0.1 GPa", E_star="115 GPa", hardness="3 GPa", theory=theory, ranges={"hardness": (2.0, 4.0)}
-    )
+    found = sensitivity(FACE, pressure="0.1 GPa", E_star="115 GPa", hardness="3 GPa", theory=theory)
     for name in numbers:
         both = []
         for factor in (0.999, 1.001):
@@ -192,8 +190,6 @@ def test_sensitivities_hold_the_hardness(theory):
         slope = np.diff(np.log(both), axis=0)[0] / np.log(1.001 / 0.999)
         known = [found.slopes[name][answer] for answer in ("area", "mean_separation", "stiffness", "conductance")]
         np.testing.assert_allclose(known, slope, atol=1e-4)
-    low, high = found.ranges["hardness"]["area"]
-    assert high / low == pytest.approx(2, rel=0.1)
 
 
 def test_scenes_and_rows_take_every_hardness():

@@ -1,18 +1,16 @@
 """Surfaces of the evidence, with or without a hardness, as laws are fitted to them and tested on them."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from scipy.special import erf, erfinv
 
-from generate.boundary_elements.design import REFINEMENT, SPLITS
+from generate.boundary_elements.surfaces import REFINEMENT, SPLITS
 from mbma_tables import Surface
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness
@@ -126,7 +124,7 @@ class Case(Simulated):
     area: FloatArray
     u: FloatArray
 
-    def at(self, kept: Any) -> Case:
+    def at(self, kept: Any) -> Self:
         """The same at some of its loads."""
         return dataclasses.replace(self, force=self.force[kept], area=self.area[kept], u=self.u[kept])
 
@@ -170,7 +168,7 @@ class Capped(Simulated):
     def elastic(self) -> tuple[FloatArray, FloatArray]:
         """Simulated force and stiffness at these gaps; by the law, fitted at its end, where not pressed so far."""
         u, found = self.bare["u"], []
-        laws = self.by_law, self.law.force_and_stiffness(u[-1:])
+        laws = self.by_law, self.law.contact(u[-1:])[::2]
         for name, beyond, end in zip(("force", "frozen"), *laws, strict=True):
             known = PchipInterpolator(u[::-1], np.log(self.bare[name][::-1]))
             inside = np.exp(known(np.maximum(self.u, u[-1])))
@@ -180,7 +178,7 @@ class Capped(Simulated):
     @functools.cached_property
     def by_law(self) -> tuple[FloatArray, FloatArray]:
         """Elastic force and stiffness at these gaps, by the spectrum's law."""
-        return self.law.force_and_stiffness(self.u)
+        return self.law.contact(self.u)[::2]
 
     @functools.cached_property
     def elastic_areas(self) -> dict[str, FloatArray]:
@@ -235,7 +233,7 @@ def capped(data: xr.Dataset) -> list[Capped]:
         heights = hardness.BearingCurve(curves["mean_height"], known.h_max)
         force, _, stiffness = by_map.answer(u)
         levels = {
-            "calibrated": (*law.force_and_stiffness(u), hardness.bearing_share(u, known.h_max)[0]),
+            "calibrated": (*law.contact(u)[::2], hardness.bearing_share(u, known.h_max)[0]),
             "calibrated_map": (force, stiffness, heights(u)[0]),
         }
         rows = {own: one[name].values.astype(float) for own, name in names.items()}

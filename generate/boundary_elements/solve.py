@@ -1,6 +1,7 @@
-"""One surface pressed flat: Tamaas at a list of loads, and all that is kept of it."""
+"""One surface pressed flat: contact by Tamaas, with a hardness or with flow by the library's own boundary elements.
 
-from __future__ import annotations
+Tamaas has pressures capped at a hardness too (KatoSaturated), but its iteration always runs to its limit.
+"""
 
 import importlib.metadata
 import os
@@ -9,31 +10,43 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy.special import erfinv
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.boundary_elements.tamaas_contact import Contact as Contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import ConvergenceError
-from mbma_tables.laws.bearing_curve import (
-    BANDS,
-    RadialSpectrum,
-    bearing,
-    half_plane_weights,
-    radial_spectrum,
-    wavevectors,
-)
+from mbma_tables.laws import bearing_curve, boundary_elements
+from mbma_tables.laws.bearing_curve import RadialSpectrum, bearing, radial_spectrum
 from mbma_tables.laws.boundary_elements import LOADS as LOADS
+from mbma_tables.laws.reynolds import flow_conductance
 
 # beyond LOADS, where heavy tails of the gradient keep gaps open
 HIGHER_LOADS = (1.5, 2.1, 3.0)
 FULL = 0.96
-
 QUANTITIES = ("area", "area_raw", "mean_separation", "energy", "pressure_weighted_height", "residual", "seconds")
 
+HARDNESSES = (0.025, 0.05, 0.1, 0.2, 0.4, 0.8, np.inf)  # eta = p_m/(E* g)
+AREAS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1, 0.18, 0.3, 0.45, 0.6, 0.75, 0.9)  # that loads aim at
+CAPPED = (
+    *("area", "area_raw", "area_yielded", "area_yielded_raw", "mean_separation", "plane_separation", "energy"),
+    *("frozen_stiffness", "residual", "iterations", "seconds"),
+)
+# of flow, F/(A0 E* g): 0.5% to 42% contact, where the last cells are blocked; and of the largest grids
+FLOW_LOADS = (0.0025, 0.005, 0.01, 0.02, 0.035, 0.055, 0.08, 0.105, 0.13, 0.155, 0.18, 0.2, 0.22)
+FEW_LOADS = (0.005, 0.02, 0.055, 0.08, 0.105, 0.13, 0.155)
+FLOW_AREAS = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)  # that loads of surfaces that yield aim at
+LARGE = 1024
+OF_FLOW = ("area", "area_raw", "mean_separation", "residual", "seconds")
+LENGTHS = ("mean_separation", "plane_separation", "energy", "pressure_weighted_height")  # in h_rms
 
-def simulate(recipe: Recipe) -> dict[str, Any]:
-    """All that is kept of one random surface."""
-    return pressed(heights(recipe), recipe.sizes, recipe.q0)
+
+def engine() -> str:
+    return f"Tamaas {importlib.metadata.version('tamaas')}"
+
+
+def kept(results: list[dict[str, float]], names: tuple[str, ...], h_rms: float) -> dict[str, FloatArray]:
+    """Quantities of loads by name, lengths in h_rms."""
+    return {name: np.array([r[name] for r in results]) / (h_rms if name in LENGTHS else 1) for name in names}
 
 
 def prepared(
@@ -64,33 +77,69 @@ def prepared(
     return surface, spectrum, curves
 
 
+def simulate(recipe: Recipe) -> dict[str, Any]:
+    """All that is kept of one random surface."""
+    return pressed(heights(recipe), recipe.sizes, recipe.q0)
+
+
 def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict[str, Any]:
     """All that is kept of one periodic map: lengths in h_rms, force in A0 E* g, energy in A0 E* g h_rms."""
     surface, spectrum, curves = prepared(unscaled, sizes, q0)
     h_rms = float(surface.std())
-    wavenumber = np.hypot(*wavevectors(surface.shape, sizes))
+    wavenumber = np.hypot(*bearing_curve.wavevectors(surface.shape, sizes))
     wavenumber[0, 0] = np.inf
-    weights = half_plane_weights(surface.shape)
-    length = np.array([1, 1, h_rms, h_rms, h_rms, 1, 1])
+    weights = bearing_curve.half_plane_weights(surface.shape)
     contact = Contact(surface, sizes)
-    rows: list[FloatArray] = []
-    shares: list[FloatArray] = []
+    rows, shares = list[dict[str, float]](), list[FloatArray]()
     for force in (*LOADS, *HIGHER_LOADS):
-        if force > LOADS[-1] and rows[-1][0] > FULL:
+        if force > LOADS[-1] and rows[-1]["area"] > FULL:
             break
-        result = contact.press(force)
-        rows.append(np.array([result[name] for name in QUANTITIES]) / length)
+        rows.append(contact.press(force))
         # elastic energy by bands, sum |p_q|^2/|q|: longer waves than the surface has, its bands, shorter ones
-        pressure = np.fft.rfft2(np.asarray(contact.model.traction)) / surface.size
-        modes = np.abs(pressure) ** 2 * weights / wavenumber
-        shares.append(np.bincount(spectrum.band.ravel() + 1, modes.ravel(), BANDS + 2) / h_rms)
-    return {
-        **dict(zip(QUANTITIES, np.array(rows).T, strict=True)),
-        "force": np.array((*LOADS, *HIGHER_LOADS)[: len(rows)]),
-        "band_energy": np.array(shares),
-        **curves,
-        "engine": f"Tamaas {importlib.metadata.version('tamaas')}",
-    }
+        modes = np.abs(np.fft.rfft2(contact.traction) / surface.size) ** 2 * weights / wavenumber
+        shares.append(np.bincount(spectrum.band.ravel() + 1, modes.ravel(), bearing_curve.BANDS + 2) / h_rms)
+    forces = np.array((*LOADS, *HIGHER_LOADS)[: len(rows)])
+    found = {"force": forces, "band_energy": np.array(shares), "engine": engine()}
+    return curves | kept(rows, QUANTITIES, h_rms) | found
+
+
+def load_at(area: float, eta: float) -> float:
+    """F/(A0 E* g) at about that A/A0, below eta."""
+    elastic = float(erfinv(area)) * np.sqrt(0.3 + 0.2 * area)
+    return float(((eta * area) ** -2.0 + elastic**-2.0) ** -0.5)
+
+
+def simulate_capped(recipe: Recipe) -> dict[str, Any]:
+    """All that is kept of one surface: lengths in h_rms, force in A0 E* g, rows for `HARDNESSES`, columns for loads."""
+    surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+    h_rms = float(surface.std())
+    forces = np.array([[load_at(area, eta) for area in AREAS] for eta in HARDNESSES])
+    found = []
+    for eta, loads in zip(HARDNESSES, forces, strict=True):
+        contact = boundary_elements.Contact(surface, recipe.sizes, hardness=eta)
+        results = [contact.press(force) | {"frozen_stiffness": contact.frozen_stiffness() * h_rms} for force in loads]
+        found.append(kept(results, CAPPED, h_rms))
+    rows = {name: np.array([row[name] for row in found]) for name in CAPPED}
+    return known | rows | {"force": forces, "engine": "conjugate gradients here"}
+
+
+def solve_flow(recipe: Recipe) -> dict[str, Any]:
+    """Contact and flow coefficient, by Reynolds' equation, of one surface up to its blocking: lengths in h_rms."""
+    surface, spectrum, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+    h_rms = float(surface.std())
+    contact: Any = Contact(surface, recipe.sizes)
+    loads: tuple[float, ...] = FEW_LOADS if recipe.points >= LARGE else FLOW_LOADS
+    if recipe.kind == "yielded":
+        contact = boundary_elements.Contact(surface, recipe.sizes, hardness=recipe.shape)
+        loads = tuple(load_at(area, recipe.shape) for area in FLOW_AREAS)
+    rows, flows = list[dict[str, float]](), list[FloatArray]()
+    for force in loads:
+        rows.append(contact.press(force))
+        flows.append(flow_conductance(contact.gap / h_rms, recipe.sizes))
+        if not flows[-1].any():
+            break
+    known |= {"band_q": np.where(spectrum.variance > 0, spectrum.q / recipe.q0, np.nan), "engine": engine()}
+    return known | kept(rows, OF_FLOW, h_rms) | {"force": np.array(loads[: len(flows)]), "flow": np.array(flows)}
 
 
 def simulate_to(recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str, Any]] = simulate) -> str:
@@ -100,7 +149,7 @@ def simulate_to(recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str,
         partial = target.with_suffix(f".{os.getpid()}.partial")
         try:
             found = solve(recipe)
-        except (ConvergenceError, RuntimeError) as fault:
+        except (ArithmeticError, RuntimeError) as fault:
             raise RuntimeError(f"{recipe.name}: {fault}") from None
         with open(partial, "wb") as stream:
             np.savez_compressed(stream, **found)

@@ -1,12 +1,10 @@
-"""Further commands on simulated maps: `grids`, `measured_maps` and `gaps`."""
-
-from __future__ import annotations
+"""Further commands on simulated maps: `grids`, `measured_maps`, `light` and `gaps`."""
 
 import dataclasses
 import itertools
 import pathlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -15,14 +13,14 @@ import pandas as pd
 import xarray as xr
 from tqdm import tqdm
 
-from generate.boundary_elements.capped import load_at
-from generate.boundary_elements.collect import TEXTS, collected, group
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
-from generate.boundary_elements.solve import LOADS, Contact, prepared, pressed
-from generate.boundary_elements.surfaces import Recipe, heights
-from generate.calibrated_file import rms, write_part
-from generate.timing import fixed_work
+from generate.boundary_elements.run import TEXTS, collected, group, of_recipes
+from generate.boundary_elements.solve import LOADS, Contact, load_at, prepared, pressed
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, Recipe, campaign, heights
+from generate.calibrated_file import rms, variable, write_part
+from generate.timing import seconds_of_work
 from mbma_tables import Surface, contact
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.data import FILE
 from mbma_tables.laws import boundary_elements
@@ -42,6 +40,11 @@ HEAD = """\
 # seconds of the processor a load; cost: those over the fixed piece of work of docs/cost.md, timed before and after.
 """
 LARGEST = 256  # points a side of measured maps that are kept, from the middle
+
+LIGHT_LOADS = np.geomspace(2e-5, 0.012, 40)  # F/(A0 E* g): from first contact, a few points of the grid, to 3% contact
+LIGHT_BANDS = ((1, 8), (1, 32), (2, 16), (4, 10), (8, 5), (16, 3.2))  # longest wavelengths a side, and q1/q0
+LIGHT_HURSTS, LIGHT_SEEDS = (0.5, 0.8), (1, 2, 3, 4, 5)
+LIGHT_BINS = (2e-4, 5e-4, 1e-3, 3e-3, 1e-2)  # A/A0
 
 JUMPS = np.array([0.03, 0.1, 0.3, 1.0, 3.0])  # of a gas's temperature [h_rms]
 AREAS = (0.003, 0.01, 0.03, 0.1, 0.2, 0.35, 0.55, 0.75)
@@ -65,19 +68,6 @@ SURFACES = {
 PATH: Any = click.Path(path_type=pathlib.Path)
 
 
-def priced(run: Callable[[], Any]) -> tuple[Any, float, float]:
-    """What `run` returns, its seconds, and these over the fixed piece of work done before and after."""
-
-    def timed(function: Callable[[], Any]) -> tuple[Any, float]:
-        started = time.process_time()
-        return function(), time.process_time() - started
-
-    before = min(timed(fixed_work)[1] for _ in range(3))
-    found, seconds = timed(run)
-    after = min(timed(fixed_work)[1] for _ in range(3))
-    return found, seconds, 2 * seconds / (before + after)
-
-
 def solve(recipe: Recipe, grid: int, finest: int, start: str) -> Iterator[tuple[Any, ...]]:
     """Rows of one surface on one grid, whose heights are those of the finest at every second, fourth, ... point."""
     fine = heights(dataclasses.replace(recipe, points=finest))
@@ -86,35 +76,26 @@ def solve(recipe: Recipe, grid: int, finest: int, start: str) -> Iterator[tuple[
     length, engine = known.h_rms / known.gradient, Contact(surface, recipe.sizes)
     for force in LOADS[::2]:
         # cold by an engine made for the load, continued from the pressures of the load below
-        own = (lambda: Contact(surface, recipe.sizes)) if start == "cold" else (lambda: engine)
-        found, *times = priced(lambda own=own, force=force: own().press(force))  # type: ignore[misc]
+        before, started = seconds_of_work(), time.process_time()
+        found = (Contact(surface, recipe.sizes) if start == "cold" else engine).press(force)
+        seconds = time.process_time() - started
+        cost = 2 * seconds / (before + seconds_of_work())
         node = (recipe.hurst, recipe.zeta_1, recipe.waves, recipe.seed, grid, start, force)
-        yield (*node, found["area"], found["mean_separation"] / length, *times)
+        yield (*node, found["area"], found["mean_separation"] / length, seconds, cost)
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--folder", type=PATH, default="boundary_elements", show_default=True, help="One file a grid.")
+@click.command()
 @click.option("--out", "target", type=PATH, default=DATA / "boundary_element_grids.csv", show_default=True)
-@click.option("--collect", is_flag=True, help="Write what there is, no runs.")
-def grids(folder: pathlib.Path, target: pathlib.Path, collect: bool) -> None:
-    """Solve held-out surfaces on ever finer grids, loads cold and continued: half an hour.
-
-    Stopped and called again, it goes on where it was.
-    """
+def grids(target: pathlib.Path) -> None:
+    """Solve held-out surfaces on ever finer grids, loads cold and continued: half an hour."""
     held = [task.recipe for task in campaign() if task.split == HELD_OUT_SPECTRUM and task.recipe.kind == PLAIN]
     surfaces = [next(one for one in held if (one.hurst, one.zeta_1) == chosen) for chosen in CHOSEN]
-    finest, parts = GRIDS[-1], []
+    rows = list[tuple[Any, ...]]()
     for grid, recipe, start in tqdm(list(itertools.product(GRIDS, surfaces, STARTS)), disable=None):
-        path = folder / f"{recipe.name}_on_{grid}_of_{finest}_{start}.csv"
-        if not path.exists():
-            if collect:
-                continue
-            rows = pd.DataFrame(list(solve(recipe, grid, finest, start)))
-            text = rows.to_csv(index=False, header=False, float_format="%.8g", lineterminator="\n")
-            write_file(path, text.encode(), make_folders=True)
-        parts.append(path.read_text(encoding="utf-8"))
-    write_file(target, (HEAD + ",".join(COLUMNS) + "\n" + "".join(parts)).encode())
-    click.echo(f"{target}: {sum(part.count(chr(10)) for part in parts)} loads")
+        rows += solve(recipe, grid, GRIDS[-1], start)
+    text = pd.DataFrame(rows, columns=COLUMNS).to_csv(index=False, float_format="%.8g", lineterminator="\n")
+    write_file(target, (HEAD + text).encode())
+    click.echo(f"{target}: {len(rows)} loads")
 
 
 def middle(treated: Treated) -> Treated:
@@ -123,7 +104,7 @@ def middle(treated: Treated) -> Treated:
     return dataclasses.replace(treated, heights=treated.heights[kept])
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.argument("maps", nargs=-1, required=True, type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
 @click.option("--data", type=PATH, default=FILE, show_default=True)
 def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
@@ -135,15 +116,62 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
         sizes = surface.shape[0] * treated.steps[0], surface.shape[1] * treated.steps[1]
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
-        solved.append(found := pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
-        click.echo(f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")
-    write_part(data, of_maps([path.stem for path in maps], solved), "measured")
-
-
-def of_maps(names: list[str], solved: list[dict[str, Any]]) -> xr.Dataset:
-    """The group of simulated maps."""
+        solved.append(pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
+        click.echo(
+            f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(solved[-1]['anisotropy']):.3g}"
+        )
     found = {name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]}
-    return group("measured", found, engine=str(solved[0]["engine"])).assign_coords(surface=names)
+    own = group("measured", found, engine=str(solved[0]["engine"])).assign_coords(surface=[path.stem for path in maps])
+    write_part(data, own, "measured")
+
+
+def light_recipes() -> list[Recipe]:
+    return [
+        Recipe("self_affine", hurst, zeta_1, waves, seed, 256)
+        for (waves, zeta_1), hurst, seed in itertools.product(LIGHT_BANDS, LIGHT_HURSTS, LIGHT_SEEDS)
+    ]
+
+
+def light_contacts(recipe: Recipe) -> FloatArray:
+    """Highest point, A/A0 and mean separations [h_rms] at `LIGHT_LOADS`; NaN where a single point is in contact."""
+    surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+    model, rows = Contact(surface, recipe.sizes), np.full((3, LIGHT_LOADS.size), np.nan)
+    rows[0] = known["h_max"]
+    for k, load in enumerate(LIGHT_LOADS):
+        try:
+            found = model.press(load)
+        except ConvergenceError:
+            model = Contact(surface, recipe.sizes)
+            continue
+        rows[1:, k] = found["area"], found["mean_separation"] / surface.std()
+    return rows
+
+
+def compared(one: xr.Dataset) -> FloatArray:
+    """A/A0, ln of simulated over the law's stiffness between loads, and of force at equal u; shape (3, loads - 1)."""
+    h_max, area, u = float(one.h_max), *(one[name].values.astype(float) for name in ("area", "mean_separation"))
+    face = Surface(float(one.hurst), 1.0, float(one.zeta_1), 1.0, h_max)
+    scale = float(face.rms_gradient)
+    known = contact(face, pressure=LIGHT_LOADS * scale, theory="calibrated").mean_separation
+    with np.errstate(invalid="ignore", divide="ignore"):
+        stiffness = np.log(np.diff(known) / np.diff(u))
+        force = np.log(
+            LIGHT_LOADS * scale / contact(face, mean_separation=np.nan_to_num(u), theory="calibrated").pressure
+        )
+    return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
+
+
+@click.command()
+@click.option("--data", type=PATH, default=FILE, show_default=True)
+def light(data: pathlib.Path) -> None:
+    """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
+    recipes, over, texts = light_recipes(), ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
+    h_max, area, u = np.array([light_contacts(recipe) for recipe in tqdm(recipes, disable=None)]).swapaxes(0, 1)
+    columns = {"h_max": ("surface", h_max[:, 0]), "force": ("load", LIGHT_LOADS), "area": (over, area.astype("f4"))}
+    columns["mean_separation"] = over, u.astype("f4")
+    found = {name: variable(*column, texts[name]) for name, column in columns.items()}
+    write_part(data, group("light_loads", of_recipes(recipes) | found), "light_loads")
+    click.echo(f"{data}: {len(recipes)} surfaces")
 
 
 def gap_errors(kind: str) -> pd.DataFrame:
@@ -171,7 +199,7 @@ def gap_errors(kind: str) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 def gaps() -> None:
     """Print errors of a gas's conductance against gaps of boundary elements, for docs/joints.md: six minutes."""
     for kind in SURFACES:

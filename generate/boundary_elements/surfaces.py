@@ -1,17 +1,26 @@
-"""Random surfaces, each made anew from a few numbers and a seed.
+"""Random surfaces, each made anew from a few numbers and a seed, and the campaigns of `campaign.toml` that press them.
 
 Wavevectors are drawn in the order of their length, so one seed gives the same surface on every grid, and a larger
 cut-off adds waves without moving those that were there.
+
+Nodes of a campaign are spectra (with a transform where there is one). Those marked held out are never fitted, nor is
+the second surface of every other node; so a law is tested on new surfaces of known spectra and on spectra of its own.
 """
 
-from __future__ import annotations
-
 import dataclasses
+import itertools
+import pathlib
+import tomllib
+import zlib
 
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 
+CAMPAIGNS = tomllib.loads(pathlib.Path(__file__).with_name("campaign.toml").read_text(encoding="utf-8"))
+SPLITS = ("training", "held_out_surface", "held_out_spectrum", "refine")
+TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM, REFINEMENT = SPLITS
+FINER = (64, 128, 256, 512)  # grids of refined surfaces: 2 to 32 points a shortest wave
 PATCH_WAVES = 2  # a patchy surface's amplitude varies over waves down to 1/PATCH_WAVES of its longest
 WORN_WIDTH = 0.3  # heights over which a worn surface's slope turns from 1 to WORN_SLOPE [h_rms]
 WORN_SLOPE = 0.2
@@ -83,37 +92,63 @@ def _field(kx: np.ndarray, ky: np.ndarray, amplitude: FloatArray, seed: int, poi
     return field
 
 
-def _amplitude(recipe: Recipe, k: FloatArray) -> FloatArray:
-    plain: FloatArray = k ** -(1 + recipe.hurst)
-    if recipe.kind == "plateau":
-        plain = np.maximum(k, recipe.waves) ** -(1 + recipe.hurst)
+def heights(recipe: Recipe) -> FloatArray:
+    """The surface: heights of mean zero and root mean square 1, shape (points, points)."""
+    kx, ky = _half_plane(*recipe.band)
+    k = np.hypot(kx, ky)
+    amplitude = (np.maximum(k, recipe.waves) if recipe.kind == "plateau" else k) ** -(1 + recipe.hurst)
     if recipe.kind == "filtered":
         cut = recipe.zeta_1 * recipe.waves
-        plain = plain * 2.0 ** -((k / cut) ** 2) * -np.expm1(-np.log(2) * (k / recipe.waves) ** 2)
-    return plain
-
-
-def _transformed(recipe: Recipe, z: FloatArray) -> FloatArray:
+        amplitude = amplitude * 2.0 ** -((k / cut) ** 2) * -np.expm1(-np.log(2) * (k / recipe.waves) ** 2)
+    z = _field(kx, ky, amplitude, recipe.seed, recipe.points)
+    z /= z.std()
     if recipe.kind == "peaks":
         z = np.expm1(recipe.shape * z) / recipe.shape
     if recipe.kind == "valleys":
         z = -np.expm1(-recipe.shape * z) / recipe.shape
     if recipe.kind == "worn":
-        above = np.logaddexp(0, (z - recipe.shape) / WORN_WIDTH) * WORN_WIDTH
-        z = z - (1 - WORN_SLOPE) * above
+        z = z - (1 - WORN_SLOPE) * np.logaddexp(0, (z - recipe.shape) / WORN_WIDTH) * WORN_WIDTH
     if recipe.kind == "patchy":
         kx, ky = _half_plane(recipe.waves, PATCH_WAVES * recipe.waves)
         smooth = _field(kx, ky, np.ones(len(kx)), recipe.seed + 10_000_000, recipe.points)
         z = z * np.exp(recipe.shape * smooth / smooth.std())
-    return z
-
-
-def heights(recipe: Recipe) -> FloatArray:
-    """The surface: heights of mean zero and root mean square 1, shape (points, points)."""
-    kx, ky = _half_plane(*recipe.band)
-    z = _field(kx, ky, _amplitude(recipe, np.hypot(kx, ky)), recipe.seed, recipe.points)
-    z /= z.std()
-    z = _transformed(recipe, z)
     z -= z.mean()
     z /= z.std()
     return z
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """A surface to solve and the set that it belongs to."""
+
+    recipe: Recipe
+    split: str
+
+
+def cost(recipe: Recipe) -> float:
+    """Grid points a side, more where stretching makes the equations ill-conditioned."""
+    return recipe.points * (max(1.0, recipe.shape / 4) if recipe.kind == "stretched" else 1.0)
+
+
+def campaign(kind: str = "elastic") -> list[Task]:
+    """Every surface to solve, cheap ones first and kinds in turn, so that stopping early leaves a balanced set.
+
+    `kind` is elastic, hardness (pressures are capped) or leakage (gaps are solved for flow).
+    """
+    refined = [
+        Task(dataclasses.replace(recipe, points=points), REFINEMENT)
+        for points, recipe in itertools.product(FINER, (Recipe(*row) for row in CAMPAIGNS["refined"][kind]))
+        if points > 2 * recipe.band[1]
+    ]
+    tasks = []
+    for family, hursts, bands, points, surfaces, shapes, held_out in CAMPAIGNS[kind]:
+        for hurst, band, shape in itertools.product(hursts.split(), bands.split(), shapes.split()):
+            zeta_1, waves = band.split("x")
+            node = Recipe(family, float(hurst), float(zeta_1), int(waves), 0, points, float(shape))
+            for turn in range(surfaces):
+                split = HELD_OUT_SPECTRUM if held_out else HELD_OUT_SURFACE if turn == 1 else TRAINING
+                # of the spectrum alone, so that a longer list moves no seed; its order mixes the kinds
+                seed = zlib.crc32(node.name.encode()) % 10_000_000 * 100 + turn
+                tasks.append((cost(node), turn, seed, Task(dataclasses.replace(node, seed=seed), split)))
+    tasks.sort(key=lambda entry: entry[:3])
+    return sorted(refined + [entry[3] for entry in tasks], key=lambda task: cost(task.recipe))

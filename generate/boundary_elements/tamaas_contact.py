@@ -1,7 +1,5 @@
 """Boundary elements by Tamaas (the extra `simulate`): the reference of laws, and of the library's own simulation."""
 
-from __future__ import annotations
-
 import os
 import time
 

@@ -11,8 +11,6 @@ Totals have two branches, which meet where the largest islands reach the floor o
 r = (h_max - d)/h_rms. Their logarithms are a start, such as the power of first contact, and a sum of products.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

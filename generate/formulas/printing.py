@@ -4,8 +4,6 @@
 and the equations of docs/formula.md are made from it. `models/closed_form_certificates.py` has ranges and errors.
 """
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import itertools
@@ -50,8 +48,6 @@ _HEAD = f'''"""Ranges of the closed forms, and their certificates; the forms are
 """
 
 # fmt: off
-
-from __future__ import annotations
 
 from mbma_tables.models import Certificate
 

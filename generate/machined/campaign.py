@@ -11,10 +11,10 @@ import click
 import numpy as np
 import xarray as xr
 
-from generate.boundary_elements import collect
-from generate.boundary_elements.design import Task
+from generate.boundary_elements import run as campaigns
 from generate.boundary_elements.run import run
 from generate.boundary_elements.solve import simulate_to
+from generate.boundary_elements.surfaces import Task
 from generate.calibrated_file import variable, write_part
 from generate.machined.hardness import ETA, WAYS, yielded
 from generate.machined.makers import FAMILIES, Part
@@ -28,7 +28,7 @@ LARGE, SMOOTHEST = (
 )  # points a side of one more of each family, and its number: of the longest shortest wavelength
 EVERY = 3  # part that is pressed with a hardness, too
 FORMS = ("calibrated", "corrected", "simulated")
-TEXTS = collect.TEXTS["groups"]["machined"]
+TEXTS = campaigns.TEXTS["groups"]["machined"]
 
 
 def parts() -> list[Part]:
@@ -71,7 +71,7 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
     known["shortest"] = [part.shortest for part in have]
     for name, meaning in TEXTS["surface"].items():
         data[name] = variable("surface", np.array(known[name], float), meaning)
-    return collect.group("machined", data, engine=engine)
+    return campaigns.group("machined", data, engine=engine)
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -84,13 +84,13 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     Stopped and called again, it goes on where it was. Answers of theories are kept in folders of their own: remove
     these to ask a changed library again.
     """
-    from generate.tables.commands import executor
+    from generate.workers import executor
 
     tasks: list[Any] = [Task(cast(Any, part), "") for part in parts()]
     solvers: dict[str, Callable[[Part], dict[str, Any]]] = {"": solved}
     solvers |= {form: functools.partial(answers, form=form, folder=folder) for form in FORMS}
     hard: list[Any] = [Task(cast(Any, part), "") for part in yielding_parts()]
-    with executor(workers, None) as pool:
+    with executor(workers) as pool:
         run(hard, folder / "hardness", pool, functools.partial(simulate_to, solve=cast(Any, yielded)))
         for form, solve in solvers.items():
             run(tasks, folder / form, pool, functools.partial(simulate_to, solve=cast(Any, solve)))

@@ -13,7 +13,7 @@ import click
 import numpy as np
 from scipy.optimize import least_squares
 
-from generate.boundary_elements.collect import of_contacts
+from generate.boundary_elements.run import of_contacts
 from generate.boundary_elements.tamaas_contact import Contact
 from generate.calibrated_file import write_part
 from generate.machined.makers import GRADIENT, finished, rough
@@ -100,16 +100,12 @@ def errors(constants: FloatArray, known: FloatArray) -> FloatArray:
     return np.concatenate(both)
 
 
-def columns_of(known: dict[str, FloatArray]) -> list[FloatArray]:
-    """Columns of the data set's group of all sets."""
-    recipes = [(*one, load, kind == "fitted") for kind in SETS for one in SETS[kind] for load in LOADS for _ in NUS]
-    anisotropy, area, nu, *stresses = np.concatenate(list(known.values()), axis=1)
-    return [*np.transpose(recipes), anisotropy, area, nu, *((1 - nu) / (1 - nu * c) for c in stresses)]
-
-
 if __name__ == "__main__":
     known = {kind: rows(kind) for kind in SETS}
-    write_part(FILE, of_contacts("tangential", columns_of(known)), "tangential")
+    recipes = [(*one, load, kind == "fitted") for kind in SETS for one in SETS[kind] for load in LOADS for _ in NUS]
+    anisotropy, area, nu, *stresses = np.concatenate([*known.values()], axis=1)
+    columns = [*np.transpose(recipes), anisotropy, area, nu, *((1 - nu) / (1 - nu * c) for c in stresses)]
+    write_part(FILE, of_contacts("tangential", columns), "tangential")
     fitted = least_squares(errors, CONSTANTS, args=(known["fitted"],)).x
     click.echo(f"constants {' '.join(f'{value:.3f}' for value in fitted)}; kept {CONSTANTS}")
     for kind, each in known.items():

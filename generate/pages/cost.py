@@ -15,7 +15,7 @@ from generate.calibrated_file import rms
 from generate.cost_distances import SIMULATED
 from generate.distances import DEEP, LOW
 from generate.files import ROOT, dataset, read_csv
-from generate.pages.page import Measured, panels, printed
+from generate.page import Measured, panels, printed
 from mbma_tables.scenes.costs import shipped_costs
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}

@@ -1,7 +1,5 @@
 """docs/explorer.md: size and speed of the explorer's page in a browser, and its picture."""
 
-from __future__ import annotations
-
 import contextlib
 import pathlib
 import shutil
@@ -10,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from typing import Any
 
-from generate.pages.page import Measured, table
+from generate.page import Measured, table
 from mbma_tables import Surface
 from mbma_tables.export.explorer import explorer_page
 
@@ -51,38 +49,23 @@ def visit(opened: Any, address: str, **options: Any) -> Any:
     return tab
 
 
-def openings(opened: Any, address: str) -> Iterator[float]:
-    """Milliseconds of each opening to the first curves."""
-    for _ in range(OPENINGS):
-        tab = visit(opened, address)
-        yield float(tab.evaluate("document.documentElement.dataset.ready"))
-        tab.context.close()
-
-
-def steps(opened: Any, address: str) -> Iterator[float]:
-    """Milliseconds of each step of a slider."""
-    tab = visit(opened, address)
-    tab.wait_for_timeout(1000)
-    yield from (tab.evaluate(STEP, 400 + 10 * k) for k in range(STEPS))
-    tab.context.close()
-
-
 def measure() -> Measured:
-    """The measured block of the page, and its picture."""
     text = explorer_page(Surface.named("concrete"), 13.3, "MPa", "calibrated", title="concrete road of Lorenz")
-    rows: list[list[Any]] = [["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", ""]]
+    clocks, ready = dict[str, list[float]](), "document.documentElement.dataset.ready"
     with tempfile.TemporaryDirectory() as folder, browser() as opened:
         path = pathlib.Path(folder, "explorer.html")
         path.write_text(text, encoding="utf-8")
-        timed = {"opening to the first curves": openings(opened, path.as_uri())}
+        openings = (visit(opened, path.as_uri()) for _ in range(OPENINGS))
+        clocks["opening to the first curves"] = [float(tab.evaluate(ready)) for tab in openings]
         for against in ("gap", "pressure"):
-            address = f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson"
-            timed[f"a slider's step, three theories against {against}"] = steps(opened, address)
-        for name, found in timed.items():
-            clock = list(found)
-            rows.append([name, statistics.median(clock), max(clock)])
+            tab = visit(opened, f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson")
+            tab.wait_for_timeout(1000)
+            clock = [tab.evaluate(STEP, 400 + 10 * k) for k in range(STEPS)]
+            clocks[f"a slider's step, three theories against {against}"] = clock
         tab = visit(opened, path.as_uri())
         tab.locator(".chart").first.hover(position={"x": 200, "y": 100})
         picture = tab.screenshot()
-    parts = {"numbers": table("quantity | median | largest", rows, "{} | {:.0f} ms")}
+    rows = [[name, statistics.median(clock), max(clock)] for name, clock in clocks.items()]
+    size = ["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", ""]
+    parts = {"numbers": table("quantity | median | largest", [size, *rows], "{} | {:.0f} ms")}
     return parts, {"docs/figures/explorer.png": picture}

@@ -1,7 +1,5 @@
 """docs/fidelity.md: theories beside simulations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 
@@ -9,8 +7,7 @@ import numpy as np
 
 from generate import distances
 from generate.calibrated_file import QUANTITIES, by_bin
-from generate.distances import HUES
-from generate.pages.page import Measured, panels, percent, table
+from generate.page import Measured, panels, percent, table
 from generate.pages.score import OTHERS, scores, theories_of
 from mbma_tables.data import boundary_elements
 
@@ -40,7 +37,7 @@ def by_contact(sets: dict[str, distances.DataSet], keys: list[str], height: floa
     for column, key in zip(axes.T, keys, strict=True):
         seen = sets[key].seen
         for theory, make in distances.THEORIES.items():
-            style: dict[str, Any] = {"color": HUES[theory], "label": theory}
+            style: dict[str, Any] = {"color": distances.HUES[theory], "label": theory}
             if len(seen) > 2:
                 area = np.concatenate([one.area for one in seen])
                 for ax, values in zip(column, distances.distances(seen, make).values(), strict=True):
@@ -50,7 +47,7 @@ def by_contact(sets: dict[str, distances.DataSet], keys: list[str], height: floa
                     ax.plot(x, np.exp(mean), ".-", **style)
                     if theory in BANDED:
                         band = np.exp(mean - spread), np.exp(mean + spread)
-                        ax.fill_between(x, *band, color=HUES[theory], alpha=0.15, lw=0)
+                        ax.fill_between(x, *band, color=distances.HUES[theory], alpha=0.15, lw=0)
                 continue
             for k, one in enumerate(seen):
                 for ax, values in zip(column, distances.distances([one], make).values(), strict=True):

@@ -1,7 +1,5 @@
 """docs/machined.md: errors of answers on maps of machined surfaces by family, and how many their scatter covers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ from generate.machined.campaign import FORMS
 from generate.machined.coverage import left_out
 from generate.machined.errors import QUANTITIES, coverage, errors, seen
 from generate.machined.makers import FAMILIES, Part, heights
-from generate.pages.page import Measured, panels, table
+from generate.page import Measured, panels, table
 from mbma_tables.common.arguments import FloatArray
 
 NAMES = {"simulated": "simulation", "law": "law of hardness on the simulated elastic contact"}

@@ -1,7 +1,5 @@
 """docs/gallery.md, measured maps from file to contact, and docs/maps.md, theories on maps beside boundary elements."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import pathlib
@@ -12,10 +10,9 @@ import numpy as np
 import pandas as pd
 from scipy.signal import resample
 
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS
-from generate.boundary_elements.surfaces import Recipe, heights
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, Recipe, heights
 from generate.files import ROOT, dataset, read_csv, to_csv
-from generate.pages.page import Measured, printed, table
+from generate.page import Measured, printed, table
 from mbma_tables import Surface, contact
 from mbma_tables.answers.measurement import curves, draw
 from mbma_tables.common.arguments import FloatArray
@@ -28,8 +25,8 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories import BoundaryElements, get_theory
 from mbma_tables.theories.calibrated_curves import own_law
+from mbma_tables.theories.numerical import answer_where_finite
 from mbma_tables.theories.protocol import Theory
-from mbma_tables.theories.wrapped import answer_where_finite
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"

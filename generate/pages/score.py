@@ -13,7 +13,7 @@ import click
 from generate.boundary_elements.evidence import TheoryCurve
 from generate.distances import RANGES, distances, held_out, summed_up
 from generate.files import ROOT
-from generate.pages.page import percent, table
+from generate.page import percent, table
 from mbma_tables.common.errors import InputError
 
 HEADER = "theory | area at given pressure | pressure at given gap | stiffness at given pressure | loads reached"

@@ -3,20 +3,18 @@
 The reference is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter tolerance.
 """
 
-from __future__ import annotations
-
-import dataclasses
 import functools
 import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import mpmath as mp
 import numpy as np
+from matplotlib import colormaps, colors
 
-from generate.pages.page import Measured, panels, table
+from generate.page import Measured, panels, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
@@ -52,43 +50,32 @@ TOTAL_HURSTS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
 TOP, TOTAL_TRUTH = 3.0, 1e-10
 
 Answer = tuple[Sequence[Any], float]  # values, and a bound on their relative error
-Counted = tuple[list["Tally"], dict[str, FloatArray]]  # and the error at each corner by way
+Ways = Mapping[str, Callable[..., Answer]]
 
 
-@dataclasses.dataclass
-class Tally:
-    """The outcome at some corners: how many were refused or without a number, and the largest error of the rest."""
+class Outcome(NamedTuple):
+    """What one answer is: its error is NaN where it was refused, has no number, or its truth is not known."""
 
-    name: str
-    tried: int = 0
-    refused: int = 0
-    not_finite: int = 0
+    refused: bool = False
+    not_finite: bool = False
     warned: int = 0
-    largest: float = math.nan  # where nothing was compared, as of rigid spheres
-    beyond: int = 0
+    error: float = math.nan
+    beyond: bool = False
 
-    def add(self, answer: Callable[[], Answer], truth: Sequence[Any] | None) -> float:
-        """Evaluate one corner; its error, NaN where it was refused, has no number, or its truth is not known."""
-        self.tried += 1
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            try:
-                values, bound = answer()
-            except MbmaError:
-                self.refused += 1
-                return math.nan
-            except (ArithmeticError, ValueError):
-                values, bound = [math.nan], math.inf
-        self.warned += len(caught)
-        if not all(math.isfinite(value) for value in values):
-            self.not_finite += 1
-            return math.nan
-        if truth is None:
-            return math.nan
-        error = max(relative_error(value, exact) for value, exact in zip(values, truth, strict=True))
-        self.largest = float(np.fmax(self.largest, error))
-        self.beyond += error > bound
-        return error
+
+def outcome(answer: Callable[[], Answer], truth: Sequence[Any] | None) -> Outcome:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            values, bound = answer()
+        except MbmaError:
+            return Outcome(refused=True)
+        except (ArithmeticError, ValueError):
+            values, bound = [math.nan], math.inf
+    if truth is None or not all(math.isfinite(value) for value in values):
+        return Outcome(not_finite=not all(math.isfinite(value) for value in values), warned=len(caught))
+    error = max(map(relative_error, values, truth))
+    return Outcome(warned=len(caught), error=error, beyond=error > bound)
 
 
 def relative_error(found: float, truth: Any) -> float:
@@ -99,10 +86,10 @@ def relative_error(found: float, truth: Any) -> float:
 
 
 def counted(
-    ways: Mapping[str, Callable[..., Answer]], corners: Iterable[tuple[Any, ...]], truth: Callable[..., Sequence[Any]]
-) -> Counted:
+    ways: Ways, corners: Iterable[tuple[Any, ...]], truth: Callable[..., Sequence[Any]]
+) -> dict[str, list[Outcome]]:
     """Every way at every corner; rigid spheres do not claim to be elastic ones, and have no truth."""
-    tallies, errors = {name: Tally(name) for name in ways}, dict[str, list[float]]({name: [] for name in ways})
+    found: dict[str, list[Outcome]] = {name: [] for name in ways}
     for corner in corners:
         try:
             exact: Sequence[Any] | None = truth(*corner)
@@ -110,8 +97,8 @@ def counted(
             exact = None
         for name, way in ways.items():
             known = None if name.endswith("rigid") else exact
-            errors[name].append(tallies[name].add(functools.partial(way, *corner), known))
-    return list(tallies.values()), {name: np.array(own) for name, own in errors.items()}
+            found[name].append(outcome(functools.partial(way, *corner), known))
+    return found
 
 
 def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
@@ -121,17 +108,13 @@ def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
         return mp.pi / 5 * force, mp.pi / 2 * area
 
 
-def islands() -> Counted:
+def islands() -> dict[str, list[Outcome]]:
     """Every island model at every corner of (X, mu)."""
 
-    def ask(name: str) -> Callable[..., Answer]:
+    def ask(name: str, X: float, mu: float) -> Answer:
         model = get_model(name, 10 * SOLVED, get_variant("reported"))
-
-        def answer(X: float, mu: float) -> Answer:
-            found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
-            return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
-
-        return answer
+        found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
+        return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
 
     def truth(X: float, mu: float) -> Sequence[Any]:
         if mu <= RIGID_MU:
@@ -140,11 +123,11 @@ def islands() -> Counted:
         solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
         return solved.phi_F, solved.phi_A
 
-    ways = {f"islands by {name}": ask(name) for name in ISLAND_MODELS}
+    ways = {f"islands by {name}": functools.partial(ask, name) for name in ISLAND_MODELS}
     return counted(ways, itertools.product(X_CORNERS, MU_CORNERS), truth)
 
 
-def island_geometry() -> Counted:
+def island_geometry() -> dict[str, list[Outcome]]:
     """Geometry by the library and by the paper's formulas as printed, against 60 digits; corners of the maps first."""
 
     def library(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
@@ -170,7 +153,7 @@ def island_geometry() -> Counted:
     return counted(ways, corners, truth)
 
 
-def totals() -> list[Tally]:
+def totals() -> dict[str, list[Outcome]]:
     """Totals of every island model at corners of surfaces and gaps, both variants, against the exact one at 1e-10."""
 
     def ask(name: str, variant: str, hurst: float, zeta_1: float, depth: float, rtol: float = 1e-8) -> Answer:
@@ -178,33 +161,32 @@ def totals() -> list[Tally]:
         found = contact(surface, separation=TOP - depth, island_model=name, variant=variant, rtol=rtol)
         return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
 
-    exact = functools.partial(ask, "exact", rtol=TOTAL_TRUTH)
+    def truth(variant: str, hurst: float, zeta_1: float, depth: float) -> Sequence[Any]:
+        return ask("exact", variant, hurst, zeta_1, depth, TOTAL_TRUTH)[0]
 
-    def of(names: Sequence[str], variants: Sequence[str]) -> list[Tally]:
+    def of(names: Sequence[str], variants: Sequence[str]) -> dict[str, list[Outcome]]:
         ways = {f"totals by {name}": functools.partial(ask, name) for name in names}
-        corners = itertools.product(variants, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS)
-        return counted(ways, corners, lambda *corner: exact(*corner)[0])[0]
+        return counted(ways, itertools.product(variants, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS), truth)
 
     # the four-number table is of one variant
-    return of(ISLAND_MODELS, VARIANTS) + of(["island4d"], VARIANTS[:1])
+    return of(ISLAND_MODELS, VARIANTS) | of(["island4d"], VARIANTS[:1])
 
 
-def draw(geometry_errors: dict[str, FloatArray], island_errors: dict[str, FloatArray]) -> Any:
+def draw(found: Mapping[str, Sequence[Outcome]]) -> Any:
     """Maps of error: geometry by the paper's formulas as printed and by the library, and islands."""
-    from matplotlib import colormaps, colors
-
     figure, axes = panels(2, 2, (10, 8))
     colormap = colormaps["viridis"].with_extremes(bad="white")
     style = {"norm": colors.LogNorm(MIN_ERROR, MAX_ERROR), "cmap": colormap, "shading": "nearest", "rasterized": True}
-    geometries = {name: own[: APPROACHES.size * BANDS.size] for name, own in reversed(geometry_errors.items())}
-    for panel, (name, errors) in zip(axes[0], geometries.items(), strict=True):
-        own = errors.reshape(APPROACHES.size, BANDS.size)
-        panel.pcolormesh(BANDS, APPROACHES, np.maximum(own, MIN_ERROR), **style)
+
+    def errors(name: str, *shape: int) -> FloatArray:
+        return np.maximum([one.error for one in found[name][: math.prod(shape)]], MIN_ERROR).reshape(shape)
+
+    for panel, name in zip(axes[0], ("geometry, the paper's formulas as printed", "geometry, library"), strict=True):
+        panel.pcolormesh(BANDS, APPROACHES, errors(name, APPROACHES.size, BANDS.size), **style)
         panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=name)
     places = np.arange(MU_CORNERS.size), np.arange(X_CORNERS.size)
     for panel, name in zip(axes[1], ("islands by exact", "islands by universal"), strict=True):
-        errors = island_errors[name].reshape(X_CORNERS.size, MU_CORNERS.size)
-        mesh = panel.pcolormesh(*places, np.maximum(errors, MIN_ERROR), **style)
+        mesh = panel.pcolormesh(*places, errors(name, X_CORNERS.size, MU_CORNERS.size), **style)
         panel.set(xlabel="mu", ylabel="X", title=f"{name} (white: refused)")
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in X_CORNERS[::4]])
@@ -212,10 +194,15 @@ def draw(geometry_errors: dict[str, FloatArray], island_errors: dict[str, FloatA
     return figure
 
 
+def row(name: str, outcomes: Sequence[Outcome]) -> list[Any]:
+    """Sums over corners, and the largest error where one was compared."""
+    refused, not_finite, warned, errors, beyond = zip(*outcomes, strict=True)
+    largest = max((error for error in errors if not math.isnan(error)), default=math.nan)
+    return [name, len(outcomes), sum(refused), sum(not_finite), sum(warned), largest, sum(beyond)]
+
+
 def measure() -> Measured:
-    """The measured block of the page, and its figure."""
-    (island_tallies, island_errors), (geometry_tallies, geometry_errors) = islands(), island_geometry()
+    found = islands() | island_geometry() | totals()
     header = "corners | tried | refused | not finite | warnings | largest error of answers | beyond their bound"
-    rows = (vars(tally).values() for tally in (*island_tallies, *geometry_tallies, *totals()))
-    text = table(header, rows, "{} | {} | {} | {} | {} | {:.1e} | {}").replace("—", "-")
-    return {"corners": text}, {"docs/figures/stability.svg": draw(geometry_errors, island_errors)}
+    text = table(header, itertools.starmap(row, found.items()), "{} | {} | {} | {} | {} | {:.1e} | {}")
+    return {"corners": text.replace("—", "-")}, {"docs/figures/stability.svg": draw(found)}

@@ -4,8 +4,6 @@ A chunk's file is named by the hash of all that decides its values to the last b
 tolerance and arguments. So a resumed run computes what is missing, and never mixes versions.
 """
 
-from __future__ import annotations
-
 import concurrent.futures
 import io
 import pathlib

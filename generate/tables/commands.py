@@ -1,27 +1,25 @@
 """`python -m generate tables`: make the tables and the coefficients of the height integrals."""
 
-from __future__ import annotations
-
 import os
 import pathlib
 import shutil
 
 import click
 
+from generate.files import ROOT
 from generate.tables import height_coefficients
-from generate.tables.build import build
 from generate.tables.certificate import UncertifiedError
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
 from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
 from generate.tables.writing import write_table
-from generate.workers import Pool
-from generate.workers import executor as executor
+from generate.workers import Pool, executor
 from mbma_tables.common.errors import InputError
-from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL, TableContent
+from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
-TABLES = pathlib.Path(__file__).parents[2] / "tables"
+TABLES = ROOT / "tables"
+KINDS: dict[str, type[Universal | Island4d]] = {UNIVERSAL: Universal, ISLAND4D: Island4d}
 
 
 def destination(what: str, configuration: Configuration, out: pathlib.Path | None) -> pathlib.Path:
@@ -38,30 +36,22 @@ def destination(what: str, configuration: Configuration, out: pathlib.Path | Non
     return path
 
 
-def built(configuration: Configuration, solver: ChunkedSolver) -> TableContent:
-    """A table that meets its target."""
-    if configuration.kind == UNIVERSAL:
-        return Universal(configuration).build(solver)
-    content: TableContent = build(Island4d(configuration), configuration, solver)
-    return content
-
-
 def make_table(configuration: Configuration, target: pathlib.Path, pool: Pool) -> None:
     """Build, certify and write one table; finished chunks are kept beside it until then."""
     chunks = target.parent / f".{target.name}.chunks"
     try:
-        content = built(configuration, ChunkedSolver(pool, chunks))
+        content = KINDS[configuration.kind](configuration).build(ChunkedSolver(pool, chunks))
+        write_table(target, content)
     except UncertifiedError:
         # another resolution shares no chunks with this one
         shutil.rmtree(chunks, ignore_errors=True)
         raise
-    write_table(target, content)
     shutil.rmtree(chunks, ignore_errors=True)
     errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
     click.echo(f"{target}: {content.size}; largest held-out error {errors}; {target.stat().st_size} bytes")
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @click.argument("what", type=click.Choice([*KINDS, "heights", "all"]))
 @click.option(
     "--config", type=click.Path(path_type=pathlib.Path), help="TOML file that changes the shipped configuration."
@@ -70,7 +60,6 @@ def make_table(configuration: Configuration, target: pathlib.Path, pool: Pool) -
 @click.option("--out", type=click.Path(path_type=pathlib.Path), help="File (for all: folder); default tables/.")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
 @click.option("--resume", is_flag=True, help="Continue from the chunks that an earlier run finished.")
-@click.option("--scheduler", help="Address of a dask scheduler whose workers have this checkout on their path.")
 def tables(
     what: str,
     config: pathlib.Path | None,
@@ -78,7 +67,6 @@ def tables(
     out: pathlib.Path | None,
     workers: int,
     resume: bool,
-    scheduler: str | None,
 ) -> None:
     """Make a table, the coefficients of the height integrals (heights), or all of them in order."""
     if what in ("all", "heights") and (config is not None or target is not None):
@@ -87,9 +75,7 @@ def tables(
     paths = [destination(what, configuration, out) for configuration in configurations]
     if what in ("all", "heights"):
         height_coefficients.main()
-    if not configurations:
-        return
-    with executor(workers, scheduler) as pool:
+    with executor(workers) as pool:
         for configuration, path in zip(configurations, paths, strict=True):
             path.parent.mkdir(parents=True, exist_ok=True)
             if not resume:

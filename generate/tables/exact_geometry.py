@@ -1,7 +1,5 @@
 """Islands' geometry transcribed from the paper at 60 digits, in units of s and 1/q0."""
 
-from __future__ import annotations
-
 import math
 import types
 from typing import Any

@@ -4,8 +4,6 @@
 on every machine.
 """
 
-from __future__ import annotations
-
 import itertools
 import pathlib
 import re

@@ -8,17 +8,19 @@
 with sigma of Eq. (32) in units of s: the first parameter is read at zeta_1 without bound, where s is h_rms.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any
 
 import numpy as np
+import scipy.ndimage
 from numpy.typing import NDArray
+from scipy.stats import qmc
+from threadpoolctl import threadpool_limits
 
-from generate.tables.certificate import conformance, enough, require, visited_surfaces
-from generate.tables.configuration import Configuration, make_axis
+from generate.splines import coefficients, padding
+from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance
+from generate.tables.chunks import ChunkedSolver
 from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
@@ -27,11 +29,14 @@ from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.island4d import at_places
 from mbma_tables.surfaces.spectrum import BROADENING
-from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.tablefiles.schema import ISLAND4D, Axis, TableContent
+from mbma_tables.surfaces.variants import Variant, get_variant
+from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell
 
 VISITED = {"hurst": (0.3, 1.0), "log10_zeta_1": (math.log10(3.001), 4.0), "log10_approach": (-8.0, 1.0)}
 COVER_TRIALS = 4096
+BLAS_THREADS = 2  # as when the shipped table was made
+LOCAL_FLOOR = 0.8  # smallest bound, in units of the islands' tolerance
+LOCAL_FACTOR = 2.5  # bound over the largest error at the middles of the cells nearby
 
 
 def from_axes(sphere: Any, hurst: Any) -> Any:
@@ -45,16 +50,70 @@ def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
     return at_places(coefs, np.stack(positions)).T
 
 
-class Island4d:
+def error_cells(axis: Axis, largest: int = 32) -> int:
+    """Cells of the error field along an axis: as the nodes where those are few."""
+    return min(axis.nodes - 1, largest)
+
+
+class Island4d(Kind):
     """The four-parameter table of a configuration."""
 
-    def __init__(self, configuration: Configuration) -> None:
-        self.configuration = configuration
-        self.variant = get_variant(configuration.variant)
+    @property
+    def variant(self) -> Variant:
+        """The interpretation of the paper that its arguments follow."""
+        return get_variant(self.configuration.variant)
 
-    def axes(self, nodes: dict[str, int]) -> tuple[Axis, ...]:
-        """Axes with these node counts."""
-        return tuple(make_axis(ISLAND4D, name, self.configuration.axes[name], count) for name, count in nodes.items())
+    # the spline's factors are rounded differently on another number of BLAS threads
+    @threadpool_limits.wrap(limits=BLAS_THREADS)
+    def build(self, solver: ChunkedSolver) -> TableContent:
+        """Make a table that meets its target, or raise UncertifiedError."""
+        own = self.configuration
+        axes = tuple(own.axis(name) for name in own.axes)
+        grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
+        values = solver.log_ratio("island4d table", *self.arguments(*grid), rtol=self.rtol)
+        coefs = coefficients(values, DEGREE, len(axes))
+        certified = self.certify(axes, coefs, solver)
+        content = TableContent(
+            kind=ISLAND4D,
+            axes=axes,
+            coefficients=coefs,
+            local_error=self.local_errors(axes, coefs, solver),
+            auxiliary=self.auxiliary(axes, values),
+            conformance=self.conformance(axes, coefs, self.held_out(axes, CONFORMANCE_POINTS, own.seed + 303)),
+            attributes=self.attributes() | certified | own.attributes(),
+        )
+        return self.checked(content)
+
+    def held_out(self, axes: tuple[Axis, ...], count: int, seed: int) -> list[FloatArray]:
+        """Coordinates of certificate points: half over the whole box, half where surfaces really go."""
+        box = qmc.Halton(len(axes), seed=seed).random(count // 2)
+        spread = [axis.coordinate(d * (axis.nodes - 1)) for axis, d in zip(axes, box.T, strict=True)]
+        return [np.concatenate(pair) for pair in zip(spread, self.manifold(count - count // 2), strict=True)]
+
+    def certify(self, axes: tuple[Axis, ...], coefs: FloatArray, solver: ChunkedSolver) -> dict[str, Any]:
+        """Errors on held-out points, solved on twice the nodes that made the table."""
+        places = self.held_out(axes, self.configuration.certificate_points, self.configuration.seed + 101)
+        positions = [axis.position(x) for axis, x in zip(axes, places, strict=True)]
+        if any((p == np.round(p)).any() for p in positions):
+            raise UncertifiedError("island4d: a held-out point lies on a node")
+        truth = solver.log_ratio("certificate", *self.arguments(*places), rtol=self.rtol, refinement=2)
+        errors = np.abs(np.expm1(evaluate(coefs, positions) - truth))
+        return self.certificate(errors, {axis.name: x for axis, x in zip(axes, places, strict=True)})
+
+    def local_errors(self, axes: tuple[Axis, ...], coefs: FloatArray, solver: ChunkedSolver) -> FloatArray:
+        """Bounds on the error over a coarser grid, from the middle of every cell of the table."""
+        cells = tuple(error_cells(axis) for axis in axes)
+        middles = np.meshgrid(*(np.arange(axis.nodes - 1) + 0.5 for axis in axes), indexing="ij")
+        positions = [middle.ravel() for middle in middles]
+        places = [axis.coordinate(p) for axis, p in zip(axes, positions, strict=True)]
+        rtol = max(0.1 * self.rtol, greenwood_tripp.MIN_SOLVER_RTOL)
+        truth = solver.log_ratio("local error", *self.arguments(*places), rtol=rtol)
+        where = tuple(error_cell(a, c, p) for a, c, p in zip(axes, cells, positions, strict=True))
+        field = np.zeros((*cells, 2))
+        np.maximum.at(field, where, np.abs(np.expm1(evaluate(coefs, positions) - truth)))
+        # a neighbour's worst point may lie just across the border
+        spread = scipy.ndimage.maximum_filter(field, size=(*(3 for _ in axes), 1), mode="nearest")
+        return np.asarray(LOCAL_FACTOR * spread + LOCAL_FLOOR * self.rtol)
 
     def arguments(self, *coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """X and mu at coordinates of the axes: X is one of them, mu follows from the other three."""
@@ -68,29 +127,40 @@ class Island4d:
             places, inside = self._visited(draw)
             return [place[inside] for place in places]
 
-        return [place[:count] for place in enough(ISLAND4D, count, 2 * count, drawn)]
+        return [place[:count] for place in self.enough(count, 2 * count, drawn)]
 
     def _visited(self, draw: int) -> tuple[list[FloatArray], NDArray[np.bool_]]:
         """Coordinates of islands of random surfaces, and which of them the axes cover."""
         own = self.configuration.axes["hurst"]
-        ranges = VISITED | {"hurst": (own.low, own.high)}
-        hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, ranges)
+        approach, hurst, zeta_1 = self.visited_surfaces(draw, VISITED | {"hurst": (own.low, own.high)})
         fields = geometry(approach, hurst, zeta_1, self.variant)
         spread = np.expm1(np.log(fields["zeta_u"]) - np.log(fields["zeta_d"]))
         places = [fields["X"], spread, (SPHERE_FLOOR / fields["zeta_d"]) ** (4 - 2 * hurst), hurst]
         pairs = zip(self.configuration.axes.values(), places, strict=True)
         return places, np.all([(place > axis.low) & (place < axis.high) for axis, place in pairs], axis=0)
 
-    def auxiliary(self, axes: tuple[Axis, ...]) -> dict[str, Any]:
-        """The raw parameters on the grid, and the numbers that turn a ratio into a force."""
+    def auxiliary(self, axes: tuple[Axis, ...], log_ratio: FloatArray) -> dict[str, Any]:
+        """Values at the nodes, the raw parameters there, and coordinates of coefficients and of the error's cells."""
         _, spread, sphere, hurst = (axis.values for axis in axes)
         mu, sigma, _, _ = band_fields(*np.meshgrid(spread, sphere, hurst, indexing="ij"), self.variant)
         names, inverse = tuple(axis.name for axis in axes), 1 / from_axes(sphere[:, None], hurst)
-        return {
+        found: dict[str, Any] = {
             "mu": (names[1:], mu, label(TEXTS["axes"]["mu"])),
             "sigma": (names[1:], sigma, label("standard deviation of summit heights over s, times zeta_d^hurst")),
             "inverse_zeta_d": (names[2:], inverse, label("1/zeta_d; zeta_u = zeta_d (1 + spread)")),
         }
+        for number, f in enumerate(FUNCTIONS):
+            text = f"natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes"
+            found[f"log_ratio_{f}"] = (names, log_ratio[..., number], label(text))
+        for axis in axes:
+            cells, cell, knot = error_cells(axis), f"{axis.name}_cell", f"{axis.name}_knot"
+            middles = axis.coordinate((np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells))
+            knots = np.arange(-padding(DEGREE), axis.nodes + padding(DEGREE), dtype=float)
+            text = f"middle of the error field's cells along {axis.name}, as {axis.name}"
+            found[cell] = ((cell,), middles, label(text))
+            text = f"position along {axis.name}, in node units, of the middle of a coefficient's B-spline"
+            found[knot] = ((knot,), knots, label(text))
+        return found
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file."""
@@ -144,4 +214,4 @@ class Island4d:
             "force increasing with the spread": (np.diff(force, axis=1) > 0).all(),
             "rigid limit at the smallest spread": (np.abs(ratio[:, 0]) <= 100 * mu[:, 0, ..., None]).all(),
         }
-        require(ISLAND4D, "between its nodes", rules)
+        self.require(rules)

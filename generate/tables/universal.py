@@ -1,7 +1,5 @@
 """The universal table: Chebyshev series of Phi_F/mu and Phi_A over cells of (X, mu)."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any
@@ -10,19 +8,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
-from generate.tables.certificate import (
-    CONFORMANCE_POINTS,
-    UncertifiedError,
-    certificate,
-    checked,
-    conformance,
-    enough,
-    require,
-    rtol_for,
-    visited_surfaces,
-)
+from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance
 from generate.tables.chunks import ChunkedSolver, phi
-from generate.tables.configuration import Configuration, make_axis
 from generate.tables.writing import about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
@@ -134,61 +121,60 @@ def cells_of(low: float, high: float, mu_high: float, aim: float, rtol: float) -
     return np.concatenate([cells_of(*ends, mu_high, aim, rtol) for ends in ((low, middle), (middle, high))])
 
 
-class Universal:
-    """Makes the universal table."""
+class Universal(Kind):
+    """The universal table of a configuration."""
 
-    def __init__(self, configuration: Configuration) -> None:
-        self.configuration = configuration
-        self.aim, self.rtol = AIM * configuration.target, rtol_for(configuration)
-        self.X, self.mu = (configuration.axes[name] for name in ("X", "mu"))
-
-    def strips(self) -> list[tuple[float, float]]:
+    def strips(self) -> list[Strip]:
         """Ranges of X, each as wide as polynomials allow."""
-        strips = []
-        low, width = self.X.low, 1
+        X, mu_high, aim = (
+            self.configuration.axes["X"],
+            self.configuration.axes["mu"].high,
+            AIM * self.configuration.target,
+        )
+        strips, low, width = list[Strip](), X.low, 1
 
-        def end(steps: int) -> float:
-            return min(low + steps / X_STEPS, self.X.high)
+        def strip(steps: int) -> Strip:
+            return Strip(low, min(low + steps / X_STEPS, X.high), mu_high, aim, self.rtol)
 
-        while low < self.X.high:
-            widest = math.ceil((self.X.high - low) * X_STEPS)
+        while low < X.high:
+            widest = math.ceil((X.high - low) * X_STEPS)
             width = min(width, widest)
-            while width > 1 and not Strip(low, end(width), self.mu.high, self.aim, self.rtol).is_narrow():
+            while width > 1 and not strip(width).is_narrow():
                 width -= max(1, width // 8)
             while width < widest:
                 wider = min(width + max(1, width // 8), widest)
-                if not Strip(low, end(wider), self.mu.high, self.aim, self.rtol).is_narrow():
+                if not strip(wider).is_narrow():
                     break
                 width = wider
-            strips.append((low, end(width)))
-            low = end(width)
+            strips.append(strip(width))
+            low = strips[-1].high
         return strips
 
     def build(self, solver: ChunkedSolver) -> TableContent:
         """Make a table that meets its target, or raise UncertifiedError."""
-        configuration = self.configuration
-        jobs = [(*ends, self.mu.high, self.aim, self.rtol) for ends in self.strips()]
-        rows = np.concatenate(solver.map("cells", cells_of, jobs))
-        if len(rows) * TERMS**2 > configuration.max_nodes:
+        own = self.configuration
+        rows = np.concatenate(solver.map("cells", cells_of, [dataclasses.astuple(strip) for strip in self.strips()]))
+        if len(rows) * TERMS**2 > own.max_nodes:
             raise UncertifiedError(
-                f"universal: an error of {configuration.target:.1e} needs {len(rows) * TERMS**2} coefficients, more "
-                f"than the {configuration.max_nodes} allowed; raise max_nodes or the target"
+                f"universal: an error of {own.target:.1e} needs {len(rows) * TERMS**2} coefficients, more than the "
+                f"{own.max_nodes} allowed; raise max_nodes or the target"
             )
         series = np.moveaxis(rows[:, 6:].reshape(-1, 2, TERMS, TERMS), 1, -1)
         content = TableContent(
-            kind=configuration.kind,
-            axes=tuple(make_axis(UNIVERSAL, name, given, 2) for name, given in configuration.axes.items()),
+            kind=UNIVERSAL,
+            axes=tuple(own.axis(name) for name in own.axes),
             coefficients=np.ascontiguousarray(series),
             local_error=LOCAL_FACTOR * rows[:, 4:6] + self.rtol,
             auxiliary={n: (("cell",), r, label(t)) for (n, t), r in zip(CELL_EDGES.items(), rows.T, strict=False)},
             conformance={},
             attributes={},
         )
-        X, mu = self.held_out(content, CONFORMANCE_POINTS, configuration.seed + 303)
+        X, mu = self.held_out(content, CONFORMANCE_POINTS, own.seed + 303)
         table = np.stack(UniversalModel(content).answer(X, mu)[:2])
         points = conformance({"X": X, "mu": mu}, X, mu, table, 1.0, 0.0)
-        attributes = self.attributes() | self.certify(content, solver)
-        return checked(self, dataclasses.replace(content, conformance=points, attributes=attributes))
+        known = about(UNIVERSAL) | {"variant": "any", "variant_numbers": "[]"} | own.attributes()
+        attributes = known | self.certify(content, solver)
+        return self.checked(dataclasses.replace(content, conformance=points, attributes=attributes))
 
     def held_out(self, content: TableContent, count: int, seed: int) -> list[FloatArray]:
         """(X, mu) of points: half anywhere in any cell, half where surfaces really go."""
@@ -200,35 +186,25 @@ class Universal:
 
     def certify(self, content: TableContent, solver: ChunkedSolver) -> dict[str, Any]:
         """Errors on held-out points, solved on twice the nodes that made the table."""
-        configuration = self.configuration
-        X, mu = self.held_out(content, configuration.certificate_points, configuration.seed + 101)
+        X, mu = self.held_out(content, self.configuration.certificate_points, self.configuration.seed + 101)
         truth = solver.phi("certificate", X, mu, rtol=self.rtol, refinement=2)
         errors = np.abs(np.stack(UniversalModel(content).answer(X, mu)[:2], axis=-1) / truth - 1)
-        found = certificate(configuration, errors, {"X": X, "mu": mu})
-        worst = max(found["largest_error_F"], found["largest_error_A"])
-        if worst > configuration.target:
-            raise UncertifiedError(
-                f"universal: the largest held-out error is {worst:.2e}, the target {configuration.target:.2e}"
-            )
-        return found
+        return self.certificate(errors, {"X": X, "mu": mu})
 
     def manifold(self, count: int) -> list[FloatArray]:
         """(X, mu) of islands of random surfaces, every variant, as far as the table covers them."""
+        axes = self.configuration.axes
 
         def drawn(draw: int) -> list[FloatArray]:
-            hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, VISITED)
+            approach, hurst, zeta_1 = self.visited_surfaces(draw, VISITED)
             fields = [geometry(approach, hurst, zeta_1, variant) for variant in VARIANTS.values()]
             X, mu = (np.concatenate([f[name] for f in fields]) for name in ("X", "mu"))
-            inside = (self.X.low < X) & (self.X.high > X) & (mu > 0) & (mu < self.mu.high)
+            inside = (axes["X"].low < X) & (axes["X"].high > X) & (mu > 0) & (mu < axes["mu"].high)
             return [X[inside], mu[inside]]
 
-        X, mu = enough(UNIVERSAL, count, 4 * count, drawn)
+        X, mu = self.enough(count, 4 * count, drawn)
         chosen = np.linspace(0, X.size - 1, count).astype(int)
         return [X[chosen], mu[chosen]]
-
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of the file."""
-        return about(UNIVERSAL) | {"variant": "any", "variant_numbers": "[]"} | self.configuration.attributes()
 
     def check(self, content: TableContent) -> None:
         """Force and area positive and increasing in X, force increasing in mu, the rigid limit met."""
@@ -250,4 +226,4 @@ class Universal:
             "force increasing in mu": (by_mu.phi_F > 0).all(),
             "rigid limit at mu = 0": (np.abs(limit) <= target).all(),
         }
-        require(UNIVERSAL, "in its cells", rules)
+        self.require(rules)

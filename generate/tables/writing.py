@@ -1,7 +1,5 @@
 """Write table files (netCDF-4): their fields with labels, and the texts of `texts.toml`."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -13,7 +11,6 @@ import netCDF4
 import numpy as np
 
 from generate.provenance import MODULES, source_digest, versions
-from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles import schema
@@ -36,29 +33,6 @@ def about(kind: str, **numbers: Any) -> dict[str, str]:
 def label(text: str) -> dict[str, Any]:
     """Attributes of a variable without a unit."""
     return {"long_name": text, "units": "1"}
-
-
-def labels_of_nodes(axes: tuple[schema.Axis, ...], log_ratio: FloatArray) -> dict[str, Any]:
-    """Of a table over nodes: `log_ratio` there, and coordinates of coefficients and of the error field's cells."""
-    names = tuple(axis.name for axis in axes)
-    labels: dict[str, Any] = {}
-    for number, f in enumerate(schema.FUNCTIONS):
-        text = f"natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes"
-        labels[f"log_ratio_{f}"] = (names, log_ratio[..., number], label(text))
-    for axis in axes:
-        pad, cells = (schema.DEGREE - 1) // 2, error_cells(axis)
-        middles = (np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells)
-        text = f"middle of the error field's cells along {axis.name}, as {axis.name}"
-        labels[f"{axis.name}_cell"] = ((f"{axis.name}_cell",), axis.coordinate(middles), label(text))
-        text = f"position along {axis.name}, in node units, of the middle of a coefficient's B-spline"
-        knots = np.arange(-pad, axis.nodes + pad, dtype=float)
-        labels[f"{axis.name}_knot"] = ((f"{axis.name}_knot",), knots, label(text))
-    return labels
-
-
-def error_cells(axis: schema.Axis, largest: int = 32) -> int:
-    """Cells of the error field along an axis: as the nodes where those are few."""
-    return min(axis.nodes - 1, largest)
 
 
 def _fill(dataset: netCDF4.Dataset, content: schema.TableContent) -> None:

@@ -117,10 +117,6 @@ def contact(
     ConvergenceError
         Where the accuracy was not reached; `mask` is true for these entries.
 
-    See Also
-    --------
-    contact_law : for many gaps on one surface.
-
     Examples
     --------
     >>> from mbma_tables import Surface, contact
@@ -250,13 +246,12 @@ def _places(
 ) -> tuple[dict[str, Any], Any]:
     """Both separations for the given quantity; with a hardness also `lighter` of `Yielding.loaded`."""
     h_max, lighter = np.asarray(surface.h_max), None
-    if by != "separation":
-        require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
-        average = (h_max + asked) / 2
         require(by, asked, asked >= -h_max, "at least -h_max, where the model ends at full compression")
-    elif by == "mean_separation":
-        average = asked
+    else:
+        require(by, asked, asked >= 0, "at least 0")
+    if by in ("separation", "mean_separation"):
+        average = (h_max + asked) / 2 if by == "separation" else asked
     else:
         with np.errstate(over="ignore"):  # what is infinite is refused as too large
             wanted = asked / modulus if by == "pressure" else asked
@@ -297,23 +292,16 @@ def _of_labelled(
     """`contact` of DataArrays, lazily where they are."""
     units, held = source.units, by if by in QUANTITIES else None
     names = (*(("separation", "mean_separation") if held else ()), *QUANTITIES, "error")
-    fields: dict[str, Any] = {"islands": None}
-    slopes: list[tuple[str, str]] = []
     if derivatives:
-        kinds = [f"{kind}_by" for kind in QUANTITIES if kind != held] + (["separation_by"] if held else [])
-        free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
-        slopes = [(kind, name) for kind in kinds for name in free]
+        raise InputError("derivatives are of plain arrays: use .values of the DataArrays")
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, cap, by, source, derivatives)
-        return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
+        found = _contact(block, asked, modulus, cap, by, source, False)
+        return tuple(getattr(found, name) for name in names)
 
-    arrays = {by: value, "E_star": E_star, "hardness": hardness}
-    outputs = apply_to_surface(answer, surface, arrays, len(names) + len(slopes))
-    for found, name in zip(outputs, names, strict=False):
-        fields[name] = named(found, name, units)
-    for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
-        fields.setdefault(kind, {})[name] = found
+    outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star, "hardness": hardness}, len(names))
+    fields: dict[str, Any] = {name: named(found, name, units) for found, name in zip(outputs, names, strict=True)}
+    fields["islands"] = None
     # the given quantity keeps its name and attributes
     if by == "separation":
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}

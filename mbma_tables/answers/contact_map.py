@@ -23,29 +23,15 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ContactMap(Displayed):
-    """Contact of one map at one load, from `Contact.map`; `to_dataset` gives an xarray Dataset, `plot` a picture.
+    """Contact of one map at one load, from `Contact.map`; arrays of shape (nx, ny), the first axis is x."""
 
-    Attributes
-    ----------
-    pressure, gap, heights : ndarray, shape (nx, ny)
-        Contact pressure, zero where the gap is open [stress]; gap to the plane, zero in contact [length]; heights above
-        their mean [length]. The first axis is x.
-    steps : pair of float
-        Sampling steps along x and y [length].
-    units : Units
-        Of lengths and stresses.
-    """
-
-    pressure: FloatArray
-    gap: FloatArray
-    heights: FloatArray
-    steps: tuple[float, ...]
+    pressure: FloatArray  #: contact pressure, zero where the gap is open [stress]
+    gap: FloatArray  #: gap to the plane, zero in contact [length]
+    heights: FloatArray  #: heights above their mean [length]
+    steps: tuple[float, ...]  #: sampling steps along x and y [length]
     units: Units
 
-    @property
-    def contact(self) -> Any:
-        """True where the map is in contact, shape (nx, ny)."""
-        return self.pressure > 0
+    contact = property(lambda self: self.pressure > 0, doc="True where the map is in contact.")
 
     def _facts(self) -> dict[str, str]:
         stress, length = unit_of("pressure", self.units), self.units.length or "1"

@@ -12,7 +12,7 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
-from mbma_tables.theories.differences import differences
+from mbma_tables.theories.numerical import differences
 from mbma_tables.theories.protocol import Theory
 
 STEP = 0.02  # relative step of a parameter, or of its distance to a limit

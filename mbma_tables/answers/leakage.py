@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,25 +51,14 @@ class Leakage(Displayed):
 
     Reynolds' equation on the gaps: no flow where bodies touch, small slopes, isotropic roughness, and a fluid whose
     pressure does not move the solids. It is the mean of a long seal, many of the longest wavelengths each way; cells of
-    a few wavelengths differ by `scatter`.
-
-    Attributes
-    ----------
-    K : ndarray
-        Flow coefficient [length^3], the cube of the `hydraulic_aperture`: flow per length of seal is
-        K (p1 - p2)/(12 viscosity width). Exactly 0 where `blocked`; of `theory="simulated"` the geometric mean of
-        both axes.
-    x, y : ndarray
-        Flow coefficient along the first and the second axis of the map [length^3]: its own with `theory="simulated"`,
-        whose gaps are solved for flow, else that of isotropic roughness, `K`.
-    xy : ndarray
-        Flow per width along one axis by a pressure gradient along the other [length^3]; 0 where isotropic.
+    a few wavelengths differ by `scatter`. Flow per length of seal is K (p1 - p2)/(12 viscosity width). With
+    ``theory="simulated"`` K is the geometric mean of both axes, else that of isotropic roughness on both.
     """
 
-    K: Numbers
-    x: Numbers
-    y: Numbers
-    xy: Numbers
+    K: Numbers  #: flow coefficient [length^3], the cube of the `hydraulic_aperture`; exactly 0 where `blocked`
+    x: Numbers  #: that along the first axis of the map [length^3]
+    y: Numbers  #: along the second axis
+    xy: Numbers  #: flow per width along one axis by a pressure gradient along the other; 0 where isotropic
     _contact: Any = dataclasses.field(repr=False)
 
     def _facts(self) -> dict[str, str]:
@@ -91,10 +79,7 @@ class Leakage(Displayed):
             leakage_label=leakage_label(self.units["K"]),
         )
 
-    @property
-    def blocked(self) -> Any:
-        """Whether the contact percolates, A/A0 at or above about 0.41; any remaining flow is not modelled."""
-        return self.K == 0
+    blocked = property(lambda self: self.K == 0, doc="Whether contact percolates, A/A0 at or above about 0.41.")
 
     def along(self, direction: ArrayLike | str) -> Any:
         """Flow coefficient of a long seal whose width is along "x", "y" or degrees from x [length^3].
@@ -111,15 +96,10 @@ class Leakage(Displayed):
         """
         return along(direction, self.x, self.y, self.xy)
 
-    @property
-    def hydraulic_aperture(self) -> Numbers:
-        """K^(1/3) [length], the gap of parallel plates with the same flow."""
-        return np.cbrt(self.K)
-
-    @property
-    def flow_factor(self) -> Any:
-        """K/u^3, Patir and Cheng's pressure flow factor of the mean separation u."""
-        return self.K / self._contact.mean_separation**3
+    #: K^(1/3) [length], the gap of parallel plates with the same flow
+    hydraulic_aperture = property(lambda self: np.cbrt(self.K))
+    #: K/u^3, Patir and Cheng's pressure flow factor of the mean separation u
+    flow_factor = property(lambda self: self.K / self._contact.mean_separation**3)
 
     @functools.cached_property
     def scatter(self) -> Any:
@@ -140,13 +120,8 @@ class Leakage(Displayed):
             with np.errstate(divide="ignore"):
                 return np.hypot(stated, np.interp(np.log(area), np.log(MAP_AREAS), of_maps))
 
-        return self._map(stated)
-
-    @functools.cached_property
-    def closed_form(self) -> Any:
-        """K/h_rms^3 by a closed form of gap and area alone, accurate up to zeta_1 = 32, for comparison."""
-        constants = shipped_flow().constants
-        return self._map(lambda theory, s, u, E, area: constants.closed_form(u / np.asarray(s.h_rms), area))
+        area = {"area": self._contact.area}
+        return self._contact._source.map(lambda *given: (stated(*given),), self._contact, 1, area)[0]
 
     @functools.cached_property
     def valid(self) -> Any:
@@ -160,17 +135,13 @@ class Leakage(Displayed):
         contact = self._contact
         return contact.reasons | contact._source.reasons(contact, reasons_against, {"area": contact.area})
 
-    def _map(self, function: Callable[..., FloatArray]) -> Any:
-        area = {"area": self._contact.area}
-        return self._contact._source.map(lambda *given: (function(*given),), self._contact, 1, area)[0]
-
     @property
     def units(self) -> dict[str, str]:
         """Units of the quantities that are not dimensionless."""
         units = self._contact._source.units
         return {"K": unit_of("leakage", units), "hydraulic_aperture": unit_of("separation", units)}
 
-    def liquid(self, viscosity: ArrayLike | str, pressure_drop: ArrayLike | str, width: ArrayLike | str) -> Numbers:
+    def liquid(self, viscosity: ArrayLike | str, pressure_drop: ArrayLike | str, width: ArrayLike | str) -> Any:
         """Volume that leaks per time and length of seal [length^2/time].
 
         Parameters
@@ -179,14 +150,9 @@ class Leakage(Displayed):
             Dynamic viscosity [stress time], such as "1e-3 Pa s"; a number is in the modulus's unit of stress times
             the unit of time that the result then has.
         pressure_drop : array_like or str
-            p1 - p2 [stress], or with its unit, such as "0.3 MPa".
+            p1 - p2 [stress].
         width : array_like or str
-            Of the seal, along the flow [length], or with its unit, such as "2 mm".
-
-        Raises
-        ------
-        InputError, OutOfRangeError
-            For numbers that are not positive and finite, and units that cannot be converted.
+            Of the seal, along the flow [length].
 
         Examples
         --------
@@ -196,8 +162,7 @@ class Leakage(Displayed):
         >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.1e} um^2/s"
         '3.0e+02 um^2/s'
         """
-        eta, drop, length = self._positive(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
-        agree(K=self.K, viscosity=eta, pressure_drop=drop, width=length)
+        eta, drop, length = self._numbers(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
         return self.K * (drop / (12 * eta * length))
 
     def gas(
@@ -207,7 +172,7 @@ class Leakage(Displayed):
         pressure_out: ArrayLike | str,
         width: ArrayLike | str,
         mean_free_path: ArrayLike | str,
-    ) -> Numbers:
+    ) -> Any:
         """Volume of an ideal gas at the outlet's pressure that leaks per time and length of seal [length^2/time].
 
         Isothermal: mass flow goes as p1^2 - p2^2. Slip of the first order adds the share 6 Kn, with Kn the mean free
@@ -220,44 +185,33 @@ class Leakage(Displayed):
         pressure_in, pressure_out : array_like or str
             Absolute pressures [stress], pressure_in the larger.
         mean_free_path : array_like or str
-            At the mean pressure (p1 + p2)/2 [length]: about 68 nm bar over it for air at 20 C. 0 leaves slip out.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
-            As for `liquid`, and where Kn is above 0.1, in transition flow; where blocked there is no channel, and no
-            Kn.
+            At the mean pressure (p1 + p2)/2 [length]: about 68 nm bar over it for air at 20 C. 0 leaves slip out; an
+            error where Kn is above 0.1, in transition flow.
         """
-        eta, high, low, length = self._positive(
-            viscosity=viscosity, pressure_in=pressure_in, pressure_out=pressure_out, width=width
-        )
+        given = {"viscosity": viscosity, "pressure_in": pressure_in, "pressure_out": pressure_out, "width": width}
+        eta, high, low, length, path = self._numbers(**given, mean_free_path=mean_free_path)
         larger = "at least pressure_out: both are absolute pressures"
         require("pressure_in", np.asarray(high + 0 * low), np.asarray(high >= low), larger)
-        path = self._number("mean_free_path", mean_free_path)
-        require("mean_free_path", np.asarray(path), np.asarray(path >= 0), "at least 0")
         channel = self.hydraulic_aperture
-        agree(K=self.K, viscosity=eta, pressure_in=high, pressure_out=low, width=length, mean_free_path=path)
         knudsen = path / np.maximum(channel, np.finfo(float).tiny) * (channel > 0)
         limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, first-order slip does not apply"
         require("mean_free_path", np.asarray(path + 0 * knudsen), np.asarray(knudsen <= LARGEST_KNUDSEN), limit)
         return self.K * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
 
-    def _positive(self, **given: Any) -> list[FloatArray]:
-        found = {name: self._number(name, value) for name, value in given.items()}
-        for name, number in found.items():
-            require(name, np.asarray(number), np.asarray(number > 0), "positive")
+    def _numbers(self, **given: Any) -> list[FloatArray]:
+        """Positive numbers in the units of surface and modulus; a mean free path may be 0."""
+        found: dict[str, Any] = {}
+        for name, value in given.items():
+            if name == "viscosity" and isinstance(value, str):
+                value, stress, seconds = value.strip().rpartition(" ")
+                if seconds != "s" or not stress:
+                    raise InputError(f"viscosity = {given[name]!r} must be a stress times seconds, such as '1e-3 Pa s'")
+            number = self._contact._source.units.number(name, value)
+            array, free = finite_array(name, number), name == "mean_free_path"
+            require(name, array, array >= 0 if free else array > 0, "at least 0" if free else "positive")
+            found[name] = number if is_labelled(number) else array
+        agree(K=self.K, **found)
         return list(found.values())
-
-    def _number(self, name: str, value: Any) -> FloatArray:
-        """A number in the units of surface and modulus."""
-        if name == "viscosity" and isinstance(value, str):
-            plain, found, rest = value.strip().rpartition(" ")
-            if rest != "s" or not found:
-                raise InputError(f"viscosity = {value!r} must be a stress times seconds, such as '1e-3 Pa s'")
-            value = plain
-        value = self._contact._source.units.number(name, value)
-        array = finite_array(name, value)
-        return value if is_labelled(value) else array
 
 
 def leakage_of(contact: Any) -> Leakage:

@@ -1,8 +1,7 @@
-"""Flow coefficient of contacts: the contact factor's table of self-affine surfaces, and its scatter.
+"""Flow coefficient of contacts: the contact factor R of self-affine surfaces from a table, and its scatter.
 
-The table holds ln R of `mbma_tables.laws.effective_medium` over Hurst exponent, ln zeta_1 and ln A/(Ac - A).
-Below the smallest tabulated contact ln R is proportional to A^m, as the obstruction is; above the largest it is linear
-in ln A/(Ac - A), so that R is a power of Ac - A.
+The table holds ln R of `laws.effective_medium` over Hurst exponent, ln zeta_1 and ln A/(Ac - A). Below the smallest
+tabulated contact ln R is proportional to A^m, as the obstruction is; above the largest R is a power of Ac - A.
 """
 
 from __future__ import annotations

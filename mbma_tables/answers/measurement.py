@@ -14,7 +14,7 @@ from mbma_tables.surfaces.areal import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.wrapped import answer_where_finite
+from mbma_tables.theories.numerical import answer_where_finite
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,11 +30,9 @@ def described(surface: MeasuredSurface) -> list[str]:
     """Text lines on a measurement: its properties, its treatment, and consequences for theories."""
     unit = surface.unit or "length"
     h_rms, shortest, longest = float(surface.h_rms), 2 * np.pi / float(surface.q1), 2 * np.pi / float(surface.q0)
-    lines = [
-        f"h_rms {h_rms:.4g} {unit}, highest point {float(surface.h_max):.4g} {unit} "
-        f"({float(surface.h_max) / h_rms:.3g} h_rms), rms gradient {float(surface.rms_gradient):.4g}",
-        f"wavelengths from {shortest:.4g} to {longest:.4g} {unit}",
-    ]
+    top, gradient = float(surface.h_max), float(surface.rms_gradient)
+    lines = [f"h_rms {h_rms:.4g} {unit}, highest point {top:.4g} {unit} ({top / h_rms:.3g} h_rms), rms gradient"]
+    lines = [f"{lines[0]} {gradient:.4g}", f"wavelengths from {shortest:.4g} to {longest:.4g} {unit}"]
     if (found := areal(surface)) is not None:
         shown = {name: f"{name} {number:.4g}" for name, number in found.items()}
         lines.append(f"ISO 25178 [{unit}]: " + ", ".join(shown[name] for name in ("Sq", "Sa", "Sp", "Sv", "Sz")))
@@ -54,9 +52,8 @@ def described(surface: MeasuredSurface) -> list[str]:
         lines.append(f"heights: skewness {surface.skewness:.2g}, kurtosis {surface.kurtosis:.3g} (Gaussian: 0 and 3)")
     if surface.bearing is not None:
         ratio, peaked = surface.bearing.anisotropy, surface.bearing.slope_kurtosis
-        lines.append(
-            f"slopes: anisotropy {ratio:.3g} (rms gradient along over across), kurtosis {peaked:.3g} (Gaussian: 3)"
-        )
+        text = f"anisotropy {ratio:.3g} (rms gradient along over across), kurtosis {peaked:.3g} (Gaussian: 3)"
+        lines.append(f"slopes: {text}")
     lines += [f"not valid: {reason}" for reason in surface.departures(by_map=surface.bearing is not None)]
     return lines + [entry["told"] for entry in surface.provenance if "told" in entry]
 
@@ -89,31 +86,27 @@ def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str,
 
 
 def draw(
-    treated: Treated,
-    surface: MeasuredSurface,
-    answers: Mapping[str, Mapping[str, FloatArray]],
-    title: str,
-    pressure_label: str,
+    treated: Treated, surface: MeasuredSurface, answers: Mapping[str, Any], title: str, pressure_label: str,
     simulated: Mapping[str, FloatArray] | None = None,
-) -> Figure:
+) -> Figure:  # fmt: skip
     """One picture: heights, spectrum with fit and cut-offs, heights' distribution, area and separation by pressure.
 
     `answers` are those of `curves`; `simulated` has force, area and mean_separation of boundary elements, as points.
     """
-    figure = new_figure(12, 7.5)
+    figure, unit = new_figure(12, 7.5), surface.unit or "length"
     parts: Any = figure.subfigures(2, 1)
     above, below = parts
-    panels = dict(zip("ABCDE", [*above.subplots(1, 3), *below.subplots(1, 2)], strict=True))
-    unit = surface.unit or "length"
-    _heights(above, panels["A"], treated, unit)
-    _spectrum(panels["B"], surface, unit)
-    _distribution(panels["C"], surface)
-    _by_pressure(panels["D"], answers, simulated, "area", "area_scatter", pressure_label, "real contact area  A/A0")
-    names = ("mean_separation", "separation_scatter", pressure_label, f"mean separation u [{unit}]")
-    _by_pressure(panels["E"], answers, simulated, *names)
-    panels["D"].set_yscale("log")
-    panels["E"].set_ylim(0, 1.05 * float(surface.h_max))
-    panels["D"].legend()
+    heights, spectrum, distribution = above.subplots(1, 3)
+    _heights(above, heights, treated, unit)
+    _spectrum(spectrum, surface, unit)
+    _distribution(distribution, surface)
+    areas, separations = below.subplots(1, 2)
+    _by_pressure(areas, answers, simulated, "area", "area_scatter")
+    areas.set(xscale="log", yscale="log", xlabel=pressure_label, ylabel="real contact area  A/A0")
+    areas.legend()
+    _by_pressure(separations, answers, simulated, "mean_separation", "separation_scatter")
+    separations.set(xscale="log", xlabel=pressure_label, ylabel=f"mean separation u [{unit}]")
+    separations.set_ylim(0, 1.05 * float(surface.h_max))
     figure.suptitle(title)
     return figure
 
@@ -121,16 +114,13 @@ def draw(
 def _heights(figure: Any, axes: Axes, treated: Treated, unit: str) -> None:
     values = treated.heights
     sides = [count * step for count, step in zip(values.shape, treated.steps, strict=True)]
-    axes.set_xlabel(f"x [{unit}]")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"{'height' if values.ndim == 1 else 'y'} [{unit}]")
     if values.ndim == 1:
         axes.plot(np.arange(values.size) * treated.steps[0], values, lw=0.5)
-        axes.set_ylabel(f"height [{unit}]")
         return
     low, high = np.quantile(values, [0.002, 0.998])
-    shown = axes.imshow(
-        values.T, origin="lower", extent=(0, sides[0], 0, sides[1]), cmap="viridis", vmin=low, vmax=high
-    )
-    axes.set_ylabel(f"y [{unit}]")
+    ends = {"extent": (0, sides[0], 0, sides[1]), "vmin": low, "vmax": high}
+    shown = axes.imshow(values.T, origin="lower", cmap="viridis", **ends)
     figure.colorbar(shown, ax=axes, label=f"height [{unit}]", shrink=0.8)
 
 
@@ -149,8 +139,7 @@ def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
         if entry["step"] == "extrapolated":
             first = next(e["shortest"] for e in surface.provenance if e["step"] == "resolution")
             axes.axvspan(2 * np.pi / first, float(surface.q1), alpha=0.15, color="grey", label="not measured")
-    axes.set_xlabel(f"q [1/{unit}]")
-    axes.set_ylabel(f"C(q) [{unit}$^4$]")
+    axes.set(xlabel=f"q [1/{unit}]", ylabel=f"C(q) [{unit}$^4$]")
     axes.legend()
 
 
@@ -164,34 +153,21 @@ def _distribution(axes: Axes, surface: MeasuredSurface) -> None:
     axes.stairs(np.diff(below) / np.diff(grid), grid, label="heights", fill=True, alpha=0.4)
     axes.plot(grid, np.exp(-(grid**2) / 2) / np.sqrt(2 * np.pi), "k--", lw=1, label="Gaussian")
     axes.axvline(float(surface.h_max) / h_rms, color="C3", lw=1, label="h_max")
-    axes.set_xlabel("height/h_rms")
-    axes.set_ylabel("density")
+    axes.set(xlabel="height/h_rms", ylabel="density")
     axes.legend()
 
 
-def _by_pressure(
-    axes: Axes,
-    answers: Mapping[str, Mapping[str, FloatArray]],
-    simulated: Mapping[str, FloatArray] | None,
-    what: str,
-    scatter: str,
-    x_label: str,
-    y_label: str,
-) -> None:
+def _by_pressure(axes: Axes, answers: Mapping[str, Any], simulated: Any, what: str, scatter: str) -> None:
     for name, found in answers.items():
         pressure, value, width = found["pressure"], found[what], found[scatter]
         # MBMA's sum of island areas may exceed 1
         held = np.isfinite(pressure) & (found["area"] > 1e-4) & (found["area"] <= 1) & (pressure > 0)
         (line,) = axes.plot(pressure[held], value[held], label=theory_label(name))
-        band = held & np.isfinite(width)
-        times = np.exp(width)
+        band, times = held & np.isfinite(width), np.exp(width)
         low, high = (value / times, value * times) if what == "area" else (value - width, value + width)
         axes.fill_between(pressure[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
     if simulated is not None:
         axes.plot(simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this map")
-    axes.set_xscale("log")
-    axes.set_xlabel(x_label)
-    axes.set_ylabel(y_label)
     axes.grid(True, which="major", alpha=0.3)
 
 
@@ -201,26 +177,23 @@ def table_of_loads(
     """Columns of a theory's results at a few contact areas, and text lines on those omitted or not valid."""
     from mbma_tables.answers.contact import contact
 
+    def contacts(some: FloatArray) -> str:
+        return f"contact of {', '.join(f'{area:g}' for area in some)}"
+
     areas, told = AREAS, []
     try:
         found = contact(surface, area=areas, theory=theory, E_star=E_star)
     except OutOfRangeError as fault:
         if fault.mask is None or np.all(fault.mask):
             raise
-        areas, told = AREAS[~fault.mask], [f"{_contacts(AREAS[fault.mask])} left out: {fault}"]
+        areas, told = AREAS[~fault.mask], [f"{contacts(AREAS[fault.mask])} left out: {fault}"]
         found = contact(surface, area=areas, theory=theory, E_star=E_star)
     # curves of unusual maps skip some contact areas
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
     if not reached.all():
-        told.append(f"{_contacts(areas[~reached])} omitted: the map's curve does not reach it")
+        told.append(f"{contacts(areas[~reached])} omitted: the map's curve does not reach it")
     names = ("area", "pressure", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
     reasons, everywhere = found.reasons, get_theory(theory, surface).departures(surface)
-    told += [
-        f"not valid at {_contacts(areas[m])}: {reason}" for reason, m in reasons.items() if reason not in everywhere
-    ]
+    told += [f"not valid at {contacts(areas[m])}: {text}" for text, m in reasons.items() if text not in everywhere]
     return columns | {"valid": ["yes" if valid else "no" for valid in np.asarray(found.valid)[reached]]}, told
-
-
-def _contacts(areas: FloatArray) -> str:
-    return f"contact of {', '.join(f'{area:g}' for area in areas)}"

@@ -44,38 +44,22 @@ def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers
 class Contact(Interface, Displayed):
     """Result of a contact: pressure, area and derived quantities; arrays of the broadcast shape, or DataArrays.
 
-    Attributes
-    ----------
-    separation : ndarray
-        d, between the rigid plane and the mid-plane [length].
-    mean_separation : ndarray
-        u = (h_max + d)/2 (50) [length].
-    pressure : ndarray
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
-    area : ndarray
-        A/A0. MBMA does not end at 1 under full compression, and this is not clamped.
-    error : ndarray
-        Bound on the relative numerical error of both against the theory (for "mbma" against its island model),
-        NaN where not known. The deviation of the theory from simulation is given separately, as `scatter`.
-    theory, variant, island_model : str
-        Names of what computed them; variant and island model are empty unless the theory is MBMA.
-    islands : int or None
-        Number of islands evaluated; None if computed by dask or if the theory has none.
-    pressure_by, area_by, separation_by : dict of ndarray, or None
-        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held. If
-        pressure or area was given, that is held in place of the separation, whose own derivatives are `separation_by`,
-        and "pressure" or "area" stands for "separation".
+    If pressure or area was given, that is held in derivatives in place of the separation, whose own are
+    `separation_by`, and "pressure" or "area" stands for "separation".
     """
 
-    separation: Numbers
-    mean_separation: Numbers
-    pressure: Numbers
-    area: Numbers
+    separation: Numbers  #: d, between the rigid plane and the mid-plane [length]
+    mean_separation: Numbers  #: u = (h_max + d)/2 (50) [length]
+    pressure: Numbers  #: F/A0 in the unit of E_star; F/(A0 E*) where that is 1
+    area: Numbers  #: A/A0; MBMA does not end at 1 under full compression, and this is not clamped
+    #: bound on the relative numerical error of both against the theory (for "mbma" against its island model), NaN where
+    #: not known; the deviation of the theory from simulation is `scatter`
     error: Numbers
-    theory: str
+    theory: str  #: name of what computed them; variant and island model are empty unless the theory is MBMA
     variant: str
     island_model: str
-    islands: int | None
+    islands: int | None  #: number of islands evaluated; None if computed by dask or if the theory has none
+    #: partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held
     pressure_by: dict[str, Numbers] | None = None
     area_by: dict[str, Numbers] | None = None
     separation_by: dict[str, Numbers] | None = None
@@ -100,6 +84,7 @@ class Contact(Interface, Displayed):
         if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
+        facts |= {name: shown(values, unit) for name, (values, unit) in self._stiffness().items()}
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
         if source.yields:
             more |= {"psi": self.psi, "yielded": self.yielded}
@@ -114,6 +99,15 @@ class Contact(Interface, Displayed):
             facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}
 
+    def _stiffness(self) -> dict[str, tuple[Any, str]]:
+        """Stiffnesses, and the conductance of named materials, with their units."""
+        found = {"stiffness": (self.stiffness, self.units["stiffness"])}
+        if self._source.yields:
+            found["unloading_stiffness"] = self.unloading_stiffness, self.units["unloading_stiffness"]
+        if self._source.materials is not None:
+            found["conductance"] = self.conductance(), "W/(m^2 K)"
+        return found
+
     def _variables(self) -> dict[str, Variable]:
         source = self._source
         known = {n: getattr(self, n) for n in MEANINGS if n not in (("energy",) if source.yields else OF_HARDNESS)}
@@ -126,7 +120,12 @@ class Contact(Interface, Displayed):
     def _figure(self) -> Figure:
         source, unit = self._source, self.units["pressure"]
         title = f"hardness {shown(source.hardness, unit)}" if source.yields else ""
-        return draw_compression([self.curve()], title, pressure_label(unit))
+        order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
+        more: dict[str, dict[str, Any]] = {}
+        for name, (values, of_values) in self._stiffness().items():
+            label = f"{name.rpartition('_')[2]} [{of_values}]"
+            more.setdefault(label, {})[name.replace("_", " ")] = np.ravel(values)[order]
+        return draw_compression([self.curve()], title, pressure_label(unit), more=more)
 
     def curve(self, leakage: bool = False) -> Curve:
         """A line of pictures, of one surface at several separations; optionally with its leakage."""
@@ -141,14 +140,7 @@ class Contact(Interface, Displayed):
         return Curve(label, *(np.ravel(field)[order] for field in fields))
 
     def map(self) -> ContactMap:
-        """Pressure, gap and contact at every point of the surface's map at this pressure, by boundary elements.
-
-        The map is simulated on its full grid at the contact's pressure, whichever theory computed the contact.
-
-        Raises
-        ------
-        InputError
-            For several contacts, one with a hardness, and surfaces without a map.
+        """Pressure, gap and contact at every point of the surface's map, simulated on its full grid at this pressure.
 
         Examples
         --------
@@ -192,35 +184,36 @@ class Contact(Interface, Displayed):
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
 
-    def _of_loading(self, name: str) -> Any:
-        """A field of `Loaded`, divided by E*."""
-        known = self._source.loaded
-        if known is not None:
-            return getattr(known, name)[()]
-        return self._source.map(lambda theory, s, u, E: (getattr(theory.loaded(s, u), name),), self, 1)[0]
+    def _of_loading(self, name: str, elastic: Any) -> Any:
+        """A field of `Loaded`, divided by E*; `elastic` where nothing yields."""
+        source = self._source
+        if not source.yields:
+            return elastic
+        if source.loaded is not None:
+            return getattr(source.loaded, name)[()]
+        return source.map(lambda theory, s, u, E: (getattr(theory.loaded(s, u), name),), self, 1)[0]
 
     @described
     def yielded(self) -> Any:
         """Share of the contact area at the hardness, 0 to 1."""
-        return self._of_loading("yielded") if self._source.yields else 0.0 * self.mean_separation
+        return self._of_loading("yielded", 0.0 * self.mean_separation)
 
     @described
     def unloading_stiffness(self) -> Any:
         """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
         if not self._source.yields:
             return self.stiffness
-        return (self._source.E_star * self._of_loading("unloading_stiffness"))[()]
+        return (self._source.E_star * self._of_loading("unloading_stiffness", None))[()]
 
     @described
     def plane_separation(self) -> Any:
         """Gap between the mean planes [length]: u less the flattening of yielded points."""
-        return self._of_loading("plane_separation") if self._source.yields else self.mean_separation
+        return self._of_loading("plane_separation", self.mean_separation)
 
     @property
     def psi(self) -> Any:
         """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
-        source = self._source
-        return (source.E_star * source.surface.rms_gradient / source.hardness)[()]
+        return (self._source.E_star * self._source.surface.rms_gradient / self._source.hardness)[()]
 
     @property
     def elastic_hardness(self) -> Any:
@@ -259,7 +252,7 @@ class Contact(Interface, Displayed):
 
     @functools.cached_property
     def leakage(self) -> Leakage:
-        """Flow through the gaps of the contact, `theories.leakage.Leakage`; computed when first read."""
+        """Flow through the gaps of the contact; computed when first read."""
         from mbma_tables.answers.leakage import leakage_of
 
         return leakage_of(self)

@@ -1,12 +1,11 @@
-"""Sensitivity of results to each parameter of a surface: logarithmic derivatives, and results over stated ranges."""
+"""Sensitivity of results to each parameter of a surface: logarithmic derivatives."""
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,48 +24,29 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import OF_MAPS, theory_name
 from mbma_tables.theories.calibrated import Calibrated
-from mbma_tables.theories.differences import differences
+from mbma_tables.theories.numerical import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # step of the logarithm of a parameter
 NEAR = 0.9  # share of a parameter's upper limit above which its steps go down
 MAX_ERROR = 0.05  # largest error of a slope, over itself or 1; else it is NaN
-POINTS = 33  # points of a range, geometric
 ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
-
-Answers = dict[str, FloatArray]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sensitivity:
     """Result of `sensitivity`; its text is a table.
 
-    Attributes
-    ----------
-    by : str
-        Quantity held fixed: "separation", "mean_separation", "pressure" or "area".
-    parameters : dict of float
-        The surface's parameters, the modulus if given, and the quantity held fixed.
-    answers : dict of float
-        The results for these parameters; stiffness is that of loading, conductance over the mean conductivity of the
-        bodies [1/length].
-    slopes, errors : dict of dict of float
-        d ln(result)/d ln(parameter) by parameter and result, the other parameters held, NaN where the result jumps,
-        and estimates of their errors.
-    ranges : dict of dict of tuple of float
-        Smallest and largest result while a parameter runs over its range, and, under "all", over the ends and the
-        present values of all ranges together.
-    units : Units
-        Of parameters and results.
+    Stiffness is that of loading, conductance that over the mean conductivity of the bodies [1/length].
     """
 
-    by: str
-    parameters: dict[str, float]
-    answers: dict[str, float]
+    by: str  #: quantity held fixed: "separation", "mean_separation", "pressure" or "area"
+    parameters: dict[str, float]  #: the surface's parameters, the modulus if given, and the quantity held fixed
+    answers: dict[str, float]  #: the results for these parameters
+    #: d ln(result)/d ln(parameter) by parameter and result, the other parameters held; NaN where the result jumps
     slopes: dict[str, dict[str, float]]
-    errors: dict[str, dict[str, float]]
-    ranges: dict[str, dict[str, tuple[float, float]]]
-    units: Units
+    errors: dict[str, dict[str, float]]  #: estimates of their errors
+    units: Units  #: of parameters and results
 
     def __str__(self) -> str:
         width = max(map(len, self.parameters)) + 2
@@ -76,9 +56,6 @@ class Sensitivity:
             slopes = "".join(f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}" for answer in self.answers)
             number = f"{value:.5g} {unit_of(name, self.units)}".removesuffix(" 1")
             lines.append(f"{name:{width}}{number:>22}{slopes}")
-        for name, found in self.ranges.items():
-            ends = "; ".join(f"{a} {low:.4g} to {high:.4g}" for a, (low, high) in found.items())
-            lines.append(f"range of {name}: {ends}")
         return "\n".join(lines)
 
 
@@ -91,7 +68,6 @@ def sensitivity(
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
     E_star: float | str = 1.0,
-    ranges: Mapping[str, tuple[Any, Any]] | None = None,
     theory: str | Theory | UserTheory | None = None,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
@@ -114,8 +90,6 @@ def sensitivity(
         The quantity held fixed, as for `contact`.
     E_star : float or str
         Effective modulus, as for `contact`.
-    ranges : mapping of pairs, optional
-        Lower and upper limit of parameters: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
     theory, island_model, variant, rtol, hardness, materials : optional
         As for `contact`, but for maps "calibrated" by default, as a simulation is of one surface only; a hardness is
         one of the parameters.
@@ -124,21 +98,13 @@ def sensitivity(
     -------
     Sensitivity
 
-    Raises
-    ------
-    InputError, OutOfRangeError
-        For a batch, unknown names, ranges that end where no surface is, and where there is no contact.
-
     Examples
     --------
     >>> from mbma_tables import Surface, sensitivity
     >>> ground = Surface.from_roughness(Rq=0.5, Rdq=0.1, longest=100, hurst=0.8, h_max=1.8, unit="um")
-    >>> found = sensitivity(ground, pressure="10 MPa", E_star="100 GPa", ranges={"hurst": (0.7, 0.9)})
+    >>> found = sensitivity(ground, pressure="10 MPa", E_star="100 GPa")
     >>> print(f"area goes like Rdq^{found.slopes['Rdq']['area']:.2f}")
     area goes like Rdq^-1.03
-    >>> low, high = found.ranges["hurst"]["stiffness"]
-    >>> f"stiffness {low:.3g} to {high:.3g} {unit_of('stiffness', found.units)}"
-    'stiffness 0.0885 to 0.094 GPa/um'
     >>> found = sensitivity(ground, pressure="10 MPa", materials="steel 1020", theory="calibrated")
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.68'
@@ -157,28 +123,42 @@ def sensitivity(
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
     same = "mean_separation" if by == "separation" else by
     wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
+    varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
+    places, asked = {name: j for j, name in enumerate(varied)}, cast(Callable[..., Any], contact)
 
-    asked: Callable[..., Any] = contact
-
-    def answers(moved: Mapping[str, Any]) -> Answers:
-        given = {name: moved.get(name, number) for name, number in numbers.items()}
-        places = np.broadcast(*given.values())
+    @np.errstate(all="ignore")
+    def logarithms(k: Any, x: FloatArray) -> FloatArray:
+        """Of the results at places of x, at each of which the logarithm of the parameter number k is moved by x."""
+        given = {n: number * np.exp(np.where(k == places.get(n), x, 0.0)) for n, number in numbers.items()}
         # there are no batches of spectra
-        single = [dict(zip(given, map(float, entry), strict=True)) for entry in places]
+        each = [given] if batches else [{n: float(v[i]) for n, v in given.items()} for i in range(x.size)]
         rows = []
-        for own in [given] if batches else single:
+        for own in each:
             modulus, cap, held = own.pop("E_star"), own.pop("hardness", np.inf), {by: own.pop(by)}
             found: Any = asked(make(**own), **held, E_star=modulus, hardness=cap, theory=chosen)
-            rows.append([*(getattr(found, name) for name in ANSWERS[:-1]), found.unloading_stiffness / modulus])
-        return {name: np.reshape(row, places.shape) for name, row in zip(ANSWERS, zip(*rows, strict=True), strict=True)}
+            values = {"conductance": found.unloading_stiffness / modulus}
+            rows.append(np.log([values[name] if name in values else getattr(found, name) for name in wanted]))
+        return np.asarray(rows[0] if batches else np.transpose(rows))
 
-    here = {name: float(number[()]) for name, number in answers({}).items() if name in wanted}
-    if not all(number > 0 for number in here.values()):
+    here = np.exp(logarithms(-1, np.zeros(1)))[:, 0]
+    if not (here > 0).all():
         raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
-    varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
-    slopes, errors = _slopes(answers, numbers, varied, wanted, 3 if batches else 1)
-    ends = _ranges(answers, numbers, ranges or {}, units, wanted)
-    return Sensitivity(by, {name: numbers[name] for name in varied}, here, slopes, errors, ends, units)
+    # cut-offs only remove wavelengths; other parameters may be near a limit
+    ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": numbers.get("hardness", np.inf)}
+    ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
+    ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
+    sides, shape = np.array([ways.get(name, 0.0) for name in varied]), (len(wanted), len(varied))
+    with np.errstate(all="ignore"):
+        steps = np.full(len(varied), STEP)
+        slopes, errors = differences(logarithms, steps, sides, np.ones(shape), 3 if batches else 1)
+        # a discontinuous result has no slope
+        slopes = np.where(errors <= MAX_ERROR * np.maximum(1, np.abs(slopes)), slopes, np.nan)
+    by_name, off = (
+        {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.T.tolist(), strict=True)}
+        for table in (slopes, errors)
+    )
+    answers = dict(zip(wanted, here.tolist(), strict=True))
+    return Sensitivity(by, {name: numbers[name] for name in varied}, answers, by_name, off, units)
 
 
 def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
@@ -223,60 +203,3 @@ def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurfa
         return moved.resized(heights, lengths)
 
     return make, own
-
-
-@np.errstate(all="ignore")
-def _slopes(
-    answers: Callable[[Mapping[str, Any]], Answers],
-    numbers: Mapping[str, float],
-    varied: list[str],
-    wanted: list[str],
-    halvings: int,
-) -> list[dict[str, dict[str, float]]]:
-    """Logarithmic derivatives by parameter and result, and their errors."""
-
-    def logarithms(k: Any, x: FloatArray) -> FloatArray:
-        found = answers({name: numbers[name] * np.exp(np.where(k == j, x, 0.0)) for j, name in enumerate(varied)})
-        return np.log([found[name] for name in wanted])
-
-    # cut-offs only remove wavelengths; other parameters may be near a limit
-    cap = numbers.get("hardness", np.inf)
-    ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": cap}
-    ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
-    ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
-    sides, shape = np.array([ways.get(name, 0.0) for name in varied]), (len(wanted), len(varied))
-    slopes, errors = differences(logarithms, np.full(len(varied), STEP), sides, np.ones(shape), halvings)
-    # a discontinuous result has no slope
-    slopes = np.where(errors <= MAX_ERROR * np.maximum(1, np.abs(slopes)), slopes, np.nan)
-    return [
-        {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.T.tolist(), strict=True)}
-        for table in (slopes, errors)
-    ]
-
-
-def _ranges(
-    answers: Callable[[Mapping[str, Any]], Answers],
-    numbers: Mapping[str, float],
-    ranges: Mapping[str, tuple[Any, Any]],
-    units: Units,
-    wanted: list[str],
-) -> dict[str, dict[str, tuple[float, float]]]:
-    """Smallest and largest results over each range, and over the ends of all ranges."""
-    ends = {}
-    for name, pair in ranges.items():
-        if name not in numbers:
-            raise InputError(f"ranges: there is no {name!r}; there are {', '.join(numbers)}")
-        if isinstance(pair, str) or np.size(pair) != 2:
-            raise InputError(f"ranges: {name} needs two numbers, from and to, got {pair!r}")
-        low, high = (float(one_number(name, units.number(name, end))) for end in pair)
-        if not 0 < low < high:
-            raise InputError(f"ranges: {name} must be two rising positive numbers, got {low:g} and {high:g}")
-        ends[name] = (low, high)
-    found = {name: answers({name: np.geomspace(*pair, POINTS)}) for name, pair in ends.items()}
-    if len(ends) > 1:
-        corners = np.array(list(itertools.product(*((low, numbers[name], high) for name, (low, high) in ends.items()))))
-        found["all"] = answers(dict(zip(ends, corners.T, strict=True)))
-    return {
-        name: {answer: (float(np.min(values[answer])), float(np.max(values[answer]))) for answer in wanted}
-        for name, values in found.items()
-    }

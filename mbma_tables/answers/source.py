@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -111,8 +112,7 @@ class Source:
 
     def reasons(self, contact: Any, against: Against, more: Mapping[str, Any]) -> dict[str, Any]:
         """The same reasons with their masks, plain arrays, where any entry has them."""
-        surface = self.surface
-        fields = [contact.mean_separation, self.E_star, self.hardness, *more.values()]
+        surface, fields = self.surface, [contact.mean_separation, self.E_star, self.hardness, *more.values()]
         if any_labelled(surface, *fields):
             import xarray as xr
 
@@ -159,21 +159,13 @@ def _beyond_metals(
     return {f"{pair.softer.name} yields here: give hardness={needed}": elastic & (yields | (mean > soft * unit))}
 
 
-class _Point(NamedTuple):
-    separation: Any
-    mean_separation: Any
-    area: Any
-    stiffness: Any
-    pressure: Any
+_Point = collections.namedtuple("_Point", ("separation", "mean_separation", "area", "stiffness", "pressure"))
 
 
 class LawPoint(_Point):
-    """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape.
+    """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape."""
 
-    `units` are the law's. Laws do not contain the yielded share; `contact` computes it.
-    """
-
-    units = Units()
+    units = Units()  #: the law's
 
     def __repr__(self) -> str:
         fields = self._asdict().items()
@@ -186,10 +178,5 @@ class LawPoint(_Point):
             return self.pressure / self.area
 
 
-class LawValues(NamedTuple):
-    """Results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape."""
-
-    pressure: Any
-    area: Any
-    stiffness: Any
-    energy: Any
+#: results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape
+LawValues = collections.namedtuple("LawValues", ("pressure", "area", "stiffness", "energy"))

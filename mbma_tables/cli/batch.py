@@ -144,36 +144,25 @@ def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: s
     return from_tables(tables, folder, "").in_units(length, stress)
 
 
-def _pair(text: str) -> tuple[str, tuple[str, str]]:
-    name, equals, ends = text.partition("=")
-    low, colon, high = ends.partition(":")
-    if not (equals and colon and low and high):
-        raise InputError(f"--range must be like h_max=2um:4um, got {text!r}")
-    return name.strip().lstrip("-").replace("-", "_"), (low, high)
-
-
 @click.command("sensitivity", short_help="Sensitivity of results to each parameter.")
 @options.load_options(options.quantity_option)
-@click.option("--range", "ranges", multiple=True, metavar="NAME=X:X", help="Range of a parameter; may be repeated.")
 @options.specimen_options
 @options.theory_options
 @options.output_options
 def sensitivity_command(
-    loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: options.Model, output: options.Output
+    loads: dict[str, Any], specimen: Specimen, model: options.Model, output: options.Output
 ) -> None:
     """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
-    and lengths, h_max, cut-offs and the exponent of an extrapolation. With --range also the smallest and largest
-    result while one runs over its range, and over the ends of all ranges together.
+    and lengths, h_max, cut-offs and the exponent of an extrapolation.
 
-    Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa --range h_max=1:1.5 --range hurst=0.6:0.8
+    Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
     from mbma_tables.answers.sensitivity import sensitivity
 
     model = model.of(specimen.surface)
-    ends = dict(map(_pair, ranges))
-    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=ends, **vars(model))
+    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, **vars(model))
     parameters = list(found.parameters)
     columns = {
         "parameter": parameters,
@@ -189,9 +178,6 @@ def sensitivity_command(
     here = ", ".join(with_unit(name, f"{value:.6g}") for name, value in found.answers.items())
     notes = [f"theory {model.theory}; d ln(answer)/d ln(parameter) at given {found.by}", f"here: {here}"]
     notes.append("conductance is over the mean conductivity of the bodies")
-    for name, spans in found.ranges.items():
-        spread = ", ".join(with_unit(answer, f"{low:.4g} to {high:.4g}") for answer, (low, high) in spans.items())
-        notes.append(f"range of {name}: {spread}")
     facts = {"theory": model.theory, "answer_units": units}
-    facts |= {name: getattr(found, name) for name in ("by", "answers", "ranges", "errors")}
+    facts |= {name: getattr(found, name) for name in ("by", "answers", "errors")}
     Report("sensitivity", specimen.title, notes, facts, columns).write(output)

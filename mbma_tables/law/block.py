@@ -1,15 +1,8 @@
-"""The block of a contact law (layout in `core/mbma.h`): its indices, its inverse, and softening.
-
-The inverse is polynomials of x in buckets of force or area, found from their bits: `INVERSE_HEAD` numbers, then records
-of centre, rate, the sign of the side and INVERSE_DEGREE + 1 coefficients. They are starting values for a Newton step on
-the law itself.
-"""
+"""The block of a contact law (layout in `core/mbma.h`): its indices, and its inverse."""
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -39,18 +32,16 @@ INVERSE_HEAD = 6
 Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)
 OCTAVES = 100  # below the largest value; lighter loads are found by iteration
 LEAST = float(np.finfo(float).tiny)
-SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
-
-
-@functools.cache
-def _rule() -> tuple[Any, Any]:
-    """Chebyshev points and values there to monomials."""
-    points = chebyshev.chebpts1(INVERSE_DEGREE + 1)
-    return points, np.linalg.inv(np.vander(points, increasing=True)).T
+POINTS = chebyshev.chebpts1(INVERSE_DEGREE + 1)
+TRANSFORM: Any = np.linalg.inv(np.vander(POINTS, increasing=True)).T  # values there to monomials
 
 
 def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
-    """The inverse of force or area of a law's block, down to the gap `end`."""
+    """The inverse of force or area of a block, down to the gap `end`: starting values for a Newton step on the law.
+
+    Polynomials of x in buckets of force or area, found from their bits: `INVERSE_HEAD` numbers, then records of centre,
+    rate, the sign of the side and INVERSE_DEGREE + 1 coefficients.
+    """
     ends = bool(block.view(np.int64)[ENDS])
     top = block[H_MAX] - block[LOW] / block[SCALE] if ends else block[HIGHEST]
     values = np.empty(3)
@@ -64,35 +55,17 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     edges[0], edges[-1] = bottom, max(most, edges[-2])
     if turn < most:
         edges = np.insert(edges, np.searchsorted(edges, max(turn, bottom)), max(turn, bottom))
-    points, transform = _rule()
     centre, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
-    wanted = (centre[:, None] + half[:, None] * points).ravel()
+    wanted = (centre[:, None] + half[:, None] * POINTS).ravel()
     x, side = np.empty((2, wanted.size))
     core.inverse_nodes(wanted, block, which, end, x, side)
     records = np.zeros((centre.size, INVERSE_RECORD))
     records[:, 0] = centre
     records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > np.finfo(float).tiny)
-    records[:, 2] = side.reshape(-1, points.size)[:, points.size // 2]
-    records[:, 3:] = x.reshape(-1, points.size) @ transform
+    records[:, 2] = side.reshape(-1, POINTS.size)[:, POINTS.size // 2]
+    records[:, 3:] = x.reshape(-1, POINTS.size) @ TRANSFORM
     head = np.zeros(INVERSE_HEAD)
     head[Y_LEAST] = 0.0 if ends else least
     head[[Y_LOW, Y_HIGH, Y_TURN, END]] = bottom, most, turn, end
     head.view(np.int64)[FIRST_BUCKET] = first
     return np.concatenate([head, records.ravel()])
-
-
-def softening(stiffness: Callable[[Any], Any], h_max: float, lowest: float, noise: float) -> float | None:
-    """Mean separation at which stiffness first falls with compression by more than `noise`, relatively; or None."""
-    from scipy.optimize import minimize_scalar
-
-    step = (h_max - lowest) / 2 / SCAN
-    u = h_max - step * np.arange(1, SCAN + 1)
-    u[-1] = max(u[-1], (h_max + lowest) / 2)
-    values = np.asarray(stiffness(u))
-    falls = values[1:] < values[:-1] * (1 - noise)
-    if not falls.any():
-        return None
-    peak = int(falls.argmax())
-    low, high = u[peak + 1], min(u[peak] + step, h_max)
-    near = {"xatol": 1e-7 * high}
-    return float(minimize_scalar(lambda x: -stiffness(x), bounds=(low, high), method="bounded", options=near).x)

@@ -15,7 +15,6 @@ from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
-from mbma_tables.law.block import softening
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from mbma_tables.law.leakage import LeakageLaw
 
 LIGHT, HEAVY = 1e-2, 0.99  # overclosures of the default ends of a continued law, over that of the law's last
+SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors of the polynomials
 
 
@@ -96,17 +96,7 @@ class Derived:
         E: Any = None,
         direction: str | None = None,
     ) -> Tangential:
-        """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`.
-
-        Examples
-        --------
-        >>> from mbma_tables import Surface, contact_law
-        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-        >>> law = contact_law(face, E_star="100 GPa", theory="calibrated")
-        >>> sheared = law.tangential(pressure="10 MPa", friction=0.2, nu=0.3)
-        >>> f"{sheared.stiffness:.3g} GPa/um; slips from {sheared.gross_slip:.3g} um on"
-        '0.0242 GPa/um; slips from 0.231 um on'
-        """
+        """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`."""
         if (mean_separation is None) == (pressure is None):
             raise InputError("give the mean separation, or pressure=, one of them")
         if pressure is None:
@@ -162,8 +152,20 @@ class Derived:
     @functools.cached_property
     def softening(self: Any) -> float | None:
         """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
-        noise = DIGITS * self.error
-        return softening(lambda u: self.stiffness(u), self.h_max, max(self.lowest, -self.h_max), noise)
+        from scipy.optimize import minimize_scalar
+
+        lowest = max(self.lowest, -self.h_max)
+        step = (self.h_max - lowest) / 2 / SCAN
+        u = self.h_max - step * np.arange(1, SCAN + 1)
+        u[-1] = max(u[-1], (self.h_max + lowest) / 2)
+        values = np.asarray(self.stiffness(u))
+        falls = values[1:] < values[:-1] * (1 - DIGITS * self.error)
+        if not falls.any():
+            return None
+        peak = int(falls.argmax())
+        low, high = u[peak + 1], min(u[peak] + step, self.h_max)
+        near = {"bounds": (low, high), "method": "bounded", "options": {"xatol": 1e-7 * high}}
+        return float(minimize_scalar(lambda x: -self.stiffness(x), **near).x)
 
     @functools.cached_property
     def leakage(self: Any) -> LeakageLaw:

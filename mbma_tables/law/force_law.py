@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 import types
 from typing import Any
@@ -14,54 +13,14 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import SIZES, Units, factor, unit_of
-from mbma_tables.law.half_space import FLAT, HalfSpace
+from mbma_tables.law.half_space import RTOL, Body
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import theory_law
-from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
-RTOL = 1e-7  # tolerance of the force of one contact
 LIGHT = 1e-9  # share of the largest force at which laws without a last contact begin
 NEWTONS = {"uN": 1e-6, "mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6}
 _FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N)\s*(?:/\s*(\w+))?\s*")
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Body(HalfSpace):
-    """What is pressed, and units of quantities: forces over E* times `newtons` are in the unit of force."""
-
-    surface: AnySurface
-    theory: Theory
-    units: dict[str, str]
-    newtons: float
-
-    @property
-    def name(self) -> str:
-        """What it is, in words."""
-        return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
-
-    def smooth_approach(self, force: FloatArray) -> FloatArray:
-        """Hertz's approach at a force over E*."""
-        if not self.plane:
-            return np.asarray((0.75 * force / math.sqrt(self.radius)) ** (2 / 3))
-        a = np.sqrt(4 * self.radius * force / math.pi)
-        return np.asarray(force / math.pi * (2 * np.log(2 * self.reference / a) + 1))
-
-    def approach_at(self, force: float) -> float:
-        """Approach at a force over E*: between those of the smooth body, and of one larger by h_max."""
-        from scipy.optimize import brentq
-
-        smooth, (thin, wide) = float(self.smooth_approach(np.asarray(force))), self.ends
-
-        def miss(approach: float) -> float:
-            found = self.solved(approach, RTOL)
-            return math.log(self.integral(found, found.p) / force)
-
-        low, high = smooth - wide * (1 - 1e-9), smooth - thin + 2 * FLAT * wide
-        # no layer is thinner than its law allows: there may be no such force
-        if miss(high) < 0:
-            self.quantities(self.solved(high, RTOL))
-        return float(brentq(miss, low, high, xtol=1e-12 * wide, rtol=1e-12))
 
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
@@ -88,6 +47,15 @@ def forces(given: Any, body: Body, length: str | None) -> Any:
     return float(found[1]) * NEWTONS[found[2]] * (1.0 if found[3] is None else factor("mm", found[3]))
 
 
+def _of(quantity: str, meaning: str) -> Any:
+    def found(self: Any, approach: ArrayLike | str) -> Numbers:
+        value: Numbers = getattr(self.law, quantity)(self._left(approach))
+        return value
+
+    found.__doc__ = meaning
+    return found
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class ForceLaw:
     """Force of a rough sphere or cylinder against its approach, made by `RoughContact.law`; per length of a cylinder.
@@ -102,26 +70,15 @@ class ForceLaw:
     first: float
     body: Body
 
-    def force(self, approach: ArrayLike | str) -> Numbers:
-        """F."""
-        return self.law.pressure(self._left(approach))
-
-    def stiffness(self, approach: ArrayLike | str) -> Numbers:
-        """dF/d(approach)."""
-        return self.law.stiffness(self._left(approach))
-
-    def area(self, approach: ArrayLike | str) -> Numbers:
-        """Real contact area."""
-        return self.law.area(self._left(approach))
-
-    def energy(self, approach: ArrayLike | str) -> Numbers:
-        """Work of loading, the integral of F over the approach."""
-        return self.law.energy(self._left(approach))
+    force = _of("pressure", "F.")
+    stiffness = _of("stiffness", "dF/d(approach).")
+    area = _of("area", "Real contact area.")
+    energy = _of("energy", "Work of loading, the integral of F over the approach.")
 
     def approach(self, force: Any) -> Numbers:
         """Approach at a force."""
-        found: FloatArray = self.law.at_pressure(forces(force, self.body, self.law.units.length)).mean_separation
-        return self.law.h_max + self.first - found
+        left: FloatArray = self.law.at_pressure(forces(force, self.body, self.law.units.length)).mean_separation
+        return self.law.h_max + self.first - left
 
     def _left(self, approach: ArrayLike | str) -> FloatArray:
         return self.law.h_max + self.first - finite_array("approach", self.law.units.number("approach", approach))

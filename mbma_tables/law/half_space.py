@@ -20,7 +20,10 @@ from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.islands.spectral import Basis, basis, gauss_legendre, made
 from mbma_tables.law.law import ContactLaw
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.protocol import Theory
 
+RTOL = 1e-7  # tolerance of the force of one contact
 NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn
 STEPS, SETTLED = 100, 1e-12  # steps of Newton's method, and size of the last one over the lengths that add up
 EDGE = 1e-10  # share of the largest pressure that defines the edge
@@ -63,13 +66,17 @@ class Solved(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class HalfSpace:
-    """The problem: law of the layer, radius R [length], whether it is a cylinder, and its reference [length]."""
+class Body:
+    """What is pressed, and units of quantities: forces over E* times `newtons` are in the unit of force."""
 
-    law: ContactLaw
-    radius: float
-    plane: bool
-    reference: float
+    law: ContactLaw  # of the layer
+    radius: float  # R [length]
+    plane: bool  # whether it is a cylinder
+    reference: float  # of a cylinder, where it does not move [length]
+    surface: AnySurface
+    theory: Theory
+    units: dict[str, str]
+    newtons: float
 
     @functools.cached_property
     def ends(self) -> tuple[float, float]:
@@ -147,3 +154,31 @@ class HalfSpace:
         stiffness = at.raised(self.layer(at.u)[1])
         area: Any = self.law.area(np.clip(at.u, *self.ends))
         return self.integral(at, at.p), self.integral(at, stiffness), self.integral(at, np.where(at.p > 0, area, 0.0))
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
+
+    def smooth_approach(self, force: FloatArray) -> FloatArray:
+        """Hertz's approach at a force over E*."""
+        if not self.plane:
+            return np.asarray((0.75 * force / math.sqrt(self.radius)) ** (2 / 3))
+        a = np.sqrt(4 * self.radius * force / math.pi)
+        return np.asarray(force / math.pi * (2 * np.log(2 * self.reference / a) + 1))
+
+    def approach_at(self, force: float) -> float:
+        """Approach at a force over E*: between those of the smooth body, and of one larger by h_max."""
+        from scipy.optimize import brentq
+
+        smooth, (thin, wide) = float(self.smooth_approach(np.asarray(force))), self.ends
+
+        def miss(approach: float) -> float:
+            found = self.solved(approach, RTOL)
+            return math.log(self.integral(found, found.p) / force)
+
+        low, high = smooth - wide * (1 - 1e-9), smooth - thin + 2 * FLAT * wide
+        # no layer is thinner than its law allows: there may be no such force
+        if miss(high) < 0:
+            self.quantities(self.solved(high, RTOL))
+        return float(brentq(miss, low, high, xtol=1e-12 * wide, rtol=1e-12))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -142,7 +143,7 @@ def _mbma_law(
     start, first = fit.first_record(lambda start: fit.power_record(values, start, POWERS), octaves, tolerance)
     facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
     side, limits = fit.Side(-1, start, values, tuple(kinks)), (h_max - end, math.inf)
-    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: kept.error, kept.leverage, facts)
+    return _finish(1 / end, [side], tolerance, first, limits, 0.0, [np.array([kept.error])], kept.leverage, facts)
 
 
 def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
@@ -151,7 +152,7 @@ def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str
     # below the elastic theory's end, and with a hardness towards u = 0, force depends on the logarithm of u
     lowest = _lowest(surface, theory.elastic, LOWEST if theory.elastic is theory else LOWEST[1:])
     highest = h_max if ends else min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
-    errors: list[FloatArray] = []
+    errors: list[FloatArray] = []  # of the answers, which are asked until the end
 
     def answer(u: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
@@ -186,13 +187,12 @@ def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
     facts |= {"theory": theory.name, "variant": "", "island_model": ""}
 
-    worst = lambda: float(np.concatenate(errors).max())  # noqa: E731
-    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, worst, 0.0, facts)
+    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, errors, 0.0, facts)
 
 
 def _finish(
     scale: float, sides: list[fit.Side], tolerance: float, first: fit.First, limits: tuple[float, float], beyond: float,
-    own_error: Callable[[], float], leverage: float, facts: dict[str, Any],
+    own_errors: list[FloatArray], leverage: float, facts: dict[str, Any],
 ) -> ContactLaw:  # fmt: skip
     """Fit the sides, put the block together, and look for turning points."""
     h_max, (lowest, highest) = float(facts["surface"].h_max), limits
@@ -210,7 +210,7 @@ def _finish(
     records[:, at.FORCE_AT : at.AREA_AT] *= facts["E_star"]
     records[:, at.ENERGY_AT] *= facts["E_star"]
     block.flags.writeable = False
-    error, own = float(errors[:, 0].max()), own_error()
+    error, own = float(errors[:, 0].max()), float(np.concatenate(own_errors).max())
     ends_at: dict[str, Any] = {"h_max": h_max, "lowest": lowest, "highest": highest, "error": error + own}
     ends_at |= {"turning_point": turns[0], "area_turning_point": turns[1]}
     return ContactLaw(**facts, **ends_at, block=block, errors=errors + np.array([0.0, leverage * own]))
@@ -218,16 +218,8 @@ def _finish(
 
 def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> float:
     """Mean separation from which a theory has finite force: the least of `shares`, or where its answers begin."""
-
-    def answers(u: float) -> bool:
-        try:
-            with np.errstate(all="ignore"):
-                pressure = float(theory.answer(surface, np.array(u)).pressure)
-        except InputError:
-            return False
-        return math.isfinite(pressure) and pressure > 0
-
     for u in (*(share * float(surface.h_max) for share in shares), float(theory.interval(surface)[0])):
-        if answers(u):
-            return u
+        with np.errstate(all="ignore"), contextlib.suppress(InputError):
+            if 0 < float(theory.answer(surface, np.array(u)).pressure) < math.inf:
+                return u
     raise OutOfRangeError(f"theory {theory.name!r} has no finite force on this surface up to u = {u:.6g}")

@@ -52,10 +52,7 @@ class Pieces(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """Matrices of a fit: from an interval's ends to its samples, from values there to a series, errors and monomials.
-
-    The series has the even and odd parts of what is left out in its first two terms, so that neighbours join.
-    """
+    """Matrices of a fit: from an interval's ends to samples, from values there to a series, errors and monomials."""
 
     places: FloatArray  # (2, SAMPLES), Chebyshev points
     series: FloatArray  # (SAMPLES, SAMPLES)
@@ -68,6 +65,7 @@ class Rule(NamedTuple):
 def _rule() -> Rule:
     points, degrees = chebyshev.chebpts1(SAMPLES), np.arange(SAMPLES)
     series: Any = np.linalg.inv(chebyshev.chebvander(points, SAMPLES - 1)).T.copy()
+    # the even and odd parts of what is left out are in the first two terms, so that neighbours join
     for odd in (0, 1):
         series[:, odd] += series[:, KEPT + 1 - odd :: 2].sum(axis=1)
     bounds = np.where(degrees < KEPT, 0.0, np.stack([np.full(SAMPLES, 2.0), degrees**2 + 1]))
@@ -255,7 +253,6 @@ def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[float | None, 
 
 
 def _first_fall(series: FloatArray, end: float) -> float | None:
-    """t at which a polynomial first falls on the way from an end of [-1, 1] to the other."""
     slope = np.polynomial.Polynomial(series).deriv()
     if slope(end) <= 0:
         return end

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
+from scipy.sparse.linalg import LinearOperator, cg
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
@@ -202,28 +203,21 @@ class Contact:
 
         Pressures on the area alone, of mean 1, that move it as a whole: preconditioned conjugate gradients.
         """
-        touching = self.traction > 0
-        count = int(touching.sum())
+        shape, touching = self.surface.shape, self.traction > 0
+        even = np.where(touching, touching.size / touching.sum(), 0.0)
 
-        def inside(field: FloatArray) -> FloatArray:
-            """On the area, of mean zero."""
-            return np.where(touching, field - field[touching].mean(), 0.0)
+        def inside(filter_: FloatArray) -> LinearOperator:
+            """Filters fields on the area, whose mean there is taken off."""
 
-        p = np.where(touching, touching.size / count, 0.0)
-        rest = -inside(self.deflect(p))
-        z = inside(self._filtered(rest, self._stiffness))
-        direction, gain = z, float(np.sum(rest * z))
-        first = gain
-        for _ in range(MAX_ITERATIONS):
-            if gain <= STIFFNESS_RTOL**2 * first or count < 2:
-                break
-            moved = inside(self.deflect(direction))
-            step = gain / float(np.sum(direction * moved))
-            p = p + step * direction
-            rest = rest - step * moved
-            z = inside(self._filtered(rest, self._stiffness))
-            gain, before = float(np.sum(rest * z)), gain
-            direction = z + gain / before * direction
-        else:
+            def filtered(field: FloatArray) -> FloatArray:
+                found = self._filtered(field.reshape(shape), filter_)
+                return np.where(touching, found - found[touching].mean(), 0.0).ravel()
+
+            return LinearOperator((touching.size, touching.size), filtered, dtype=float)
+
+        compliance, stiffness = inside(self._compliance), inside(self._stiffness)
+        start = -compliance @ even.ravel()
+        more, failed = cg(compliance, start, rtol=STIFFNESS_RTOL, maxiter=MAX_ITERATIONS, M=stiffness)
+        if failed:
             raise ConvergenceError("the stiffness of a frozen contact was not found")
-        return 1 / float(self.deflect(p)[touching].mean())
+        return 1 / float(self.deflect(even + more.reshape(shape))[touching].mean())

@@ -49,11 +49,6 @@ def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -
     return area_of(force, light_factor(alpha, constants), constants.area_t0)
 
 
-def area_persson(force: ArrayLike) -> FloatArray:
-    """A/A0 by Persson's theory, erf(sqrt(2) F)."""
-    return area_of(force, 1.0, 1.0)
-
-
 def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
     """A/A0 at F/(A0 E* g) by the light factor s0 and t0."""
     from scipy.special import erf
@@ -151,22 +146,15 @@ class Law:
     @functools.cached_property
     def _prepared(self) -> FloatArray:
         """The law in the core's format."""
-        s, c = self.spectrum, self.constants
-        highest = np.inf if self.h_max is None else self.h_max
-        constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
-        law = np.empty(core.words_of_spectrum_law())
-        numbers, work = np.array([s.gradient, s.alpha, *constants, highest]), np.empty(3 * s.x.size)
+        s, highest = self.spectrum, np.inf if self.h_max is None else self.h_max
+        numbers = np.array([s.gradient, s.alpha, *dataclasses.astuple(self.constants), highest])
+        law, work = np.empty(core.words_of_spectrum_law()), np.empty(3 * s.x.size)
         status = core.spectrum_law_of(s.x, s.variance, s.below, numbers, work, law)
         if status == UNRESOLVED:
             raise ConvergenceError("the law of this spectrum has no curve that polynomials follow")
         if status:
             raise InputError("a spectrum has rising positive wavenumbers and shares of variance that are not negative")
         return law
-
-    def _separations(self, force: ArrayLike, whole: bool) -> list[FloatArray]:
-        """Mean separations, and their derivatives by ln F, without end and tail factor unless `whole`."""
-        law = self._prepared
-        return answered(lambda F, *out: core.spectrum_law_separation(law, F, int(whole), *out), (force,), 2)
 
     def energy(self, force: ArrayLike) -> FloatArray:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
@@ -179,7 +167,7 @@ class Law:
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor; 0 at loads that close the gap."""
-        u, slope = self._separations(force, False)
+        u, slope = answered(functools.partial(core.spectrum_law_separation, self._prepared), (force,), 2, 0)
         return u, slope
 
     def contact(self, u: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -191,14 +179,9 @@ class Law:
         """F/(A0 E* g) at mean separations u [h_rms]; zero from h_max on."""
         return self.contact(u)[0]
 
-    def force_and_stiffness(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Force and -dF/du [A0 E* g/h_rms]."""
-        force, _, stiffness = self.contact(u)
-        return force, stiffness
-
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
-        return self._separations(force, True)[0]
+        return answered(functools.partial(core.spectrum_law_separation, self._prepared), (force,), 2, 1)[0]
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
@@ -217,13 +200,13 @@ def spectrum_of(surface: Any) -> Spectrum:
     return Spectrum.from_samples(*(np.ascontiguousarray(part, float) for part in (surface.q, surface.C)))
 
 
-def force_at_area(area: ArrayLike, light: ArrayLike) -> FloatArray:
+def force_at_area(area: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """F/(A0 E* g) at A/A0."""
     from scipy.special import erfinv
 
     share = np.asarray(area, float)
     require("area", share, (share >= 0) & (share < 1), "below 1, which is reached at infinite load")
-    return force_of(erfinv(share), light)
+    return force_of(erfinv(share), light, constants)
 
 
 def mean_top_height(share: ArrayLike) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, area
+from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, area, force_at_area, light_factor
 
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
 BANDS = 64  # bands of a spectrum, graded towards both ends
@@ -21,7 +21,6 @@ NODES, LOWEST_GAP, REACH = 80, 1e-6, 8.0  # quadrature in ln(h/s), from u1/s - 8
 NO_SLOPE = 1e-12  # share of the squared gradient that the last bands hold at least
 NO_COVER = 1e-13  # share of the surface between two magnifications
 NEAREST = 1e-4  # least distance of A/A0 to the threshold
-LOADS = 4000  # loads for the interpolation of the load at a contact fraction
 
 
 def wide_gap(u: ArrayLike) -> FloatArray:
@@ -94,59 +93,38 @@ def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS)
         cover = area(np.minimum(load / np.sqrt(below), 1e8), spectrum.alpha, constants)
     above = np.append(np.cumsum(variance[::-1])[::-1], 0.0)
     spread = np.sqrt(above[:-1])
-    mean = np.append(_mean_gaps(spectrum, constants, load / cover[:, :-1], below, variance, wave, spread), 0 * load, 1)
+    mean, middle = np.zeros((load.size, variance.size + 1)), (below[:-1] + below[1:]) / 2
+    for first in range(variance.size):
+        # wavenumbers from this band on as a spectrum of their own, lengths over `spread`, loads over its gradient
+        left = 1 - below[first]
+        part = Spectrum(
+            wave[first:] / variance[first:],
+            variance[first:] / spread[first] ** 2,
+            (middle[first:] - below[first]) / left,
+            math.sqrt(left) * spectrum.gradient / spread[first],
+            spectrum.alpha,
+        )
+        carried = load[:, 0] / cover[:, first] / math.sqrt(left)
+        mean[:, first] = Law(part, None, constants).separation(carried) * spread[first]
     share = cover[:, :-1] - cover[:, 1:]
     volume = mean * cover
-    left = np.maximum(volume[:, :-1] - volume[:, 1:], 0)
+    open_ = np.maximum(volume[:, :-1] - volume[:, 1:], 0)
     touched = share > NO_COVER
     return Gaps(
         np.where(touched, share, 0.0),
-        np.divide(left, share, out=np.zeros(share.shape), where=touched),
+        np.divide(open_, share, out=np.zeros(share.shape), where=touched),
         np.sqrt((above[1:] + above[:-1]) / 2),
         cover[:, -1],
         mean[:, 0],
     )
 
 
-def _mean_gaps(
-    spectrum: Spectrum,
-    constants: Constants,
-    load: FloatArray,
-    below: FloatArray,
-    variance: FloatArray,
-    wave: FloatArray,
-    spread: FloatArray,
-) -> FloatArray:
-    """Mean gap under each load of the wavenumbers from a band on alone."""
-    found = np.zeros(load.shape)
-    middle = (below[:-1] + below[1:]) / 2
-    for first in range(variance.size):
-        # as a separate spectrum, with lengths over `spread` and loads over its gradient
-        share = 1 - below[first]
-        part = Spectrum(
-            wave[first:] / variance[first:],
-            variance[first:] / spread[first] ** 2,
-            (middle[first:] - below[first]) / share,
-            math.sqrt(share) * spectrum.gradient / spread[first],
-            spectrum.alpha,
-        )
-        found[:, first] = Law(part, None, constants).separation(load[:, first] / math.sqrt(share)) * spread[first]
-    return found
-
-
 def contact_factor(
     spectrum: Spectrum, contact: ArrayLike, flow: FlowConstants, constants: Constants = CONSTANTS
 ) -> FloatArray:
-    """ln R at contact fractions A/A0, rising, above zero and below the threshold."""
-    return log_factor(gaps(spectrum, load_of(spectrum, contact, constants), constants), flow)
-
-
-def load_of(spectrum: Spectrum, contact: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """Loads F/(A0 E* g) of an elastic contact at contact fractions A/A0, rising and above zero."""
-    wanted = np.asarray(contact, float)
-    log_force = np.linspace(np.log(wanted[0]) - 3, 1.0, LOADS)
-    reached = area(np.exp(log_force), spectrum.alpha, constants)
-    return np.asarray(np.exp(np.interp(np.log(wanted), np.log(reached), log_force)))
+    """ln R at contact fractions A/A0 above zero and below the threshold."""
+    load = force_at_area(contact, light_factor(spectrum.alpha, constants), constants)
+    return log_factor(gaps(spectrum, load, constants), flow)
 
 
 def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.common.display import Displayed, Variable
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.common.plots import draw_lines
 from mbma_tables.core import core, in_blocks
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, to_axes
@@ -38,7 +36,7 @@ class Lookup(NamedTuple):
     error: Any
 
 
-class Island4dModel(Displayed):
+class Island4dModel:
     """F_hat and A_hat by the paper's four numbers, from a four-parameter table alone.
 
     Parameters
@@ -62,21 +60,8 @@ class Island4dModel(Displayed):
         self._X, self._spread, _, self._hurst = content.axes
         self._error: FloatArray = content.local_error.max(axis=-1)
 
-    def _facts(self) -> dict[str, str]:
-        return self.content.facts()
-
-    def _variables(self) -> dict[str, Variable]:
-        names = tuple(axis.name for axis in self.content.axes)
-        axes = {axis.name: Variable(axis.values, "1", axis.long_name, (axis.name,)) for axis in self.content.axes}
-        fields = {name: row for name, row in self.content.auxiliary.items() if row[0] == names}
-        return axes | {
-            name: Variable(values, "1", about["long_name"], names) for name, (_, values, about) in fields.items()
-        }
-
-    def _figure(self) -> Any:
-        delta = np.geomspace(0.05, 2.0, 60)
-        found = {hurst: self.lookup(delta, 3.0, 20.0, hurst, outside="nan").F_hat for hurst in (0.5, 0.7, 0.9)}
-        return draw_lines({f"H = {hurst}": (delta, F) for hurst, F in found.items()}, "delta/h_rms", "F_hat")
+    def __repr__(self) -> str:
+        return f"Island4dModel({self.content.describe()})"
 
     def lookup(
         self,

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.common.display import Displayed, Variable
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.common.plots import draw_lines
 from mbma_tables.core import core, in_blocks
 from mbma_tables.models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
-SHOWN = 65  # points along an axis of the table as a Dataset
 BLOCK = 1 << 16  # islands between two checks for Ctrl-C
 TERMS = 8  # terms of each polynomial along each axis
 RECORD = 8 + 2 * TERMS**2  # doubles of a cell, `mbma_cell` of mbma.h
@@ -62,7 +58,7 @@ class Ranged:
         return self.answer(islands["X"], islands["mu"], outside=outside)
 
 
-class UniversalModel(Ranged, Displayed):
+class UniversalModel(Ranged):
     """Phi_F and Phi_A from a universal table.
 
     Parameters
@@ -88,19 +84,8 @@ class UniversalModel(Ranged, Displayed):
         self._X, self._mu = content.axes
         self.ranges = {"X": (self._X.low, self._X.high), "mu": (0.0, self._mu.high)}
 
-    def _facts(self) -> dict[str, str]:
-        return self.content.facts()
-
-    def _variables(self) -> dict[str, Variable]:
-        X, mu = (axis.coordinate(np.linspace(0, axis.nodes - 1, SHOWN)) for axis in self.content.axes)
-        held = zip(("Phi_F", "Phi_A", "error"), self.answer(X[:, None], mu), strict=True)
-        axes = {"X": Variable(X, "1", self._X.long_name, ("X",)), "mu": Variable(mu, "1", self._mu.long_name, ("mu",))}
-        return axes | {name: Variable(values, "1", "", ("X", "mu")) for name, values in held}
-
-    def _figure(self) -> Any:
-        X = np.linspace(0.0, 20.0, 60)
-        lines = {f"mu = {mu:g}": (X[1:], self.answer(X[1:], mu).phi_F) for mu in (1e-3, 1.0, 1e3)}
-        return draw_lines(lines, "X", "Phi_F")
+    def __repr__(self) -> str:
+        return f"UniversalModel({self.content.describe()})"
 
     def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A with the error bound that the table states.

@@ -65,12 +65,12 @@ def _contact(run: Run, step: Step) -> None:
     names += VALIDITY * ("validity" in wanted) + YIELDED * ("yield" in wanted)
     values = {name: getattr(found, name) for name in names if name != "area" or "subscale_area" not in problem.dropped}
     if "conductance" in wanted:
-        from mbma_tables.totals.conductance import conductance, mean_conductivity
+        from mbma_tables.totals.conductance import mean_conductivity
 
         assert problem.conductivities is not None
         k_s = mean_conductivity(*problem.conductivities)
         # yielded points unload elastically
-        values["conductance"] = conductance(found.unloading_stiffness, k_s, problem.E_star)
+        values["conductance"] = k_s / problem.E_star * found.unloading_stiffness
     if "leakage" in wanted:
         fields = {"": "K", "_valid": "valid", "_scatter": "scatter", "_blocked": "blocked"}
         values |= {f"leakage{end}": getattr(found.leakage, field) for end, field in fields.items()}
@@ -139,7 +139,7 @@ def other_theory(
 ) -> OtherTheory:
     """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories import get_theory
-    from mbma_tables.theories.wrapped import answer_where_finite
+    from mbma_tables.theories.numerical import answer_where_finite
 
     if name == "persson_simplified":
         from mbma_tables.theories.persson import Persson

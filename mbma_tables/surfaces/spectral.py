@@ -16,7 +16,6 @@ from mbma_tables.common.display import Variable
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
-from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING
 from mbma_tables.surfaces.any_surface import AnySurface, frozen
 from mbma_tables.surfaces.extremes import of_area
 from mbma_tables.surfaces.heights import Heights, one_height
@@ -209,8 +208,11 @@ class SpectralSurface(AnySurface):
             known["anisotropy"] = self.anisotropy
         beyond = "beyond, only 'calibrated' by a map was tested"
         mend = "theory='simulated' simulates the map" if by_map else beyond
-        if by_map and self.map is not None and 2 * np.pi / self.q1 < MIN_POINTS * (1 - ROUNDING) * max(self.map.steps):
-            mend += f" with a short_cutoff of {MIN_POINTS * max(self.map.steps):.4g}"
+        if by_map and self.map is not None:
+            from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING
+
+            resolved = MIN_POINTS * max(self.map.steps)
+            mend += f" with a short_cutoff of {resolved:.4g}" * (2 * np.pi / self.q1 < resolved * (1 - ROUNDING))
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()

@@ -1,17 +1,18 @@
 """Open and check table files (netCDF-4); `generate.tables.writing` writes them.
 
-A file ends in a line with the SHA-256 of all bytes before it. The file is read whole and checked against that line,
-and only then opened by the HDF5 library, which may crash on damaged bytes. HDF5 ignores what follows its own end of
-file, so every netCDF reader opens the file as it is.
+A file ends in a line with the SHA-256 of all bytes before it, which is checked before the HDF5 library opens the file,
+since that may crash on damaged bytes. HDF5 ignores what follows its own end of file.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
 import pathlib
 import threading
+from collections.abc import Iterator
 from typing import Any
 
 import netCDF4
@@ -21,6 +22,7 @@ from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import read_file
 from mbma_tables.tablefiles import schema
 
+REMEDY = "rebuild it with `python -m generate tables {}` or reinstall mbma_tables"
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
 MAX_BYTES = 256 * 2**20  # largest size of a file, and of its values
@@ -62,22 +64,33 @@ def attributes_digest(dataset: netCDF4.Dataset) -> str:
     return digest_json(content)
 
 
-def _refuse(path: pathlib.Path, why: str, kind: str = "all") -> TableFileError:
-    return TableFileError(f"{path}: {why}; rebuild it with `python -m generate tables {kind}` or reinstall mbma_tables")
-
-
-def read_sealed(path: pathlib.Path) -> bytes:
+def read_sealed(path: pathlib.Path, remedy: str = REMEDY.format("all")) -> bytes:
     """The netCDF bytes of a table file, checked against its checksum."""
     try:
         content = read_file(path, MAX_BYTES)
     except InputError as fault:
-        raise _refuse(path, str(fault).removeprefix(f"{path} ")) from None
+        raise TableFileError(f"{path}: {str(fault).removeprefix(f'{path} ')}; {remedy}") from None
     body, seal = content[:-SEAL_LENGTH], content[-SEAL_LENGTH:]
     if not seal.startswith(SEAL) or not seal.endswith(b"\n"):
-        raise _refuse(path, "is not a table file, or is cut short (no checksum at its end)")
+        raise TableFileError(f"{path}: is not a table file, or is cut short (no checksum at its end); {remedy}")
     if seal[len(SEAL) : -1] != hashlib.sha256(body).hexdigest().encode():
-        raise _refuse(path, "is damaged (its checksum does not match)")
+        raise TableFileError(f"{path}: is damaged (its checksum does not match); {remedy}")
     return body
+
+
+@contextlib.contextmanager
+def opened(path: os.PathLike[str] | str, remedy: str) -> Iterator[netCDF4.Dataset]:
+    """The dataset of a table file whose checksum is right; all errors are `TableFileError` and name the remedy."""
+    source = pathlib.Path(path)
+    body = read_sealed(source, remedy)
+    try:
+        with HDF5_LOCK, netCDF4.Dataset(source.name, memory=body) as dataset:
+            yield dataset
+    except ValueError as fault:
+        raise TableFileError(f"{source}: {fault}; {remedy}") from None
+    # raised by netCDF4 for bytes that are not a netCDF file, or without a variable
+    except (OSError, RuntimeError, LookupError) as fault:
+        raise TableFileError(f"{source}: is not a table file ({fault}); {remedy}") from None
 
 
 def verified(
@@ -121,34 +134,19 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     main = {f"{what}_{function}" for what in kinds for function in schema.FUNCTIONS} | set(names)
     point = "conformance_"
     beside = [name for name in values if name not in main and not name.startswith(point)]
-    return schema.TableContent(
-        kind=kind,
-        axes=axes,
-        coefficients=coefficients,
-        local_error=local_error,
-        auxiliary={name: (dataset[name].dimensions, values[name], described[name]) for name in beside},
-        conformance={name.removeprefix(point): values[name] for name in values if name.startswith(point)},
-        attributes=own,
-    )
+    auxiliary = {name: (dataset[name].dimensions, values[name], described[name]) for name in beside}
+    conformance = {name.removeprefix(point): values[name] for name in values if name.startswith(point)}
+    return schema.TableContent(kind, axes, coefficients, local_error, auxiliary, conformance, own)
 
 
 def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.TableContent:
     """Open and check a table file, which must be of a `kind` where one is given."""
-    source = pathlib.Path(path)
-    body = read_sealed(source)
-    try:
-        with HDF5_LOCK, netCDF4.Dataset(source.name, memory=body) as dataset:
-            found = getattr(dataset, "mbma_kind", None)
-            if found not in schema.KINDS or (kind is not None and found != kind):
-                raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(schema.KINDS)}")
-            version = getattr(dataset, "format_version", None)
-            if version != schema.FORMAT_VERSIONS[found]:
-                raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
-            content = _content(dataset, found)
+    with opened(path, REMEDY.format(kind or "all")) as dataset:
+        found, version = (getattr(dataset, name, None) for name in ("mbma_kind", "format_version"))
+        if found not in schema.KINDS or (kind is not None and found != kind):
+            raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(schema.KINDS)}")
+        if version != schema.FORMAT_VERSIONS[found]:
+            raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
+        content = _content(dataset, found)
         schema.check_content(content)
-    except ValueError as fault:
-        raise _refuse(source, str(fault), kind or "all") from None
-    # raised by netCDF4 for bytes that are not a netCDF file, or without a variable
-    except (OSError, RuntimeError, LookupError) as fault:
-        raise _refuse(source, f"is not a table file ({fault})", kind or "all") from None
     return content

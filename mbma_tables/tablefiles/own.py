@@ -1,7 +1,4 @@
-"""Tables of a user's own surface: BEM results of one map, in a netCDF-4 file with a checksum like other tables.
-
-Each variable has its dimensions named, a `long_name` and `units`; hashes and the seal are those of `netcdf`.
-"""
+"""Tables of a user's own surface: BEM results of one map, in a netCDF-4 file with a checksum like other tables."""
 
 from __future__ import annotations
 
@@ -16,15 +13,8 @@ import numpy as np
 
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
-from mbma_tables.tablefiles.netcdf import (
-    HDF5_LOCK,
-    SEAL,
-    SEAL_LENGTH,
-    attributes_digest,
-    digest_arrays,
-    read_sealed,
-    verified,
-)
+from mbma_tables.tablefiles import netcdf
+from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, opened, verified
 
 KIND, FORMAT = "simulated_map", "2.0"
 REQUIRED = ("mbma_kind", "format_version", "values_sha256")
@@ -35,7 +25,7 @@ def is_own(path: os.PathLike[str] | str) -> bool:
     """Whether a file ends with a table's checksum."""
     try:
         with open(path, "rb") as stream:
-            stream.seek(-SEAL_LENGTH, os.SEEK_END)
+            stream.seek(-netcdf.SEAL_LENGTH, os.SEEK_END)
             return stream.read().startswith(SEAL)
     except (OSError, ValueError):
         return False
@@ -53,7 +43,7 @@ def write_own(
 ) -> None:
     """Write variables (dimensions, values, long_name, units) and attributes whole, or not at all."""
     arrays = {name: np.asarray(entry[1], float) for name, entry in variables.items()}
-    own = {"mbma_kind": KIND, "format_version": FORMAT, "values_sha256": digest_arrays(arrays), **attributes}
+    own = {"mbma_kind": KIND, "format_version": FORMAT, "values_sha256": netcdf.digest_arrays(arrays), **attributes}
 
     def write(draft: str) -> None:
         with HDF5_LOCK, netCDF4.Dataset(draft, "w", format="NETCDF4") as dataset:
@@ -65,7 +55,7 @@ def write_own(
                 variable.setncatts({"long_name": meaning, "units": units})
                 variable[...] = arrays[name]
             dataset.setncatts(own)
-            dataset.setncattr("attributes_sha256", attributes_digest(dataset))
+            dataset.setncattr("attributes_sha256", netcdf.attributes_digest(dataset))
 
     try:
         body = written_bytes(pathlib.Path(path).name, write)
@@ -75,26 +65,12 @@ def write_own(
 
 
 def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Values and attributes of such a file, checked.
-
-    Raises
-    ------
-    TableFileError
-        Where it is damaged, was edited, or is another file.
-    """
-    source = pathlib.Path(path)
-    try:
-        body = read_sealed(source)
-        with HDF5_LOCK, netCDF4.Dataset(source.name, memory=body) as dataset:
-            own, _, values = verified(dataset, REQUIRED)
+    """Values and attributes of such a file, checked; TableFileError for damaged, edited and other ones."""
+    with opened(path, ADVICE) as dataset:
+        own, _, values = verified(dataset, REQUIRED)
         if (own["mbma_kind"], own["format_version"]) != (KIND, FORMAT):
             raise ValueError(f"holds a {own['mbma_kind']} of format {own['format_version']}, not a {KIND} of {FORMAT}")
         lost = [name for name, array in values.items() if not np.isfinite(array).all()]
         if lost:
             raise ValueError(f"has variable {lost[0]}, which is not finite")
-    except TableFileError as fault:
-        raise TableFileError(f"{str(fault).partition('; rebuild')[0]}; {ADVICE}") from None
-    # raised by netCDF4 for bytes that are not a netCDF file
-    except (ValueError, OSError, RuntimeError, LookupError) as fault:
-        raise TableFileError(f"{source}: {fault}; {ADVICE}") from None
     return values, own

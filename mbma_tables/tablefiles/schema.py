@@ -1,9 +1,5 @@
-"""Contents of a table file: names of the format, types of the attributes, consistency of the parts.
+"""Contents of a table file: names of the format, types of the attributes, consistency of the parts (docs/tables.md).
 
-The universal table is a list of cells of (X, mu), each with a Chebyshev series of Phi_F/mu and of Phi_A. The
-four-parameter table holds the logarithm of the ratio to the rigid sphere at the nodes of four axes, and the spline
-coefficients that interpolate it. Both have bounds on the error, conformance points, and attributes on the
-origin of all. `docs/tables.md` describes the format for readers in other languages.
 The core relies on these checks, and the text of attributes is written to exported files.
 """
 
@@ -68,15 +64,10 @@ class Axis:
         shifted = np.asarray(x, dtype=float) + self.offset
         return np.log(shifted) if self.transform == "log" else shifted
 
-    @property
-    def start(self) -> float:
-        """First t."""
-        return float(self.to_grid(self.low))
-
-    @property
-    def step(self) -> float:
-        """Spacing in t."""
-        return (float(self.to_grid(self.high)) - self.start) / (self.nodes - 1)
+    #: first t
+    start = property(lambda self: float(self.to_grid(self.low)))
+    #: spacing in t
+    step = property(lambda self: (float(self.to_grid(self.high)) - self.start) / (self.nodes - 1))
 
     def position(self, x: Any) -> Any:
         """Place in node units, 0 ... nodes - 1."""
@@ -92,8 +83,7 @@ class Axis:
     @property
     def values(self) -> FloatArray:
         """Coordinates of the nodes."""
-        values: FloatArray = self.coordinate(np.arange(self.nodes))
-        return values
+        return np.asarray(self.coordinate(np.arange(self.nodes)))
 
     def formula(self) -> str:
         """The position in node units as a formula."""
@@ -103,15 +93,9 @@ class Axis:
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the axis in the file."""
-        return {
-            "long_name": self.long_name,
-            "units": "1",
-            "transform": self.transform,
-            "offset": self.offset,
-            "first": self.low,
-            "last": self.high,
-            "position_formula": self.formula(),
-        }
+        own: dict[str, Any] = {"long_name": self.long_name, "units": "1", "transform": self.transform}
+        own |= {"offset": self.offset, "first": self.low, "last": self.high}
+        return own | {"position_formula": self.formula()}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,15 +116,14 @@ class TableContent:
     @property
     def size(self) -> str:
         """Number of cells or nodes, as text."""
-        if self.kind == UNIVERSAL:
-            return f"{self.coefficients.shape[0]} cells"
-        return " x ".join(f"{axis.nodes} {axis.name}" for axis in self.axes)
+        cells = f"{self.coefficients.shape[0]} cells"
+        return cells if self.kind == UNIVERSAL else " x ".join(f"{axis.nodes} {axis.name}" for axis in self.axes)
 
-    def facts(self) -> dict[str, str]:
+    def describe(self) -> str:
         """Range and error of the table, in one line."""
         ranges = ", ".join(f"{axis.name} {axis.low:g} to {axis.high:g}" for axis in self.axes)
         errors = ", ".join(f"{f} {self.attributes[f'largest_error_{f}']:.2g}" for f in FUNCTIONS)
-        return {"covers": ranges, "size": self.size, "largest held-out error": errors}
+        return f"covers {ranges}, size {self.size}, largest held-out error {errors}"
 
     def arrays(self) -> dict[str, Any]:
         """All arrays included in the values' hash, by their names in the file."""
@@ -167,18 +150,14 @@ def error_cell(axis: Axis, cells: int, position: Any) -> Any:
     return np.clip(np.floor(scaled).astype(np.intp), 0, cells - 1)
 
 
-def _matches(pattern: str) -> Callable[[str], bool]:
-    return lambda text: re.fullmatch(pattern, text) is not None
-
-
 # the first pattern that matches a name determines the type of the attribute
-ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], bool], str], ...] = (
+ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], Any], str], ...] = (
     ("certificate_points|spline_degree", int, lambda value: value > 0, "a whole number above 0"),
     ("target|.*_error_[FA]", float, lambda value: 0 <= value < np.inf, "a finite number, at least 0"),
     ("offset|first|last", float, np.isfinite, "a finite number"),
-    (".*_sha256", str, _matches("[0-9a-f]{64}"), "64 hexadecimal digits"),
-    ("data_version", str, _matches("[0-9a-f]{12}"), "12 hexadecimal digits"),
-    ("variant|mbma_kind|transform", str, _matches("[A-Za-z][A-Za-z0-9_]{0,39}"), "a name"),
+    (".*_sha256", str, re.compile("[0-9a-f]{64}").fullmatch, "64 hexadecimal digits"),
+    ("data_version", str, re.compile("[0-9a-f]{12}").fullmatch, "12 hexadecimal digits"),
+    ("variant|mbma_kind|transform", str, re.compile("[A-Za-z][A-Za-z0-9_]{0,39}").fullmatch, "a name"),
     (".*", str, str.isprintable, "printable text"),
 )
 
@@ -203,7 +182,6 @@ def _check_axis(axis: Axis) -> None:
 
 
 def _check_nodes(content: TableContent) -> None:
-    """Raise ValueError if the shapes of a table's values differ from its axes."""
     nodes = tuple(axis.nodes for axis in content.axes)
     knots = tuple(count + DEGREE - 1 for count in nodes)
     cells = content.local_error.shape[:-1]

@@ -67,8 +67,8 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     >>> get_theory("persson").name
     'persson'
     """
+    from mbma_tables.theories.numerical import Wrapped
     from mbma_tables.theories.protocol import Theory, UserTheory
-    from mbma_tables.theories.wrapped import Wrapped
 
     if isinstance(theory, str) and theory in OF_MAPS:
         from mbma_tables.theories.corrected import of_map

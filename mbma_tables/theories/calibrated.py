@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, filled, grouped, require, spread
-from mbma_tables.core import core
+from mbma_tables.common.arguments import FloatArray, grouped, require, spread
 from mbma_tables.laws.calibrated import KEPT, TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
 from mbma_tables.laws.calibrated import area as law_area
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -57,9 +58,8 @@ class Batch:
         table, self.shape, self.h_rms, self.gradient = calibrated_table.shipped(), surface.shape, h_rms, gradient
         self.columns = np.array([hurst, np.log(zeta_1), h_max / h_rms])
         self.covered = table.covers(*self.columns[:2]) & (self.columns[2] <= np.exp(table.covered[2, 1]))
-        self.whole, given = bool(self.covered.all()), table.given(self.columns, entries)
-        self.contact = functools.partial(core.calibrated_contact, *given)
-        self.separation = functools.partial(core.calibrated_separation, *given)
+        self.whole = bool(self.covered.all())
+        self.contacts, self.separations = table.prepared(self.columns, entries)
 
     def placed(self, value: FloatArray) -> tuple[FloatArray, Any, tuple[int, ...], Any]:
         """Numbers that broadcast with the surfaces, flat; the surface of each, as a number and to index; the shape."""
@@ -70,16 +70,28 @@ class Batch:
         flat, owner = (np.ascontiguousarray(spread(each, shape)).ravel() for each in (value, number))
         return flat, owner, shape, owner
 
-    def outside(self, owner: Any, loaded: Any = True) -> list[tuple[Law, Any]]:
+    def outside(self, owner: Any, asked: Any = True) -> Iterator[tuple[Law, Any]]:
         """Laws of the surfaces outside of the table, with their entries."""
-        if self.whole:
-            return []
-        chosen = np.flatnonzero(~self.covered[owner] & loaded)
-        return [(self._law(row), chosen[mine]) for row, mine in grouped(owner[chosen])]
+        chosen = np.flatnonzero(~self.covered[owner] & asked)
+        for row, mine in grouped(owner[chosen]):
+            hurst, log_zeta, heights = self.columns[:, row].tolist()
+            yield self_affine_law(hurst, math.exp(log_zeta), heights), chosen[mine]
 
-    def _law(self, row: int) -> Law:
-        hurst, log_zeta, heights = self.columns[:, row]
-        return self_affine_law(float(hurst), float(np.exp(log_zeta)), float(heights))
+    def contact(self, u: FloatArray) -> FloatArray:
+        """Force, area and stiffness at mean separations [length]."""
+        flat, owner, shape, own = (
+            self.placed(u) if self.shape else (u.ravel(), np.zeros(u.size, np.int64), u.shape, slice(None))
+        )
+        gradient, h_rms = self.gradient[own], self.h_rms[own]
+        x = flat / h_rms
+        out = self.contacts((owner, x))
+        if not self.whole:
+            for law, mine in self.outside(owner):
+                out[:, mine] = law.contact(x[mine])
+        out[0] *= gradient
+        out[2] *= gradient
+        out[2] /= h_rms
+        return out.reshape(3, *shape)
 
 
 @functools.lru_cache(KEPT)
@@ -89,23 +101,6 @@ def _single(surface: Surface) -> Batch:
 
 def _bound(surface: Surface, value: FloatArray) -> Batch:
     return Batch(surface, max(np.size(value), surface.hurst.size)) if surface.shape else _single(surface)
-
-
-def _contact(batch: Batch, u: FloatArray) -> FloatArray:
-    """Force, area and stiffness of surfaces at mean separations."""
-    flat, owner, shape, own = (
-        batch.placed(u) if batch.shape else (u.ravel(), np.zeros(u.size, np.int64), u.shape, slice(None))
-    )
-    gradient, h_rms = batch.gradient[own], batch.h_rms[own]
-    x = flat / h_rms
-    out = filled(batch.contact, (owner, x), 3)
-    if not batch.whole:
-        for law, mine in batch.outside(owner):
-            out[:, mine] = law.contact(x[mine])
-    out[0] *= gradient
-    out[2] *= gradient
-    out[2] /= h_rms
-    return out.reshape(3, *shape)
 
 
 def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatArray:
@@ -123,20 +118,12 @@ def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatA
     return np.asarray(np.std(found, axis=0, ddof=1))
 
 
-def area_reasons(area: FloatArray) -> dict[str, Any]:
-    """Contact fractions with no or few simulations."""
-    low, high = TESTED_AREA
-    below = (area > 0) & (area < low * (1 - 1e-9))
-    return {f"A/A0 is below {low:g}": below, f"A/A0 is above {high:g}": area > high * (1 + 1e-9)}
-
-
 class Calibrated(Theory):
     """Persson's energy integral with cover and weight calibrated on boundary elements.
 
-    Self-affine surfaces are evaluated by its table, those outside of it (H below 0.1, zeta_1 above 1e5,
-    h_max above 8 h_rms) by the law's
-    quadrature. For a surface given by a spectrum, the spectrum is used; measured heights determine the separation,
-    and a measured map also determines the area, by its highest and lowest parts.
+    Self-affine surfaces are evaluated by its table, those outside of it (H below 0.1, zeta_1 above 1e5, h_max above
+    8 h_rms) by the law's quadrature. For a surface given by a spectrum, the spectrum is used; measured heights
+    determine the separation, and a measured map also determines the area, by its highest and lowest parts.
     """
 
     name = "calibrated"
@@ -158,7 +145,7 @@ class Calibrated(Theory):
             return TheoryAnswer(pressure, area, stiffness, error)
         assert isinstance(surface, Surface)
         gap, h_rms, (start, rate) = np.asarray(mean_separation, float), np.asarray(surface.h_rms), TAIL
-        found = _contact(_bound(surface, gap), gap)
+        found = _bound(surface, gap).contact(gap)
         x = gap / h_rms
         require("mean_separation", spread(gap, x.shape), x >= 0, "at least 0")
         stated = calibrated_table.shipped().error * np.exp(rate * np.clip(x - start, 0, TESTED_HEIGHTS[1] - start))
@@ -172,7 +159,7 @@ class Calibrated(Theory):
         batch = _bound(cast(Surface, surface), np.empty(0))
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
-            pressure, area, stiffness = _contact(batch, u)
+            pressure, area, stiffness = batch.contact(u)
             if quantity == "pressure":
                 return pressure, stiffness, True
             return area, area * stiffness / pressure, False
@@ -195,8 +182,8 @@ class Calibrated(Theory):
         # zero load is last contact
         u, loaded = np.full(loads.size, np.inf), loads > 0
         some = np.flatnonzero(batch.covered[owner] & loaded)
-        u[some] = filled(batch.separation, (owner[some], loads[some]), 1)[0]
-        for law, mine in batch.outside(owner, loaded):
+        u[some] = batch.separations((owner[some], loads[some]))[0]
+        for law, mine in () if batch.whole else batch.outside(owner, loaded):
             u[mine] = law.separation(np.maximum(loads[mine], 1e-300))
         require(quantity, np.broadcast_to(wanted, shape), ~np.isnan(u).reshape(shape), "less: u is 0")
         return np.asarray(np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max))
@@ -216,27 +203,29 @@ class Calibrated(Theory):
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons why results lie outside the range tested against boundary elements."""
+        area, (low, high) = answer.area, TESTED_AREA
         broad = f"the longest wavelength is more than {TESTED_ZETA_1:g} times the shortest"
+        reasons: dict[str, Any]
         if isinstance(surface, MeasuredSurface):
             law = _own_law(surface)
-            straight = np.zeros(answer.area.shape, dtype=bool)
-            if law.curve is not None:
-                straight |= law.curve.straight(np.asarray(mean_separation) / law.h_rms)
+            straight = None if law.curve is None else law.curve.straight(np.asarray(mean_separation) / law.h_rms)
             text = (
                 "the light-load and near-full-contact approximations disagree for this map: stiffness is constant "
                 "over a range of forces"
             )
-            wide = np.full(answer.area.shape, surface.q1 / surface.longest > TESTED_ZETA_1 * (1 + 1e-9))
-            return {text: straight & (answer.area >= TESTED_AREA[0]), broad: wide} | area_reasons(answer.area)
-        assert isinstance(surface, Surface)
-        heights = np.asarray(surface.h_max / surface.h_rms)
-        reasons = {
-            f"the Hurst exponent is below {TESTED_HURST:g}": np.asarray(surface.hurst) < TESTED_HURST * (1 - 1e-9),
-            broad: np.asarray(surface.zeta_1) > TESTED_ZETA_1 * (1 + 1e-9),
-            f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < TESTED_HEIGHTS[0]) | (heights > TESTED_HEIGHTS[1]),
-        }
-        found = {text: np.broadcast_to(mask, answer.area.shape) for text, mask in reasons.items()}
-        return found | area_reasons(answer.area)
+            reasons = {broad: surface.q1 / surface.longest > TESTED_ZETA_1 * (1 + 1e-9)}
+            reasons |= {} if straight is None else {text: straight & (area >= low)}
+        else:
+            assert isinstance(surface, Surface)
+            heights, (least, most) = np.asarray(surface.h_max / surface.h_rms), TESTED_HEIGHTS
+            reasons = {
+                f"the Hurst exponent is below {TESTED_HURST:g}": surface.hurst < TESTED_HURST * (1 - 1e-9),
+                broad: surface.zeta_1 > TESTED_ZETA_1 * (1 + 1e-9),
+                f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < least) | (heights > most),
+            }
+        reasons[f"A/A0 is below {low:g}"] = (area > 0) & (area < low * (1 - 1e-9))
+        reasons[f"A/A0 is above {high:g}"] = area > high * (1 + 1e-9)
+        return {text: np.broadcast_to(mask, area.shape) for text, mask in reasons.items()}
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """Reasons why a measured surface is unlike those tested against boundary elements."""

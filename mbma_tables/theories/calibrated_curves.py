@@ -185,11 +185,6 @@ class OwnLaw:
         """A/A0 at a force over A0 E*."""
         return (self.law if self.curve is None else self.curve).area(pressure / self.gradient)
 
-    def separations(self, force: FloatArray) -> FloatArray:
-        """Mean separations [length] of the bare law at forces over A0 E*, which may be below zero near full contact."""
-        known = self.law if self._known is None else self._known
-        return known.separation(force / self.gradient) * self.h_rms
-
     def mean_separation(self, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
         if self.curve is not None:

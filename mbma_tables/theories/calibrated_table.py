@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import pathlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -78,20 +79,17 @@ class Table(SurfaceSpline):
     scatter: dict[str, FloatArray]  # by theory: ln of rms of ln(theory/simulation), rows `QUANTITIES`, by
     log_area: FloatArray  # ln of contact fractions
 
-    def given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
-        """The table and surfaces (columns: H, ln zeta_1, h_max/h_rms) in the core's format, for so many entries."""
+    def prepared(self, surfaces: FloatArray, entries: int) -> list[Callable[..., FloatArray]]:
+        """Two functions for surfaces (columns: H, ln zeta_1, h_max/h_rms) and about so many entries.
+
+        Of (owners, u) [h_rms], rows force, area and -dF/du; of (owners, force F/(A0 E* g) > 0), one row of mean
+        separations [h_rms], NaN where they lie beyond the table.
+        """
         ends = np.empty((surfaces.shape[1], 2))
         core.calibrated_ends(*self.core_table, *surfaces, None, None, ends)
-        return *self.core_table, *surfaces, ends, self.shared(surfaces, entries)
-
-    def fill(self, surfaces: FloatArray, owner: Owners, u: FloatArray) -> FloatArray:
-        """Force, area and -dF/du, shape (3, n), at u [h_rms] of surfaces."""
-        return filled(functools.partial(core.calibrated_contact, *self.given(surfaces, u.size)), (owner, u), 3)
-
-    def separations(self, surfaces: FloatArray, owner: Owners, pressure: FloatArray) -> FloatArray:
-        """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
-        given = self.given(surfaces, pressure.size)
-        return np.ravel(filled(functools.partial(core.calibrated_separation, *given), (owner, pressure), 1))
+        given = *self.core_table, *surfaces, ends, self.shared(surfaces, entries)
+        loops = (core.calibrated_contact, 3), (core.calibrated_separation, 1)
+        return [functools.partial(filled, functools.partial(loop, *given), outputs=rows) for loop, rows in loops]
 
     def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""

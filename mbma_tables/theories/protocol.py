@@ -18,7 +18,6 @@ from mbma_tables.common.arguments import FloatArray, describe_entries, require, 
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
-from mbma_tables.theories.differences import integral
 
 LOOKS, FEW_LOOKS = 128, 8  # initial gaps of an inversion, for one surface and for each of a batch,
 LOOKED_AT, FAR = 7.0, 12.0  # range of ln u - ln(h_max - u) for these, and largest u/h_rms without last contact
@@ -27,6 +26,8 @@ SCAN = 49  # compressions at which a law is searched for a turning point
 # last steps of a logarithm (its error is about the square) and of y; product of the last two where slopes are not known
 SETTLED, SETTLED_STEP, SETTLED_BOTH = 1e-7, 1e-4, 1e-14
 FARTHEST = 40.0  # step of y
+INTEGRAL_RTOL = 1e-9
+LEAST_LEVEL = 4  # least level for energies: error estimates on coarse intervals may be too small by chance
 DISTINCT = 8.9e-16  # smallest relative difference of distinct gaps
 
 # values at mean separations, approximately their -d/du, and whether this is exact
@@ -135,15 +136,22 @@ class Theory(abc.ABC):
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
+        from scipy.integrate import tanhsinh
+
         u = np.asarray(mean_separation, dtype=float)
         high = np.broadcast_to(self.interval(surface)[1], u.shape)
         low = np.minimum(u, high)
         # from bend to bend, across which no rule converges
         edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.bends(surface)), high], axis=0)
-        found, missed = integral(lambda x, k: self.at(u.shape, k).answer(select(surface, u.shape, k), x)[0], edges)
-        if missed.any():
-            raise unfinished(missed, "the elastic energy")
-        return found
+
+        def force(x: FloatArray, place: FloatArray) -> FloatArray:
+            return self.at(u.shape, place).answer(select(surface, u.shape, place), x)[0]
+
+        place = np.arange(float(u.size)).reshape(u.shape)
+        found = tanhsinh(force, edges[:-1], edges[1:], args=(place,), rtol=INTEGRAL_RTOL, minlevel=LEAST_LEVEL)
+        if not found.success.all():
+            raise unfinished(~found.success.all(axis=0), "the elastic energy")
+        return np.asarray(found.integral.sum(axis=0))
 
     def looks(self, surface: AnySurface) -> int:
         """Number of initial gaps of each surface in an inversion."""

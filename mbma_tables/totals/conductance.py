@@ -1,8 +1,4 @@
-"""Conductance of a contact from its incremental stiffness (Barber 2003), thermal or electrical; older correlations.
-
-Where the contact yields the incremental stiffness is that of the frozen contact, `Contact.unloading_stiffness`. The
-slope of the loading curve is less, by up to ten times: yielded points do not unload along it.
-"""
+"""Conductivity of two bodies, and older correlations for the conductance of their contact, thermal or electrical."""
 
 from __future__ import annotations
 
@@ -11,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import Numbers, broadcast_shape, finite_array, positive_array
+from mbma_tables.common.arguments import Numbers, broadcast_shape, positive_array
 
 
 def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
@@ -20,43 +16,6 @@ def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
     broadcast_shape(k1=first, k2=second)
     # the smaller over the larger cannot overflow
     return (2 / (1 / first + 1 / second))[()]
-
-
-def conductance(stiffness: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) -> Numbers:
-    """Conductance per nominal area, h = -(k_s/E*) dp/du.
-
-    J. R. Barber, "Bounds on the electrical resistance between contacting elastic rough bodies", Proc. R. Soc. A 459
-    (2003): conductance and incremental stiffness of a contact of two half-spaces solve the same potential problem.
-
-    Parameters
-    ----------
-    stiffness : array_like
-        -dp/du against the mean separation [stress/length], zero or positive; incremental where the contact yields.
-    k_s : array_like
-        Mean conductivity of the bodies, `mean_conductivity`; thermal or electrical.
-    E_star : array_like
-        Effective modulus, in the unit of stress of the stiffness.
-
-    Returns
-    -------
-    float or ndarray
-        [unit of k_s/length].
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-
-    Examples
-    --------
-    >>> from mbma_tables.totals.conductance import conductance, mean_conductivity
-    >>> k_s = mean_conductivity(50.0, 200.0)  # W/(m K)
-    >>> float(conductance(1e14, k_s, 1e11))  # Pa/m and Pa give W/(m^2 K)
-    80000.0
-    """
-    slope = finite_array("stiffness", stiffness)
-    mean, modulus = positive_array("k_s", k_s), positive_array("E_star", E_star)
-    broadcast_shape(stiffness=slope, k_s=mean, E_star=modulus)
-    return (mean / modulus * slope)[()]
 
 
 def cooper_mikic_yovanovich(
@@ -81,9 +40,7 @@ def cooper_mikic_yovanovich(
     return _by_slope(surface, k_s, 1.25 * (np.asarray(pressure) / hardness) ** 0.95)
 
 
-def mikic(
-    surface: Any, pressure: ArrayLike, k_s: ArrayLike, E_star: ArrayLike, hardness: ArrayLike = np.inf
-) -> Numbers:
+def mikic(surface: Any, pressure: ArrayLike, k_s: ArrayLike, E_star: ArrayLike, hardness: Any = np.inf) -> Numbers:
     """Conductance of elastic contacts, h = 1.55 k_s (m/sigma) (sqrt(2) p/(m E*))^0.94; hardness does not matter.
 
     Model of B. B. Mikic, Int. J. Heat Mass Transfer 17 (1974) 205-214. The paper was not consulted: of two public

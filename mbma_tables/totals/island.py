@@ -30,47 +30,23 @@ from mbma_tables.surfaces.variants import Variant, get_variant
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Island:
-    """Contact islands at approaches delta = z_max - d, in the surface's own length unit.
+    """Contact islands at approaches delta = z_max - d, in the surface's own length unit."""
 
-    Attributes
-    ----------
-    delta : ndarray
-        Approach [length], broadcast against the surface.
-    zeta_d, zeta_u : ndarray
-        Magnifications between which roughness deforms (27, 30).
-    R_d, R_u : ndarray
-        Radii of the island's sphere and of its summits (26, 29) [length].
-    D, sigma : ndarray
-        Density [1/length^2] and standard deviation of height [length] of its summits (32).
-    h_d : ndarray
-        Roughness above zeta_d (B.3) [length].
-    eta : ndarray
-        Reduction factor of a summit's contact area by finer roughness (39).
-    X, mu : ndarray
-        The two numbers of the island problem (34, 36, 37).
-    force, area : ndarray
-        F^i [E_star length^2] and A^i [length^2] (40).
-    error : ndarray
-        Bound on the relative error of both.
-    variant, island_model : str
-        Names of what computed them.
-    """
-
-    delta: Numbers
-    zeta_d: Numbers
+    delta: Numbers  #: approach [length], broadcast against the surface
+    zeta_d: Numbers  #: magnifications between which roughness deforms (27, 30)
     zeta_u: Numbers
-    R_d: Numbers
+    R_d: Numbers  #: radii of the island's sphere and of its summits (26, 29) [length]
     R_u: Numbers
-    D: Numbers
+    D: Numbers  #: density [1/length^2] and standard deviation of height [length] of its summits (32)
     sigma: Numbers
-    h_d: Numbers
-    eta: Numbers
-    X: Numbers
+    h_d: Numbers  #: roughness above zeta_d (B.3) [length]
+    eta: Numbers  #: reduction factor of a summit's contact area by finer roughness (39)
+    X: Numbers  #: the two numbers of the island problem (34, 36, 37)
     mu: Numbers
-    force: Numbers
+    force: Numbers  #: F^i [E_star length^2] and A^i [length^2] (40)
     area: Numbers
-    error: Numbers
-    variant: str
+    error: Numbers  #: bound on the relative error of both
+    variant: str  #: names of what computed them
     island_model: str
 
 
@@ -118,10 +94,6 @@ def island(
     -------
     Island
 
-    Raises
-    ------
-    InputError, OutOfRangeError, ConvergenceError
-
     Examples
     --------
     >>> from mbma_tables import Surface, island
@@ -130,12 +102,11 @@ def island(
     ['6.537', '1.322', '3.352']
     """
     E_star, units = modulus_and_units(E_star, surface)
-    delta = units.number("delta", delta)
+    delta, rule = units.number("delta", delta), get_variant(variant)
+    named: dict[str, Any] = {"variant": rule.name, "island_model": island_model_name(island_model)}
     if any_labelled(surface, delta, E_star):
-        return _of_labelled(surface, delta, island_model, variant, E_star, rtol)
-    approach = positive_array("delta", delta)
-    modulus = positive_array("E_star", E_star)
-    rule = get_variant(variant)
+        raise InputError("island takes plain arrays: use .values of the DataArrays")
+    approach, modulus = positive_array("delta", delta), positive_array("E_star", E_star)
     model = get_model(island_model, rtol, rule)
     require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
@@ -151,9 +122,8 @@ def island(
         force=(modulus * s / q0 * scale_force(g) * phi.phi_F)[()],
         area=(scale_area(g) * phi.phi_A / q0**2)[()],
         error=np.asarray(phi.error)[()],
-        variant=rule.name,
-        island_model=model.name,
         **values,
+        **named,
     )
 
 
@@ -182,23 +152,3 @@ def refuse_bands(model: AnyModel) -> None:
             f"island model {model.name!r} supports islands of self-affine surfaces only: use 'universal' or 'exact', "
             "or surface.fit()"
         )
-
-
-def _of_labelled(
-    surface: AnySurface, delta: Any, island_model: str | AnyModel, variant: str | Variant, E_star: Any, rtol: float
-) -> Island:
-    """`island` of DataArrays, lazily where they are."""
-    # xarray is imported already if its objects are passed
-    from mbma_tables.surfaces.labels import apply_to_surface
-
-    names = (*GEOMETRY, "force", "area", "error")
-
-    def answer(block: AnySurface, own: Any, modulus: Any) -> tuple[Any, ...]:
-        found = island(block, own, island_model, variant, modulus, rtol)
-        return tuple(np.broadcast_to(getattr(found, name), np.shape(found.force)) for name in names)
-
-    outputs = apply_to_surface(answer, surface, {"delta": delta, "E_star": E_star}, len(names))
-    values = {name: found.rename(name) for name, found in zip(names, outputs, strict=True)}
-    return Island(
-        delta=delta, variant=get_variant(variant).name, island_model=island_model_name(island_model), **values
-    )

@@ -40,6 +40,7 @@ MAX_ROUNDS = 30
 BLOCK = 1 << 14  # gaps between two checks for interrupts
 MOST = 1000  # panels evaluated together
 
+Shape = tuple[float, float, float] | MeasuredSurface  # hurst, zeta_1 and h_max/h_rms of self-affine ones
 # function of approaches and which of them are used: rows of `Panels.fields`, and their error
 Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 
@@ -102,23 +103,17 @@ class Panels(NamedTuple):
         core.profile_missed(RULES, *self, len(self.fields) - 2, last, error)
         return error
 
-    def series(self) -> tuple[FloatArray, FloatArray, Nodes]:
-        """Chebyshev series of ln of each row's sum, (panels, rows, 2 GAPS), their errors, and the islands."""
+    def series(self) -> tuple[FloatArray, FloatArray, tuple[Any, ...]]:
+        """Chebyshev series of ln of each row's sum, (panels, rows, 2 GAPS), their errors, and the islands at nodes.
+
+        The last as weights, (rows, nodes), shift and rate of heights, and how many lie below each panel, and in all.
+        """
         count, rows = self.low.size, len(self.fields) - 2
         series, error = np.empty((count, rows, 2 * GAPS)), np.empty(count)
         weights, (shift, rate) = np.zeros((rows, NODES * count)), np.zeros((2, NODES * count))
         stops = np.empty(count + 1, np.int64)
         core.profile_series(RULES, *self, rows, series, error, weights, shift, rate, stops)
-        return series, error, Nodes(weights[:, : stops[-1]], shift[: stops[-1]], rate[: stops[-1]], stops)
-
-
-class Nodes(NamedTuple):
-    """Islands at the nodes of panels, in order, with weights as they count in sums."""
-
-    weights: FloatArray  # (rows, nodes)
-    shift: FloatArray
-    rate: FloatArray
-    stops: NDArray[np.int64]  # how many lie below each panel, and in all
+        return series, error, (weights[:, : stops[-1]], shift[: stops[-1]], rate[: stops[-1]], stops)
 
 
 class Source(NamedTuple):
@@ -144,12 +139,13 @@ class Source(NamedTuple):
 
 def _jacobian_below(rms_over_s: float, variant: Variant) -> float:
     """K1 below the kink, by (47) or (46)."""
-    printed = variant.jacobian == "printed"
-    return 1.0 - 4.0 / 3.0 * variant.beta / (1.0 if printed else rms_over_s) if printed or variant.offset else 1.0
+    if variant.jacobian == "printed":
+        return 1.0 - 4.0 / 3.0 * variant.beta
+    return 1.0 - 4.0 / 3.0 * variant.beta / rms_over_s if variant.offset else 1.0
 
 
-def source_of(surface: tuple[float, float, float] | MeasuredSurface, variant: Variant) -> Source:
-    """The islands of a surface; of a self-affine one by hurst, zeta_1 and h_max/h_rms."""
+def source_of(surface: Shape, variant: Variant) -> Source:
+    """The islands of a surface."""
     if not isinstance(surface, MeasuredSurface):
         hurst, zeta_1, peak = surface
         h_rms = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
@@ -183,7 +179,7 @@ class Profile:
     series: Any
     error: float  # bound on the relative error of totals, of panels and islands together
     islands: int  # evaluated for it
-    nodes: Nodes  # the islands of the panels
+    nodes: tuple[Any, ...]  # the islands of the panels, of `Panels.series`
 
     @functools.cached_property
     def end(self) -> float:
@@ -253,7 +249,7 @@ def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
     return fields
 
 
-def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, variant: Variant) -> Fields:
+def _fields_by_table(shape: tuple[float, ...], model: UniversalModel, variant: Variant) -> Fields:
     """Profile of a self-affine surface by the universal table, force and area in one pass."""
     hurst, zeta_1, peak = shape
 
@@ -317,15 +313,10 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
 
 @functools.lru_cache(maxsize=KEPT)
 def _profile(
-    surface: tuple[float, float, float] | MeasuredSurface,
-    model: AnyModel,
-    variant: Variant,
-    rtol: float,
-    outside: str = "nan",
-    rows: int = 2,
-    last: float = math.inf,
-) -> Profile:
-    """The profile of a surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
+    surface: Shape, model: AnyModel, variant: Variant, rtol: float,
+    outside: str = "nan", rows: int = 2, last: float = math.inf,
+) -> Profile:  # fmt: skip
+    """The profile of a surface to `rtol` and the model's error.
 
     It ends at the compression `last`, or with a table unless `outside` is "exact". Rows 3 and 4: number and Hertz area.
     """

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from generate.page import svg
 from generate.pages import stability as cases
-from generate.pages.page import svg
 from mbma_tables import InputError
 from mbma_tables.islands.greenwood_tripp import rigid_sphere
 
@@ -25,27 +25,25 @@ FEW = {
 def test_corners(monkeypatch):
     for name, value in FEW.items():
         monkeypatch.setattr(cases, name, value)
-    (islands, island_errors), (geometry, geometry_errors) = cases.islands(), cases.island_geometry()
-    library, printed = geometry
-    for tally in [*islands, *cases.totals(), library]:
-        assert tally.not_finite == tally.warned == tally.beyond == 0, tally
-        assert tally.refused < tally.tried
+    found = cases.islands() | cases.island_geometry() | cases.totals()
+    rows = {name: cases.row(name, outcomes)[1:] for name, outcomes in found.items()}
     # the comparison would show it if the formulas as printed were fine
-    assert printed.not_finite > 0
-    assert library.largest < 1e-13
-    assert svg(cases.draw(geometry_errors, island_errors)).startswith(b"<?xml")
+    assert rows.pop("geometry, the paper's formulas as printed")[2] > 0
+    for name, (tried, refused, not_finite, warned, _, beyond) in rows.items():
+        assert not_finite == warned == beyond == 0, name
+        assert refused < tried
+    assert rows["geometry, library"][4] < 1e-13
+    assert svg(cases.draw(found)).startswith(b"<?xml")
 
 
-def test_a_tally_counts_what_goes_wrong():
-    tally = cases.Tally("some")
-
+def test_what_goes_wrong_is_counted():
     def refuse():
         raise InputError("no")
 
     answers = [lambda: ([1.0], 0.1), lambda: ([1.5], 0.1), lambda: ([math.nan], 0.1), lambda: ([1 / 0], 0.1), refuse]
-    errors = [tally.add(answer, [1.0]) for answer in answers]
-    assert errors == pytest.approx([0.0, 0.5, math.nan, math.nan, math.nan], nan_ok=True)
-    assert (tally.tried, tally.refused, tally.not_finite, tally.beyond, tally.largest) == (5, 1, 2, 1, 0.5)
+    found = [cases.outcome(answer, [1.0]) for answer in answers]
+    assert [one.error for one in found] == pytest.approx([0.0, 0.5, math.nan, math.nan, math.nan], nan_ok=True)
+    assert cases.row("some", found) == ["some", 5, 1, 2, 0, 0.5, 1]
 
 
 @pytest.mark.parametrize("X", [-37.0, -3.0, 0.0, 8.5, 1e3])

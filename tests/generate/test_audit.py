@@ -42,7 +42,7 @@ def test_workers_end_with_a_killed_parent():
         "import os, time\n"
         "from generate.workers import executor\n"
         "if __name__ == '__main__':\n"
-        "    with executor(2, None) as pool:\n"
+        "    with executor(2) as pool:\n"
         "        print(pool.submit(os.getpid).result(), flush=True)\n"
         "        time.sleep(60)\n"
     )

@@ -11,11 +11,9 @@ import xarray as xr
 from click.testing import CliRunner
 
 from generate import files
-from generate.boundary_elements.collect import dataset
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign
-from generate.boundary_elements.run import SOLVERS, boundary_elements, run
+from generate.boundary_elements.run import SOLVERS, TEXTS, boundary_elements, dataset, group, run
 from generate.boundary_elements.solve import Contact, simulate, simulate_to
-from generate.boundary_elements.surfaces import Recipe, heights
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Recipe, Task, campaign, heights
 from generate.calibrated_file import write_part
 from mbma_tables.laws.bearing_curve import FRACTIONS, bearing
 
@@ -159,6 +157,12 @@ class TestCampaign:
             np.testing.assert_allclose(own["band_energy"][:15].sum(axis=1), own["energy"][:15], rtol=1e-6)
             identity = data.mean_separation + 2 * data.energy / data.force
             np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
+
+    @pytest.mark.parametrize("kind", list(TEXTS["groups"]))
+    def test_groups_name_the_code_that_made_them(self, kind):
+        made = group(kind, {}, engine="x").attrs
+        assert set(made) >= set(files.dataset(kind).attrs) - {"versions", "code_sha256"}
+        assert made["title"] == files.dataset(kind).attrs["title"]
 
     @pytest.mark.parametrize("kind", ["hardness", "leakage"])
     def test_other_campaigns_keep_what_their_files_hold(self, kind, tmp_path):

@@ -1,19 +1,18 @@
-"""Certified tables: the certificate against fresh exact solutions, refinement by error, physical checks."""
+"""Certified tables: the certificate against fresh exact solutions, errors by target, physical checks."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from small_tables import KINDS, SMALL, small, small_build
+from small_tables import SMALL, small, small_build
 
 from generate.__main__ import main
-from generate.tables import build as build_module
-from generate.tables.build import certify, evaluate, held_out, resolve
 from generate.tables.certificate import UncertifiedError
 from generate.tables.chunks import ChunkedSolver
-from generate.tables.commands import built as build_table
+from generate.tables.commands import KINDS
 from generate.tables.configuration import load
+from generate.tables.island4d import evaluate
 from generate.tables.universal import AIM, Strip
 from generate.tables.writing import write_table
 from mbma_tables.islands import greenwood_tripp
@@ -80,7 +79,7 @@ def test_the_local_bound_is_honest(built):
 def test_certificate_points_stand_off_the_nodes_and_half_of_them_where_surfaces_go(nodes):
     kind, content = nodes
     count = 300
-    places = held_out(kind, content.axes, count, 11)
+    places = kind.held_out(content.axes, count, 11)
     assert all(place.size == count for place in places)
     for axis, place in zip(content.axes, places, strict=True):
         assert ((axis.low <= place) & (place <= axis.high)).all()
@@ -92,18 +91,18 @@ def test_certificate_points_stand_off_the_nodes_and_half_of_them_where_surfaces_
 
 def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
     kind, content = nodes
-    places = held_out(kind, content.axes, 100, 11)
+    places = kind.held_out(content.axes, 100, 11)
     places[0][3] = content.axes[0].low
-    monkeypatch.setattr(build_module, "held_out", lambda *_: places)
+    monkeypatch.setattr(kind, "held_out", lambda *_: places)
     with pytest.raises(UncertifiedError, match="a held-out point lies on a node"):
-        certify(kind, content.axes, content.coefficients, ChunkedSolver(), kind.configuration)
+        kind.certify(content.axes, content.coefficients, ChunkedSolver())
 
 
 def test_a_tighter_target_takes_more_cells_and_is_met(tmp_path):
     cells = []
     for target in (1e-4, 1e-6, 1e-8):
         configuration = load("universal", small(tmp_path, "universal"), target)
-        content = build_table(configuration, ChunkedSolver())
+        content = KINDS["universal"](configuration).build(ChunkedSolver())
         assert max(content.attributes[f"largest_error_{f}"] for f in "FA") <= target
         cells.append(len(content.coefficients))
     assert cells[0] < cells[1] < cells[2]
@@ -114,7 +113,7 @@ def test_a_tighter_target_takes_more_cells_and_is_met(tmp_path):
 def test_cells_end_where_they_must(tmp_path):
     """A cell that were an eighth of an octave longer would miss its aim."""
     configuration = load("universal", small(tmp_path, "universal"))
-    content = build_table(configuration, ChunkedSolver())
+    content = KINDS["universal"](configuration).build(ChunkedSolver())
     X_low, X_high, low, high = (content.auxiliary[name][1] for name in CELL_EDGES)
     aim = AIM * configuration.target
     for cell in np.flatnonzero(high < content.axes[1].high)[::3]:
@@ -124,16 +123,20 @@ def test_cells_end_where_they_must(tmp_path):
         assert strip.cell(low[cell], longer)[1].max() > 0.99 * aim
 
 
-def test_refinement_stops_at_the_target_not_far_beyond(nodes):
+def test_nodes_that_follow_the_target_meet_it(tmp_path):
+    found = []
+    for target in (1e-1, 2e-2):
+        configuration = load("island4d", small(tmp_path, "island4d"), target)
+        content = KINDS["island4d"](configuration).build(ChunkedSolver())
+        found.append(max(content.attributes[f"largest_error_{f}"] for f in "FA"))
+    assert found[1] < found[0] / 3
+
+
+def test_a_target_that_is_missed_is_refused(nodes):
     kind, content = nodes
-    aim = 1e-4
-    start = {axis.name: 8 for axis in content.axes}
-    found = resolve(kind, kind.configuration, ChunkedSolver(), aim, start)
-    fewer = {name: max(8, int(count / 1.25)) for name, count in found.nodes.items()}
-    coarser = resolve(kind, kind.configuration, ChunkedSolver(), 1.0, fewer)
-    for name in fewer:
-        assert found.errors[name].max() <= aim
-        assert found.nodes[name] == 8 or aim < coarser.errors[name].max()
+    tight = dataclasses.replace(kind.configuration, target=1e-6)
+    with pytest.raises(UncertifiedError, match=r"the largest held-out error is .*, the target 1\.00e-06"):
+        type(kind)(tight).certify(content.axes, content.coefficients, ChunkedSolver())
 
 
 def invoke(folder, text, kind="universal"):
@@ -194,7 +197,8 @@ def test_what_no_islands_can_do_breaks_a_rule(nodes):
 
 def test_what_no_islands_can_do_breaks_a_rule_in_a_cell(tmp_path):
     configuration = load("universal", small(tmp_path, "universal"))
-    kind, content = KINDS["universal"](configuration), build_table(configuration, ChunkedSolver())
+    kind = KINDS["universal"](configuration)
+    content = kind.build(ChunkedSolver())
     last = len(content.coefficients) - 1
     assert content.auxiliary["mu_low"][1][last] > 0
     for number, cell, terms, rule in (

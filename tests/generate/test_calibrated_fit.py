@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from generate.boundary_elements.design import HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import Case
+from generate.boundary_elements.surfaces import HELD_OUT_SURFACE, TRAINING
 from generate.calibrated import EDGES, coverage, cross_validate, errors, fit, summary, told
 from generate.calibrated_bars import measure
 from generate.calibrated_file import QUANTITIES, write_part

@@ -11,6 +11,8 @@ from click.testing import CliRunner
 
 from generate import cost, cost_distances, distances
 from generate.boundary_elements import studies
+from generate.files import ROOT, read_csv
+from generate.pages import cost as pages_cost
 from generate.pages.cost import pareto_front
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
@@ -115,6 +117,25 @@ def test_the_pareto_front_is_what_nothing_dominates():
         assert at_least.any(axis=1).all()
         # none of the front is better than another
         assert (at_least[pareto_front(rows).index].sum(axis=1) == 1).all()
+
+
+def test_the_gauge_names_every_theory_and_way_at_its_measured_place():
+    known = read_csv(ROOT / "tables" / "distance.csv")
+    rows = pages_cost.gauge_rows(known)
+    assert set(rows["theory"]) == set(pages_cost.LABELS)
+    law = rows[(rows["theory"] == "calibrated") & (rows["way"] == "law")].iloc[0]
+    shipped = next(row for row in shipped_distances() if (row.theory, row.way) == ("calibrated", "law"))
+    assert law["us"] == pytest.approx(1e6 * shipped.cost * shipped_costs().seconds)
+    assert law["area_light"] == pytest.approx(100 * np.expm1(shipped.area_light))
+    simulated = rows[rows["theory"] == "simulated"].iloc[0]
+    assert 1e5 < simulated["us"] < 1e7
+    assert simulated["force_light"] < 1 < simulated["area_light"] < 3
+    for panel, name in zip(pages_cost.draw_gauge(rows).axes, pages_cost.GAUGES, strict=True):
+        words = [text.get_text() for text in panel.texts]
+        assert {label for label, *_ in pages_cost.LABELS.values()} <= set(words)
+        # a way each, where there are several to choose from
+        several = rows[rows[name].notna()].groupby("theory")["way"].transform("size") > 1
+        assert len(words) == len(pages_cost.LABELS) + several.sum()
 
 
 @pytest.mark.slow

@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from generate.__main__ import main
 from generate.files import ROOT
-from generate.pages import introduction, maps
-from generate.pages.page import MARKED, fill
+from generate.page import MARKED, fill
+from generate.pages import library, maps
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
 
@@ -100,7 +100,7 @@ def test_the_page_of_theories_lists_them_all():
     text = (ROOT / "docs" / "theories.md").read_text(encoding="utf-8")
     for name in theories.THEORIES:
         assert f"\n| `{name}`" in text
-    assert fill(text, introduction.theories()[0]) == text
+    assert fill(text, library.theories()[0]) == text
 
 
 def test_coefficients_of_the_height_integrals_are_the_shipped_ones(monkeypatch, tmp_path):

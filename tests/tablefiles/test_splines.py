@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from generate.splines import coefficients, padding
-from generate.tables.writing import error_cells
+from generate.tables.island4d import error_cells
 from mbma_tables.core import core
 from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.schema import Axis, error_cell

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import erf
 
-from generate.boundary_elements.collect import surfaces
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.boundary_elements.evidence import cases
-from generate.boundary_elements.light import BINS, compared
+from generate.boundary_elements.run import surfaces
+from generate.boundary_elements.studies import LIGHT_BINS, compared
+from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.calibrated import errors
 from generate.files import dataset, evidence
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
@@ -40,7 +40,7 @@ ROLLOFF = {0: 0.041954782, 1: 0.037331897}  # highest points of two maps of h_rm
 
 def quadrature(surface, u):
     law = Law(Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1)), float(surface.h_max / surface.h_rms))
-    force, stiffness = law.force_and_stiffness(u / surface.h_rms)
+    force, stiffness = law.contact(u / surface.h_rms)[::2]
     g = surface.rms_gradient
     return force * g, law.area(force), stiffness * g / surface.h_rms
 
@@ -333,7 +333,7 @@ def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
     found = contact(surface, mean_separation=u, theory="calibrated")
     # stiffness, which nothing cancels in, integrated over the root of the depth, which it begins with
     depth, root = (top - u)[:, None], (1 + nodes) / 2
-    stiffness = law.force_and_stiffness((top - depth * root**2).ravel())[1].reshape(u.size, -1)
+    stiffness = law.contact((top - depth * root**2).ravel())[2].reshape(u.size, -1)
     exact = surface.rms_gradient * (stiffness * depth * root) @ weights
     assert (np.abs(found.pressure / exact - 1) <= found.error).all()
 
@@ -494,7 +494,7 @@ def test_light_loads_are_those_of_boundary_elements():
     errors = []
     for own in surfaces(rows):
         area, stiffness, _ = compared(own)
-        seen = (area > BINS[0]) & (area < BINS[-1]) & np.isfinite(stiffness)
+        seen = (area > LIGHT_BINS[0]) & (area < LIGHT_BINS[-1]) & np.isfinite(stiffness)
         errors.append(stiffness[seen])
     assert abs(np.mean(np.concatenate(errors))) < 0.1
     assert np.std(np.concatenate(errors)) < 0.3

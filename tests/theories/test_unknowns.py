@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import random_map, refusals, refused, run
+from helpers import random_map, refusals, run
 
 from mbma_tables import Surface, contact, sensitivity
 from mbma_tables.theories import THEORIES
@@ -62,21 +62,8 @@ def test_numbers_of_a_drawing_are_the_unknowns():
     assert "q1" in moved.parameters
 
 
-def test_ranges():
-    ranges = {"hurst": (0.7, 0.9), "h_max": ("1.5 um", "2.5e-3 mm")}
-    found = sensitivity(SURFACE, pressure=0.03, E_star=10.0, theory="calibrated", ranges=ranges)
-    for name, ends in {"hurst": (0.7, 0.9), "h_max": (1.5, 2.5)}.items():
-        numbers = {p: getattr(SURFACE, p) for p in ("hurst", "q0", "q1", "h_rms", "h_max")} | {
-            name: np.linspace(*ends, 41)
-        }
-        stiffness = contact(Surface(**numbers), pressure=0.03, E_star=10.0, theory="calibrated").stiffness
-        assert found.ranges[name]["stiffness"] == pytest.approx((stiffness.min(), stiffness.max()), rel=1e-3)
-        low, high = found.ranges["all"]["stiffness"]
-        assert low <= found.ranges[name]["stiffness"][0] * (1 + 1e-9)
-        assert high >= found.ranges[name]["stiffness"][1] * (1 - 1e-9)
-    assert "all" not in sensitivity(SURFACE, pressure=0.03, E_star=10.0, ranges={"hurst": (0.7, 0.9)}).ranges
-    text = str(found)
-    assert "range of hurst: " in text
+def test_a_table_of_slopes():
+    text = str(sensitivity(SURFACE, pressure=0.03, E_star=10.0, theory="calibrated"))
     assert "10\n" not in text.splitlines()[1]
 
 
@@ -86,26 +73,17 @@ test_what_is_refused = refusals(
     ({"pressure": 0.1, "area": 0.1}, "got pressure and area"),
     ({"separation": 2.0}, "there is no contact at this separation"),
     ({"pressure": [0.1, 0.2]}, "pressure must be one number"),
-    ({"pressure": 0.1, "ranges": {"h": (1, 2)}}, "there is no 'h'; there are hurst"),
-    ({"pressure": 0.1, "ranges": {"hurst": 0.5}}, "hurst needs two numbers"),
-    ({"pressure": 0.1, "ranges": {"hurst": (0.9, 0.7)}}, "two rising positive numbers"),
-    ({"pressure": 0.1, "ranges": {"hurst": (0.9, 1.7)}}, "hurst must be in"),
     ({"pressure": 0.1, "surface": Surface([0.7, 0.8], 0.06, 12.0, 0.5, 1.7)}, "not of a batch"),
 )
 
 
 def test_the_command():
-    arguments = ["--surface", "challenge", "--E-star", "25MPa", "-p", "100kPa", "--range", "h-max=2um:4um"]
+    arguments = ["--surface", "challenge", "--E-star", "25MPa", "-p", "100kPa"]
     answer = json.loads(run("sensitivity", *arguments, "--json"))
-    found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa", ranges={"h_max": (2.0, 4.0)})
+    found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa")
     assert answer["columns"]["area"] == [row["area"] for row in found.slopes.values()]
     assert answer["columns"]["unit"] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
-    assert answer["ranges"]["h_max"]["stiffness"] == list(found.ranges["h_max"]["stiffness"])
-    text = run("sensitivity", *arguments)
-    assert "range of h_max: mean_separation" in text
-    assert "MPa/um" in text
-    bad = refused("sensitivity", *arguments[:-1], "h_max:2")
-    assert bad == "mbma: --range must be like h_max=2um:4um, got 'h_max:2'\n"
+    assert "MPa/um" in run("sensitivity", *arguments)
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])

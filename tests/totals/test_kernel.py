@@ -9,11 +9,9 @@ from catalogue import LEVEL
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
 from mbma_tables.islands.geometry import FIELDS, geometry
-from mbma_tables.models.named import get_model
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.variants import PRINTED, REPORTED, get_variant
+from mbma_tables.surfaces.variants import PRINTED, REPORTED
 from mbma_tables.totals import contact as sums
-from mbma_tables.totals.contact import Pairs, Sums, sums_by_table
 
 
 @pytest.mark.parametrize("variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name)
@@ -95,21 +93,3 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
         phi.append(np.empty((500, 7)))
         one.phi(X, mu, *universal_model().cells, 1, phi[-1], None)
         assert phi[-1].tobytes() == phi[0].tobytes()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
-def test_stated_errors_of_totals(name):
-    # of a force and an area that are nearly proportional both differences between the rules may vanish by chance
-    rng, variant, count = np.random.default_rng(1), get_variant(name), 100_000
-    low, high = (0.1, np.log(max(3.1, 1.01 * variant.floor_u)), 2.5, 0), (1, np.log(1e4), 5.5, 1)
-    hurst, log_zeta, peak, share = rng.uniform(low, high, (count, 4)).T
-    surface = Surface(hurst, np.ones(count), np.exp(log_zeta), np.ones(count), peak)
-    pairs, model = Pairs.of(surface, 2 * peak * share**1.5), get_model("universal", 1e-8, variant)
-    (found, error, *_), (known, *_) = (
-        sums_by_table(model, pairs, Sums(model, variant, rtol), "raise", slopes=False) for rtol in (1e-8, 1e-12)
-    )
-    with np.errstate(invalid="ignore"):
-        off = np.nan_to_num(np.abs(found / known - 1))
-    assert (off.max(axis=(1, 2)) <= error).all()
-    assert error.max() <= 1e-8

@@ -183,20 +183,6 @@ def test_a_function_of_c_keeps_its_law():
     assert gone() is None
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
-def test_many_gaps_agree_with_single_ones(case, rtol):
-    surface = surface_of(*case[:3])
-    gaps = float(surface.h_max) * np.append(1 - 2 * np.geomspace(1e-12, 1, 400), [1.0, 1.5])
-    many = contact(surface, separation=gaps, rtol=rtol, variant=case[3])
-    few = [contact(surface, separation=part, rtol=1e-11, variant=case[3]) for part in np.array_split(gaps, 4)]
-    for name in ("pressure", "area"):
-        single = np.concatenate([getattr(part, name) for part in few])
-        assert (np.abs(getattr(many, name) - single) <= (many.error + 1e-11) * single).all()
-    assert (many.error <= rtol + 2e-9).all()
-    assert many.error[-2:].tolist() == [0.0, 0.0]
-
-
 def gap_by_gap(model, surface, c, variant):
     """Rows of force and area by the core's quadrature."""
     how = Sums(model, variant, 1e-11)
@@ -223,21 +209,6 @@ def test_bounds_of_a_profile_where_a_search_found_them_exceeded(numbers, c, rtol
     model, c = get_model("universal", 1e-8, variant), np.linspace(*c, 40)
     kept = profile(numbers, model, variant, 0.9 * rtol)
     assert np.abs(kept.totals(c) / gap_by_gap(model, surface, c, variant) - 1).max() <= kept.error
-
-
-@pytest.mark.slow
-def test_no_bound_of_a_profile_is_exceeded_on_300_surfaces():
-    rng = np.random.default_rng(5)
-    for number in range(300):
-        zeta_1, top = 5.2 + 10 ** rng.uniform(-3, 6), rng.uniform(1.5, 6)
-        variant = list(NAMED.values())[number % 3]
-        surface = Surface(rng.uniform(0.2, 1.0), 1.0, zeta_1, 1.0, top)
-        shape = float(surface.hurst), zeta_1, top
-        model = get_model("universal", 1e-8, variant)
-        kept = profile(shape, model, variant, 10 ** rng.uniform(-10, -3))
-        c = np.append(2 * top * 10 ** rng.uniform(-8, 0, 20), rng.uniform(0, 2 * top, 20))
-        c = c[c < kept.end]
-        assert np.abs(kept.totals(c) / gap_by_gap(model, surface, c, variant) - 1).max() <= kept.error
 
 
 def missed(law, surface, gaps, rtol):

@@ -9,10 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
-from mbma_tables.islands.geometry import floors_of, measured_islands
 from mbma_tables.models import answer_islands
 from mbma_tables.models.named import get_model
-from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
+from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED
 from mbma_tables.totals.profile import profile, source_of
 
 DATA = pathlib.Path(__file__).parents[1] / "data"
@@ -51,32 +50,6 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, 
         np.testing.assert_allclose(found.stiffness, plain.stiffness, rtol=10 * bound)
         slopes = (found.area_by["separation"], plain.area_by["separation"])
         np.testing.assert_allclose(*slopes, rtol=10 * bound)
-
-
-@pytest.mark.parametrize("variant", ["reported", "printed", "fitted"])
-@pytest.mark.parametrize(("gap", "rtol"), [(False, 2e-7), (True, 3e-5)], ids=["whole", "gap"])
-def test_totals_are_the_integral_over_islands(variant, gap, rtol):
-    # ten thousand panels that know nothing of samples, nor of the jump that a gap in the spectrum makes
-    surface, rule = rough(gap=gap), get_variant(variant)
-    model = get_model("rigid", 1e-8, rule)
-    kept = profile(surface, model, rule, 1e-8, rows=3)
-    kink = floors_of(surface, rule).kinks[0]
-    node, weight = np.polynomial.legendre.leggauss(4)
-    for depth in (0.05, 1.0, 5.0):
-        edges = np.append(0.0, np.geomspace(1e-9 * depth, depth, 10_000))
-        edges = np.unique(np.append(edges, min(kink, depth)))  # where K1 jumps
-        half = np.diff(edges)[:, None] / 2
-        delta = edges[:-1, None] + half * (1 + node)
-        g = measured_islands(surface, delta, rule)
-        phi = answer_islands(model, g)
-        height = (surface.h_max - depth + delta - g["h_d"]) / g["sigma_d"]
-        density = g["D_d"] * np.exp(-(height**2) / 2) / (np.sqrt(2 * np.pi) * g["sigma_d"])
-        density *= np.where(delta < kink, 1 - 4 / 3 * rule.beta, 1.0)
-        force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"]) * phi.phi_F
-        area = 2 * np.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2 * phi.phi_A
-        found = kept.totals(np.array([depth]) / surface.h_rms)[:, 0]
-        for each, own in zip((force, area, 1.0), found, strict=True):
-            assert own == pytest.approx(float(np.sum(each * density * half * weight)), rel=rtol)
 
 
 @settings(max_examples=15, deadline=None)

@@ -5,8 +5,6 @@
 ``python -m generate pages NAME`` writes them.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import itertools
@@ -21,14 +19,14 @@ from click.testing import CliRunner
 
 from generate.files import ROOT
 from mbma_tables.common.files import write_file
+from mbma_tables.common.plots import new_figure, to_picture
 
-_OWN = ("architecture", "cost", "explorer", "fidelity", "joints", "machined", "stability", "tables")
 PAGES = {
-    **{name: f"{name}:measure" for name in _OWN},
-    **{name: f"introduction:{name}" for name in ("formula", "readme", "theories")},
+    **{name: f"library:{name}" for name in ("architecture", "formula", "readme", "tables", "theories")},
     "data": "fidelity:data",
-    **{name: f"film:{name}" for name in ("lubrication", "rough_bodies")},
-    **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "yielding:measure"},
+    **{name: f"bodies:{name}" for name in ("joints", "lubrication", "rough_bodies")},
+    **{name: f"{name}:measure" for name in ("cost", "explorer", "fidelity", "machined", "stability")},
+    **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "laws:yielding"},
     **{"gallery": "maps:gallery", "maps": "maps:measure"},
 }
 Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files
@@ -36,7 +34,6 @@ MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def measured(name: str) -> Measured:
-    """Measure a page."""
     module, _, function = PAGES[name].partition(":")
     found: Measured = getattr(importlib.import_module(f"generate.pages.{module}"), function)()
     return found
@@ -106,14 +103,10 @@ def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
 
 def panels(rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any) -> tuple[Any, Any]:
     """A figure and its axes."""
-    from mbma_tables.common.plots import new_figure
-
     figure = new_figure(*size)
     return figure, figure.subplots(rows, columns, **options)
 
 
 def svg(figure: Any) -> bytes:
     """A figure as the content of an SVG file, the same bytes for the same figure."""
-    from mbma_tables.common.plots import to_picture
-
     return to_picture(figure, "svg", dpi=100, outlines=True)

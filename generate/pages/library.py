@@ -1,26 +1,37 @@
-"""Measured parts of README.md, docs/theories.md and docs/formula.md."""
+"""Measured parts of README.md and of pages on the library itself: architecture, tables, theories, closed forms."""
 
-from __future__ import annotations
-
+import ast
+import collections
 import dataclasses
 import itertools
 import math
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LogNorm
 from scipy.special import erf
 
-from generate.boundary_elements.design import TRAINING
+from benchmarks.import_circles import import_graph
 from generate.boundary_elements.evidence import MIN_WAVES
-from generate.files import evidence
+from generate.boundary_elements.surfaces import TRAINING
+from generate.files import ROOT, evidence
 from generate.formulas.printing import HEADER, latex_steps, read_functions
-from generate.pages.page import Measured, duration, table
+from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
+from mbma_tables.models.tables import shipped
 from mbma_tables.scenes.costs import shipped_costs, shipped_distances
+from mbma_tables.tablefiles.netcdf import read_table
+from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.theories import THEORIES
+
+BOX = {"boxstyle": "square,pad=0.4", "facecolor": "#e8eef7", "edgecolor": "#4a6fa5"}
+RIGHT = 0.83  # edge of the boxes
+SHARED = ("common", "core")  # every room uses them: no arrows
+LEAST_DRAWN = 1e-3  # mu
 
 POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are compared with simulations
 SHOWN = ("self_affine", 0.7, 24.0, 5, 0.0)  # a held-out spectrum: kind, H, zeta_1, wavelengths a side, shape
@@ -33,6 +44,80 @@ ROWS = {
     ("boundary elements", "256 x 256, cold"): "for comparison: BEM on 256 x 256 points",
 }
 PRESSURES = (1e-4, 1e-3, 1e-2)  # over E*
+
+
+def rooms() -> tuple[dict[str, set[str]], dict[str, str]]:
+    """What each folder, or module at the top, imports of the others, and what is written in its box."""
+    graph: dict[str, set[str]] = collections.defaultdict(set)
+    lines, titles = collections.Counter[str](), {}
+    imports, files = import_graph(ROOT / "mbma_tables")
+    for name, others in imports.items():
+        room = name.split(".")[1]
+        text = files[name].read_text(encoding="utf-8")
+        lines[room] += len(text.splitlines())
+        graph[room] |= {other.split(".")[1] for other in others} - {room}
+        if name.count(".") == 1:
+            titles[room] = (ast.get_docstring(ast.parse(text)) or "").split("\n")[0].rstrip(".").replace("`", "")
+    del graph["__main__"]
+    lines["core"] += sum(len(path.read_text().splitlines()) for path in (ROOT / "mbma_tables/core").glob("*.[ch]"))
+    return graph, {room: f"{room:<11}{titles[room]:<72}{lines[room]:>6,}" for room in graph}
+
+
+def architecture() -> Measured:
+    """The rooms as boxes, with arrows to those that are imported, less those that follow from others."""
+    graph, texts = rooms()
+    below = {room: set(others) for room, others in graph.items()}
+    for middle, room in itertools.product(graph, graph):
+        if middle in below[room]:
+            below[room] |= below[middle]
+    order = sorted(graph, key=lambda room: (len(below[room]), room))
+    figure, axes = panels(1, 1, (7.4, 7.2))
+    axes.set_position((0, 0, 1, 1))
+    axes.set(xlim=(0, 1), ylim=(-0.6, len(order) - 0.4))
+    axes.axis("off")
+    for y, room in enumerate(order):
+        axes.text(0.01, y, texts[room], va="center", family="monospace", fontsize=8, bbox=BOX)
+    for y, room in enumerate(order):
+        direct = graph[room] - set().union(*(below[other] for other in graph[room])) - set(SHARED)
+        for down in map(order.index, sorted(direct)):
+            style = {"arrowstyle": "-|>", "color": "#555555", "connectionstyle": f"arc3,rad={-0.15 - 0.4 / (y - down)}"}
+            axes.annotate("", (RIGHT, down + 0.12), (RIGHT, y - 0.12), arrowprops=style)
+    return {}, {"docs/figures/architecture.svg": figure}
+
+
+def tables() -> Measured:
+    """Sizes, errors and axes of the shipped tables."""
+    contents, sizes, axes = {kind: read_table(shipped(kind), kind) for kind in KINDS}, [], []
+    for (kind, content), f in itertools.product(contents.items(), "FA"):
+        names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
+        size = shipped(kind).stat().st_size / 1e6
+        sizes.append([kind, content.size, size, f, *(content.attributes[name] for name in names)])
+    for axis in contents[ISLAND4D].axes:
+        shifted = f"{axis.name} + {axis.offset:g}" if axis.offset else axis.name
+        t = f"log({shifted})" if axis.transform == "log" else shifted
+        axes.append([axis.name, axis.long_name, t, axis.low, axis.high, axis.nodes])
+    header = "table | cells or nodes | file | of | largest error | 99% below | half below | largest at islands"
+    parts = {"sizes": table(header, sizes, "{} | {} | {:.2f} MB | {} | {:.1e}")}
+    parts["axes"] = table("axis | what it is | equally spaced in | first | last | nodes", axes, "{} | {} | {} | {:g}")
+    return parts, {"docs/figures/tables_universal_error.svg": drawn_errors(contents[UNIVERSAL])}
+
+
+def drawn_errors(content: TableContent) -> Any:
+    """Bound on the relative error of the universal table over X and mu."""
+    X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
+    bottom = np.maximum(mu_low, LEAST_DRAWN)
+    corners = np.stack([X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high], axis=-1).reshape(-1, 4, 2)
+    figure, plots = panels(1, 2, (9, 3.6), sharey=True)
+    norm = LogNorm(content.local_error.min(), content.local_error.max())
+    for plot, errors, name in zip(plots, content.local_error.T, (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
+        image = PolyCollection(list(corners), array=errors)
+        image.set(norm=norm, edgecolor="white", linewidth=0.2, rasterized=True)
+        plot.add_collection(image)
+        title = f"bound on the relative error of {name}"
+        plot.set(yscale="log", xlim=(X_low[0], 12), ylim=(LEAST_DRAWN, mu_high[-1]), xlabel="X", title=title)
+    plots[0].set_ylabel(r"$\mu$")
+    figure.colorbar(image, ax=plots)
+    return figure
 
 
 def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
@@ -64,10 +149,10 @@ def pocket_errors() -> list[list[Any]]:
 def formula() -> Measured:
     """Certificates, ranges and equations of the closed forms."""
     rows = []
-    for form, results in CERTIFICATES.items():
-        for result, found in results.items():
-            worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
-            rows.append([form, result, found.coefficients, found.largest, found.median, worst])
+    for form, result in ((form, result) for form, results in CERTIFICATES.items() for result in results):
+        found = CERTIFICATES[form][result]
+        worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
+        rows.append([form, result, found.coefficients, found.largest, found.median, worst])
     header = "form | function | coefficients | largest error | median | worst at"
     parts = {"certificates": table(header, rows, "{} | {} | {} | {:g} | {:.2g}")}
     header = "pocket law | median error | 90% of errors below | largest | surfaces"
@@ -130,5 +215,4 @@ def theories() -> Measured:
         spread = found.scatter if np.isfinite(found.scatter) else "not known"
         rows.append([pressure, f"`{name}`", *numbers, "yes" if found.valid else "no", spread])
     header = "F/(A0 E*) | theory | u/h_rms | A/A0 [%] | stiffness h_rms/F | valid | scatter of ln F"
-    text = table(header, rows, "{:g} | {} | {:.3g} | {:.3g} | {:.3g} | {} | {:.2g}")
-    return {"answers": text}, {}
+    return {"answers": table(header, rows, "{:g} | {} | {:.3g} | {:.3g} | {:.3g} | {} | {:.2g}")}, {}

@@ -1,19 +1,23 @@
-"""docs/lubrication.md and docs/rough_bodies.md: flow factors and published fits, rough spheres and simulation."""
-
-from __future__ import annotations
+"""Measured parts of docs/joints.md, docs/lubrication.md and docs/rough_bodies.md."""
 
 import itertools
 from typing import Any
 
 import numpy as np
 
+from generate.boundary_elements.run import surfaces
+from generate.boundary_elements.studies import LIGHT_BINS, LIGHT_LOADS, compared
+from generate.calibrated_file import binned
 from generate.files import dataset
-from generate.pages.page import Measured, panels, table
+from generate.page import Measured, panels, table
 from generate.rough_spheres import RADIUS, heights
-from mbma_tables import Surface, flow_factors, rough_contact
+from mbma_tables import Joint, Surface, flow_factors, rough_contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.law.rough_body import CELLS, mean_wavelength
+from mbma_tables.totals.conductance import cooper_mikic_yovanovich, mean_conductivity
 
+PAIRS = {"steel on aluminium": ("steel 4140 hard", "aluminium 6061 hard"), "copper on copper": "copper C11000 hard"}
+SHORTEST, PRESSURES = ("8 um", "2 um"), (1.0, 10.0, 100.0)  # MPa
 # C and r of phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978, Table 1
 PATIR_CHENG = {1 / 9: (1.48, 0.42), 1 / 6: (1.38, 0.42), 1 / 3: (1.18, 0.42), 1.0: (0.90, 0.56), 3.0: (0.225, 1.5),
                6.0: (0.520, 1.5), 9.0: (0.870, 1.5)}  # fmt: skip
@@ -21,6 +25,51 @@ FIRST, LAST = 3.0, 6.0  # u/h_rms between which fits are compared: where there i
 SMOOTH = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=1.0, h_max=2.9)
 WIDTHS = (1.0, 2.0, 3.0, 4.5, 7.0, 20.0)  # of the contact over the mean wavelength
 FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
+
+
+def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Conductance of the solid [W/(m^2 K)] at pressures [MPa], by the law and by the correlation."""
+    k = mean_conductivity(*(float(text.split()[0]) for text in one.pair.conductivities))
+    assert one.pair.hardness is not None
+    hardness = 1e3 * float(one.pair.hardness.split()[0])
+    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance()
+    return np.asarray(law), 1e6 * np.asarray(cooper_mikic_yovanovich(one.surface, pressure, k, 1.0, hardness))
+
+
+def joints() -> Measured:
+    """Stiffness at light loads against boundary elements, conductance against a usual correlation."""
+    figure, (left, right) = panels(1, 2, (10, 3.8))
+    by_waves, lines = dict[int, list[FloatArray]](), []
+    for one in surfaces(dataset("light_loads")):
+        by_waves.setdefault(int(one.waves), []).append(compared(one))
+    for waves, parts in by_waves.items():
+        area, stiffness, _ = np.concatenate(parts, axis=1)
+        bins = binned(area, stiffness, LIGHT_BINS)
+        lines.append([str(waves), *(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "" for part in bins)])
+        style: dict[str, Any] = {"markersize": 2, "color": f"C{int(np.log2(waves))}", "rasterized": True}
+        for own in parts:
+            right.semilogx(own[0], np.exp(own[1]), ".", **style)
+    right.set(xlabel="contact A/A0", ylabel="simulated stiffness over law", ylim=(0, 2), xlim=(LIGHT_LOADS[0], 0.03))
+    right.set_title("light loads, by longest wavelengths a side")
+    for waves in by_waves:
+        right.plot([], [], ".", color=f"C{int(np.log2(waves))}", label=str(waves))
+    right.legend(fontsize=7)
+    contacts = " | ".join(f"{low:.2%} to {high:.2%}" for low, high in itertools.pairwise(LIGHT_BINS))
+
+    usual, pressure = [], np.geomspace(0.1, 300, 40)
+    for (name, materials), shortest in itertools.product(PAIRS.items(), SHORTEST):
+        face = {"hurst": 0.8, "longest": "250 um", "shortest": shortest}
+        joint = Joint(face | {"Rq": "1.6 um"}, face | {"Rq": "0.8 um"}, materials=materials, nominal_area="4 cm^2")
+        pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
+        usual.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
+        law, correlation = conductances(joint, pressure)
+        (line,) = left.loglog(pressure, law, label=f"{name}, {shortest}")
+        left.loglog(pressure, correlation, "--", color=line.get_color())
+    left.set(xlabel="pressure [MPa]", ylabel="conductance [W/(m² K)]", title="law; dashed: Cooper-Mikic-Yovanovich")
+    left.legend(fontsize=7)
+    header = f"joint | shortest wavelength | {' | '.join(f'{p:g} MPa' for p in PRESSURES)}"
+    blocks = {"light": table(f"longest wavelengths a side | {contacts}", lines), "usual": table(header, usual)}
+    return blocks, {"docs/figures/joints.svg": figure}
 
 
 def published(gamma: float, H: FloatArray) -> FloatArray:
@@ -53,24 +102,23 @@ def lubrication() -> Measured:
 
 def spheres() -> dict[str, FloatArray]:
     """Every simulated contact, and the library's at the same approach and force."""
-    found: dict[str, list[Any]] = {
-        name: [] for name in ("width", "off", "force", "area", "mean_radius", "scatter", "valid")
-    }
-    table = dataset("rough_spheres").to_dataframe()
-    for (hurst, longest, h_rms, seed), rows in table.groupby(["hurst", "longest", "h_rms", "seed"]):
+    parts, contacts = [], dataset("rough_spheres").to_dataframe()
+    for (hurst, longest, h_rms, seed), rows in contacts.groupby(["hurst", "longest", "h_rms", "seed"]):
         face = Surface.from_map(heights(hurst, longest, h_rms, int(seed)), 1.0, periodic=True)
         force, approach, area, radius = (rows[n].to_numpy() for n in ("force", "approach", "area", "mean_radius"))
         same, pushed = rough_contact(face, RADIUS, force=force), rough_contact(face, RADIUS, approach=approach)
         p, r = same.pressure, same.position
-        mean = np.trapezoid(p * r**2, r) / np.trapezoid(p * r, r)
-        found["width"] += list(np.asarray(2 * same.contact_radius) / mean_wavelength(face))
-        found["off"] += list((same.approach - approach) / h_rms)
-        found["force"] += list(np.log(pushed.force / force))
-        found["area"] += list(np.log(same.area / area))
-        found["mean_radius"] += list(np.log(mean / radius))
-        found["scatter"] += list(np.asarray(pushed.scatter))
-        found["valid"] += list(pushed.valid)
-    return {name: np.array(values) for name, values in found.items()}
+        found = {
+            "width": 2 * same.contact_radius / mean_wavelength(face),
+            "off": (same.approach - approach) / h_rms,
+            "force": np.log(pushed.force / force),
+            "area": np.log(same.area / area),
+            "mean_radius": np.log(np.trapezoid(p * r**2, r) / np.trapezoid(p * r, r) / radius),
+            "scatter": pushed.scatter,
+            "valid": pushed.valid,
+        }
+        parts.append(found)
+    return {name: np.concatenate([np.asarray(part[name]) for part in parts]) for name in parts[0]}
 
 
 def rough_bodies() -> Measured:
@@ -78,19 +126,17 @@ def rough_bodies() -> Measured:
     seen, rows = spheres(), []
     for low, high in itertools.pairwise(WIDTHS):
         mine = (seen["width"] >= low) & (seen["width"] < high)
-        off = seen["off"][mine]
+        off, valid = seen["off"][mine], mine & (seen["valid"] > 0)
         cells = [f"{low:g} to {high:g}", int(mine.sum()), (off.mean(), off.std(), np.abs(off).max())]
         cells += [(v.mean(), v.std()) for v in (seen[name][mine] for name in ("force", "area", "mean_radius"))]
-        valid = mine & (seen["valid"] > 0)
         within = [np.mean(np.abs(seen["force"] / seen["scatter"])[valid] < k) for k in (1, 2)]
         rows.append([*cells, f"{within[0]:.0%}, {within[1]:.0%} of {valid.sum()}"])
     header = "width over mean wavelength | contacts | approach [h_rms]: mean, sd, largest | ln F at the approach | "
     header += "ln A at the force | ln mean radius | valid: within 1, 2 sd"
     forms = "{} | {} | {:+.2f}, {:.2f}, {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f}"
     figure, axes = panels(1, 3, (13, 4))
-    ball = rough_contact(
-        FACE, "5 mm", force=[f"{10.0**k} N" for k in (-1, 0, 1, 2)], E_star="110 GPa", theory="calibrated"
-    )
+    forces = [f"{10.0**k} N" for k in (-1, 0, 1, 2)]
+    ball = rough_contact(FACE, "5 mm", force=forces, E_star="110 GPa", theory="calibrated")
     for r, p, force in zip(ball.position, ball.pressure, np.asarray(ball.force), strict=True):
         axes[0].semilogy(r, 1e3 * p, label=f"{force:.3g} N")
     axes[0].set(xlabel="distance from the middle [um]", ylabel="mean pressure [MPa]", ylim=(1, None))
