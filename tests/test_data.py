@@ -22,7 +22,7 @@ def test_every_variable_of_every_group_is_described(tree):
     assert tree.attrs["license"] == "BSD-3-Clause"
     for name, group in tree.children.items():
         assert {"title", "source", "history"} <= set(group.attrs), name
-        for key, variable in group.dataset.data_vars.items():
+        for key, variable in group.dataset.variables.items():
             assert "long_name" in variable.attrs, (name, key)
             assert "units" in variable.attrs or "flag_meanings" in variable.attrs, (name, key)
 

@@ -121,7 +121,9 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
             f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(solved[-1]['anisotropy']):.3g}"
         )
     found = {name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]}
-    own = group("measured", found, engine=str(solved[0]["engine"])).assign_coords(surface=[path.stem for path in maps])
+    own = group("measured", found, engine=str(solved[0]["engine"])).assign_coords(
+        surface=variable("surface", [path.stem for path in maps], "name of the map's file")
+    )
     write_part(data, own, "measured")
 
 

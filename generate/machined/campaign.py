@@ -51,7 +51,11 @@ def answers(part: Part, form: str, folder: pathlib.Path) -> dict[str, Any]:
 def gathered(folder: pathlib.Path) -> xr.Dataset:
     """All parts that are solved and answered."""
     have = [p for p in parts() if all((folder / form / f"{p.name}.npz").exists() for form in FORMS)]
-    data = xr.Dataset(coords={"surface": [part.name for part in have], "family": ("surface", [p.family for p in have])})
+    hard = {p.name: dict(np.load(folder / "hardness" / f"{p.name}.npz")) for p in yielding_parts() if p in have}
+    names: dict[str, Any] = {"surface": [part.name for part in have], "family": [part.family for part in have]}
+    names |= {"yielding": [*hard], "eta": list(ETA), "way": list(WAYS)}
+    over = {name: "surface" if name == "family" else name for name in names}
+    data = xr.Dataset(coords={n: variable(over[n], values, TEXTS["names"][n]) for n, values in names.items()})
     engine = ""
     for prefix, place in (("", folder), *((f"{form}_", folder / form) for form in FORMS)):
         read = [dict(np.load(place / f"{part.name}.npz")) for part in have]
@@ -59,19 +63,17 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
         for name in (name for name in TEXTS["columns"] if name in read[0]):
             values: Any = np.array([one[name] for one in read], "f4")
             data[prefix + name] = variable(("surface", "load"), values, TEXTS["columns"][name])
-    hard = {p.name: dict(np.load(folder / "hardness" / f"{p.name}.npz")) for p in yielding_parts() if p in have}
-    data = data.assign_coords(yielding=[*hard], eta=list(ETA), way=list(WAYS))
     for name, meaning in TEXTS["hard"].items():
         values = np.array([one[f"hard_{name}"] for one in hard.values()], "f4")
-        over = ("yielding", "way", "eta", "hard_load") if values.ndim == 4 else ("yielding", "eta", "hard_load")
-        data[f"hard_{name}"] = variable(over, values, meaning)
+        ways = ("way",) if values.ndim == 4 else ()
+        data[f"hard_{name}"] = variable(("yielding", *ways, "eta", "hard_load"), values, meaning)
     surfaces = [surface_of(part)[1] for part in have]
     known = {name: [getattr(one, name) for one in surfaces] for name in ("h_rms", "skewness", "kurtosis")}
     known |= {name: [getattr(one.bearing, name) for one in surfaces] for name in ("anisotropy", "slope_kurtosis")}
     known["shortest"] = [part.shortest for part in have]
     for name, meaning in TEXTS["surface"].items():
         data[name] = variable("surface", np.array(known[name], float), meaning)
-    return campaigns.group("machined", data, engine=engine)
+    return data.assign_attrs(campaigns.attributes(TEXTS, {"engine": engine}))
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})

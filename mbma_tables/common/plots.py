@@ -119,8 +119,8 @@ def draw_compression(
     """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
 
     A third one, flow coefficient against pressure, where a curve has leakage, and one for each label of `more`, with
-    lines by name over the first curve's pressure. Each curve is a line with its points as they are; those without contact
-    have no place on a logarithmic axis and are left out by it.
+    lines by name over the first curve's pressure. Each curve is a line with its points as they are; those without
+    contact have no place on a logarithmic axis and are left out by it.
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")

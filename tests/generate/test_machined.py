@@ -48,6 +48,27 @@ def test_truth_of_a_part(tmp_path):
     assert STEP > 1
 
 
+def test_what_is_solved_and_answered_becomes_the_group(data, tmp_path, monkeypatch):
+    rng, two = np.random.default_rng(1), [Part("gaussian", 2, 64), Part("honed", 2, 64)]
+    monkeypatch.setattr(campaign, "parts", lambda: two)
+    shapes = {name: (3, 2, 4) if data[f"hard_{name}"].ndim == 4 else (2, 4) for name in campaign.TEXTS["hard"]}
+    for part in two:
+        for form in ("", *campaign.FORMS):
+            names = [n for n in campaign.TEXTS["columns"] if (f"{form}_{n}" if form else n) in data]
+            path = tmp_path / form / f"{part.name}.npz"
+            path.parent.mkdir(exist_ok=True)
+            np.savez(path, engine="Tamaas", **{name: rng.random(7) for name in names})
+    (tmp_path / "hardness").mkdir()
+    monkeypatch.setattr(campaign, "ETA", (0.1, 0.4))
+    np.savez(tmp_path / "hardness" / two[0].name, **{f"hard_{n}": rng.random(shape) for n, shape in shapes.items()})
+    made = campaign.gathered(tmp_path)
+    assert set(made.variables) == set(data.variables)
+    assert {n: v.attrs for n, v in made.variables.items()} == {n: v.attrs for n, v in data.variables.items()}
+    assert {n: v.dims for n, v in made.variables.items()} == {n: v.dims for n, v in data.variables.items()}
+    assert made.attrs["title"] == data.attrs["title"]
+    assert made.yielding.values.tolist() == [two[0].name]
+
+
 def test_the_file_is_of_these_makers(data):
     assert data.sizes["surface"] >= 60
     assert set(data.family.values) == set(FAMILIES)
