@@ -153,7 +153,6 @@ class Calibrated(Theory):
         return TheoryAnswer(pressure, area, stiffness, _error(stated, 2.0, x / (np.asarray(surface.h_max) / h_rms)))
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Results for self-affine surfaces by the table."""
         if isinstance(surface, MeasuredSurface):
             return super().curve(surface, quantity)
         batch = _bound(cast(Surface, surface), np.empty(0))
@@ -189,7 +188,6 @@ class Calibrated(Theory):
         return np.asarray(np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max))
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
-        """A/A0 at a force over A0 E*, in closed form except for a map."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).area(np.asarray(pressure, float))
         return law_area(
@@ -202,7 +200,6 @@ class Calibrated(Theory):
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons why results lie outside the range tested against boundary elements."""
         area, (low, high) = answer.area, TESTED_AREA
         broad = f"the longest wavelength is more than {TESTED_ZETA_1:g} times the shortest"
         reasons: dict[str, Any]
@@ -228,7 +225,6 @@ class Calibrated(Theory):
         return {text: np.broadcast_to(mask, area.shape) for text, mask in reasons.items()}
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """Reasons why a measured surface is unlike those tested against boundary elements."""
         return surface.departures(by_map=self.scatter_name(surface) != self.name)
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
