@@ -213,7 +213,8 @@ class SpectralSurface(AnySurface):
             from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING
 
             resolved = MIN_POINTS * max(self.map.steps)
-            mend += f" with a short_cutoff of {resolved:.4g}" * (2 * np.pi / self.q1 < resolved * (1 - ROUNDING))
+            if 2 * np.pi / self.q1 < resolved * (1 - ROUNDING):
+                mend += f" with a short_cutoff of {resolved:.4g}"
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()
