@@ -61,7 +61,6 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
 
 
 def fitted_to(one: Capped) -> Any:
-    """Loads that constants are fitted to."""
     return (one.area > LIGHTEST) & (one.area < HEAVIEST)
 
 
@@ -128,7 +127,6 @@ def told(seen: Sequence[Capped], name: str, constants: Callable[[Capped], cap.Co
 
 
 def between(contact: Any) -> Any:
-    """Loads whose errors are summed up."""
     return (contact > LIGHTEST) & (contact < EDGES[-1])
 
 
@@ -247,7 +245,6 @@ def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
 
 
 def dataset(scatter: Scatter, accuracy: FloatArray) -> xr.Dataset:
-    """Variables of the library's file."""
     of_accuracy = "statistics of ln(law/simulation), of the difference for the yielded share"
     of_scatter = (
         "root mean square of ln(law/simulation) on the training set, by constants from other spectra; of the theory "
@@ -267,7 +264,6 @@ def dataset(scatter: Scatter, accuracy: FloatArray) -> xr.Dataset:
 
 
 def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[cap.Constants, xr.Dataset]:
-    """Fit, test, and write the group of the library's file."""
     found = capped(evidence)
     plain = [one for one in found if one.kind in GAUSSIAN]
     training = [one for one in plain if one.split == TRAINING]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,9 +21,6 @@ from mbma_tables.surfaces.labels import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LARGEST_KNUDSEN = 0.1  # largest ratio of mean free path to channel for which first-order slip holds
 SLIP = 6.0  # in a plane channel slip multiplies the flow by 1 + 6 Kn
@@ -72,7 +69,7 @@ class Leakage(Displayed):
     def _origin(self) -> Any:
         return self._contact._origin()
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         return draw_compression(
             [self._contact.curve(leakage=True)],
             pressure_label=pressure_label(self._contact.units["pressure"]),
@@ -108,20 +105,19 @@ class Leakage(Displayed):
         NaN where not known, and where blocked.
         """
 
-        def stated(by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> FloatArray:
+        @np.errstate(divide="ignore")
+        def stated(by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> tuple[FloatArray]:
             own = _simulated(by).flow_trust(surface, u, area)
             if own is not None:
-                return own[0]
+                return (own[0],)
             stated = shipped_flow().standard_deviation(by.elastic.name, area)
             if not isinstance(surface, MeasuredSurface) or surface.bearing is None:
-                return stated
+                return (stated,)
             # channels and walls of a map are not in its spectrum
             of_maps = LIKE_GAUSSIAN if not surface.departures(by_map=True) else OTHERS
-            with np.errstate(divide="ignore"):
-                return np.hypot(stated, np.interp(np.log(area), np.log(MAP_AREAS), of_maps))
+            return (np.hypot(stated, np.interp(np.log(area), np.log(MAP_AREAS), of_maps)),)
 
-        area = {"area": self._contact.area}
-        return self._contact._source.map(lambda *given: (stated(*given),), self._contact, 1, area)[0]
+        return self._contact._source.map(stated, self._contact, 1, {"area": self._contact.area})[0]
 
     @functools.cached_property
     def valid(self) -> Any:
@@ -271,17 +267,16 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
 def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
     """Reasons why the flow is not valid, in addition to those for the contact."""
     own = _simulated(theory).flow_trust(surface, u, area)
-    large = np.broadcast_to(np.asarray(surface.zeta_1) > SIMULATED, np.shape(area))
-    many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
-    far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
-    found = {many: area > LARGEST_AREA, far: large} if own is None else dict(own[1])
+    everywhere, found = np.ones(np.shape(area), bool), {} if own is None else dict(own[1])
+    if own is None:
+        many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
+        far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
+        found = {many: area > LARGEST_AREA, far: everywhere & (np.asarray(surface.zeta_1) > SIMULATED)}
     if own is None and isinstance(surface, MeasuredSurface) and surface.bearing is not None:
-        of_map = (
-            "leakage: channels and walls of a map are not in its isotropic spectrum: theory='simulated' has its flow"
-        )
-        found[of_map] = np.ones(np.shape(area), bool)
+        spectrum = "leakage: channels and walls of a map are not in its isotropic spectrum"
+        found[f"{spectrum}: theory='simulated' has its flow"] = everywhere
     if _simulated(theory) is not theory:
-        found["leakage: yielded contacts leak several times more"] = np.ones(np.shape(area), bool)
+        found["leakage: yielded contacts leak several times more"] = everywhere
     if isinstance(theory.elastic, Mbma):
-        found["leakage: the mean separation of 'mbma' is wrong by factors"] = np.ones(np.shape(area), bool)
+        found["leakage: the mean separation of 'mbma' is wrong by factors"] = everywhere
     return found

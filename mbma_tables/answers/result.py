@@ -20,8 +20,6 @@ from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.theories.protocol import TheoryAnswer
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from mbma_tables.answers.contact_map import ContactMap
     from mbma_tables.answers.leakage import Leakage
 
@@ -107,7 +105,7 @@ class Contact(Interface, Displayed):
         source = self._source
         return {"E_star": shown(source.E_star, unit_of("pressure", source.units)), "surface": repr(source.surface)}
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         source, unit = self._source, self.units["pressure"]
         title = f"hardness {shown(source.hardness, unit)}" if source.yields else ""
         return draw_compression([self.curve()], title, pressure_label(unit))

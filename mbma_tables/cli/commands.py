@@ -114,7 +114,7 @@ def curve_command(
     from mbma_tables.answers.contact import contact
     from mbma_tables.common import plots
     from mbma_tables.scenes.problem import COMPARED
-    from mbma_tables.scenes.steps import other_theory
+    from mbma_tables.scenes.run import other_theory
 
     model, surface = model.of(specimen.surface), specimen.surface
     asked, modulus = model.keywords(specimen), 1.0 if specimen.E_star is None else specimen.E_star

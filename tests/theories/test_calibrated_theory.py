@@ -11,7 +11,6 @@ import xarray as xr
 from helpers import random_map, refusals
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad
 from scipy.special import erf
 
 from generate.boundary_elements.evidence import cases
@@ -419,37 +418,6 @@ class TestMapLaw:
 
 
 EDGES = ((0.1, 3.001), (0.1, 1e5), (1.0, 3.001), (1.0, 1e5))
-
-
-def force_by_quadrature(surface, u):
-    """F/(A0 E* g) of the law's definition: u_P by parts and `quad`, the root by bisection of its logarithm."""
-    law = self_affine_law(float(surface.hurst), float(surface.zeta_1), None)
-
-    def gap(log_force):
-        F = np.exp(log_force)
-        rest = quad(
-            lambda x: float(law.energy(np.exp(x))) * np.exp(-x), log_force, 8, epsabs=0, epsrel=1e-10, limit=500
-        )
-        return rest[0] + float(law.energy(np.exp(8.0))) * np.exp(-8.0) - float(law.energy(F)) / F
-
-    def endless(wanted):
-        low, high = -200.0, 5.0
-        for _ in range(60):
-            middle = (low + high) / 2
-            low, high = (middle, high) if gap(middle) > wanted else (low, middle)
-        return np.exp(low - law.tail * wanted**3)
-
-    force = endless(u)
-    r = endless(float(surface.h_max)) / force
-    return force * (1 - r) ** 1.5 / (1 + r)
-
-
-def test_far_gaps_of_one_surface_against_quadrature():
-    surface = Surface(0.5, 1.0, 100.0, 1.0, 12.0)
-    for u in (3.0, 6.0, 11.0):
-        found = contact(surface, mean_separation=u, theory="calibrated")
-        expected = force_by_quadrature(surface, u) * float(surface.rms_gradient)
-        assert abs(found.pressure / expected - 1) <= found.error + 1e-6
 
 
 @pytest.mark.parametrize("edge", [None, *EDGES])
