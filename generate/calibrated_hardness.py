@@ -52,7 +52,7 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
     if part == "area":
         return np.log(cap.area(one.force, one.elastic_area, one.eta, constants) / one.area)
     if part == "yielded":
-        return (cap.yielded_area(one.force, one.elastic_area, one.eta, constants) - one.yielded) / one.area
+        return (cap.area(one.force, one.elastic_area, one.eta, constants, True) - one.yielded) / one.area
     if part == "force":
         return np.log(cap.force(one.elastic[0], 0.0, one.shares[share], 0.0, one.eta, constants)[0] / one.force)
     if part == "stiffness":
@@ -84,7 +84,7 @@ def errors_of_law(one: Capped, form: str, constants: cap.Constants) -> dict[str,
         return {quantity: errors(one, quantity, constants, 1) for quantity in QUANTITIES}
     by_map = form == "calibrated_map"
     area = cap.area(one.force, one.elastic_areas[form], one.eta, constants)
-    yielded = cap.yielded_area(one.force, one.elastic_areas[form], one.eta, constants)
+    yielded = cap.area(one.force, one.elastic_areas[form], one.eta, constants, True)
     at_gap = one.map_curve.answer(one.u)[0] if by_map else one.by_law[0]
     force = cap.force(at_gap, 0.0, one.shares[0 if by_map else 1], 0.0, one.eta, constants)[0]
     return {
