@@ -19,7 +19,7 @@ COMMANDS = {
     },
     **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
     "boundary_elements": "generate.boundary_elements.run",
-    "formulas": "generate.formulas.fit",
+    "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
     "tables": "generate.tables.commands",
 }

@@ -27,7 +27,6 @@ from mbma_tables.common.units import Units, factor, resolve
 
 ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
 ONE_TEMPER = 1.3  # largest ratio of tempers' hardnesses for which their geometric mean is used, within 14% of both
-TABOR = 3.0  # hardness over yield stress
 TEMPERS = ("soft", "hard")
 # Vickers number of non-austenitic steels at Rockwell C numbers: ASTM E140 table 1, as printed at
 # mikipulley.co.jp/EN/Services/Tech_data/tech20.html
@@ -85,29 +84,14 @@ def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, 
 
 @dataclasses.dataclass(frozen=True)
 class Metal:
-    """Ranges of a metal's constants at room temperature.
-
-    Attributes
-    ----------
-    name : str
-    E : float
-        Young's modulus [GPa].
-    nu : float
-        Poisson's ratio.
-    hardness : tuple of float
-        Of soft and of hard tempers [GPa], as mean pressure of an indentation; equal where only one was found.
-    conductivity : tuple of float
-        Thermal, lowest and highest of what was found [W/(m K)].
-    source : str
-        Titles and addresses of the pages on which the numbers were read.
-    """
+    """Ranges of a metal's constants at room temperature."""
 
     name: str
-    E: float
-    nu: float
-    hardness: tuple[float, float]
-    conductivity: tuple[float, float]
-    source: str
+    E: float  # Young's modulus [GPa]
+    nu: float  # Poisson's ratio
+    hardness: tuple[float, float]  # of soft and of hard tempers [GPa], mean pressure of an indentation; may be equal
+    conductivity: tuple[float, float]  # thermal, lowest and highest of what was found [W/(m K)]
+    source: str = ""  # titles and addresses of the pages on which the numbers were read
 
 
 def _mean_pressure(scale: str, number: float) -> float:
@@ -124,10 +108,8 @@ def _metals() -> dict[str, Metal]:
     lines = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
     for row in csv.DictReader(line for line in lines if not line.startswith("#")):
         soft, hard = (round(_mean_pressure(row["scale"], float(row[end])), 2) for end in ("soft", "hard"))
-        conductivity = float(row["low"]), float(row["high"])
-        found[row["name"]] = Metal(
-            row["name"], float(row["E"]), float(row["nu"]), (soft, hard), conductivity, row["source"]
-        )
+        E, nu, low, high = (float(row[name]) for name in ("E", "nu", "low", "high"))
+        found[row["name"]] = Metal(row["name"], E, nu, (soft, hard), (low, high), row["source"])
     return found
 
 
@@ -159,7 +141,7 @@ def get(name: str) -> Metal:
         return dataclasses.replace(_METALS[plain], name=name, hardness=(one, one))
     if str(name) not in _METALS:
         near = difflib.get_close_matches(str(name), METALS, 3, 0.4) or METALS
-        raise InputError(f"no metal is named {name!r}: there are {', '.join(near)}, each also with ' soft' or ' hard'")
+        raise InputError(f"no metal is named {name!r}: give a Metal, or {', '.join(near)}, or with ' soft', ' hard'")
     return _METALS[name]
 
 
@@ -212,7 +194,7 @@ def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
     return Pair((one, other))
 
 
-def hardness(given: str | None = None, *, yield_stress: str | None = None) -> str:
+def hardness(given: str) -> str:
     """Hardness as a mean pressure with its unit, for the argument ``hardness=``.
 
     Parameters
@@ -220,9 +202,8 @@ def hardness(given: str | None = None, *, yield_stress: str | None = None) -> st
     given : str
         A Vickers number, "200 HV", force over the faces of the pyramid: p_m = 9.80665 MPa HV/sin(68 deg); a Rockwell C
         number of steel from 20 to 68, "58 HRC", by table 1 of ASTM E140; a metal by name, with its temper where these
-        differ by more than a factor of 1.3, "aluminium 6061 hard"; or a pressure, "1.5 GPa".
-    yield_stress : str
-        Instead, with its unit: p_m = 3 Y (Tabor 1951), of a metal that does not harden.
+        differ by more than a factor of 1.3, "aluminium 6061 hard"; or a pressure, "1.5 GPa", which of a metal that does
+        not harden is three times its yield stress (Tabor 1951).
 
     Raises
     ------
@@ -231,18 +212,9 @@ def hardness(given: str | None = None, *, yield_stress: str | None = None) -> st
     Examples
     --------
     >>> from mbma_tables import materials
-    >>> materials.hardness("200 HV"), materials.hardness("58 HRC"), materials.hardness(yield_stress="250 MPa")
-    ('2.11536 GPa', '6.9405 GPa', '750 MPa')
-    >>> materials.hardness("aluminium 6061 hard")
-    '0.95 GPa'
+    >>> materials.hardness("200 HV"), materials.hardness("58 HRC"), materials.hardness("aluminium 6061 hard")
+    ('2.11536 GPa', '6.9405 GPa', '0.95 GPa')
     """
-    if (given is None) == (yield_stress is None):
-        raise InputError("give a hardness or yield_stress, one of them")
-    if yield_stress is not None:
-        plain, unit = resolve({"hardness": yield_stress}, kind="stress")
-        if unit is None:
-            raise InputError(f"yield_stress needs a unit, such as '250 MPa', got {yield_stress!r}")
-        return f"{TABOR * plain['hardness']:.6g} {unit}"
     text = str(given)
     if found := _SCALE.fullmatch(text):
         number, scale = np.asarray(float(found[1])), found[2]

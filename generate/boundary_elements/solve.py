@@ -16,7 +16,7 @@ from generate.boundary_elements.surfaces import Recipe, heights
 from generate.boundary_elements.tamaas_contact import Contact as Contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import bearing_curve, boundary_elements
-from mbma_tables.laws.bearing_curve import RadialSpectrum, bearing, radial_spectrum
+from mbma_tables.laws.bearing_curve import band_sums, bearing, radial_bands
 from mbma_tables.laws.boundary_elements import LOADS as LOADS
 from mbma_tables.laws.reynolds import flow_conductance
 
@@ -49,12 +49,13 @@ def kept(results: list[dict[str, float]], names: tuple[str, ...], h_rms: float) 
     return {name: np.array([r[name] for r in results]) / (h_rms if name in LENGTHS else 1) for name in names}
 
 
-def prepared(
-    unscaled: FloatArray, sizes: tuple[float, float], q0: float
-) -> tuple[FloatArray, RadialSpectrum, dict[str, Any]]:
+def prepared(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> tuple[FloatArray, Any, dict[str, Any]]:
     """A map at rms gradient 1, so that mean pressure is F/(A0 E* g), its spectrum, and what laws may know, in h_rms."""
     surface = unscaled / bearing(unscaled, sizes).gradient
-    known, spectrum = bearing(surface, sizes), radial_spectrum(surface, sizes)
+    known, (power, q, band) = bearing(surface, sizes), radial_bands(surface, sizes)
+    sums = [band_sums(power * np.where(q > 0, q, 1) ** n, band) for n in (0, -2, 2, 4)]
+    variance, inverse, gradient, curvature = sums
+    per_variance = 1 / np.where(variance > 0, variance, np.nan)
     h_rms = known.h_rms
     curves = {
         "q0_h_rms": q0 * h_rms,
@@ -66,25 +67,24 @@ def prepared(
         "tension": known.tension,
         "anisotropy": known.anisotropy,
         "slope_kurtosis": known.slope_kurtosis,
-        "band_q": spectrum.q / q0,
-        "band_variance": spectrum.variance / h_rms**2,
-        "band_inverse_q2": spectrum.q2_mean_inverse * q0**2,
-        "band_gradient": spectrum.gradient,
+        "band_q": np.sqrt(gradient * per_variance) / q0,
+        "band_variance": variance / h_rms**2,
+        "band_inverse_q2": inverse * per_variance * q0**2,
+        "band_gradient": gradient,
         # in units of 1/h_rms^2: m0 m4/m2^2 is 4 times its sum at g = 1
-        "band_curvature": spectrum.curvature * h_rms**2,
+        "band_curvature": 0.375 * curvature * h_rms**2,
         "numpy": np.__version__,
     }
-    return surface, spectrum, curves
+    return surface, band, curves
 
 
 def simulate(recipe: Recipe) -> dict[str, Any]:
-    """All that is kept of one random surface."""
     return pressed(heights(recipe), recipe.sizes, recipe.q0)
 
 
 def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict[str, Any]:
     """All that is kept of one periodic map: lengths in h_rms, force in A0 E* g, energy in A0 E* g h_rms."""
-    surface, spectrum, curves = prepared(unscaled, sizes, q0)
+    surface, band, curves = prepared(unscaled, sizes, q0)
     h_rms = float(surface.std())
     wavenumber = np.hypot(*bearing_curve.wavevectors(surface.shape, sizes))
     wavenumber[0, 0] = np.inf
@@ -97,7 +97,7 @@ def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict
         rows.append(contact.press(force))
         # elastic energy by bands, sum |p_q|^2/|q|: longer waves than the surface has, its bands, shorter ones
         modes = np.abs(np.fft.rfft2(contact.traction) / surface.size) ** 2 * weights / wavenumber
-        shares.append(np.bincount(spectrum.band.ravel() + 1, modes.ravel(), bearing_curve.BANDS + 2) / h_rms)
+        shares.append(np.bincount(band.ravel(), modes.ravel(), bearing_curve.BANDS + 2) / h_rms)
     forces = np.array((*LOADS, *HIGHER_LOADS)[: len(rows)])
     found = {"force": forces, "band_energy": np.array(shares), "engine": engine()}
     return curves | kept(rows, QUANTITIES, h_rms) | found
@@ -125,7 +125,7 @@ def simulate_capped(recipe: Recipe) -> dict[str, Any]:
 
 def solve_flow(recipe: Recipe) -> dict[str, Any]:
     """Contact and flow coefficient, by Reynolds' equation, of one surface up to its blocking: lengths in h_rms."""
-    surface, spectrum, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+    surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
     h_rms = float(surface.std())
     contact: Any = Contact(surface, recipe.sizes)
     loads: tuple[float, ...] = FEW_LOADS if recipe.points >= LARGE else FLOW_LOADS
@@ -138,8 +138,12 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
         flows.append(flow_conductance(contact.gap / h_rms, recipe.sizes))
         if not flows[-1].any():
             break
-    known |= {"band_q": np.where(spectrum.variance > 0, spectrum.q / recipe.q0, np.nan), "engine": engine()}
-    return known | kept(rows, OF_FLOW, h_rms) | {"force": np.array(loads[: len(flows)]), "flow": np.array(flows)}
+    return (
+        known
+        | {"engine": engine()}
+        | kept(rows, OF_FLOW, h_rms)
+        | {"force": np.array(loads[: len(flows)]), "flow": np.array(flows)}
+    )
 
 
 def simulate_to(recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str, Any]] = simulate) -> str:

@@ -97,7 +97,6 @@ def _figure(data: xr.Dataset) -> Any:
 
 
 def measure() -> Measured:
-    """The tables."""
     data, lines = dataset("machined"), []
     for form in FORMS:
         for valid, name in ((True, "valid"), (False, "not valid")):

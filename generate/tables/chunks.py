@@ -39,7 +39,6 @@ def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> Floa
 
 
 def chunk_key(work: Work, job: Job) -> str:
-    """Name of a chunk's file."""
     made_by = [source_digest(CODE), versions(), work.__name__]
     return digest_json([made_by, digest_arrays({str(number): value for number, value in enumerate(job)})])
 

@@ -20,8 +20,8 @@ from mbma_tables.scenes.specimen import Specimen
 if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
 
-MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
-EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
+LIGHTEST = 1e-4  # A/A0 at a curve's second point
+SEARCHED = 1 - np.append(np.geomspace(1e-3, 0.2, 60), np.linspace(0.2, 2.0, 141)[1:])  # d/h_max where areas are found
 MIN_POINTS = 5
 DRAWN = ("calibrated", "persson")  # theories shown beside the chosen one in a picture, where available
 COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
@@ -100,8 +100,8 @@ def curve_command(
 ) -> None:
     """Pressure and area from first contact (d = h_max) to full compression (d = -h_max).
 
-    Half of the points are geometric in (h_max - d)/h_max, from 0.001 to 0.2, since the force is proportional to
-    its power 7/2 at light contact; the rest are even, up to 2. Gaps where a theory has no finite force are omitted.
+    Contact areas are geometric, from 0.01% to the largest, between first contact and full compression. Gaps where a
+    theory has no finite force are omitted.
 
     The picture has Persson's theory beside the chosen one, and the calibrated law with its scatter as a band.
 
@@ -111,16 +111,18 @@ def curve_command(
     from mbma_tables.answers.contact import contact
     from mbma_tables.common import plots
     from mbma_tables.scenes.problem import COMPARED
-    from mbma_tables.scenes.steps import other_theory
+    from mbma_tables.scenes.run import other_theory
 
     model, surface = model.of(specimen.surface), specimen.surface
     asked, modulus = model.keywords(specimen), 1.0 if specimen.E_star is None else specimen.E_star
-    # half geometric in h_max - d, half even
-    light, deep = (points - 1) // 2, points // 2
-    graded, even = np.geomspace(MIN_DEPTH, EVEN_FROM, light + 1)[:-1], np.linspace(EVEN_FROM, 2.0, deep)
-    gap = float(surface.h_max) * (1 - np.concatenate([[0.0], graded, even]))
+    gap = float(surface.h_max) * SEARCHED
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
+    area = np.asarray(contact(surface, separation=gap, **asked).area)
+    rising = slice(np.flatnonzero(area > 0)[0], int(area.argmax()) + 1)
+    wanted = np.geomspace(max(LIGHTEST, 1.5 * area[rising][0]), area[rising][-1], points - 1)
+    inner = np.interp(np.log(wanted[:-1]), np.log(area[rising]), gap[rising])
+    gap = np.concatenate([[surface.h_max], inner, gap[-1:]])
     answer = contact(surface, separation=gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}

@@ -172,9 +172,6 @@ _MAP_OPTIONS = (
     _option("long_cutoff", "Longest wavelength to keep [length]."),
     _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
     _option("l_filter", "and of an L-filter [length]."),
-    _option("tip_radius", "Of the probe or stylus [length]: keep wavelengths that it can follow."),
-    _option("reliable/--all-waves", "Whether to use the resolution stated in the file.", default=None),
-    _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
     _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
     _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
 )

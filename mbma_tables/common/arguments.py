@@ -58,11 +58,6 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
     parameters = inspect.signature(function).parameters
     names = [name for name in parameters if name not in ("self", "cls")]
     called = function.__qualname__.removesuffix(".__init__")
-    by_place = [
-        name for name, each in parameters.items() if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)
-    ]
-    by_name = [f"{name}=" for name, each in parameters.items() if each.kind is each.KEYWORD_ONLY][:4]
-    open_ended = any(each.kind is each.VAR_POSITIONAL for each in parameters.values())
 
     @functools.wraps(function)
     def checked(*given: P.args, **named: P.kwargs) -> R:
@@ -76,11 +71,6 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
             meant = SYMBOLS.get(name)
             hint = f"did you mean {meant!r}?" if meant in names else nearest(name, names)
             raise TypeError(f"{called} has no argument {name!r}: {hint}")
-        if len(given) > len(by_place) and by_name and not open_ended:
-            raise TypeError(
-                f"{called} takes {len(by_place)} argument{'s' * (len(by_place) > 1)} by position, "
-                f"got {len(given)}; the others are given by name: {', '.join(by_name)} ..."
-            )
         return function(*given, **named)
 
     return checked

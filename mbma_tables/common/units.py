@@ -53,9 +53,7 @@ DIMENSIONS = {
     **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest", "rolloff"), (1, 0)),
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
-    **dict.fromkeys(
-        ("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter", "extrapolate_to"), (1, 0)
-    ),
+    **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "s_filter", "l_filter", "extrapolate_to"), (1, 0)),
     **dict.fromkeys(("width", "mean_free_path", "displacement", "radius", "approach", "reference"), (1, 0)),
     **dict.fromkeys(("viscosity", "pressure_drop", "pressure_in", "pressure_out"), (0, 1)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),

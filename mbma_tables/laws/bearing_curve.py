@@ -20,15 +20,10 @@ RIDGES, BOTH = (np.sqrt(2 / np.pi), 1.0), (np.sqrt(np.pi / 2), 8 / 3)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RadialSpectrum:
-    """Height variance by bands of wavenumber; arrays of shape (BANDS,) but for `band`."""
+    """Height variance by bands of wavenumber, shape (BANDS,)."""
 
     q: FloatArray  # of each band, the root of mean q^2 weighted by variance [1/length]; NaN for an empty band
-    q2_mean_inverse: FloatArray  # mean q^-2 of each band, weighted by variance [length^2]
-    variance: FloatArray  # contribution of the band to m0 [length^2],
-    gradient: FloatArray  # to 2 m2,
-    curvature: FloatArray  # and to m4 [1/length^2]
-    # band of every wavevector of the real transform: -1 below the smallest wavenumber, BANDS above the largest
-    band: NDArray[np.intp]
+    variance: FloatArray  # contribution of the band to m0 [length^2]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,27 +60,28 @@ def half_plane_weights(shape: tuple[int, ...]) -> FloatArray:
     return weights
 
 
-def radial_spectrum(heights: FloatArray, sizes: tuple[float, float]) -> RadialSpectrum:
-    """Variance of a periodic map by logarithmic bands of wavenumber."""
-    qx, qy = wavevectors(heights.shape, sizes)
-    q = np.hypot(qx, qy)
-    transform = np.fft.rfft2(heights) / heights.size
-    power = np.abs(transform) ** 2 * half_plane_weights(heights.shape)
+def radial_bands(heights: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
+    """Of every wavevector of a periodic map: variance, wavenumber, and its band, from 1 to BANDS, 0 below them."""
+    q = np.hypot(*wavevectors(heights.shape, sizes))
+    power = np.abs(np.fft.rfft2(heights) / heights.size) ** 2 * half_plane_weights(heights.shape)
     power[0, 0] = 0.0
     lit = power > 1e-20 * power.max()
-    edges = np.geomspace(q[lit].min() * (1 - 1e-9), q[lit].max() * (1 + 1e-9), BANDS + 1)
-    band = np.searchsorted(edges, q) - 1
     power[~lit] = 0.0
+    edges = np.geomspace(q[lit].min() * (1 - 1e-9), q[lit].max() * (1 + 1e-9), BANDS + 1)
+    return power, q, np.searchsorted(edges, q)
 
-    def total(values: FloatArray) -> FloatArray:
-        return np.bincount(band.ravel() + 1, values.ravel(), BANDS + 2)[1:-1].astype(float)
 
-    variance, gradient = total(power), total(power * q**2)
-    inverse = total(power / np.where(q > 0, q, 1.0) ** 2)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return RadialSpectrum(
-            np.sqrt(gradient / variance), inverse / variance, variance, gradient, 0.375 * total(power * q**4), band
-        )
+def band_sums(values: FloatArray, band: NDArray[np.intp]) -> FloatArray:
+    """Sums over the wavevectors of each band."""
+    return np.bincount(band.ravel(), values.ravel(), BANDS + 2)[1:-1].astype(float)
+
+
+def radial_spectrum(heights: FloatArray, sizes: tuple[float, float]) -> RadialSpectrum:
+    """Variance of a periodic map by logarithmic bands of wavenumber."""
+    power, q, band = radial_bands(heights, sizes)
+    variance = band_sums(power, band)
+    with np.errstate(invalid="ignore"):
+        return RadialSpectrum(np.sqrt(band_sums(power * q**2, band) / variance), variance)
 
 
 def bearing(heights: FloatArray, sizes: tuple[float, float], part: tuple[slice, ...] = ()) -> Bearing:

@@ -26,7 +26,6 @@ REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 EFFECTS = (*OUTPUTS, *REFINEMENTS)
 ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
 COMPARED = (*THEORIES, "persson_simplified")
-CORRELATIONS = ("cooper_mikic_yovanovich", "mikic")  # for conductance
 PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
 INVERTED = ("pressures", "areas")  # gaps follow from them
 MIN_RTOL, MAX_RTOL, MAX_SECONDS = 1e-10, 0.1, 1e6
@@ -194,20 +193,13 @@ class Problem:
         if self.seconds is not None and not isinstance(self.island_model, str | None):
             raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
         own = () if not isinstance(self.theory, str) else ((self.theory, (*THEORIES, *OF_MAPS)),)
-        for name, named in (*own, *((other, (*COMPARED, *CORRELATIONS)) for other in self.theories)):
+        for name, named in (*own, *((other, COMPARED) for other in self.theories)):
             if name not in named:
                 raise InputError(f"no theory is named {name!r}; {nearest(str(name), named)}")
         if not own:
             get_theory(self.theory)
         if self.theory_name in self.theories:
             raise InputError(f"the scene is by theory {self.theory_name!r} itself: leave it out of theories")
-        correlations = [name for name in CORRELATIONS if name in self.theories]
-        if correlations and ("conductance" not in self.outputs or not self.has_pressure):
-            raise InputError(
-                f"{correlations[0]!r} is of conductance at a pressure: add effects 'conductance' and 'pressure'"
-            )
-        if CORRELATIONS[0] in correlations and self.hardness is None:
-            raise InputError(f"{CORRELATIONS[0]!r} needs a hardness: add effect 'yield'")
         options = {
             "island_model": self.island_model is not None,
             "variant": self.variant != get_variant("reported"),
@@ -216,11 +208,6 @@ class Problem:
         given = [name for name, is_given in options.items() if is_given]
         if given and self.theory != "mbma":
             raise InputError(f"{' and '.join(given)}: of theory 'mbma', not of {self.theory_name!r}: leave out")
-
-    @property
-    def has_pressure(self) -> bool:
-        """Whether pressures are known, as prescribed or computed."""
-        return "pressure" in self.outputs or self.prescribed == "pressures"
 
     @property
     def theory_name(self) -> str:

@@ -102,9 +102,10 @@ def _heights(parts: Sequence[Heights]) -> Heights:
 
 def _bands(parts: Sequence[Any]) -> RadialSpectrum:
     """The bands of all scans, each with its share of the variance."""
-    names = [field.name for field in dataclasses.fields(RadialSpectrum) if field.name != "band"]
-    joined = {name: np.concatenate([getattr(part, name)[part.variance > 0] for part in parts]) for name in names}
-    order = np.argsort(joined["q"])
-    for name in ("variance", "gradient", "curvature"):
-        joined[name] = joined[name] / len(parts)
-    return RadialSpectrum(**{name: values[order] for name, values in joined.items()}, band=np.empty(0, np.intp))
+    held = [part.variance > 0 for part in parts]
+    q, variance = (
+        np.concatenate([getattr(part, name)[own] for part, own in zip(parts, held, strict=True)])
+        for name in ("q", "variance")
+    )
+    order = np.argsort(q)
+    return RadialSpectrum(q[order], variance[order] / len(parts))

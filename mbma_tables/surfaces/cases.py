@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 from mbma_tables.common.errors import InputError
 
 
-@dataclasses.dataclass(frozen=True)
-class Case:
-    """A named surface, its length unit (None if lengths are over h_rms), and its place in the paper.
+class Case(NamedTuple):
+    """A named surface of the paper."""
 
-    `numbers` are arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments.
-    """
-
-    name: str
     title: str
-    length_unit: str | None
-    numbers: Mapping[str, Any]
+    length_unit: str | None  # None if lengths are over h_rms
+    numbers: Mapping[str, Any]  # arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments
 
 
 def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, top: float) -> dict[str, float]:
@@ -32,25 +26,18 @@ def _moments(hurst: float, m0: float, m2: float, m4: float, h_max: float) -> dic
 
 
 CASES = {
-    case.name: case
-    for case in (
-        Case(
-            "yang-persson",
-            "Yang-Persson molecular dynamics (Fig. 11)",
-            "nm",
-            _band(0.8, 6 * pi / 1040 * 10, 216, 1.0, 3.0),
-        ),
-        Case(
-            "papangelo", "Papangelo Green's function simulation (Fig. 12)", "um", _band(0.8, 2 * pi / 100, 64, 5.0, 3.0)
-        ),
-        Case("concrete", "concrete road of Lorenz (Figs. 13a, 14a)", "mm", _moments(0.7, 0.071, 0.27, 62.0, 1.1)),
-        Case("asphalt", "asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _moments(0.85, 0.091, 2.67, 21000.0, 1.37)),
-        Case("challenge", "contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * pi / 20, 200, 0.762, 3.7)),
-        *(
-            Case(f"resolution-{z}", f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)", None, numbers)
-            for z, numbers in ((z, _band(0.7, 0.1, z, 1.0, 3.0)) for z in (125, 250, 500, 1000))
-        ),
+    "yang-persson": Case(
+        "Yang-Persson molecular dynamics (Fig. 11)", "nm", _band(0.8, 6 * pi / 1040 * 10, 216, 1.0, 3.0)
+    ),
+    "papangelo": Case("Papangelo Green's function simulation (Fig. 12)", "um", _band(0.8, 2 * pi / 100, 64, 5.0, 3.0)),
+    "concrete": Case("concrete road of Lorenz (Figs. 13a, 14a)", "mm", _moments(0.7, 0.071, 0.27, 62.0, 1.1)),
+    "asphalt": Case("asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _moments(0.85, 0.091, 2.67, 21000.0, 1.37)),
+    "challenge": Case("contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * pi / 20, 200, 0.762, 3.7)),
+} | {
+    f"resolution-{z}": Case(
+        f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)", None, _band(0.7, 0.1, z, 1.0, 3.0)
     )
+    for z in (125, 250, 500, 1000)
 }
 
 

@@ -19,7 +19,7 @@ from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import SCATTER, log_bins
-from mbma_tables.surfaces.spectral import SpectralSurface, resolution
+from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface, resolution
 from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
@@ -56,18 +56,18 @@ def radial_spectrum(heights: FloatArray, dx: float, dy: float) -> tuple[FloatArr
 def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2) -> Treated:
     """A map or line scan, treated, with options of `Surface.from_map`; without `dimensions` a file decides which."""
     given = {name: value for name, value in options.items() if value is not None}
-    for name in given.keys() & {"periodic", "reliable"}:
-        require_flag(name, given[name])
+    for name in given.keys() - set(OPTIONS):
+        raise TypeError(f"there is no option {name!r}: {nearest(name, OPTIONS)}")
+    if "periodic" in given:
+        require_flag("periodic", given["periodic"])
     lengths, unit = resolve({name: given.pop(name) for name in ("dx", "dy") if name in given}, given.pop("unit", None))
     channel, periodic = given.pop("channel", None), given.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
         source, lengths = read_measurement(source, **lengths, unit=unit, channel=channel), {}
     elif channel is not None:
         raise InputError("channel belongs to a file")
-    for name in given.keys() - set(OPTIONS):
-        raise TypeError(f"there is no option {name!r}: {nearest(name, OPTIONS)}")
     dimensions = source.dim if dimensions is None else dimensions
-    grid, steps, whole, own, info = grid_of(source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions)
+    grid, steps, whole, own = grid_of(source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions)
     own = unit if own is None else known(own)
     if own is not None and unit not in (None, own):
         by, own = factor(own, unit), unit
@@ -75,7 +75,7 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
         grid, steps = grid * by, steps if lengths else tuple(step * by for step in steps)
     units = Units(own)
     given |= {name: units.number(name, given[name]) for name in given.keys() & {*LENGTHS, "outliers"}}
-    return treat(grid, steps, whole, Treatment(**given), own, info)
+    return treat(grid, steps, whole, Treatment(**given), own)
 
 
 def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:
@@ -99,9 +99,9 @@ def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:
     return {
         "q": q,
         "C": C,
-        "counts": waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP),
+        "counts": waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP),
         "variances": C * waves * (steps[0] * steps[1]),
-        "low": float(q[0]) if treated.plain else max(WINDOW_LOBE * max(steps), float(q[0])),
+        "low": float(q[0]) if treated.periodic else max(WINDOW_LOBE * max(steps), float(q[0])),
     }
 
 
@@ -205,7 +205,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     scale = float(np.abs(treated.heights).max())
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
     q, C, waves = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
-    bins = log_bins(q, C, waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP))
+    bins = log_bins(q, C, waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP))
     # for ridges, or a few cosines, some bins have no wavelength
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
@@ -218,7 +218,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
 
     notes: list[dict[str, Any]] = []
     C_bins, variance, whole = np.exp(bins.log_c), own.h_rms**2, slopes(0.0)
-    if treated.plain:
+    if treated.periodic:
         changed = raised(bins.q, C_bins, variance, whole)
         # a tilt if there are many long wavelengths, as for a step
         C_bins = matched(bins.q, C_bins, variance, whole / variance) if changed is C_bins else changed
@@ -284,8 +284,7 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
     # the curves of the map do not include the added wavelengths
     C = np.append(surface.C, np.exp(level - slope * np.log(q)))
-    plain = dataclasses.replace(surface, bearing=None, bands=None, map=None, table=None, scans=())
-    longer = dataclasses.replace(plain, q=np.append(surface.q, q), C=C, samples=samples)
+    longer = dataclasses.replace(surface, **NO_MAP, q=np.append(surface.q, q), C=C, samples=samples)
     area = float(surface.rms_gradient / longer.rms_gradient)
     stiffness = float(surface.h_rms / longer.h_rms)
     told = (

@@ -9,7 +9,7 @@ import pathlib
 import re
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -156,8 +156,8 @@ def sampling_step(name: str, value: Any) -> float:
 
 def grid_of(
     source: Any, dx: Any, dy: Any, periodic: bool | None, dimensions: int = 2
-) -> tuple[Any, tuple[float, ...], bool, str | None, Mapping[str, Any]]:
-    """Heights, sampling steps, periodicity, unit and the file's remarks, from an array or a topography."""
+) -> tuple[Any, tuple[float, ...], bool, str | None]:
+    """Heights, sampling steps, periodicity and unit, from an array or a topography."""
     if not callable(getattr(source, "heights", None)):
         if dx is None:
             raise InputError("dx is missing: the sampling step of a plain array of heights")
@@ -165,7 +165,7 @@ def grid_of(
         steps = tuple(sampling_step(name, value) for name, value in given.items())
         # of a DataArray
         stated = getattr(source, "attrs", {}).get("units")
-        return source, steps, bool(periodic), None if stated in ("", "1") else stated, {}
+        return source, steps, bool(periodic), None if stated in ("", "1") else stated
     if dx is not None or dy is not None:
         raise InputError("dx and dy belong to a plain array; a topography has its own physical_sizes")
     if not getattr(source, "is_uniform", True):
@@ -188,7 +188,7 @@ def grid_of(
     if periodic is None:
         periodic = getattr(source, "is_periodic", False)
     found = tuple(float(size) / max(count, 1) for size, count in zip(extent, np.shape(grid), strict=True))
-    return grid, found, bool(periodic), getattr(source, "unit", None), dict(getattr(source, "info", None) or {})
+    return grid, found, bool(periodic), getattr(source, "unit", None)
 
 
 def heights_of(grid: Any, dimensions: int = 2) -> Any:
@@ -212,11 +212,11 @@ def heights_of(grid: Any, dimensions: int = 2) -> Any:
     return np.ma.masked_array(numbers, holes)
 
 
-def wrapped(heights: Any, steps: tuple[float, ...], periodic: bool, unit: str | None = None, **info: Any) -> Any:
+def wrapped(heights: Any, steps: tuple[float, ...], periodic: bool) -> Any:
     """A plain array of heights as a topography or line scan; masked points are undefined."""
     module = library()
     values = heights if np.ma.getmaskarray(heights).any() else np.ma.getdata(heights)
     sizes = tuple(count * step for count, step in zip(values.shape, steps, strict=True))
     if values.ndim == 1:
-        return module.UniformLineScan(values, sizes[0], periodic=periodic, unit=unit, info=info)
-    return module.Topography(values, sizes, periodic=periodic, unit=unit, info=info)
+        return module.UniformLineScan(values, sizes[0], periodic=periodic)
+    return module.Topography(values, sizes, periodic=periodic)

@@ -48,6 +48,7 @@ SAME_LAW = 0.01  # largest deviation of ln C from one power law for which a spec
 FINE = 1.02  # ratio of wavenumbers in a sum of spectra, which deviates from power laws between them by at most 1e-4
 NO_POWER = 1e-3  # share of the squared gradient beyond the last wavelengths that count
 SIDE = 1e-12  # beside a wavenumber, relative
+NO_MAP: dict[str, Any] = {"bearing": None, "bands": None, "map": None, "table": None, "scans": ()}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -208,6 +209,12 @@ class SpectralSurface(AnySurface):
             known["anisotropy"] = self.anisotropy
         beyond = "beyond, only 'calibrated' by a map was tested"
         mend = "theory='simulated' simulates the map" if by_map else beyond
+        if by_map and self.map is not None:
+            from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING
+
+            resolved = MIN_POINTS * max(self.map.steps)
+            if 2 * np.pi / self.q1 < resolved * (1 - ROUNDING):
+                mend += f" with a short_cutoff of {resolved:.4g}"
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()
@@ -234,14 +241,7 @@ class SpectralSurface(AnySurface):
             moved |= dict.fromkeys(("gradient", "tension_force", "tension"), slope)
             known = dataclasses.replace(known, **{name: by * getattr(known, name) for name, by in moved.items()})
         if bands is not None:
-            bands = dataclasses.replace(
-                bands,
-                q=bands.q / along,
-                q2_mean_inverse=bands.q2_mean_inverse * along**2,
-                variance=bands.variance * up**2,
-                gradient=bands.gradient * slope**2,
-                curvature=bands.curvature * (slope / along) ** 2,
-            )
+            bands = dataclasses.replace(bands, q=bands.q / along, variance=bands.variance * up**2)
         if whole is not None:
             steps = tuple(along * step for step in whole.steps)
             whole = dataclasses.replace(whole, heights=up * whole.heights, steps=steps)
@@ -262,17 +262,8 @@ class SpectralSurface(AnySurface):
         """The wavelengths from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
         inside = (self.q > low) & (self.q < high)
         q = np.concatenate([[low], self.q[inside], [high]])
-        less = dataclasses.replace(
-            self,
-            q=q,
-            C=np.concatenate([self.power_spectrum(q[:1]), self.C[inside], self.power_spectrum(q[-1:])]),
-            samples=None,
-            bearing=None,
-            bands=None,
-            map=None,
-            table=None,
-            scans=(),
-        )
+        C = np.concatenate([self.power_spectrum(q[:1]), self.C[inside], self.power_spectrum(q[-1:])])
+        less = dataclasses.replace(self, **NO_MAP, q=q, C=C, samples=None)
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 
     def added(self, other: SpectralSurface) -> Self:

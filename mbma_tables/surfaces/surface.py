@@ -144,9 +144,6 @@ class Surface(SelfAffine):
         long_cutoff: Any = None,
         s_filter: Any = None,
         l_filter: Any = None,
-        tip_radius: Any = None,
-        reliable: bool = True,
-        window: str | None = None,
         unit: str | None = None,
         channel: int | None = None,
     ) -> Surface | MeasuredSurface:
@@ -176,7 +173,7 @@ class Surface(SelfAffine):
         extrapolate_to, extrapolate_hurst : float, optional
             Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; its
             influence is recorded.
-        outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter, tip_radius, reliable, window : optional
+        outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter : optional
             As in `mbma_tables.surfaces.treatment.Treatment`; the treatment is recorded in `provenance`.
         unit : str, optional
             Unit of the result and of plain lengths; lengths of a file are converted to it, or taken to be in it if the
@@ -237,7 +234,7 @@ class Surface(SelfAffine):
         dx : float, optional
             Sampling step [length], of an array.
         extrapolate_to, extrapolate_hurst, **treatment : optional
-            As for `from_map`: periodic, detrend, outliers, ... channel; `tip_radius` is the stylus's.
+            As for `from_map`: periodic, detrend, outliers, ... channel.
         h_max, nominal_area : float, optional
             As for `Surface`; by default h_max is that of the line, which is lower than that of a surface.
 

@@ -1,7 +1,6 @@
 """Measured maps and line scans, treated by SurfaceTopography (the extra `maps`), each step on record.
 
-Terms are those of that library: detrend modes, windows, harmonic filling of undefined data, short and long cut-off,
-tip radius. Only the search for outliers is added here.
+Terms are those of that library: detrend modes, harmonic filling of undefined data, short and long cut-off.
 """
 
 from __future__ import annotations
@@ -9,14 +8,13 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.surfaces.filters import gaussian, last_wave, without_polynomial
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
@@ -27,12 +25,17 @@ FREE_HOLES = 0.05  # share of undefined points that is filled without being requ
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
 MIN_POWER = 1e-24  # power over that of the strongest wavelength: lower values are rounding
-LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius", "s_filter", "l_filter")  # options that are lengths
+LENGTHS = ("short_cutoff", "long_cutoff", "s_filter", "l_filter")  # options that are lengths
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
 USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier; share of points up to which they are reported
-CUTS = {"long_cutoff": "longcut", "short_cutoff": "shortcut"}  # by that library
-CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
-CALLED |= {"s_filter": "an S-filter", "l_filter": "an L-filter"}
+CALLED = {
+    "long_cutoff": "a long cut-off",
+    "short_cutoff": "a short cut-off",
+    "s_filter": "an S-filter",
+    "l_filter": "an L-filter",
+}
+GAUSSIAN = math.log(2)  # factor in the filter's exponent: wavelengths equal to the nesting index are halved
+LAST_WAVES = 0.01  # amplitude below which wavelengths count as removed by an S-filter
 Provenance = tuple[Mapping[str, Any], ...]
 
 
@@ -56,13 +59,6 @@ class Treatment:
     s_filter, l_filter : float, optional
         Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve this wavelength. An
         S-filter removes shorter ones, completely below 0.39 times the index, an L-filter longer ones.
-    tip_radius : float, optional
-        Of a scanning probe or stylus [length]: sets `short_cutoff` where `scanning_probe_reliability_cutoff` finds
-        wavelengths that such a tip cannot follow.
-    reliable : bool, optional
-        Whether a resolution or tip radius that the file states counts as given, the default.
-    window : str, optional
-        Of the power spectrum, as in `scipy.signal.get_window`; a Hann window by default, none where periodic.
     """
 
     outliers: float | None = None
@@ -72,9 +68,6 @@ class Treatment:
     long_cutoff: float | None = None
     s_filter: float | None = None
     l_filter: float | None = None
-    tip_radius: float | None = None
-    reliable: bool = True
-    window: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("outliers", *LENGTHS):
@@ -99,7 +92,6 @@ class Treated:
     unit: str | None  # of length, that the file names
     waves: tuple[float, float] = (0.0, math.inf)  # smallest and largest wavenumber kept
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
-    window: str | None = None
     uncut: Any = None  # heights before the short cut-off, where there is one
 
     def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
@@ -107,41 +99,23 @@ class Treated:
         record = {"step": step, **numbers, "told": told}
         return dataclasses.replace(self, heights=heights, provenance=(*self.provenance, record))
 
-    @property
-    def read(self) -> dict[str, Any]:
-        """The record of the data read, which precedes those of the treatment."""
+    def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
+        """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
         shape, unit = self.heights.shape, f" {self.unit}" if self.unit else ""
         sides = " x ".join(f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True))
         told = (
             f"{'map' if len(shape) == 2 else 'line scan'} of {' x '.join(map(str, shape))} points, {sides}{unit}, "
             f"heights read in {self.unit or 'the same unit, which is not known'}"
         )
-        record = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit}
-        return record | {"told": told}
-
-    def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
-        """All steps of a surface made of it: variant, treatment, what was done at the edges, and notes."""
-        edges = ("periodic" if self.plain else "under a window for the spectrum") + more
-        return (self.read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
-
-    @property
-    def plain(self) -> bool:
-        """Whether the spectrum is taken without a window: where periodic, unless one is asked for."""
-        return self.periodic and self.window is None
+        read = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit, "told": told}
+        edges = ("periodic" if self.periodic else "under a window for the spectrum") + more
+        return (read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
 
     def windowed(self) -> FloatArray:
-        """Heights under a window of unit mean square, their mean under it removed; as they are where `plain`."""
-        if self.plain:
+        """Heights under a Hann window of unit mean square, their mean under it removed; as they are where periodic."""
+        if self.periodic:
             return np.asarray(self.heights)
-        if self.window is None:
-            windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
-        else:
-            from scipy.signal import get_window
-
-            try:
-                windows = [get_window(self.window, count) for count in self.heights.shape]
-            except ValueError:
-                raise InputError(f"window must be one of scipy.signal.get_window, got {self.window!r}") from None
+        windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
         values = self.heights - np.average(self.heights, weights=window)
         return np.asarray(values * (window / math.sqrt(np.mean(window**2))))
@@ -153,27 +127,23 @@ def treat(
     periodic: bool,
     treatment: Treatment,
     unit: str | None = None,
-    info: Mapping[str, Any] | None = None,
 ) -> Treated:
-    """Heights [length] made ready for their spectrum; NaN and masked points are undefined, `info` is the file's."""
+    """Heights [length] made ready for their spectrum; NaN and masked points are undefined."""
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
         raise InputError(
             f"{' x '.join(map(str, heights.shape))} points have too few wavelengths; needed are at least "
             f"{' x '.join([str(MIN_GRID)] * heights.ndim)}"
         )
-    known = Treated(heights, steps, periodic, unit, window=treatment.window)
+    known = Treated(heights, steps, periodic, unit)
     with warnings.catch_warnings():
         # warnings of numpy inside that library are ignored
         warnings.simplefilter("ignore")
         known = _without_outliers(known, treatment.outliers)
         known = _flattened(_filled(known, treatment.fill), treatment.detrend)
-        known, short = _resolution(known, treatment, info or {})
-        known = _within(known, short, treatment)
-    shortest = min(
-        2 * math.pi / short if short else math.inf,
-        last_wave(treatment.s_filter) if treatment.s_filter else math.inf,
-    )
+        known = _within(known, treatment)
+    shortest = 2 * math.pi / treatment.short_cutoff if treatment.short_cutoff else math.inf
+    shortest = min(shortest, last_wave(treatment.s_filter) if treatment.s_filter else math.inf)
     return dataclasses.replace(known, waves=(2 * math.pi / (treatment.long_cutoff or math.inf), shortest))
 
 
@@ -252,31 +222,9 @@ def _filled(known: Treated, fill: str | None) -> Treated:
     return known.after(_harmonic(known), "fill", told, method="harmonic", points=count, share=share)
 
 
-def _resolution(known: Treated, treatment: Treatment, info: Mapping[str, Any]) -> tuple[Treated, float | None]:
-    """Shortest wavelength kept: the largest of those given, resolved by the tip and stated by the file; None: all."""
-    found = [(treatment.short_cutoff, "as given")] if treatment.short_cutoff is not None else []
-    tip, stated = treatment.tip_radius, (info.get("instrument") or {}).get("parameters") or {}
-    if tip is None and not (treatment.reliable and known.unit and {"tip_radius", "resolution"} & set(stated)):
-        return known, found[0][0] if found else None
-    origin = "the file's instrument" if tip is None else f"a tip of radius {tip:g}"
-    own = {"instrument": info["instrument"]} if tip is None else {}
-    try:
-        scan = wrapped(known.heights, known.steps, False, known.unit, **own)
-        limit = scan.short_reliability_cutoff() if tip is None else scan.scanning_probe_reliability_cutoff(tip)
-    except (ValueError, KeyError, TypeError) as fault:
-        raise InputError(f"the reliability cut-off by {origin} cannot be found: {fault}") from None
-    if limit is None or limit <= 2 * max(known.steps):
-        known = known.after(known.heights, "reliability", f"{origin} follows every wavelength that was sampled")
-    else:
-        told = f"{origin} follows no wavelength below {limit:.4g} {known.unit or ''}".rstrip()
-        known = known.after(known.heights, "reliability", told, wavelength=float(limit))
-        found.append((float(limit), origin))
-    return known, max(found)[0] if found else None
-
-
-def _within(known: Treated, short: float | None, treatment: Treatment) -> Treated:
+def _within(known: Treated, treatment: Treatment) -> Treated:
     """Heights whose wavelengths lie between both cut-offs, or filters."""
-    long = treatment.long_cutoff
+    long, short = treatment.long_cutoff, treatment.short_cutoff
     if short is not None and not short > 2 * min(known.steps):
         raise InputError(
             f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wavelength "
@@ -284,19 +232,14 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
         )
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
-    asked = {"long_cutoff": long, "short_cutoff": short, "s_filter": treatment.s_filter, "l_filter": treatment.l_filter}
-    own = {name: wavelength for name, wavelength in asked.items() if wavelength is not None}
+    own = {name: getattr(treatment, name) for name in CALLED if getattr(treatment, name) is not None}
     values = known.heights if known.periodic or not own else mirrored(known.heights)
     whole = tuple(slice(count) for count in known.heights.shape)
     for name, wavelength in own.items():
         if name == "short_cutoff":
             known = dataclasses.replace(known, uncut=values[whole])
         before = squares(values, known.steps)
-        if name in CUTS:
-            scan = wrapped(values, known.steps, True, known.unit)
-            values = np.asarray(getattr(scan, CUTS[name])(cutoff_wavelength=wavelength).heights(), float)
-        else:
-            values = gaussian(values, known.steps, name, wavelength)
+        values = filtered(values, known.steps, name, wavelength)
         after = squares(values, known.steps)
         if not after[0] > MIN_POWER * before[0]:
             raise InputError(f"{name} {wavelength:g} leaves no wavelength of the measurement")
@@ -308,6 +251,42 @@ def _within(known: Treated, short: float | None, treatment: Treatment) -> Treate
         told += f"; it removes {of_variance:.0%} of the height variance"
         known = known.after(values, name, told, wavelength=wavelength, of_gradient=of_gradient, of_variance=of_variance)
     return dataclasses.replace(known, heights=values[whole]) if own else known
+
+
+def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
+    """Heights less their least-squares polynomial of that total degree: same as SurfaceTopography's modes."""
+    bases = [
+        np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), degree))[0] for count in heights.shape
+    ]
+    if heights.ndim == 1:
+        return np.asarray(heights - bases[0] @ (bases[0].T @ heights))
+    along, across = bases
+    wanted = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree
+    return np.asarray(heights - along @ (wanted * (along.T @ heights @ across)) @ across.T)
+
+
+def last_wave(nesting: float) -> float:
+    """Wavenumber above which an S-filter leaves less than `LAST_WAVES` of the amplitude."""
+    return 2 * math.pi / nesting * math.sqrt(-math.log(LAST_WAVES) / GAUSSIAN)
+
+
+def _squared_waves(shape: tuple[int, ...], steps: tuple[float, ...]) -> Any:
+    """Squares of the wavenumbers of a grid's Fourier components."""
+    waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(shape, steps, strict=True)]
+    return np.add.outer(waves[0] ** 2, waves[1] ** 2) if len(shape) == 2 else waves[0] ** 2
+
+
+def filtered(values: FloatArray, steps: tuple[float, ...], name: str, wavelength: float) -> FloatArray:
+    """Periodic heights after a cut-off or a filter, an option of `Treatment`, at a wavelength."""
+    q2, cut = _squared_waves(values.shape, steps), (2 * math.pi / wavelength) ** 2
+    if name == "short_cutoff":
+        left = q2 <= cut * (1 + 1e-12)
+    elif name == "long_cutoff":
+        left = q2 >= cut * (1 - 1e-12)
+    else:
+        left = np.exp(-GAUSSIAN * q2 / cut)
+        left = 1 - left if name == "l_filter" else np.where(q2 < last_wave(wavelength) ** 2, left, 0.0)
+    return np.asarray(np.fft.ifftn(np.fft.fftn(values) * left).real)
 
 
 def mirrored(values: FloatArray) -> FloatArray:
@@ -323,8 +302,6 @@ def squares(
     """Mean squares of periodic heights and of their gradient, of the wavelengths between two wavenumbers."""
     power = np.abs(np.fft.fftn(values) / values.size) ** 2
     power.flat[0] = 0.0
-    waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(values.shape, steps, strict=True)]
-    squared: Callable[..., FloatArray] = np.add.outer
-    q2 = squared(waves[0] ** 2, waves[1] ** 2) if values.ndim == 2 else waves[0] ** 2
+    q2 = _squared_waves(values.shape, steps)
     power = power * ((q2 >= band[0] ** 2) & (q2 <= band[1] ** 2))
     return float(power.sum()), float((power * q2).sum())

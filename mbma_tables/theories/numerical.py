@@ -106,7 +106,6 @@ class Wrapped(Theory):
         return FEW_LOOKS
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Force or area alone."""
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
             found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)

@@ -28,16 +28,16 @@ NUMBERS = {
     "left_out": "wavelength below which a large map was cut off, 0 if it was not",
     "anisotropy": "root of the ratio of the gradient tensor's eigenvalues",
 }
-# parts of the surface, by the names of their fields; `band` of a spectrum is for the map's own grid
+# parts of the surface, by the names of their fields
 PARTS: dict[str, Any] = {"heights": Heights, "bearing": Bearing, "bands": RadialSpectrum}
 POWERS = {
     **dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), "{length}"),
-    **{"q": "1/{length}", "q2_mean_inverse": "{length}^2", "variance": "{length}^2", "curvature": "1/{length}^2"},
+    **{"q": "1/{length}", "variance": "{length}^2"},
 }
 
 
 def _fields(name: str) -> list[str]:
-    return [field.name for field in dataclasses.fields(PARTS[name]) if field.name != "band"]
+    return [field.name for field in dataclasses.fields(PARTS[name])]
 
 
 def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
@@ -62,7 +62,7 @@ def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
             values = np.asarray(getattr(getattr(surface, part), name), float)
             values = values[held] if part == "bands" else values
             over = (f"{part}_{values.size}",) if values.ndim else ()
-            unit = "1" if (part, name) == ("bands", "gradient") else POWERS.get(name, "1")
+            unit = POWERS.get(name, "1")
             table[f"{part}_{name}"] = over, values, f"{name} of mbma_tables {kind.__name__}", unit
     length = surface.unit or "length"
     attributes = {
@@ -87,10 +87,7 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         parts = {
             part: kind(**{name: _plain(values[f"{part}_{name}"]) for name in _fields(part)})
             for part, kind in PARTS.items()
-            if part != "bands"
         }
-        known = {name: values[f"bands_{name}"] for name in _fields("bands")}
-        bands = RadialSpectrum(**known, band=np.empty(0, np.intp))
         numbers = [values[name].item() for name in NUMBERS]
         rows = np.stack([values[name] for name in ROWS])
         if values["flow"].shape != (*values["flow_gaps"].shape, 3) or rows.ndim != 2:
@@ -98,7 +95,7 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         points, left_out, anisotropy = numbers
         table = Table(rows, values["flow_gaps"], values["flow"], points, left_out, own["source"])
         return MeasuredSurface(
-            values["q"], values["C"], values["h_max"].item(), **parts, bands=bands, table=table,
+            values["q"], values["C"], values["h_max"].item(), **parts, table=table,
             samples=values["samples"], anisotropy=anisotropy, unit=own.get("length_unit"),
             provenance=tuple(json.loads(own["provenance"])),
         )  # fmt: skip

@@ -93,7 +93,7 @@ class Loaded:
     def yielded(self) -> FloatArray:
         """Share of the contact area at the hardness."""
         with np.errstate(invalid="ignore"):
-            share = law.yielded_area(self.load, self.elastic_area, self.eta) / self.answer.area
+            share = law.area(self.load, self.elastic_area, self.eta, yielded=True) / self.answer.area
         return np.where(np.isinf(self.eta) | (self.answer.area == 0), 0.0, share)
 
     @property
@@ -131,7 +131,6 @@ class Yielding(Theory):
         self._bound: tuple[Any, Any] = None, None
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
-        """The theory with the hardnesses at flat indices of a broadcast shape."""
         if self.hardness.ndim == 0:
             return self
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
@@ -189,7 +188,6 @@ class Yielding(Theory):
         return low, np.minimum(high, MAX_LEVEL * h_rms)
 
     def looks(self, surface: AnySurface) -> int:
-        """Few, also at many hardnesses."""
         return FEW_LOOKS if self.hardness.size > MANY else self.elastic.looks(surface)
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
@@ -223,11 +221,9 @@ class Yielding(Theory):
         return over.shape
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Those of the elastic contact."""
         return self.elastic.bends(surface)  # type: ignore[no-any-return]
 
     def gaps(self) -> Any:
-        """The elastic contact's."""
         return self.elastic.gaps()
 
     def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray | None]:
@@ -254,7 +250,6 @@ class Yielding(Theory):
         return shipped().standard_deviation(self.elastic.scatter_name(surface), quantity, eta, area, elastic)
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
-        """The elastic theory's reasons, and hardnesses below those that were simulated."""
         soft = np.broadcast_to(self._eta(surface) < self.tested_eta * (1 - 1e-9), np.shape(answer.area))
         own = {f"the hardness over E* times the rms gradient is below {self.tested_eta:g}": soft}
         return {**self.elastic.reasons(surface, answer, mean_separation), **own}

@@ -85,7 +85,6 @@ def test_the_same_in_toml(map_file, tmp_path):
     [
         (["fit", "absent.sur"], "there is no file"),
         (["contact", "--surface", "concrete", "--outliers", "8", "-a", "0.1"], "goes with --map"),
-        (["fit", "MAP", "--window", "bay"], "--window must be one of scipy.signal.get_window, got 'bay'"),
         (["fit", "MAP", "--dx", "1um"], "leave --dx and --dy out (--length-unit ... sets their unit)"),
         (["fit", "MAP", "--extrapolate-to", "0.1um"], "--extrapolate-to and --extrapolate-hurst: give both"),
         (["fit", "MAP", "--channel", "7"], "has channels 0 to 0"),

@@ -191,31 +191,6 @@ test_what_contradicts = refusals(
 )
 
 
-def test_older_conductances_beside():
-    scene = Scene(
-        **PRESSED,
-        effects=["conductance", "comparison", "yield"],
-        hardness=1500.0,
-        theory="calibrated",
-        conductivities=(16.0, 167.0),
-        theories=["cooper_mikic_yovanovich", "mikic", "greenwood_williamson"],
-    )
-    found = scene.run()
-    ratio = found.cooper_mikic_yovanovich_conductance / found.conductance
-    assert ((ratio > 0.5) & (ratio < 2)).all()
-    slope = np.sqrt(2 * SURFACE.m2 / np.pi)
-    k_s = mean_conductivity(16.0, 167.0)
-    elastic = 1.55 * k_s * slope * (np.sqrt(2) * np.array(PRESSED["pressures"]) / (slope * 100e3)) ** 0.94
-    assert found.mikic_conductance.values == pytest.approx(elastic)
-    with pytest.raises(InputError, match="needs a hardness"):
-        Scene(
-            **PRESSED,
-            effects=["conductance", "comparison"],
-            conductivities=(1.0, 2.0),
-            theories=["cooper_mikic_yovanovich"],
-        )
-
-
 def test_a_plan_of_mbma_that_yields_keeps_the_tolerance():
     known = {"surface": SURFACE, "mean_separations": [1.0], "effects": ["pressure", "yield"], "hardness": 0.01}
     for rtol, island_model in ((1e-6, "universal"), (1e-10, "exact")):

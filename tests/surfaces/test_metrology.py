@@ -149,8 +149,8 @@ class TestBatchOfMaps:
     def test_mistakes(self, folder):
         for text, message in (
             ("map,surface\n1.npy,challenge\n", "name and map are given: one of"),
-            ("map,dx\nabsent.npy,1um\n", "there is no file"),
-            ("surface,dx\nchallenge,1um\n", "for a map, which is missing"),
+            ("map,dx\nabsent.npy,1um\n", "is not a file"),
+            ("surface,dx\nchallenge,1um\n", "for a measured map, which is missing"),
         ):
             (folder / "all.csv").write_text(text)
             assert message in refused("batch", folder / "all.csv", "--area", "0.1")

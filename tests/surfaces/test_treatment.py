@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.signal
 from helpers import refusals, topographies
 
 from mbma_tables import Surface
@@ -33,8 +34,8 @@ def waves(highest=12, seed=4, shape=(POINTS, POINTS)):
 MAP = waves()
 
 
-def treated(heights=MAP, periodic=False, unit=None, info=None, steps=(STEP, STEP), **options):
-    return treat(heights, steps, periodic, Treatment(**options), unit, info)
+def treated(heights=MAP, periodic=False, steps=(STEP, STEP), **options):
+    return treat(heights, steps, periodic, Treatment(**options))
 
 
 def told(result, step):
@@ -131,25 +132,6 @@ class TestCutoff:
     )
 
 
-class TestReliability:
-    SHARP = waves(30, seed=8)
-
-    def test_a_tip_cannot_follow(self):
-        found = treated(self.SHARP, tip_radius=5.0)
-        limit = library.Topography(treated(self.SHARP).heights, (SIDE, SIDE)).scanning_probe_reliability_cutoff(5.0)
-        assert limit > 2 * STEP
-        entry = next(e for e in found.provenance if e["step"] == "reliability")
-        assert entry["wavelength"] == pytest.approx(limit)
-        assert found.waves[1] == pytest.approx(2 * np.pi / limit)
-
-    def test_what_the_file_says_counts_unless_told_otherwise(self):
-        info = {"instrument": {"parameters": {"resolution": {"value": 2000.0, "unit": "nm"}}}}
-        found = treated(unit="um", info=info)
-        assert found.waves[1] == pytest.approx(2 * np.pi / 2.0)
-        assert treated(unit="um", info=info, reliable=False).waves[1] == math.inf
-        assert treated(unit="um", info=info, short_cutoff=4.0).waves[1] == pytest.approx(2 * np.pi / 4.0)
-
-
 class TestReading:
     def test_arrays_in_files(self, tmp_path):
         np.save(tmp_path / "a.npy", MAP)
@@ -206,10 +188,9 @@ class TestReading:
             other = Surface.from_map(tmp_path / "a.xyz", unit="mm")
             assert other.h_rms == pytest.approx(1e-3 * found.h_rms, rel=1e-9)
 
-    @pytest.mark.parametrize("name", ["periodic", "reliable"])
-    def test_a_text_is_no_yes(self, name):
-        with pytest.raises(InputError, match=f"{name} must be True or False, got 'no'"):
-            Surface.from_map(MAP, STEP, **{name: "no"})
+    def test_a_text_is_no_yes(self):
+        with pytest.raises(InputError, match="periodic must be True or False, got 'no'"):
+            Surface.from_map(MAP, STEP, periodic="no")
 
     def test_units_of_a_labelled_array(self):
         xr = pytest.importorskip("xarray")
@@ -244,12 +225,11 @@ class TestReading:
             read_measurement(tmp_path / "w.csv")
 
 
-@pytest.mark.parametrize("window", ["hann", "blackman", "tukey"])
-def test_a_window_is_the_librarys(window):
-    found = treated(MAP[3], steps=(STEP,), window=window)
-    scan = library.UniformLineScan(found.heights, SIDE).window(window)
-    weights = np.asarray(scan.window_data)
-    expected = scan.heights() - weights * np.average(found.heights, weights=weights)
+def test_the_window_is_hanns():
+    found = treated(MAP[3], steps=(STEP,))
+    weights = scipy.signal.windows.hann(2 * POINTS + 1)[1::2]  # at the middle of each step
+    weights = weights / np.sqrt(np.mean(weights**2))
+    expected = weights * (found.heights - np.average(found.heights, weights=weights))
     np.testing.assert_allclose(found.windowed(), expected, atol=1e-12)
 
 

@@ -11,7 +11,6 @@ import xarray as xr
 from helpers import random_map, refusals
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad
 from scipy.special import erf
 
 from generate.boundary_elements.evidence import cases
@@ -127,9 +126,12 @@ class TestAnswers:
         odd = Surface([0.1, 0.8, 0.8], 1.0, [64.0, 1000.0, 64.0], 1.0, [3.0, 3.0, 9.0])
         reasons = contact(odd, mean_separation=0.5, theory="calibrated").reasons
         assert [text.split(" is ")[0] for text in reasons if "gradient" not in text] == [
-            "the Hurst exponent", "zeta_1", "h_max/h_rms"]  # fmt: skip
+            "the Hurst exponent", "the longest wavelength", "h_max/h_rms"]  # fmt: skip
         gentle = Surface(0.8, 0.01, 0.64, 1.0, 3.3)
         assert contact(gentle, area=[0.0005, 0.02, 0.98], theory="calibrated").valid.tolist() == [False, True, False]
+        broad = Surface(0.8, 0.01, 1.29, 1.0, 3.3)
+        assert not contact(broad.combined(broad), area=0.02).valid
+        assert contact(gentle.combined(gentle), area=0.02).valid
 
 
 class TestScatter:
@@ -419,37 +421,6 @@ class TestMapLaw:
 
 
 EDGES = ((0.1, 3.001), (0.1, 1e5), (1.0, 3.001), (1.0, 1e5))
-
-
-def force_by_quadrature(surface, u):
-    """F/(A0 E* g) of the law's definition: u_P by parts and `quad`, the root by bisection of its logarithm."""
-    law = self_affine_law(float(surface.hurst), float(surface.zeta_1), None)
-
-    def gap(log_force):
-        F = np.exp(log_force)
-        rest = quad(
-            lambda x: float(law.energy(np.exp(x))) * np.exp(-x), log_force, 8, epsabs=0, epsrel=1e-10, limit=500
-        )
-        return rest[0] + float(law.energy(np.exp(8.0))) * np.exp(-8.0) - float(law.energy(F)) / F
-
-    def endless(wanted):
-        low, high = -200.0, 5.0
-        for _ in range(60):
-            middle = (low + high) / 2
-            low, high = (middle, high) if gap(middle) > wanted else (low, middle)
-        return np.exp(low - law.tail * wanted**3)
-
-    force = endless(u)
-    r = endless(float(surface.h_max)) / force
-    return force * (1 - r) ** 1.5 / (1 + r)
-
-
-def test_far_gaps_of_one_surface_against_quadrature():
-    surface = Surface(0.5, 1.0, 100.0, 1.0, 12.0)
-    for u in (3.0, 6.0, 11.0):
-        found = contact(surface, mean_separation=u, theory="calibrated")
-        expected = force_by_quadrature(surface, u) * float(surface.rms_gradient)
-        assert abs(found.pressure / expected - 1) <= found.error + 1e-6
 
 
 @pytest.mark.parametrize("edge", [None, *EDGES])
