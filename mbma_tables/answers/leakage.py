@@ -234,7 +234,7 @@ def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, ar
     everywhere, found = np.ones(np.shape(area), bool), {} if own is None else dict(own[1])
     if own is None:
         many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
-        far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
+        far = f"leakage: the longest wavelength is more than {SIMULATED:g} times the shortest, beyond simulated flow"
         found = {many: area > LARGEST_AREA, far: everywhere & (np.asarray(surface.zeta_1) > SIMULATED)}
     if own is None and isinstance(surface, MeasuredSurface) and surface.bearing is not None:
         spectrum = "leakage: channels and walls of a map are not in its isotropic spectrum"
