@@ -160,7 +160,7 @@ class BoundaryElements(Theory):
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         area, left_out = answer.area, self.pressed.left_out
         coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
-        coarse += ": give a short_cutoff of so many steps"
+        coarse += f": give a short_cutoff of {MIN_POINTS:g} steps"
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         return {
             coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
