@@ -125,16 +125,6 @@ class Theory(abc.ABC):
         """Of a simulated map, the theory that knows the flow through its gaps."""
         return None
 
-    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficients xx, yy and xy [length^3], shape (3, ...), of simulated gaps, if there are any."""
-        return None
-
-    def flow_trust(
-        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
-    ) -> tuple[FloatArray, dict[str, Any]] | None:
-        """Standard deviation of ln of that flow, and reasons why it is not valid, with their masks."""
-        return None
-
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
         from scipy.integrate import tanhsinh
