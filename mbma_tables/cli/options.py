@@ -211,8 +211,6 @@ _SPECIMEN_OPTIONS = (
     _option("longest", "longest wavelength [length],"),
     _option("shortest", "or shortest wavelength [length],"),
     _option("rolloff", "wavelength from which on a power law follows a flat spectrum [length],"),
-    _option("Sds", "or summits per area [1/length^2],"),
-    _option("Spd", "the same by its newer name;"),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),
     _option("nominal_area", "or the nominal area [length^2], which determines the highest point."),
     _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
@@ -291,7 +289,7 @@ _SECTIONS = {
     "Surface": "surface file map",
     "Measured map": f"{' '.join(specimens.MAP_OPTIONS)} model",
     "Surface in numbers": "hurst q0 q1 zeta_1 h_rms h_max nominal_area m0 m2 m4",
-    "Surface by roughness parameters": "Rq Ra Sq Sa Rdq Sdq Rsm longest shortest Sds Spd Sp",
+    "Surface by roughness parameters": "Rq Ra Sq Sa Rdq Sdq Rsm longest shortest Sp",
     "Bodies": "E_star E1 nu1 E2 nu2 materials hardness conductivity length_unit stress_unit",
     "Theory": "theory variant island_model rtol",
 }

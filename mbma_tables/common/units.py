@@ -44,7 +44,7 @@ DIMENSIONS = {
             "pressures shear mean_pressure"
         ),
         (-1, 0): "q0 q1 conductance",
-        (-2, 0): "D m4 Sds Spd",
+        (-2, 0): "D m4",
         (2, 0): "m0 nominal_area island_area",
         (-1, 1): "stiffness unloading_stiffness",
         (3, 0): "leakage",

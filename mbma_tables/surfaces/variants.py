@@ -43,9 +43,7 @@ class Variant:
     # K1 of (47): 1 - 4 beta/3, or "exact", 1 - (4 beta/3)/sqrt(1 - zeta_1^(-2H)) as (46) with (27b) gives
     jacobian: Literal["printed", "exact"] = "printed"
     offset: bool = True  # whether islands are offset by h_d below z_max (35, 41)
-    summit_sigma: bool = (
-        True  # whether sigma of an island and of their heights is the summits' (32, 43a), else sqrt(m0)
-    )
+    summit_sigma: bool = True  # whether sigma of islands and of their heights is the summits' (32, 43a), or sqrt(m0)
     beta: float = 1 / 3  # share of the approach that deforms the sphere (B.6)
     phi: float = 0.05  # roughness over Hertz deformation below which roughness does not matter (28)
     floor_d: float = 1.5  # smallest zeta_d (27a)
