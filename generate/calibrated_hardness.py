@@ -52,7 +52,7 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
     if part == "area":
         return np.log(cap.area(one.force, one.elastic_area, one.eta, constants) / one.area)
     if part == "yielded":
-        return (cap.yielded_area(one.force, one.elastic_area, one.eta, constants) - one.yielded) / one.area
+        return (cap.area(one.force, one.elastic_area, one.eta, constants, True) - one.yielded) / one.area
     if part == "force":
         return np.log(cap.force(one.elastic[0], 0.0, one.shares[share], 0.0, one.eta, constants)[0] / one.force)
     if part == "stiffness":
@@ -61,7 +61,6 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
 
 
 def fitted_to(one: Capped) -> Any:
-    """Loads that constants are fitted to."""
     return (one.area > LIGHTEST) & (one.area < HEAVIEST)
 
 
@@ -85,7 +84,7 @@ def errors_of_law(one: Capped, form: str, constants: cap.Constants) -> dict[str,
         return {quantity: errors(one, quantity, constants, 1) for quantity in QUANTITIES}
     by_map = form == "calibrated_map"
     area = cap.area(one.force, one.elastic_areas[form], one.eta, constants)
-    yielded = cap.yielded_area(one.force, one.elastic_areas[form], one.eta, constants)
+    yielded = cap.area(one.force, one.elastic_areas[form], one.eta, constants, True)
     at_gap = one.map_curve.answer(one.u)[0] if by_map else one.by_law[0]
     force = cap.force(at_gap, 0.0, one.shares[0 if by_map else 1], 0.0, one.eta, constants)[0]
     return {
@@ -128,7 +127,6 @@ def told(seen: Sequence[Capped], name: str, constants: Callable[[Capped], cap.Co
 
 
 def between(contact: Any) -> Any:
-    """Loads whose errors are summed up."""
     return (contact > LIGHTEST) & (contact < EDGES[-1])
 
 
@@ -247,7 +245,6 @@ def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
 
 
 def dataset(scatter: Scatter, accuracy: FloatArray) -> xr.Dataset:
-    """Variables of the library's file."""
     of_accuracy = "statistics of ln(law/simulation), of the difference for the yielded share"
     of_scatter = (
         "root mean square of ln(law/simulation) on the training set, by constants from other spectra; of the theory "
@@ -267,7 +264,6 @@ def dataset(scatter: Scatter, accuracy: FloatArray) -> xr.Dataset:
 
 
 def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[cap.Constants, xr.Dataset]:
-    """Fit, test, and write the group of the library's file."""
     found = capped(evidence)
     plain = [one for one in found if one.kind in GAUSSIAN]
     training = [one for one in plain if one.split == TRAINING]

@@ -79,7 +79,6 @@ def held_out(count: int = ISLANDS) -> tuple[dict[str, FloatArray], FloatArray]:
 
 
 def island_error(phi_F: FloatArray, phi_A: FloatArray, truth: FloatArray) -> float:
-    """Largest relative error of both."""
     return float(np.abs(np.stack([phi_F, phi_A]) / truth - 1).max())
 
 
@@ -171,7 +170,6 @@ def gap_rows() -> Iterator[Row]:
 
 
 def law_rows() -> Iterator[Row]:
-    """Making laws, and evaluating them."""
 
     def make(island_model: str, rtol: float, surfaces: Sequence[Surface] = SURFACES) -> list[Any]:
         return [contact_law(surface, rtol=rtol, island_model=island_model) for surface in surfaces]
@@ -215,7 +213,6 @@ def theory_rows() -> Iterator[Row]:
 
 
 def first_use_rows() -> Iterator[Row]:
-    """First use in a new process."""
     seconds = measure(lambda: None)[1]
     for island_model in ISLAND_MODELS:
         command = [sys.executable, "-c", FIRST_USE.format(island_model)]

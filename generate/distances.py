@@ -150,7 +150,6 @@ def measured(name: str, path: pathlib.Path = FILE) -> Case:
 
 
 def data_sets() -> dict[str, DataSet]:
-    """All data sets, by name."""
 
     def chosen(kinds: Sequence[str], splits: Sequence[str], low: int = MIN_WAVES, high: int = 99) -> list[Case]:
         return [one for one in evidence() if one.kind in kinds and one.split in splits and low <= one.waves <= high]

@@ -1,4 +1,4 @@
-"""The law of leakage: its constants from the training set, its errors on held-out surfaces, its table."""
+"""The law of leakage and others: constants from the training set, errors on held-out surfaces, the table."""
 
 import dataclasses
 import functools
@@ -13,21 +13,23 @@ import xarray as xr
 from scipy.interpolate import RegularGridInterpolator
 
 from generate import files
-from generate.boundary_elements.evidence import TheoryCurve
+from generate.boundary_elements.evidence import Simulated, TheoryCurve, simulated
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.calibrated_file import FOLDS, by_bin, coordinates, fitted, made_by, rms, variable, within, write_part
-from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 from mbma_tables.laws import effective_medium as leakage
-from mbma_tables.laws.calibrated import Constants, Spectrum
+from mbma_tables.laws.calibrated import Constants, Law, Spectrum, force_at_area, light_factor
 from mbma_tables.laws.effective_medium import FlowConstants
+from mbma_tables.theories import get_theory
 from mbma_tables.theories.calibrated_table import load
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Persson
+from mbma_tables.theories.yielding import Yielding
 
+MIN_WAVES = 4  # longest waves a side: below, the cell's own scatter rules
 EDGES = (0.004, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)  # contact fractions between which errors are told
 NOISE = (0.1, 6.0)  # errors of ln k that count as one: a + b (A/A0)^2, about what cells of one spectrum differ by
 COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_odds": (-14.0, 5.5)}
@@ -48,10 +50,114 @@ LONG_NAMES = {
 }
 MODULES = (
     *("mbma_tables.laws.calibrated", "mbma_tables.laws.effective_medium"),
-    *("generate.calibrated_file", "generate.leakage_flow", "generate.leakage_law"),
+    *("generate.calibrated_file", "generate.leakage_law"),
 )
 PROCESSES = 2
 TABLE = files.ROOT / "tables" / "calibrated.nc"
+
+
+def log_odds(area: FloatArray, threshold: float) -> FloatArray:
+    """The table's axis of contact, ln A/(Ac - A)."""
+    return np.asarray(np.log(area / (threshold - area)))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Case(Simulated):
+    """One surface, and the flow through it: `log_k` of the geometric mean of both axes, where neither is blocked."""
+
+    force: FloatArray
+    area: FloatArray
+    u: FloatArray
+    log_k: FloatArray
+    blocked: FloatArray
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether constants are fitted to surfaces like it."""
+        return self.kind not in ("stretched", "yielded") and self.waves >= MIN_WAVES
+
+    @property
+    def plain(self) -> bool:
+        """Whether its errors are those that are stated."""
+        return self.isotropic and self.zeta_1 < LARGE
+
+    def law(self, constants: Constants) -> tuple[FloatArray, FloatArray]:
+        """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and a hardness, the last of `node`."""
+        if self.kind == "yielded":
+            gradient = self.spectrum.gradient
+            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), self)
+            return curve.area(self.force), curve.separation(self.force)
+        law = Law(self.spectrum, self.h_max, constants)
+        return law.area(self.force), law.separation(self.force)
+
+
+def cases(data: xr.Dataset) -> list[Case]:
+    """Surfaces of a file by `python -m generate boundary_elements --of leakage`."""
+    found = []
+    for one, fields in simulated(data):
+        known = np.isfinite(one.force.values)
+        force, area, u, flow = (one[n].values[known] for n in ("force", "area", "mean_separation", "flow"))
+        blocked = (flow == 0).mean(axis=1)
+        kept = blocked == 0
+        loads = {"force": force[kept], "area": area[kept], "u": u[kept], "log_k": np.log(flow[kept]).mean(axis=1)}
+        found.append(Case(**vars(fields), **loads, blocked=np.stack([area, blocked])))
+    return found
+
+
+class Flow:
+    """Laws of flow on one surface, each as ln k at the surface's loads; -inf where blocked."""
+
+    def __init__(self, one: Case, constants: Constants) -> None:
+        self.one = one
+        self.area, self.u = one.law(constants)
+        # gaps of contacts that yield are taken for those of elastic ones of equal area
+        at_area = force_at_area(self.area, light_factor(one.spectrum.alpha, constants), constants)
+        load = at_area if one.kind == "yielded" else one.force
+        self._gaps = leakage.gaps(one.spectrum, load, constants)
+
+    @functools.cache  # noqa: B019 - there are as many surfaces as the file has
+    def log_factor(self, flow: FlowConstants) -> FloatArray:
+        """ln R at the loads."""
+        return leakage.log_factor(self._gaps, flow)
+
+    def medium(self, flow: FlowConstants, area: FloatArray | None = None, u: FloatArray | None = None) -> FloatArray:
+        """The law; of another area and mean gap than the calibrated law's where given."""
+        factor, gap = self.log_factor(flow), self.u if u is None else u
+        if area is not None:
+            # by interpolation between the loads
+            kept = self._gaps.area < flow.threshold - leakage.NEAREST
+            odds = log_odds(self._gaps.area[kept], flow.threshold)
+            inside = np.minimum(area, flow.threshold * (1 - 1e-9))
+            found = np.interp(log_odds(inside, flow.threshold), odds, factor[kept])
+            factor = np.where(area < flow.threshold, found, -np.inf)
+        return np.asarray(factor + 3 * np.log(gap) + np.log(leakage.wide_gap(gap)))
+
+    def closed_form(self, flow: FlowConstants) -> FloatArray:
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.log(flow.closed_form(self.u, self.area)))
+
+    def critical_junction(self, flow: FlowConstants) -> FloatArray:
+        """Persson and Yang (2008): the cube of the gap u1 at the magnification at which contact percolates."""
+        share = self._gaps.share
+        cover = self.area[:, None] + np.cumsum(share[:, ::-1], axis=1)[:, ::-1]
+        found = np.full(self.area.shape, -np.inf)
+        for k, row in enumerate(cover):
+            held = share[k] > 0
+            if self.area[k] < flow.threshold:
+                gap = np.interp(flow.threshold, row[held][::-1], self._gaps.mean[k][held][::-1])
+                found[k] = 3 * np.log(max(gap, 1e-300))
+        return found
+
+    def bruggeman(self, flow: FlowConstants, n: float) -> FloatArray:
+        """Bruggeman's medium of n dimensions on the same gaps: sum w (h^3 - k)/(h^3 + (n - 1) k) = A/(n - 1)."""
+        share, log_cube = self._gaps.quadrature
+        # with K = (n - 1) k: h^3 - k = (1 + 1/(n-1)) (h^3 - K)/2 + ..., so the same balance at another right side
+        total = share.sum(axis=1)
+        ratio = 1 / (n - 1)
+        blocked = (2 * ratio * self._gaps.area - (1 - ratio) * total) / (1 + ratio)
+        with np.errstate(invalid="ignore"):
+            found = leakage.effective_medium(share, log_cube, blocked) + np.log(ratio)
+        return np.where(self._gaps.area < 1 - 1 / n, found, -np.inf)
 
 
 def fit(training: Sequence[Flow], first: FlowConstants = DEFAULT) -> FlowConstants:
@@ -88,14 +194,15 @@ LAWS: dict[str, Callable[[Flow, FlowConstants], FloatArray]] = {
     "Bruggeman, n = 1/(1 - 0.42)": lambda flow, c: flow.bruggeman(c, 1 / (1 - 0.42)),
     "Bruggeman, n = 2": lambda flow, c: flow.bruggeman(c, 2.0),
     "critical junction": Flow.critical_junction,
-    "Patir and Cheng": Flow.patir_cheng,
-    "parallel plates": Flow.parallel_plates,
+    # 1978, isotropic
+    "Patir and Cheng": lambda flow, _: 3 * np.log(flow.u) + np.log(1 - 0.9 * np.exp(-0.56 * flow.u)),
+    "parallel plates": lambda flow, _: 3 * np.log(flow.u),
 }
 SETS: dict[str, Callable[[Case], bool]] = {
-    "training": lambda one: one.isotropic and one.split == TRAINING and one.zeta_1 < LARGE,
-    "held-out surfaces": lambda one: one.isotropic and one.split == HELD_OUT_SURFACE and one.zeta_1 < LARGE,
-    "held-out spectra": lambda one: one.isotropic and one.split == HELD_OUT_SPECTRUM and one.zeta_1 < LARGE,
-    "held out": lambda one: one.isotropic and one.split != TRAINING and one.zeta_1 < LARGE,
+    "training": lambda one: one.plain and one.split == TRAINING,
+    "held-out surfaces": lambda one: one.plain and one.split == HELD_OUT_SURFACE,
+    "held-out spectra": lambda one: one.plain and one.split == HELD_OUT_SPECTRUM,
+    "held out": lambda one: one.plain and one.split != TRAINING,
     "plateaus": lambda one: one.kind == "plateau",
     "stretched": lambda one: one.kind == "stretched",
     "yielded": lambda one: one.kind == "yielded",
@@ -131,18 +238,15 @@ def noise_floor(found: Sequence[Case], edges: Sequence[float] = EDGES) -> FloatA
 
 def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, FloatArray]:
     """Errors by area and mean gap of other theories on self-affine surfaces; nothing was fitted to these."""
-    told = {}
+    told, seen = {}, [flow for flow in flows if flow.one.kind == "self_affine" and flow.one.isotropic]
     for theory in (Mbma(outside="nan"), Persson(), GreenwoodWilliamson()):
         parts = []
-        for flow in flows:
-            one = flow.one
-            if one.kind != "self_affine" or not one.isotropic:
-                continue
-            curve = TheoryCurve(theory, one)
-            kept = np.isfinite(curve.separation(one.force))
-            area, u = curve.area(one.force[kept]), curve.separation(one.force[kept])
-            log_k = np.full(one.force.shape, -np.inf)
-            log_k[kept] = flow.medium(constants, area, u)
+        for flow in seen:
+            curve = TheoryCurve(theory, flow.one)
+            area, u = curve.area(flow.one.force), curve.separation(flow.one.force)
+            kept = np.isfinite(u)
+            log_k = np.full(u.shape, -np.inf)
+            log_k[kept] = flow.medium(constants, area[kept], u[kept])
             parts.append(errors(flow, log_k))
         told[theory.name] = summary(parts)
     return told
@@ -185,7 +289,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
         },
         coordinates(nodes, LONG_NAMES, COVERED, edges, (edges[1:] + edges[:-1]) / 2),
     )
-    simulated, beyond = certificate(values, constants, contact)
+    below, beyond = certificate(values, constants, contact)
     data.attrs = {
         "title": "Flow coefficient of gaps: contact factor of an effective medium, and its errors against simulation",
         "source": "mbma_tables.laws.effective_medium, its constants fitted to a training set of simulated flow",
@@ -196,7 +300,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
         "statistics": " ".join(STATISTICS),
         **{f"flow_{name}": value for name, value in dataclasses.asdict(constants).items()},
         **{f"law_{name}": value for name, value in dataclasses.asdict(contact).items()},
-        "largest_error_simulated": simulated,
+        "largest_error_simulated": below,
         "largest_error_log_factor": beyond,
         "coverage": np.array(coverage(flows, constants, stated["calibrated"])),
         **made_by(MODULES),

@@ -102,7 +102,6 @@ def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
 
 
 def panels(rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any) -> tuple[Any, Any]:
-    """A figure and its axes."""
     figure = new_figure(*size)
     return figure, figure.subplots(rows, columns, **options)
 

@@ -24,7 +24,6 @@ SMOOTH_RADII = (10.0, 20.0, 35.0, 60.0)  # of Hertz's contact at the loads
 
 
 def heights(hurst: float, longest: float, h_rms: float, seed: int) -> FloatArray:
-    """A periodic map of mean zero."""
     z = rough(np.random.default_rng(seed), POINTS, longest, SHORTEST, hurst)
     return np.asarray((z - z.mean()) * (h_rms / z.std()))
 

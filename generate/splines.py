@@ -20,7 +20,6 @@ def padding(degree: int) -> int:
 
 @functools.lru_cache(maxsize=32)
 def _factors(nodes: int, degree: int) -> tuple[FloatArray, FloatArray]:
-    """LU factors of the conditions of one axis."""
     import scipy.linalg
     import scipy.special
 

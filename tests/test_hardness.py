@@ -42,16 +42,6 @@ def test_areas_are_those_of_a_diffusion_between_walls():
         assert hardness.diffused(x, tau, sign) == pytest.approx(exact[:, column], rel=rel, abs=1e-250)
 
 
-@pytest.mark.parametrize("u", [1e-250, 1e-10, 1e-3, 0.1, 0.39, 1.0, 3.0, 5.0, 8.2, 20.0])
-def test_bearing_share_of_gaussian_heights(u):
-    with mpmath.workdps(30):
-        level = mpmath.findroot(
-            lambda d: mpmath.log(d * mpmath.ncdf(d) + mpmath.npdf(d)) - mpmath.log(u),
-            -float(mpmath.sqrt(-2 * mpmath.log(u))) if u < 0.4 else u,
-        )
-        assert hardness.bearing_share(u)[0] == pytest.approx(float(mpmath.ncdf(-level)), rel=1e-12)
-
-
 def test_levels_of_mean_gaps():
     u = np.append(10 ** np.random.default_rng(2).uniform(-290, 1, 40), [3.8e-4, np.nextafter(3.8e-4, 0), 3.0, 8.3])
     u = np.append(u, np.geomspace(1e-6, 8, 60))

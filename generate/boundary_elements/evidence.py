@@ -45,7 +45,6 @@ class Simulated:
 
     @property
     def zeta_1(self) -> float:
-        """q1/q0."""
         return float(self.node[2])
 
     @property
@@ -98,15 +97,12 @@ class TheoryCurve:
         return np.asarray(PchipInterpolator(self._log_force, values, extrapolate=False)(np.log(force)))
 
     def area(self, force: FloatArray) -> FloatArray:
-        """A/A0 at a force."""
         return np.exp(self._at(self._log_area, force))
 
     def separation(self, force: FloatArray) -> FloatArray:
-        """Mean separation at a force."""
         return self._at(self._u, force)
 
     def force(self, u: FloatArray) -> FloatArray:
-        """Force at mean separations."""
         if not hasattr(self._theory, "answer"):
             known = PchipInterpolator(self._u[::-1], self._log_force[::-1], extrapolate=False)
             return np.asarray(np.exp(known(u)))
@@ -125,15 +121,12 @@ class Case(Simulated):
     u: FloatArray
 
     def at(self, kept: Any) -> Self:
-        """The same at some of its loads."""
         return dataclasses.replace(self, force=self.force[kept], area=self.area[kept], u=self.u[kept])
 
     def law(self, constants: Constants) -> Law:
-        """The spectrum's law with h_max."""
         return Law(self.spectrum, self.h_max, constants)
 
     def map_law(self, constants: Constants, map_constants: MapConstants) -> MapLaw:
-        """The map's law."""
         return MapLaw(self.own_spectrum, **self.curves, constants=constants, map_constants=map_constants)
 
 

@@ -122,7 +122,6 @@ def of_contacts(kind: str, columns: Iterable[Any]) -> xr.Dataset:
 
 
 def surfaces(data: xr.Dataset) -> list[xr.Dataset]:
-    """Every surface of a group."""
     return [data.isel(surface=number) for number in range(data.sizes["surface"])]
 
 

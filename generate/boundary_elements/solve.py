@@ -79,7 +79,6 @@ def prepared(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> tup
 
 
 def simulate(recipe: Recipe) -> dict[str, Any]:
-    """All that is kept of one random surface."""
     return pressed(heights(recipe), recipe.sizes, recipe.q0)
 
 

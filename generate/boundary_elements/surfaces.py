@@ -47,13 +47,11 @@ class Recipe:
 
     @property
     def name(self) -> str:
-        """Name of the surface's file."""
         shape = f"_{self.shape:g}" if self.shape else ""
         return f"{self.kind}{shape}_H{self.hurst:g}_z{self.zeta_1:g}_w{self.waves}_s{self.seed}_n{self.points}"
 
     @property
     def sizes(self) -> tuple[float, float]:
-        """Sides of the periodic cell: the short one is 1."""
         return (self.shape, 1.0) if self.kind == "stretched" else (1.0, 1.0)
 
     @property
@@ -80,7 +78,6 @@ def _half_plane(low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _field(kx: np.ndarray, ky: np.ndarray, amplitude: FloatArray, seed: int, points: int) -> FloatArray:
-    """Sum of cosines with these amplitudes and random phases."""
     if 2 * max(np.abs(kx).max(), ky.max()) >= points:
         raise ValueError(f"{points} points a side are too few for {ky.max()} waves")
     phases = 2 * np.pi * np.random.default_rng(seed).random(len(kx))

@@ -35,7 +35,6 @@ class Contact:
 
     @property
     def traction(self) -> FloatArray:
-        """Pressures of the last load over E*."""
         return np.asarray(self.model.traction)
 
     def press(self, force: float) -> dict[str, float]:

@@ -14,8 +14,7 @@ from generate.boundary_elements.surfaces import REFINEMENT, SPLITS, TRAINING
 from generate.calibrated_file import binned
 from generate.calibrated_hardness import BARS, blind
 from generate.files import dataset
-from generate.leakage_flow import Flow, cases
-from generate.leakage_law import EDGES, LARGE, errors, noise_floor, summary
+from generate.leakage_law import EDGES, LARGE, Flow, cases, errors, noise_floor, summary
 from generate.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact, materials
 from mbma_tables.answers.leakage_table import GROUP, shipped_flow

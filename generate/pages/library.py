@@ -5,9 +5,11 @@ import collections
 import dataclasses
 import itertools
 import math
+import re
 from typing import Any
 
 import numpy as np
+import sympy
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LogNorm
 from scipy.special import erf
@@ -16,7 +18,7 @@ from benchmarks.import_circles import import_graph
 from generate.boundary_elements.evidence import MIN_WAVES
 from generate.boundary_elements.surfaces import TRAINING
 from generate.files import ROOT, evidence
-from generate.formulas.printing import HEADER, latex_steps, read_functions
+from generate.formulas import HEADER, Function, read_functions
 from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
@@ -44,6 +46,15 @@ ROWS = {
     ("boundary elements", "256 x 256, cold"): "for comparison: BEM on 256 x 256 points",
 }
 PRESSURES = (1e-4, 1e-3, 1e-2)  # over E*
+LATEX = {
+    "hurst": "H",
+    "phi_F": r"\Phi_F",
+    "phi_A": r"\Phi_A",
+    "log_total": r"\ln T",
+    "d_over_h_rms": r"\tilde d",
+    "h_max_over_h_rms": r"\tilde h",
+    **{name: rf"\mathrm{{{name}}}" for name in ("near", "far", "pressure", "area")},
+}
 
 
 def rooms() -> tuple[dict[str, set[str]], dict[str, str]]:
@@ -86,7 +97,6 @@ def architecture() -> Measured:
 
 
 def tables() -> Measured:
-    """Sizes, errors and axes of the shipped tables."""
     contents, sizes, axes = {kind: read_table(shipped(kind), kind) for kind in KINDS}, [], []
     for (kind, content), f in itertools.product(contents.items(), "FA"):
         names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
@@ -146,8 +156,28 @@ def pocket_errors() -> list[list[Any]]:
     return [[what, *np.quantile(np.concatenate(e), (0.5, 0.9, 1.0)), len(seen)] for what, e in found.items()]
 
 
+def expressions(function: Function) -> dict[str, sympy.Expr]:
+    """The steps of a closed form as sympy expressions, their whole numbers and fractions exact."""
+    known: dict[str, Any] = {name: sympy.Symbol(name) for name in (*function.arguments, *function.steps)}
+    known |= {"pow": sympy.Pow, "where": lambda condition, a, b: sympy.Piecewise((a, condition), (b, True))}
+    exact = ((name, text.replace(repr(math.pi), "pi")) for name, text in function.steps.items())
+    return {name: sympy.sympify(re.sub(r"\b(\d+)\.0\b", r"\1", text), locals=known) for name, text in exact}
+
+
+def latex_steps(function: Function) -> list[str]:
+    """One equation a step, in the order in which they are evaluated; polynomials without Horner's brackets."""
+    _, is_island, letter = function.result.partition("phi_")
+    own = {"log_Q": rf"\ln Q_{letter}", "rigid": f"R_{letter}"} | {name: f"{name}_{{{letter}}}" for name in "pytzuv"}
+    names = {sympy.Symbol(name): text for name, text in (LATEX | (own if is_island else {})).items()}
+    style = {"symbol_names": names, "ln_notation": True, "fold_frac_powers": True}
+    lines = []
+    for name, value in expressions(function).items():
+        shown = value.expand() if len(value.free_symbols) == 1 and value.is_polynomial() else value
+        lines.append(f"{sympy.latex(sympy.Symbol(name), **style)} = {sympy.latex(shown, **style)}")
+    return lines
+
+
 def formula() -> Measured:
-    """Certificates, ranges and equations of the closed forms."""
     rows = []
     for form, result in ((form, result) for form, results in CERTIFICATES.items() for result in results):
         found = CERTIFICATES[form][result]

@@ -1,6 +1,5 @@
 """docs/gallery.md, measured maps from file to contact, and docs/maps.md, theories on maps beside boundary elements."""
 
-import dataclasses
 import os
 import pathlib
 from collections.abc import Iterator
@@ -48,30 +47,24 @@ EXTRAPOLATION = (
 Seen = tuple[str, MeasuredSurface, FloatArray]
 
 
-@dataclasses.dataclass(frozen=True)
-class Example:
-    """A measurement and its options on the command line."""
-
-    name: str
-    options: dict[str, Any]
-
-    def path(self) -> pathlib.Path | None:
-        """The file, in the repository or in the folder that MBMA_REFERENCE_MAPS names; None if in neither."""
-        places = [ROOT / FOLDER, *([pathlib.Path(os.environ[VARIABLE])] if VARIABLE in os.environ else [])]
-        return next((place / self.name for place in places if (place / self.name).is_file()), None)
-
-
-EXAMPLES = (
-    Example("top-1.top", {"short_cutoff": "9.4nm"}),
-    Example("frt-2.frt", {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"}),
-    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}),
-)
+# files and their options on the command line
+EXAMPLES: dict[str, dict[str, Any]] = {
+    "top-1.top": {"short_cutoff": "9.4nm"},
+    "frt-2.frt": {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"},
+    "dektak-1.csv": {"outliers": 10, "long_cutoff": "100um"},
+}
 # too large to be shipped; their boundary elements are
-BARS = (
-    Example("al3d-1.al3d", {"short_cutoff": f"{4 * 4.38027e-07 * (1 - 1e-9)}m"}),
-    # whose light contacts are solved on a finer grid too
-    Example("di-1.di", {"short_cutoff": f"{4 * 500 / 512 * (1 - 1e-9)}nm"}),
-)
+BARS: dict[str, dict[str, Any]] = {
+    "al3d-1.al3d": {"short_cutoff": f"{4 * 4.38027e-07 * (1 - 1e-9)}m"},
+    "di-1.di": {"short_cutoff": f"{4 * 500 / 512 * (1 - 1e-9)}nm"},
+}
+FINER = "di-1.di"  # whose light contacts are solved on a finer grid too
+
+
+def path_of(name: str) -> pathlib.Path | None:
+    """The file, in the repository or in the folder that MBMA_REFERENCE_MAPS names; None if in neither."""
+    places = [ROOT / FOLDER, *([pathlib.Path(os.environ[VARIABLE])] if VARIABLE in os.environ else [])]
+    return next((place / name for place in places if (place / name).is_file()), None)
 
 
 def read_rows() -> dict[str, FloatArray]:
@@ -93,22 +86,22 @@ def refined(treated: Treated, surface: MeasuredSurface) -> FloatArray:
 def gallery() -> Measured:
     """What `mbma fit` prints of each example, and its picture with boundary elements, solved where none are known."""
     rows, parts, files = read_rows(), {}, dict[str, Any]()
-    for example, fine in (*((one, False) for one in (*EXAMPLES, *BARS)), (BARS[1], True)):
-        name, path = f"{example.name} refined" if fine else example.name, example.path()
+    for name, label in (*((name, name) for name in EXAMPLES | BARS), (FINER, f"{FINER} refined")):
+        path, options = path_of(name), (EXAMPLES | BARS)[name]
         if path is None:
             continue
-        treated, surface = measured(path, example.options)
-        if name not in rows and treated.heights.ndim == 2:
-            rows[name] = refined(treated, surface) if fine else BoundaryElements.of(surface).rows
+        treated, surface = measured(path, options)
+        if label not in rows and treated.heights.ndim == 2:
+            rows[label] = BoundaryElements.of(surface).rows if label == name else refined(treated, surface)
             frames = [pd.DataFrame(own.T, columns=COLUMNS).assign(map=of) for of, own in sorted(rows.items())]
             # at once: what comes after may be stopped
             write_file(ROOT / ROWS, to_csv(HEAD, pd.concat(frames)[["map", *COLUMNS]], "%.9g"))
-        if example in EXAMPLES:
+        if name in EXAMPLES:
             found = dict(zip(["pressure", *COLUMNS[1:]], rows[name], strict=True)) if name in rows else None
             picture = draw(treated, surface, curves(surface), name, "pressure  F/(A0 E*)", found)
             files[f"docs/figures/gallery_{path.stem}.svg"] = picture
-            options = " ".join(f"--{key.replace('_', '-')} {value}" for key, value in example.options.items())
-            parts[path.stem.replace("-", "_")] = printed(f"mbma fit {FOLDER}/{name} {options}")
+            shown = " ".join(f"--{key.replace('_', '-')} {value}" for key, value in options.items())
+            parts[path.stem.replace("-", "_")] = printed(f"mbma fit {FOLDER}/{name} {shown}")
     return parts, files
 
 
@@ -171,12 +164,14 @@ def summary(seen: list[Seen]) -> list[Any]:
 
 
 def measure() -> Measured:
-    """Blocks of the page; no other files."""
     groups, known = dict[str, list[Seen]](), read_rows()
-    maps = [(one.name, one.path(), one.options) for one in (*EXAMPLES, *BARS) if one.name in known]
-    files = [(f"measured: {n}", measured(path, own)[1], known[n][:3]) for n, path, own in maps if path is not None]
-    for one in (*simulated(), *files):
+    for one in simulated():
         groups.setdefault(one[0], []).append(one)
+    for name, options in (EXAMPLES | BARS).items():
+        path = path_of(name)
+        if name in known and path is not None:
+            label = f"measured: {name}"
+            groups[label] = [(label, measured(path, options)[1], known[name][:3])]
     rows = []
     for name, seen in groups.items():
         stretch, kurtosis, skewness = (

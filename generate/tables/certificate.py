@@ -23,8 +23,6 @@ class UncertifiedError(MbmaError):
 
 
 class Kind:
-    """What both kinds of tables share."""
-
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
         # accuracy of the islands that the table is made of: far below its target
@@ -69,13 +67,11 @@ class Kind:
         return result
 
     def require(self, rules: dict[str, Any]) -> None:
-        """Raise UncertifiedError for the first rule that is broken."""
         for rule, kept in rules.items():
             if not kept:
                 raise UncertifiedError(f"{self.configuration.kind}: the table breaks: {rule}")
 
     def check(self, content: TableContent) -> None:
-        """Raise UncertifiedError where a table breaks a physical rule."""
         raise NotImplementedError
 
     def checked(self, content: TableContent) -> TableContent:

@@ -55,7 +55,6 @@ class Configuration:
         return {"target": self.target, "configuration": text, "configuration_sha256": self.digest()}
 
     def axis(self, name: str) -> Axis:
-        """An axis over its range."""
         own = self.axes[name]
         return Axis(name, TEXTS["axes"][name], dict(AXES[self.kind])[name], own.offset, own.low, own.high, own.nodes)  # type: ignore[arg-type]
 

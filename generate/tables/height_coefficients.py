@@ -100,7 +100,6 @@ def row_text(row: list[mpmath.mpf]) -> str:
 
 
 def main() -> None:
-    """Write the coefficients."""
     with mpmath.workdps(DIGITS):
         halves = [scaled_pieces(3) + lower_pieces(3), scaled_pieces(5) + lower_pieces(1)]
         orders = [[[row_text(row) for row in rows] for rows in both] for both in (halves, map(scaled_pieces, (2, 4)))]

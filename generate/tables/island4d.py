@@ -56,17 +56,13 @@ def error_cells(axis: Axis, largest: int = 32) -> int:
 
 
 class Island4d(Kind):
-    """The four-parameter table of a configuration."""
-
     @property
     def variant(self) -> Variant:
-        """The interpretation of the paper that its arguments follow."""
         return get_variant(self.configuration.variant)
 
     # the spline's factors are rounded differently on another number of BLAS threads
     @threadpool_limits.wrap(limits=BLAS_THREADS)
     def build(self, solver: ChunkedSolver) -> TableContent:
-        """Make a table that meets its target, or raise UncertifiedError."""
         own = self.configuration
         axes = tuple(own.axis(name) for name in own.axes)
         grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
@@ -163,7 +159,6 @@ class Island4d(Kind):
         return found
 
     def attributes(self) -> dict[str, Any]:
-        """Attributes of the file."""
         sigma = f"sqrt((1 - {BROADENING}/alpha) m0)" if self.variant.summit_sigma else "sqrt(m0)"
         axes, (places, _) = self.configuration.axes, self._visited(COVER_TRIALS)
         # by trial; smaller spreads are covered too

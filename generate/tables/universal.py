@@ -67,7 +67,6 @@ class Strip:
     rtol: float
 
     def is_narrow(self) -> bool:
-        """Whether polynomials of X alone meet the aim."""
         mu = np.minimum(LINES, self.mu_high)
         series = FIT @ values(X_at(NODES, self.low, self.high), mu, self.rtol)
         exact = values(X_at(TESTS, self.low, self.high), mu, self.rtol)
@@ -122,8 +121,6 @@ def cells_of(low: float, high: float, mu_high: float, aim: float, rtol: float) -
 
 
 class Universal(Kind):
-    """The universal table of a configuration."""
-
     def strips(self) -> list[Strip]:
         """Ranges of X, each as wide as polynomials allow."""
         X, mu_high, aim = (
@@ -151,7 +148,6 @@ class Universal(Kind):
         return strips
 
     def build(self, solver: ChunkedSolver) -> TableContent:
-        """Make a table that meets its target, or raise UncertifiedError."""
         own = self.configuration
         rows = np.concatenate(solver.map("cells", cells_of, [dataclasses.astuple(strip) for strip in self.strips()]))
         if len(rows) * TERMS**2 > own.max_nodes:

@@ -31,7 +31,6 @@ def about(kind: str, **numbers: Any) -> dict[str, str]:
 
 
 def label(text: str) -> dict[str, Any]:
-    """Attributes of a variable without a unit."""
     return {"long_name": text, "units": "1"}
 
 
@@ -68,7 +67,6 @@ def _fill(dataset: netCDF4.Dataset, content: schema.TableContent) -> None:
 
 
 def write_table(path: os.PathLike[str] | str, content: schema.TableContent) -> pathlib.Path:
-    """Write a table file, whole or not at all."""
     target = pathlib.Path(path)
     check_content(content)
     digest = digest_arrays(content.arrays())

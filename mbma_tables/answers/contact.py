@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.derivatives import at_fixed, differentiate
 from mbma_tables.answers.result import Contact
 from mbma_tables.answers.source import Source, named
 from mbma_tables.common.arguments import (
@@ -100,8 +99,8 @@ def contact(
     outside : {"raise", "exact", "nan"}
         For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
     derivatives : bool
-        Whether to compute `pressure_by`, `area_by` and `separation_by`: for MBMA from differentiated sums, for other
-        theories by numerical differentiation, to 1e-6; not with a hardness, where `sensitivity` has relative ones.
+        Whether to compute `pressure_by`, `area_by` and `separation_by` of MBMA, without a hardness, from differentiated
+        sums; `sensitivity` has relative ones of any theory.
     workers : int
         Number of threads for MBMA's batches of surfaces and gaps; results are identical for any number.
 
@@ -129,22 +128,11 @@ def contact(
     >>> joint = contact(surface, pressure=10.0, E_star=100e3)
     >>> f"{joint.mean_separation:.3f} um, {joint.stiffness:.1f} MPa/um"
     '1.942 um, 38.5 MPa/um'
-    >>> f"{contact(surface, pressure=10.0, E_star=100e3, theory='persson').area:.3%}"
-    '0.295%'
-    >>> joint = contact(surface, pressure=10.0, E_star=100e3, theory="calibrated", hardness=1500.0)
-    >>> f"psi = {joint.psi:.1f}, {joint.yielded:.0%} of {joint.area:.3%} yields"
-    'psi = 3.6, 87% of 0.701% yields'
-    >>> joint = contact(
-    ...     Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um"),
-    ...     pressure="10 MPa",
-    ...     theory="calibrated",
-    ...     materials=("steel 4140 hard", "aluminium 6061 hard"),
-    ... )
+    >>> face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
+    >>> metals = ("steel 4140 hard", "aluminium 6061 hard")
+    >>> joint = contact(face, pressure="10 MPa", theory="calibrated", materials=metals)
     >>> f"{joint.area:.2%}, {joint.yielded:.0%} of it yields; {joint.conductance():.2g} W/(m^2 K)"
     '1.05%, 100% of it yields; 1.1e+05 W/(m^2 K)'
-    >>> joint = contact(Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa")
-    >>> f"{joint.mean_separation:.3e} {joint.units['separation']}, {joint.stiffness:.1f} {joint.units['stiffness']}"
-    '1.642e-03 mm, 471.9 MPa/mm'
     """
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     pair = None
@@ -160,8 +148,8 @@ def contact(
     # what is no number is refused where it is checked
     known = np.asarray(hardness) if isinstance(hardness, float | np.ndarray) else None
     yields = stated and (known is None or known.dtype.kind != "f" or not known.size or bool((known != np.inf).any()))
-    if yields and derivatives:
-        raise InputError("derivatives are of elastic contacts: with a hardness sensitivity() has relative ones")
+    if derivatives and (yields or not isinstance(chosen, Mbma)):
+        raise InputError("derivatives are of theory 'mbma' without a hardness; sensitivity() has relative ones of any")
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
     make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
     return make(surface, value, E_star, hardness, by, source, derivatives)
@@ -216,8 +204,7 @@ def _contact(
     if derivatives and held:
         require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
-        totals = theory.totals(surface, places["separation"], E_star, derivatives)
-        fields = totals._asdict() | places
+        fields = theory.totals(surface, places["separation"], E_star, derivatives)._asdict() | places
     else:
         u = np.asarray(places["mean_separation"])
         loaded = theory.loaded(surface, u, lighter) if source.yields else None
@@ -225,14 +212,23 @@ def _contact(
         source = dataclasses.replace(source, answer=found, loaded=loaded)
         fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "islands": None} | places
         fields["error"] = spread(found.error, np.shape(found.pressure))[()]
-        if derivatives:
-            pressure_by, area_by = differentiate(theory, surface, u)
-            fields |= {"pressure_by": {name: (E_star * slope)[()] for name, slope in pressure_by.items()}}
-            fields |= {"area_by": {name: slope[()] for name, slope in area_by.items()}}
     if derivatives and held:
-        slopes = {"pressure": fields["pressure_by"], "area": fields["area_by"]}
-        fields |= at_fixed(held, by, slopes, fields["pressure"] / E_star)
+        fields |= _at_fixed(by, fields, fields["pressure"] / E_star)
     return _made(source, fields)
+
+
+def _at_fixed(held: str, fields: dict[str, Any], by_modulus: Any) -> dict[str, Any]:
+    """Derivatives at fixed pressure or area: of the separation, and of the other quantity."""
+    other = "area" if held == "pressure" else "pressure"
+    own, others = fields[f"{held}_by"], fields[f"{other}_by"]
+    steep, follows = own["separation"], others["separation"]
+    names = [name for name in own if name != "separation"]
+    gap = {held: 1 / steep} | {name: -own[name] / steep for name in names}
+    free = {held: follows / steep} | {name: others[name] + follows * gap[name] for name in names}
+    if held == "pressure":
+        gap["E_star"] = -by_modulus / steep
+        free["E_star"] = follows * gap["E_star"]
+    return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
 
 
 def _made(source: Source, fields: dict[str, Any]) -> Contact:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from mbma_tables.common.units import Units, unit_of
 from mbma_tables.laws.boundary_elements import Contact as Simulation
 from mbma_tables.laws.pressing import TOLERANCE
 from mbma_tables.theories.own_map import map_of, sides
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -54,7 +51,7 @@ class ContactMap(Displayed):
             "heights": Variable(self.heights, length, "height above the mean", ("x", "y")),
         }
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         figure = new_figure(10, 4.2)
         length, stress = self.units.length or "length", unit_of("pressure", self.units)
         sides = [count * step for count, step in zip(self.pressure.shape, self.steps, strict=True)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,9 +25,6 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.treatment import mirrored
 from mbma_tables.theories.own_map import map_of
 from mbma_tables.theories.protocol import Theory
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 RANGE = (0.2, 50.0)  # u/h_rms
 # simulated: A/A0 of the lightest contact, knots of curves in contact and before it, the first gap before it over the
@@ -70,7 +67,7 @@ class FlowFactors(Displayed):
         more = {n: Variable(v, self.units[n], "flow coefficient phi u^3", self._dims) for n, v in flows.items()}
         return {**super()._variables(), **more}
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         order = np.argsort(self.mean_separation)
         at = {name: np.asarray(values[order], float) for name, (values, *_) in self._variables().items()}
         panels: dict[str, list[tuple[str, FloatArray, FloatArray | None]]] = {

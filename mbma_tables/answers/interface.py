@@ -99,7 +99,7 @@ class Tangential:
         return array
 
     def _known(self) -> tuple[Any, ...]:
-        """The normal law and f kappa, tangential over normal displacement."""
+        """The normal law, and f kappa."""
         if isinstance(self._normal, str):
             raise InputError(self._normal)
         if self.friction is None:
@@ -248,12 +248,12 @@ class Interface:
         def at(function: Any) -> Any:
             return lambda u: source.map(function, dataclasses.replace(self, mean_separation=u), 1)[0]
 
-        def inverse(pressure: Any) -> Any:
-            find = lambda theory, s, u, E, p: (theory.mean_separation_at(s, "pressure", p / E),)  # noqa: E731
-            return source.map(find, self, 1, {"pressure": pressure})[0]
+        def find(theory: Any, s: Any, u: Any, E: Any, p: Any) -> tuple[Any]:
+            return (theory.mean_separation_at(s, "pressure", p / E),)
 
         normal = at(lambda theory, s, u, E: (E * theory.answer(s, u).pressure,))
         energy = at(lambda theory, s, u, E: (E * theory.energy(s, u),))
+        inverse = lambda p: source.map(find, self, 1, {"pressure": p})[0]  # noqa: E731
         return Tangential(
             ratio, friction, self.pressure,
             self.mean_separation, self.unloading_stiffness / ratio, last, source.units,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.answers.leakage_table import flow_of_spectrum, shipped_flow
-from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
+from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, positive_array, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
@@ -22,11 +22,6 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-LARGEST_KNUDSEN = 0.1  # largest ratio of mean free path to channel for which first-order slip holds
-SLIP = 6.0  # in a plane channel slip multiplies the flow by 1 + 6 Kn
 # standard deviations of ln k of maps by their isotropic spectrum, which come on top, of maps that are valid for the
 # calibrated law and of others; at these contacts of the data set's group machined
 MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
@@ -72,7 +67,7 @@ class Leakage(Displayed):
     def _origin(self) -> Any:
         return self._contact._origin()
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         return draw_compression(
             [self._contact.curve(leakage=True)],
             pressure_label=pressure_label(self._contact.units["pressure"]),
@@ -108,20 +103,19 @@ class Leakage(Displayed):
         NaN where not known, and where blocked.
         """
 
-        def stated(by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> FloatArray:
-            own = _simulated(by).flow_trust(surface, u, area)
-            if own is not None:
-                return own[0]
+        @np.errstate(divide="ignore")
+        def stated(by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> tuple[FloatArray]:
+            simulated = _simulated(by)
+            if simulated is not None:
+                return (simulated.flow_trust(surface, u, area)[0],)
             stated = shipped_flow().standard_deviation(by.elastic.name, area)
             if not isinstance(surface, MeasuredSurface) or surface.bearing is None:
-                return stated
+                return (stated,)
             # channels and walls of a map are not in its spectrum
             of_maps = LIKE_GAUSSIAN if not surface.departures(by_map=True) else OTHERS
-            with np.errstate(divide="ignore"):
-                return np.hypot(stated, np.interp(np.log(area), np.log(MAP_AREAS), of_maps))
+            return (np.hypot(stated, np.interp(np.log(area), np.log(MAP_AREAS), of_maps)),)
 
-        area = {"area": self._contact.area}
-        return self._contact._source.map(lambda *given: (stated(*given),), self._contact, 1, area)[0]
+        return self._contact._source.map(stated, self._contact, 1, {"area": self._contact.area})[0]
 
     @functools.cached_property
     def valid(self) -> Any:
@@ -142,7 +136,7 @@ class Leakage(Displayed):
         return {"K": unit_of("leakage", units), "hydraulic_aperture": unit_of("separation", units)}
 
     def liquid(self, viscosity: ArrayLike | str, pressure_drop: ArrayLike | str, width: ArrayLike | str) -> Any:
-        """Volume that leaks per time and length of seal [length^2/time].
+        """Volume that leaks per time and length of seal [length^2/time], K (p1 - p2)/(12 viscosity width).
 
         Parameters
         ----------
@@ -165,41 +159,8 @@ class Leakage(Displayed):
         eta, drop, length = self._numbers(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
         return self.K * (drop / (12 * eta * length))
 
-    def gas(
-        self,
-        viscosity: ArrayLike | str,
-        pressure_in: ArrayLike | str,
-        pressure_out: ArrayLike | str,
-        width: ArrayLike | str,
-        mean_free_path: ArrayLike | str,
-    ) -> Any:
-        """Volume of an ideal gas at the outlet's pressure that leaks per time and length of seal [length^2/time].
-
-        Isothermal: mass flow goes as p1^2 - p2^2. Slip of the first order adds the share 6 Kn, with Kn the mean free
-        path over k^(1/3) h_rms, the gap of parallel plates with the same flow.
-
-        Parameters
-        ----------
-        viscosity, width : array_like or str
-            As for `liquid`.
-        pressure_in, pressure_out : array_like or str
-            Absolute pressures [stress], pressure_in the larger.
-        mean_free_path : array_like or str
-            At the mean pressure (p1 + p2)/2 [length]: about 68 nm bar over it for air at 20 C. 0 leaves slip out; an
-            error where Kn is above 0.1, in transition flow.
-        """
-        given = {"viscosity": viscosity, "pressure_in": pressure_in, "pressure_out": pressure_out, "width": width}
-        eta, high, low, length, path = self._numbers(**given, mean_free_path=mean_free_path)
-        larger = "at least pressure_out: both are absolute pressures"
-        require("pressure_in", np.asarray(high + 0 * low), np.asarray(high >= low), larger)
-        channel = self.hydraulic_aperture
-        knudsen = path / np.maximum(channel, np.finfo(float).tiny) * (channel > 0)
-        limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, first-order slip does not apply"
-        require("mean_free_path", np.asarray(path + 0 * knudsen), np.asarray(knudsen <= LARGEST_KNUDSEN), limit)
-        return self.K * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
-
     def _numbers(self, **given: Any) -> list[FloatArray]:
-        """Positive numbers in the units of surface and modulus; a mean free path may be 0."""
+        """Positive numbers in the units of surface and modulus."""
         found: dict[str, Any] = {}
         for name, value in given.items():
             if name == "viscosity" and isinstance(value, str):
@@ -207,8 +168,7 @@ class Leakage(Displayed):
                 if seconds != "s" or not stress:
                     raise InputError(f"viscosity = {given[name]!r} must be a stress times seconds, such as '1e-3 Pa s'")
             number = self._contact._source.units.number(name, value)
-            array, free = finite_array(name, number), name == "mean_free_path"
-            require(name, array, array >= 0 if free else array > 0, "at least 0" if free else "positive")
+            array = positive_array(name, number)
             found[name] = number if is_labelled(number) else array
         agree(K=self.K, **found)
         return list(found.values())
@@ -218,19 +178,20 @@ def leakage_of(contact: Any) -> Leakage:
     """The leakage of a contact."""
 
     def answer(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
-        own, volume = _simulated(theory).flow(surface, u), np.asarray(surface.h_rms) ** 3
-        if own is not None:
+        simulated = _simulated(theory)
+        if simulated is not None:
+            own = simulated.flow(surface, u)
             return np.sqrt(own[0]) * np.sqrt(own[1]), *own
-        K = flow(surface, u, share) * volume
+        K = flow(surface, u, share) * np.asarray(surface.h_rms) ** 3
         return K, K, K, np.zeros_like(K)
 
     K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact.area})
     return Leakage(K, x, y, xy, contact)
 
 
-def _simulated(theory: Theory) -> Theory:
-    """What the flow is of: of yielded gaps where these are simulated, else of the elastic contact's."""
-    return theory if type(theory).flow_trust is not Theory.flow_trust else theory.elastic
+def _simulated(theory: Theory) -> Any:
+    """The theory of simulated gaps, yielded ones where these are simulated, else the elastic contact's, if any."""
+    return next((one for one in (theory, theory.elastic) if hasattr(one, "flow_trust")), None)
 
 
 def degrees(direction: ArrayLike | str) -> FloatArray:
@@ -270,18 +231,18 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
 
 def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
     """Reasons why the flow is not valid, in addition to those for the contact."""
-    own = _simulated(theory).flow_trust(surface, u, area)
-    large = np.broadcast_to(np.asarray(surface.zeta_1) > SIMULATED, np.shape(area))
-    many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
-    far = f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow"
-    found = {many: area > LARGEST_AREA, far: large} if own is None else dict(own[1])
-    if own is None and isinstance(surface, MeasuredSurface) and surface.bearing is not None:
-        of_map = (
-            "leakage: channels and walls of a map are not in its isotropic spectrum: theory='simulated' has its flow"
-        )
-        found[of_map] = np.ones(np.shape(area), bool)
-    if _simulated(theory) is not theory:
-        found["leakage: yielded contacts leak several times more"] = np.ones(np.shape(area), bool)
+    simulated, everywhere = _simulated(theory), np.ones(np.shape(area), bool)
+    if simulated is not None:
+        found = dict(simulated.flow_trust(surface, u, area)[1])
+    else:
+        many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
+        far = f"leakage: the longest wavelength is more than {SIMULATED:g} times the shortest, beyond simulated flow"
+        found = {many: area > LARGEST_AREA, far: everywhere & (np.asarray(surface.zeta_1) > SIMULATED)}
+    if simulated is None and isinstance(surface, MeasuredSurface) and surface.bearing is not None:
+        spectrum = "leakage: channels and walls of a map are not in its isotropic spectrum"
+        found[f"{spectrum}: theory='simulated' has its flow"] = everywhere
+    if theory.elastic is not theory is not simulated:
+        found["leakage: yielded contacts leak several times more"] = everywhere
     if isinstance(theory.elastic, Mbma):
-        found["leakage: the mean separation of 'mbma' is wrong by factors"] = np.ones(np.shape(area), bool)
+        found["leakage: the mean separation of 'mbma' is wrong by factors"] = everywhere
     return found

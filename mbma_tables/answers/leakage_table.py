@@ -70,9 +70,9 @@ def shipped_flow() -> FlowTable:
 @np.errstate(all="ignore")
 def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
     """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
-    numbers, cells = given[1:3]
+    numbers, found = given[1], np.empty(u.shape)
     threshold, obstruction, first = numbers[10], numbers[11], numbers[2]
-    last, found = first + cells[2] / numbers[5], np.empty(u.shape)
+    last = first + given[2][2] / numbers[5]
 
     def fill(k: slice) -> None:
         # contact fractions of Greenwood and Williamson exceed 1

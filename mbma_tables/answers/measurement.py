@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +15,6 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.numerical import answer_where_finite
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 DRAWN = ("calibrated", "mbma")
 AREAS = np.array([0.002, 0.01, 0.03, 0.1, 0.3, 0.6])  # contact of a table of loads
@@ -88,7 +84,7 @@ def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str,
 def draw(
     treated: Treated, surface: MeasuredSurface, answers: Mapping[str, Any], title: str, pressure_label: str,
     simulated: Mapping[str, FloatArray] | None = None,
-) -> Figure:  # fmt: skip
+) -> Any:  # fmt: skip
     """One picture: heights, spectrum with fit and cut-offs, heights' distribution, area and separation by pressure.
 
     `answers` are those of `curves`; `simulated` has force, area and mean_separation of boundary elements, as points.
@@ -111,7 +107,7 @@ def draw(
     return figure
 
 
-def _heights(figure: Any, axes: Axes, treated: Treated, unit: str) -> None:
+def _heights(figure: Any, axes: Any, treated: Treated, unit: str) -> None:
     values = treated.heights
     sides = [count * step for count, step in zip(values.shape, treated.steps, strict=True)]
     axes.set(xlabel=f"x [{unit}]", ylabel=f"{'height' if values.ndim == 1 else 'y'} [{unit}]")
@@ -124,7 +120,7 @@ def _heights(figure: Any, axes: Axes, treated: Treated, unit: str) -> None:
     figure.colorbar(shown, ax=axes, label=f"height [{unit}]", shrink=0.8)
 
 
-def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
+def _spectrum(axes: Any, surface: MeasuredSurface, unit: str) -> None:
     axes.loglog(surface.q, np.where(surface.C > 0, surface.C, np.nan), ".-", ms=3, lw=1, label="measured")
     try:
         nearest = surface.fit()
@@ -143,7 +139,7 @@ def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
     axes.legend()
 
 
-def _distribution(axes: Axes, surface: MeasuredSurface) -> None:
+def _distribution(axes: Any, surface: MeasuredSurface) -> None:
     from mbma_tables.surfaces.heights import SHARES
 
     # density of heights from their quantiles, smoothed over a few
@@ -157,7 +153,7 @@ def _distribution(axes: Axes, surface: MeasuredSurface) -> None:
     axes.legend()
 
 
-def _by_pressure(axes: Axes, answers: Mapping[str, Any], simulated: Any, what: str, scatter: str) -> None:
+def _by_pressure(axes: Any, answers: Mapping[str, Any], simulated: Any, what: str, scatter: str) -> None:
     for name, found in answers.items():
         pressure, value, width = found["pressure"], found[what], found[scatter]
         # MBMA's sum of island areas may exceed 1

@@ -20,8 +20,6 @@ from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.theories.protocol import TheoryAnswer
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from mbma_tables.answers.contact_map import ContactMap
     from mbma_tables.answers.leakage import Leakage
 
@@ -84,6 +82,7 @@ class Contact(Interface, Displayed):
         if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
+        facts |= {name: shown(values, unit) for name, (values, unit) in self._stiffness().items()}
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
         if source.yields:
             more |= {"psi": self.psi, "yielded": self.yielded}
@@ -98,6 +97,15 @@ class Contact(Interface, Displayed):
             facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}
 
+    def _stiffness(self) -> dict[str, tuple[Any, str]]:
+        """Stiffnesses, and the conductance of named materials, with their units."""
+        found = {"stiffness": (self.stiffness, self.units["stiffness"])}
+        if self._source.yields:
+            found["unloading_stiffness"] = self.unloading_stiffness, self.units["unloading_stiffness"]
+        if self._source.materials is not None:
+            found["conductance"] = self.conductance(), "W/(m^2 K)"
+        return found
+
     def _variables(self) -> dict[str, Variable]:
         source = self._source
         known = {n: getattr(self, n) for n in MEANINGS if n not in (("energy",) if source.yields else OF_HARDNESS)}
@@ -107,10 +115,15 @@ class Contact(Interface, Displayed):
         source = self._source
         return {"E_star": shown(source.E_star, unit_of("pressure", source.units)), "surface": repr(source.surface)}
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         source, unit = self._source, self.units["pressure"]
         title = f"hardness {shown(source.hardness, unit)}" if source.yields else ""
-        return draw_compression([self.curve()], title, pressure_label(unit))
+        order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
+        more: dict[str, dict[str, Any]] = {}
+        for name, (values, of_values) in self._stiffness().items():
+            label = f"{name.rpartition('_')[2]} [{of_values}]"
+            more.setdefault(label, {})[name.replace("_", " ")] = np.ravel(values)[order]
+        return draw_compression([self.curve()], title, pressure_label(unit), more=more)
 
     def curve(self, leakage: bool = False) -> Curve:
         """A line of pictures, of one surface at several separations; optionally with its leakage."""

@@ -84,13 +84,9 @@ class Source:
         return kind(self.theory, checked_hardness(hardness) / E_star)
 
     def map(
-        self,
-        function: Callable[..., tuple[Any, ...]],
-        contact: Any,  # which has the mean separations
-        outputs: int,
-        more: Mapping[str, Any] | None = None,
+        self, function: Callable[..., tuple[Any, ...]], contact: Any, outputs: int, more: Any = None
     ) -> tuple[Numbers, ...]:
-        """``function(theory, surface, u, E_star, *more)`` of the contact's entries."""
+        """``function(theory, surface, u, E_star, *more)``, a tuple, of the contact's entries."""
         arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, "hardness": self.hardness}
         arrays |= more or {}
 
@@ -149,10 +145,10 @@ def _beyond_metals(
     elastic = np.isinf(getattr(theory, "hardness", np.inf)) & (answer.pressure > 0)
     if pair is None:
         text = (
-            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, the hardness of the "
-            "hardest metal of materials.METALS: give hardness= of the softer body, or infinity where it does not yield"
+            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, that of the hardest metal"
         )
-        return {text: elastic & (mean > HARDEST * unit)}
+        mend = "give hardness= of the softer body, or infinity where it does not yield"
+        return {f"{text} in materials.METALS: {mend}": elastic & (mean > HARDEST * unit)}
     soft, hard = pair.softer.hardness
     needed = f"'{soft:g} GPa'" if soft == hard else f" of its temper, '{soft:g} GPa' to '{hard:g} GPa'"
     yields = E_star * np.asarray(surface.rms_gradient) > ELASTIC_PSI * soft * unit

@@ -9,6 +9,7 @@ import dataclasses
 import io
 import re
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -99,11 +100,13 @@ def draw_compression(
     pressure_label: str = PRESSURE_LABEL,
     gap_label: str = GAP_LABEL,
     leakage_label: str = LEAKAGE_LABEL,
+    more: Mapping[str, Mapping[str, FloatArray]] = MappingProxyType({}),
 ) -> Figure:
     """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
 
-    A third one, flow coefficient against pressure, where a curve has leakage. Points without contact, and blocked flow,
-    have no place on a logarithmic axis and are left out.
+    A third one, flow coefficient against pressure, where a curve has leakage, and one for each label of `more`, with
+    lines by name over the first curve's pressure. Points without contact, and blocked flow, have no place on a
+    logarithmic axis and are left out.
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
@@ -112,8 +115,9 @@ def draw_compression(
         ("pressure", "area", "area_scatter", pressure_label, "real contact area  A/A0"),
         ("pressure", "leakage", "leakage_scatter", pressure_label, leakage_label),
     ][: 2 + any(curve.leakage is not None for curve in curves)]
-    figure = new_figure(5 * len(panels), 4.5)
-    for axes, (x_name, y_name, scatter, x_label, y_label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
+    figure = new_figure(5 * (len(panels) + len(more)), 4.5)
+    own, others = np.split(figure.subplots(1, len(panels) + len(more)), [len(panels)])
+    for axes, (x_name, y_name, scatter, x_label, y_label) in zip(own, panels, strict=True):
         for curve in curves:
             touches = (curve.pressure > 0) & (curve.area > 0)
             if not touches.any():
@@ -124,8 +128,14 @@ def draw_compression(
                 axes.plot(x, y, marker="." if curve is curves[0] else "", label=curve.label)
                 _band(axes, x, y, getattr(curve, scatter))
         axes.set(xlabel=x_label, ylabel=y_label, xscale="linear" if x_name == "gap" else "log", yscale="log")
+    for axes, (label, lines) in zip(others, more.items(), strict=True):
+        for name, values in lines.items():
+            axes.loglog(curves[0].pressure, values, marker=".", label=name)
+        axes.set(xlabel=pressure_label, ylabel=label)
+    for axes in figure.axes:
         axes.grid(True, which="major", alpha=0.3)
-    figure.axes[0].legend()
+    for axes in (figure.axes[0], *others):
+        axes.legend()
     figure.suptitle(title)
     return figure
 

@@ -114,17 +114,11 @@ class Floors(NamedTuple):
     slope_d: float  # sqrt(T(q_d)) over delta
     slope_u: float
 
-    @property
-    def kinks(self) -> tuple[float, float]:
-        """delta at which q_d and q_u reach their floors [length]."""
-        return self.root_d / self.slope_d, self.root_u / self.slope_u
-
 
 def s_over_h_rms(surface: MeasuredSurface) -> float:
     """(1 - zeta_1^(-2H))^(-1/2) of a self-affine spectrum, 1 of any other."""
-    if surface.hurst is None:
-        return 1.0
-    return float(1 / np.sqrt(-np.expm1(-2 * surface.hurst * np.log(surface.zeta_1))))
+    hurst = surface.hurst
+    return 1.0 if hurst is None else float(1 / np.sqrt(-np.expm1(-2 * hurst * np.log(surface.zeta_1))))
 
 
 def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:

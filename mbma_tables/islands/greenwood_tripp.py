@@ -1,10 +1,8 @@
 """The island problem of Greenwood and Tripp (1967): a rough elastic sphere on a plane (Eqs. 34, 36, 37, 40).
 
-Heights are in units of the summits' standard deviation sigma, radii in units of L = sqrt(2 R_d sigma):
+With heights over the summits' standard deviation sigma and radii over L = sqrt(2 R_d sigma),
 
     d(rho) = rho^2 - X + w(rho),   p = (mu/2) F_{3/2}(d),   w = (4/pi) integral t/(t + rho) p K(k) dt
-
-so that every island of every surface is one point of two functions Phi_F(X, mu) and Phi_A(X, mu).
 """
 
 from __future__ import annotations
@@ -125,8 +123,6 @@ def solve(X: ArrayLike, mu: ArrayLike, rtol: float = 1e-10, nodes: int | None = 
 
     Raises
     ------
-    InputError
-        NaN, infinite, masked or empty input, a negative `mu`, an `rtol` outside [1e-13, 0.1].
     ConvergenceError
         Where the accuracy was not reached: at entries of its `mask`; its `result` holds the others.
 

@@ -17,8 +17,6 @@ from mbma_tables.common.plots import Curve, draw_compression, pressure_label, th
 from mbma_tables.common.units import unit_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from mbma_tables.law.leakage import LeakageLaw
 
 LIGHT, HEAVY = 1e-2, 0.99  # overclosures of the default ends of a continued law, over that of the law's last
@@ -185,11 +183,11 @@ class Derived:
             raise InputError("leakage needs the surface, which this law does not contain")
         return leakage_law(self, self.surface)
 
-    def _figure(self: Any) -> Figure:
+    def _figure(self: Any) -> Any:
         held = self._variables()
-        unit = self.units.length or "length"
-        curve = Curve(
-            theory_label(self.theory), *(held[name].values for name in ("mean_separation", "pressure", "area"))
+        lines = (held[name].values for name in ("mean_separation", "pressure", "area"))
+        label, gap = (
+            pressure_label(unit_of("pressure", self.units)),
+            f"mean separation u [{self.units.length or 'length'}]",
         )
-        label = pressure_label(unit_of("pressure", self.units))
-        return draw_compression([curve], pressure_label=label, gap_label=f"mean separation u [{unit}]")
+        return draw_compression([Curve(theory_label(self.theory), *lines)], pressure_label=label, gap_label=gap)

@@ -74,12 +74,8 @@ class LeakageLaw:
 def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -> LeakageLaw:
     """Leakage of a contact law's surface, as polynomials of the gap that begin where contact blocks it.
 
-    Of a simulated map in a `direction`, in degrees from x, or the geometric mean of both axes.
-
-    Raises
-    ------
-    InputError
-        For a simulated map that is blocked in this direction at the lightest load.
+    Of a simulated map in a `direction`, in degrees from x, or the geometric mean of both axes; InputError where it is
+    blocked at the lightest load.
     """
     h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
     top = min(law.h_max, law.highest) if law.block.view(np.int64)[at.ENDS] else law.highest
@@ -125,7 +121,7 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
     block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[at.LOWEST], top))
     block.view(np.int64)[at.ENDS] = blocked
     block.flags.writeable = False
-    error = float(errors[:, 0].max()) + _between_nodes(pieces, values)
+    error = float(errors[:, 0].max()) + _between_nodes(pieces.records, values)
     if law.gaps is not None:
         # bodies apart: the h_rms of the wide gap that continues it
         missed = 1 - float(values(np.array(1.0))[0]) / ((law.h_max + top) / 2) ** 3
@@ -147,10 +143,9 @@ def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
     return bottom, tuple(turn for turn in {max(ends), first} if turn > bottom)
 
 
-def _between_nodes(pieces: fit.Pieces, values: fit.Values) -> float:
+def _between_nodes(records: FloatArray, values: fit.Values) -> float:
     """Relative error midway between the nodes of the fit, because kinks of the flow may not affect its coefficients."""
     t = np.cos(np.pi * np.arange(fit.SAMPLES + 1) / fit.SAMPLES)
-    records = pieces.records
     x = np.minimum(records[:, at.CENTRE, None] + t / records[:, at.RATE, None], 1.0)
     found = np.polynomial.polynomial.polyval(t, records[:, at.FORCE_AT : at.AREA_AT].T)
     return float(np.abs(found / values(x.ravel())[0].reshape(x.shape) - 1).max())

@@ -203,7 +203,11 @@ def _finish(
         sys.float_info.max if highest == math.inf else highest * (1 + ROUNDING),
     )
     block, records, errors = fit.assemble(h_max, scale, sides, pieces, first, ends)
-    order, signs = fit.order_of(sides, pieces)
+    # records after the first in order of falling d, and the sign of d of each
+    counts = [len(piece.records) for piece in pieces]
+    signs, order = np.repeat([float(side.sign) for side in sides], counts), np.arange(1, len(records))
+    if sides[-1].sign > 0:
+        order[-counts[-1] :] = order[-counts[-1] :][::-1].copy()
     fit.fill_energies(records, order, signs, scale, first[2][0], beyond)
     turns = [None if x is None else s * (x / scale - h_max) for x, s in fit.first_falls(records[order], signs)]
     # forces carry the modulus

@@ -185,16 +185,6 @@ def straight_record(values: Values, start: float) -> First:
     return record, np.array([value.max(), (value * powers + 2 * missed).max()]), powers
 
 
-def order_of(sides: list[Side], pieces: list[Pieces]) -> tuple[Any, FloatArray]:
-    """Numbers of the records after the first in order of falling d, and the sign s of each."""
-    counts = [len(piece.records) for piece in pieces]
-    signs = np.repeat([float(side.sign) for side in sides], counts)
-    order = np.arange(1, signs.size + 1)
-    if sides[-1].sign > 0:
-        order[-counts[-1] :] = order[-counts[-1] :][::-1].copy()
-    return order, signs
-
-
 def assemble(
     h_max: float, scale: float, sides: list[Side], pieces: list[Pieces], first: First, ends: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,9 +24,6 @@ from mbma_tables.laws.calibrated import Spectrum, spectrum_of
 from mbma_tables.materials import Metal, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SHAPES = ("sphere", "cylinder")
 JOHNSON = 2 / math.e  # reference over R: approaches are Johnson's (5.57) in Hertz's contact
@@ -103,7 +100,7 @@ class RoughContact(Displayed):
         known = super()._variables()
         return {n: v._replace(dims=("load", "place")[1 - loads :][: np.ndim(v.values)]) for n, v in known.items()}
 
-    def _figure(self) -> Figure:
+    def _figure(self) -> Any:
         figure, units = new_figure(10, 4), self.units
         profile, curve = figure.subplots(1, 2)
         rows = [np.reshape(part, (-1, POINTS)) for part in (self.position, self.pressure)]

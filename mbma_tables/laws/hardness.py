@@ -51,18 +51,14 @@ class Constants:
 CONSTANTS = Constants()
 
 
-def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only if that is."""
-    given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
-    return answered(_area, given, 1, c.area_power, c.area_scale, False)[0] * np.maximum(elastic_area, 1.0)
-
-
-def yielded_area(
-    force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
+def area(
+    force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS, yielded: bool = False
 ) -> FloatArray:
-    """Yielded part of A/A0, from the same numbers."""
+    """A/A0, or its yielded part, at F/(A0 E* g), at most eta, from the elastic A/A0 there; above 1 only if that is."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
-    return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
+    if yielded:
+        return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
+    return answered(_area, given, 1, c.area_power, c.area_scale, False)[0] * np.maximum(elastic_area, 1.0)
 
 
 @np.errstate(all="ignore")

@@ -33,24 +33,18 @@ QUANTITIES = ("area", "mean_separation", "energy")
 YIELDING = (*QUANTITIES, "plane_separation", "area_yielded", "frozen_stiffness", "pressure_weighted_height")
 
 
-def resampled(values: FloatArray, shape: tuple[int, ...], mirrored: bool = False) -> FloatArray:
-    """A map, periodic or continued by its mirror images, on another number of points, by its waves."""
-    from scipy.signal import resample
-
-    if mirrored:
-        return composed(waves(values, True), shape, True)
-    for axis, count in enumerate(shape):
-        values = resample(values, count, axis=axis)
-    return np.asarray(values)
-
-
 def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> FloatArray:
     """A map on half as many points along each axis, by its waves of at least `points` of the new sampling steps."""
+    from scipy.signal import resample
+
     if points:
         q = wavenumbers(values.shape, values.shape, mirrored)
         kept = np.where(q <= np.pi / points * (1 + ROUNDING), waves(values, mirrored), 0)
         values = composed(kept, values.shape, mirrored)
-    return resampled(values, tuple(count // 2 for count in values.shape), mirrored)
+    half = tuple(count // 2 for count in values.shape)
+    if mirrored:
+        return composed(waves(values, True), half, True)
+    return np.asarray(resample(resample(values, half[0]), half[1], axis=1))
 
 
 class Press:

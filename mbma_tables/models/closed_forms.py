@@ -97,11 +97,6 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     ClosedTotals
         Force and area in the broadcast shape.
 
-    Raises
-    ------
-    InputError, OutOfRangeError
-        For surfaces and separations outside the range of the form, and for less contact than it describes.
-
     Examples
     --------
     >>> pressure, area, error = closed_totals(Surface(0.8, 1.0, 200.0, 1.0, 3.0), [-2.0, 0.0])

@@ -83,10 +83,6 @@ class Island4dModel:
             Hurst exponent.
         outside : {"raise", "exact", "nan"}
             For islands that the table does not cover: an error, the exact solver, or NaN.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
         """
         check_outside(outside)
         named = {"delta_over_h_rms": delta_over_h_rms, "zeta_d": zeta_d, "zeta_u": zeta_u, "hurst": hurst}

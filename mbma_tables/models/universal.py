@@ -96,10 +96,6 @@ class UniversalModel(Ranged):
             The arguments of Phi; they broadcast.
         outside : {"raise", "exact", "nan"}
             Where X or mu is not covered: an error, the exact solver, or NaN.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
         """
         return self._answered(X, mu, outside, lambda flat_X, flat_mu: self._filled(flat_X, flat_mu, False).T)
 

@@ -153,7 +153,6 @@ class Calibrated(Theory):
         return TheoryAnswer(pressure, area, stiffness, _error(stated, 2.0, x / (np.asarray(surface.h_max) / h_rms)))
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Results for self-affine surfaces by the table."""
         if isinstance(surface, MeasuredSurface):
             return super().curve(surface, quantity)
         batch = _bound(cast(Surface, surface), np.empty(0))
@@ -189,7 +188,6 @@ class Calibrated(Theory):
         return np.asarray(np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max))
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
-        """A/A0 at a force over A0 E*, in closed form except for a map."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).area(np.asarray(pressure, float))
         return law_area(
@@ -202,8 +200,9 @@ class Calibrated(Theory):
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons why results lie outside the range tested against boundary elements."""
         area, (low, high) = answer.area, TESTED_AREA
+        broad = f"the longest wavelength is more than {TESTED_ZETA_1:g} times the shortest"
+        reasons: dict[str, Any]
         if isinstance(surface, MeasuredSurface):
             law = _own_law(surface)
             straight = None if law.curve is None else law.curve.straight(np.asarray(mean_separation) / law.h_rms)
@@ -211,13 +210,14 @@ class Calibrated(Theory):
                 "the light-load and near-full-contact approximations disagree for this map: stiffness is constant "
                 "over a range of forces"
             )
-            reasons = {} if straight is None else {text: straight & (area >= low)}
+            reasons = {broad: surface.q1 / surface.longest > TESTED_ZETA_1 * (1 + 1e-9)}
+            reasons |= {} if straight is None else {text: straight & (area >= low)}
         else:
             assert isinstance(surface, Surface)
             heights, (least, most) = np.asarray(surface.h_max / surface.h_rms), TESTED_HEIGHTS
             reasons = {
                 f"the Hurst exponent is below {TESTED_HURST:g}": surface.hurst < TESTED_HURST * (1 - 1e-9),
-                f"zeta_1 is above {TESTED_ZETA_1:g}": surface.zeta_1 > TESTED_ZETA_1 * (1 + 1e-9),
+                broad: surface.zeta_1 > TESTED_ZETA_1 * (1 + 1e-9),
                 f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < least) | (heights > most),
             }
         reasons[f"A/A0 is below {low:g}"] = (area > 0) & (area < low * (1 - 1e-9))
@@ -225,7 +225,6 @@ class Calibrated(Theory):
         return {text: np.broadcast_to(mask, area.shape) for text, mask in reasons.items()}
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """Reasons why a measured surface is unlike those tested against boundary elements."""
         return surface.departures(by_map=self.scatter_name(surface) != self.name)
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:

@@ -34,7 +34,6 @@ class GreenwoodWilliamson(Theory):
     ends_at_h_max = False
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force, area and stiffness at mean separations u [length]."""
         density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
         x = (2 * np.asarray(mean_separation) - np.asarray(surface.h_max)) / sigma
         strength = density * np.sqrt(radius * sigma)
@@ -49,6 +48,5 @@ class GreenwoodWilliamson(Theory):
         return np.zeros_like(high), high
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons why results lie outside the theory's assumptions."""
         dense = {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}
         return {**super().reasons(surface, answer, mean_separation), **dense}

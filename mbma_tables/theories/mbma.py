@@ -88,7 +88,6 @@ class Mbma(Theory):
         return TheoryAnswer(found.pressure, found.area, stiffness, found.error)
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Force or area, and the slope of force."""
         h_max, which = np.asarray(surface.h_max), QUANTITIES.index(quantity)
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
@@ -130,7 +129,6 @@ class Mbma(Theory):
         return self.name if name == "reported" else f"{self.name}_{name}"
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons where the paper's assumptions fail."""
         return {
             f"areas of islands are added without overlap, but A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
             & (self.variant.addition == "sum"),

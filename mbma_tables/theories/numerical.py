@@ -80,6 +80,8 @@ def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: Fl
 class Wrapped(Theory):
     """A user's theory, its stiffness by numerical differentiation."""
 
+    looks = FEW_LOOKS  # each may take long
+
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """None: its author is responsible."""
         return ()
@@ -101,12 +103,7 @@ class Wrapped(Theory):
         slope, _ = differences(force_at, step, np.zeros(u.size), np.zeros((1, u.size)))
         return TheoryAnswer(pressure, area, -slope[0].reshape(u.shape), np.full(u.shape, np.nan))
 
-    def looks(self, surface: AnySurface) -> int:
-        """Few, since each evaluation may take long."""
-        return FEW_LOOKS
-
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Force or area alone."""
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
             found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)

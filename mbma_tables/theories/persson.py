@@ -160,7 +160,6 @@ class Persson(Theory):
         return area(pressure / np.asarray(surface.rms_gradient), 1.0, YANG_PERSSON)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Elastic energy over A0 E* [length]."""
         gradient = np.asarray(surface.rms_gradient)
         load = self.answer(surface, mean_separation).pressure / gradient
         return np.asarray(self._by_law(surface, load, self._energies)[0] * gradient * surface.h_rms)

@@ -67,7 +67,6 @@ class Plastic(BoundaryElements):
         return TheoryAnswer(*(np.where(beyond, one, other) for one, other in zip(heavy, inside, strict=True)))
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Mean separation [length] at a pressure over E* or an area."""
         row = 0 if quantity == "pressure" else 1
         end = self.rows[row, -1]
         u, missed = super().inverted(surface, quantity, np.minimum(wanted, end))
@@ -139,25 +138,20 @@ class Saturated(Yielding):
         return u, np.zeros(u.shape, bool)
 
     def curve(self, surface: AnySurface, quantity: str) -> Any:
-        """As of any theory."""
         return Theory.curve(self, surface, quantity)
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
-        """From full compression to first contact."""
         return self.elastic.interval(surface, quantity)
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separations [length] of the first and the last load."""
         return np.asarray(self._simulation(float(self.hardness)).bends(surface))
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Flow coefficients xx, yy and xy [length^3] through the gaps of the yielded contact."""
         return np.asarray(self._each(lambda own, u: own.flow(surface, u), mean_separation))
 
     def flow_trust(
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
     ) -> tuple[FloatArray, dict[str, Any]]:
-        """As of the elastic contact."""
         names: list[str] = []
 
         def ask(own: Any, u: FloatArray, share: FloatArray) -> Any:

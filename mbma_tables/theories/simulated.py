@@ -142,7 +142,6 @@ class BoundaryElements(Theory):
         return TheoryAnswer(np.exp(x), self.fit.area(x), self.fit.stiffness(x), np.full(np.shape(x), EVALUATED))
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Mean separation [length] at a pressure over E* or an area."""
         if quantity == "area":
             require(quantity, wanted, wanted < 1, "less than 1")
         with np.errstate(divide="ignore"):
@@ -152,7 +151,6 @@ class BoundaryElements(Theory):
         return u, np.zeros(np.shape(wanted), bool)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Elastic energy over A0 E* [length]."""
         return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
 
     def heights(self, surface: AnySurface) -> Any:
@@ -160,10 +158,9 @@ class BoundaryElements(Theory):
         return Calibrated().heights(surface)
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Reasons: grids that are too coarse, and contact areas that were not tested."""
         area, left_out = answer.area, self.pressed.left_out
         coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
-        coarse += ": give a short_cutoff of so many steps"
+        coarse += f": give a short_cutoff of {MIN_POINTS:g} steps"
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         return {
             coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
@@ -180,7 +177,6 @@ class BoundaryElements(Theory):
         return np.where((area < low * (1 - ROUNDING)) | (area > high * (1 + ROUNDING)), np.nan, found)
 
     def gaps(self) -> Any:
-        """Itself."""
         return self
 
     @functools.cached_property
@@ -188,7 +184,7 @@ class BoundaryElements(Theory):
         """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
         return self.pressed.flows(self.fit.x, self.fit.separation)
 
-    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
+    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked.
 
         Along an axis that closes at u1, ln K over ln(u - u1) is a monotone cubic, straight below the last open load;

@@ -93,7 +93,7 @@ class Loaded:
     def yielded(self) -> FloatArray:
         """Share of the contact area at the hardness."""
         with np.errstate(invalid="ignore"):
-            share = law.yielded_area(self.load, self.elastic_area, self.eta) / self.answer.area
+            share = law.area(self.load, self.elastic_area, self.eta, yielded=True) / self.answer.area
         return np.where(np.isinf(self.eta) | (self.answer.area == 0), 0.0, share)
 
     @property
@@ -126,12 +126,12 @@ class Yielding(Theory):
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
         self.elastic, self.hardness, self.reached = theory, np.asarray(hardness, dtype=float), REACHED
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
+        self.looks = FEW_LOOKS if self.hardness.size > MANY else theory.looks
         # whether the elastic area at a force needs no separation
         self.knows_areas = type(theory).area_at is not Theory.area_at
         self._bound: tuple[Any, Any] = None, None
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
-        """The theory with the hardnesses at flat indices of a broadcast shape."""
         if self.hardness.ndim == 0:
             return self
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
@@ -188,10 +188,6 @@ class Yielding(Theory):
         low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
         return low, np.minimum(high, MAX_LEVEL * h_rms)
 
-    def looks(self, surface: AnySurface) -> int:
-        """Few, also at many hardnesses."""
-        return FEW_LOOKS if self.hardness.size > MANY else self.elastic.looks(surface)
-
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force without the area, which is computed from it."""
         if quantity != "pressure":
@@ -203,12 +199,6 @@ class Yielding(Theory):
             return *closed(u, pressure, steep), exact
 
         return values
-
-    def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at a "pressure" (over E*, below the hardness) or an "area"."""
-        if np.isinf(self.hardness).all():
-            return np.asarray(self.elastic.mean_separation_at(surface, quantity, wanted))
-        return super().mean_separation_at(surface, quantity, wanted)
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """As of any theory; no force is beyond the hardness."""
@@ -223,11 +213,9 @@ class Yielding(Theory):
         return over.shape
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Those of the elastic contact."""
         return self.elastic.bends(surface)  # type: ignore[no-any-return]
 
     def gaps(self) -> Any:
-        """The elastic contact's."""
         return self.elastic.gaps()
 
     def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray | None]:
@@ -254,7 +242,6 @@ class Yielding(Theory):
         return shipped().standard_deviation(self.elastic.scatter_name(surface), quantity, eta, area, elastic)
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
-        """The elastic theory's reasons, and hardnesses below those that were simulated."""
         soft = np.broadcast_to(self._eta(surface) < self.tested_eta * (1 - 1e-9), np.shape(answer.area))
         own = {f"the hardness over E* times the rms gradient is below {self.tested_eta:g}": soft}
         return {**self.elastic.reasons(surface, answer, mean_separation), **own}

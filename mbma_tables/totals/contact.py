@@ -166,16 +166,11 @@ def _sums(surface: AnySurface, depth: FloatArray, how: Sums, slopes: bool) -> tu
         islands, left, why = _by_profiles(surface, compression, left, model, how, rows)
     if by_table and left.size:
         assert isinstance(surface, Surface)
-        rest, outside = Pairs.of(surface, depth).some(left), "nan" if how.outside == "exact" else how.outside
-        try:
-            found, rows[-1, left], more, missing = sums_by_table(model, rest, how, outside, slopes)
-        except (ConvergenceError, OutOfRangeError) as fault:
-            mask = np.zeros(size, dtype=bool)
-            mask[left] = True if fault.mask is None else fault.mask
-            fault.mask, fault.args = mask, (str(fault).replace(f"of {left.size} entries", f"of {size} entries"),)
-            raise
-        rows[:-1, left] = found[:, :, [0, BY_COMPRESSION] if slopes else [0]].T.reshape(len(rows) - 1, -1)
-        islands, left = islands + more, left[missing]
+        outside, every = "nan" if how.outside == "exact" else how.outside, Pairs.of(surface, depth)
+        found, bound, more, missing = sums_by_table(model, every, how, outside, slopes)
+        rows[-1, left] = bound[left]
+        rows[:-1, left] = found[left][:, :, [0, BY_COMPRESSION] if slopes else [0]].T.reshape(len(rows) - 1, -1)
+        islands, left = islands + more, np.intersect1d(left, missing)
     if left.size and how.outside == "exact":
         more, left, why = _by_profiles(surface, compression, left, exact_model(how.rtol), how, rows)
         islands += more
@@ -237,19 +232,15 @@ def _by_parameter(
     # log(s/h_rms) by H and by log(zeta_1): (h_rms/s)^2 = 1 - zeta_1^(-2H)
     power = -2 * hurst * np.log(zeta_1)
     lift = np.exp(power) / np.expm1(power)
-    answers = []
-    for number, scale in enumerate((stress, 1.0)):
+
+    def slopes(number: int, scale: Any) -> dict[str, Any]:
         value, by_H, by_zeta, by_compression, by_peak = np.moveaxis(sums[..., number, :], -1, 0)
         # force carries q0 s
         own = np.zeros_like(value) if number else value
         by_H, by_zeta = by_H + own * lift * np.log(zeta_1), by_zeta + own * lift * hurst
-        found = {
-            "separation": -by_compression / h_rms,
-            "hurst": by_H,
-            "q0": (own - by_zeta) / q0,
-            "q1": by_zeta / q1,
-            "h_rms": (own - compression * by_compression - peak * by_peak) / h_rms,
-            "h_max": (by_compression + by_peak) / h_rms,
-        }
-        answers.append({name: (scale * slope)[()] for name, slope in found.items()})
-    return answers[0], answers[1]
+        by_h_rms = (own - compression * by_compression - peak * by_peak) / h_rms
+        found = {"separation": -by_compression / h_rms, "hurst": by_H, "q0": (own - by_zeta) / q0, "q1": by_zeta / q1}
+        found |= {"h_rms": by_h_rms, "h_max": (by_compression + by_peak) / h_rms}
+        return {name: (scale * slope)[()] for name, slope in found.items()}
+
+    return slopes(0, stress), slopes(1, 1.0)

@@ -162,9 +162,10 @@ def source_of(surface: Shape, variant: Variant) -> Source:
     # T is a straight line up to a part of it
     layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
     jacobian = _jacobian_below(1 / s_over_h_rms(surface), variant)
+    ends = floors.root_d / floors.slope_d, floors.root_u / floors.slope_u
     return Source(
         lambda x: measured_islands(own, x * h_rms, variant), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
-        floors.kinks[0] / h_rms, np.concatenate([*samples, floors.kinks]) / h_rms, jacobian,
+        ends[0] / h_rms, np.concatenate([*samples, ends]) / h_rms, jacobian,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ def test_bounds_hold_in_a_short_search(what):
 
 
 def test_a_bound_that_is_exceeded_is_counted_and_quoted(monkeypatch):
-    monkeypatch.setitem(audit.BOUNDS, "too tight", (lambda surface, u, rtol: np.array([0.5, np.nan, 2.0]), 10))
+    monkeypatch.setitem(audit.BOUNDS, "too tight", (lambda surface, u, rtol: np.array([0.5, np.nan, 2.0]), 10, {}))
     found = audit.bound("too tight", 1, 1.0)
     assert found.beyond == 2 * found.answers / 3
     assert "Surface(" in found.where

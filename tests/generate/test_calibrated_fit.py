@@ -8,8 +8,7 @@ import xarray as xr
 
 from generate.boundary_elements.evidence import Case
 from generate.boundary_elements.surfaces import HELD_OUT_SURFACE, TRAINING
-from generate.calibrated import EDGES, coverage, cross_validate, errors, fit, summary, told
-from generate.calibrated_bars import measure
+from generate.calibrated import EDGES, coverage, cross_validate, errors, fit, measure, summary, told
 from generate.calibrated_file import QUANTITIES, write_part
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.data import read_groups

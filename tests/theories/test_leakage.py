@@ -121,24 +121,6 @@ class TestRates:
         assert found.units == {"K": "um^3", "hydraulic_aperture": "um"}
         assert found.hydraulic_aperture**3 == pytest.approx(found.K)
 
-    def test_gas_tends_to_the_liquid_and_slips(self):
-        found = asked(area=[0.05, 0.2], E_star="10 MPa")
-        drop, mean = 1e-6, 0.1
-        gas = found.gas("1.8e-5 Pa s", mean + drop / 2, mean - drop / 2, "2 mm", 0.0)
-        np.testing.assert_allclose(gas, found.liquid("1.8e-5 Pa s", drop, "2 mm"), rtol=2 * drop / mean)
-        slipping = found.gas("1.8e-5 Pa s", mean + drop / 2, mean - drop / 2, "2 mm", "1 nm")
-        np.testing.assert_allclose(slipping / gas, 1 + 6e-3 / np.cbrt(found.K), rtol=1e-12)
-        # mass is the same at the inlet: volume goes inversely as pressure
-        assert found.gas(1e-11, 0.3, 0.1, 2000, 0)[0] == pytest.approx(
-            found.K[0] * (0.3**2 - 0.1**2) / (24e-11 * 2000 * 0.1), rel=1e-12
-        )
-
-    def test_transition_flow_is_refused(self):
-        found = asked(area=[0.05, 0.3], E_star="10 MPa")
-        with pytest.raises(OutOfRangeError, match="mean_free_path") as caught:
-            found.gas("1.8e-5 Pa s", "2 bar", "1 bar", "2 mm", 0.1 * float(np.cbrt(found.K[0])))
-        assert np.asarray(caught.value.mask).tolist() == [False, True]
-
     test_bad_numbers = staticmethod(
         refusals(
             lambda *given: asked(area=0.1).liquid(*given),
@@ -275,8 +257,6 @@ def test_rates_of_named_arrays_keep_their_dimensions_and_units():
     found, expected = named.liquid("1e-3 Pa s", "0.1 MPa", width), plain.liquid("1e-3 Pa s", "0.1 MPa", width.values)
     assert found.dims == ("gap", "width")
     assert found.values == pytest.approx(expected)
-    air = ("2e-5 Pa s", "2 bar", "1 bar")
-    assert named.gas(*air, width, "1 nm").values == pytest.approx(plain.gas(*air, width.values, "1 nm"))
     assert plain.liquid("1e-3 Pa s", "0.1 MPa", ["2 um", "3e-3 mm", "4 um"]) == pytest.approx(expected)
     with pytest.raises(InputError, match="width is in 'mm'"):
         plain.liquid("1e-3 Pa s", "0.1 MPa", width.assign_attrs(units="mm"))

@@ -1,7 +1,8 @@
 """`python -m generate formulas`: fit the coefficients of the closed forms again, certify them on other samples.
 
-The terms are those of `core/closed_forms.h`; docs/formula.md says how they were chosen. Samples are rounded to
-`DATA_DIGITS`, so that the same coefficients come out on all processors.
+`core/closed_forms.h` is the one place where the forms are kept: the core is compiled with it, exports hold its text,
+and the equations of docs/formula.md are made from it; its expressions are read as Python. docs/formula.md says how the
+terms were chosen. Samples are rounded to `DATA_DIGITS`, so that the same coefficients come out on all processors.
 
 With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X, mu)), right as
 mu -> 0 whatever Q is. Log Q is its own limit at large X, which is the smooth sphere of Hertz, and a sum of terms that
@@ -11,25 +12,32 @@ Totals have two branches, which meet where the largest islands reach the floor o
 r = (h_max - d)/h_rms. Their logarithms are a start, such as the power of first contact, and a sum of products.
 """
 
+import collections
 import dataclasses
 import functools
 import itertools
 import math
 import re
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
 import click
 import numpy as np
-import sympy
 
-from generate.formulas.printing import HEADER, MODULE, Function, Step, evaluate, read_functions, write_forms
+from generate.files import ROOT
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import Certificate
 from mbma_tables.models.closed_form_certificates import RANGES
 
+HEADER = ROOT / "mbma_tables" / "core" / "closed_forms.h"
+MODULE = ROOT / "mbma_tables" / "models" / "closed_form_certificates.py"
+DEFINITION = re.compile(r"/\* ([^\n]*) \*/\ndouble mbma_((\w+?)_(\w+))\(([^\n]*)\) \{\n(.*?)\n\}\n", re.DOTALL)
+NUMBER = re.compile(r"\d[\d.]*(?:e-?\d+)?")
+WIDTH = 120
 DATA_DIGITS = 10
 MIN_DIGITS, MAX_DIGITS = 2, 15  # of a printed constant
 LAWSON_ROUNDS = 80
@@ -56,12 +64,101 @@ EDGE = 0.3  # share of each property that lies on an end of its range, where the
 TOTAL_SEED, TOTAL_HELD_OUT_SEED = 41, 42
 
 Samples = tuple[dict[str, FloatArray], dict[str, FloatArray]]  # arguments and results
+Steps = Mapping[str, str]
+NAMES = {"exp": np.exp, "log": np.log, "sqrt": np.sqrt, "where": np.where, "pow": lambda a, b: a**b}
+
+
+@dataclasses.dataclass(frozen=True)
+class Function:
+    """One closed form of one result: each step uses the arguments and earlier steps, the last is the value."""
+
+    form: str
+    result: str
+    arguments: tuple[str, ...]
+    title: str
+    steps: Steps
+
+    @property
+    def name(self) -> str:
+        return f"{self.form}_{self.result}"
+
+
+def read_functions(header: str) -> dict[str, Function]:
+    """The functions of a header's text by name."""
+    found = {}
+    for title, name, form, result, given, body in DEFINITION.findall(header):
+        lines = (line.split() for line in body.replace("return", f"const double {result} =").split(";"))
+        steps = {words[2]: " ".join(words[4:]) for words in lines if words}
+        found[name] = Function(form, result, tuple(given.replace("double ", "").split(", ")), title, steps)
+    return found
+
+
+def header_text(header: str, functions: Mapping[str, Function]) -> str:
+    """A header with the titles and steps of these functions."""
+
+    def written(match: re.Match[str]) -> str:
+        function = functions[match[2]]
+        lines = [f"/* {function.title} */", f"double mbma_{function.name}({match[5]}) {{"]
+        for name, text in function.steps.items():
+            left = "return" if name == function.result else f"const double {name} ="
+            lines += textwrap.wrap(f"{left} {text};", WIDTH, initial_indent="    ", subsequent_indent="        ")
+        return "\n".join([*lines, "}\n"])
+
+    return DEFINITION.sub(written, header)
+
+
+def module_text(certificates: Mapping[str, Mapping[str, Certificate]]) -> str:
+    """The module of ranges and certificates, the latter by form and result."""
+    text, _, _ = MODULE.read_text(encoding="utf-8").partition("CERTIFICATES")
+    wrapper = textwrap.TextWrapper(WIDTH, "    ", "        ", break_long_words=False, break_on_hyphens=False)
+    lines = [wrapper.fill(f"{form!r}: {row!r},").replace("'", '"') for form, row in certificates.items()]
+    return "\n".join([f"{text}CERTIFICATES: dict[str, dict[str, Certificate]] = {{", *lines, "}", ""])
+
+
+def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
+    """Values of all steps, by numpy functions.
+
+    Examples
+    --------
+    >>> evaluate({"w": "1.0 / (X + 3.0)"}, {"X": np.array([1.0, 2.0])})["w"]
+    array([0.25, 0.2 ])
+    """
+    names: dict[str, Any] = NAMES | dict(given)
+    with np.errstate(all="ignore"):
+        for name, text in steps.items():
+            names[name] = eval(text, names)
+    return names
 
 
 def rounded(values: FloatArray, digits: int = DATA_DIGITS) -> FloatArray:
     """Values with that many significant digits."""
     flat = [float(f"{value:.{digits}g}") for value in np.ravel(values).tolist()]
     return np.array(flat).reshape(np.shape(values))
+
+
+def terms(text: str) -> list[tuple[str, str]]:
+    """Terms of a sum: the fitted coefficient with its sign, or "" where there is none, and the rest.
+
+    A fitted coefficient that is a whole number is written 23e0, any other whole number 23.0.
+
+    Examples
+    --------
+    >>> terms("-0.5 * u * (v + 1.0) + 1.0 / 2.0 * t - 23e0")
+    [('-0.5', 'u * (v + 1.0)'), ('', '+ 1.0 / 2.0 * t'), ('-23e0', '1.0')]
+    """
+    parts, depth = [["+"]], 0
+    for word in text.removeprefix("-").split():
+        if depth == 0 and word in "+-":
+            parts.append([word])
+        else:
+            parts[-1].append(word)
+        depth += word.count("(") - word.count(")")
+    parts[0][0] = "-" if text.startswith("-") else "+"
+    found = []
+    for sign, first, *rest in parts:
+        fitted = NUMBER.fullmatch(first) and not first.endswith(".0")
+        found.append((sign + first, " ".join(rest[1:]) or "1.0") if fitted else ("", " ".join([sign, first, *rest])))
+    return found
 
 
 def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS) -> tuple[float, FloatArray]:
@@ -156,28 +253,10 @@ def log_Q(which: int, X: FloatArray, mu: FloatArray, phi: FloatArray) -> tuple[F
     return np.log(growth / mu) - limit, growth / (1 + growth)
 
 
-def terms(name: str, value: sympy.Expr) -> tuple[sympy.Expr, list[sympy.Expr]]:
-    """Of a sum what is not fitted, and the fitted terms without their coefficients, which are Floats."""
-    kept, found = sympy.Integer(0), []
-    for term in sympy.Add.make_args(value):
-        coefficient, rest = term.as_coeff_Mul()
-        if coefficient.is_Float:
-            found.append(rest)
-        else:
-            kept += term
-    return kept, sorted(found, key=_order) if name == "log_Q" else found
-
-
-def _order(product: sympy.Expr) -> tuple[Any, ...]:
-    """Place of a term among those of an island; the last digits of a fit depend on it."""
-    powers = {str(symbol): int(power) for symbol, power in product.as_powers_dict().items()}
-    letters = "v" in powers, "z" in powers and "u" in powers, "z" not in powers
-    return (*letters, powers.get("u", 0), sum(powers.values()))
-
-
-def coefficients(function: Function, name: str, value: sympy.Expr) -> FloatArray:
+def coefficients(function: Function, name: str, text: str) -> FloatArray:
     """Coefficients of the terms of one sum of a function, of least largest error."""
-    start, products = terms(name, value)
+    start = " ".join(rest for number, rest in terms(text) if not number)
+    products = [powers(rest) for number, rest in terms(text) if number]
     if name == "log_Q":
         given, truth = islands(function.form, POINTS, FIT_SEED)
         which = ("phi_F", "phi_A").index(function.result)
@@ -185,34 +264,50 @@ def coefficients(function: Function, name: str, value: sympy.Expr) -> FloatArray
         named = evaluate(function.steps, given)
     else:
         given, truth = totals(TOTAL_POINTS, TOTAL_SEED, MARGIN * MIN_AREA)
-        named = evaluate([*function.steps, ("start", start)], given)
+        named = evaluate({**function.steps, "start": start}, given)
         place = named["r"] / named["k"]
         mine = place > 1 - OVERLAP if name == "far" else place < 1 + OVERLAP
         target = rounded((np.log(truth[function.result]) - named["start"])[mine])
-        used = {str(symbol) for product in products for symbol in product.free_symbols}
-        named, weight = {name: rounded(named[name][mine]) for name in used}, np.ones(target.size)
-    ones = np.ones_like(target)
-    columns = []
+        used = set[str]().union(*products)
+        named, weight = {letter: rounded(named[letter][mine]) for letter in used}, np.ones(target.size)
+    ones, columns = np.ones_like(target), []
     for product in products:
-        powers = (named[str(x)] ** int(n) for x, n in product.as_powers_dict().items() if x.is_Symbol)
-        columns.append(functools.reduce(np.multiply, powers, ones) * weight)
-    return least_largest(np.stack(columns, axis=1), target * weight)[1]
+        factors = (named[letter] ** power for letter, power in product.items())
+        columns.append(functools.reduce(np.multiply, factors, ones) * weight)
+    # the last digits of a fit depend on the order of its terms
+    order = sorted(range(len(products)), key=lambda k: _order(products[k]))
+    found = np.empty(len(products))
+    found[order] = least_largest(np.stack(columns, axis=1)[:, order], target * weight)[1]
+    return found
 
 
-def refitted(function: Function, fits: Mapping[str, FloatArray], digits: int) -> tuple[Step, ...]:
+def powers(product: str) -> collections.Counter[str]:
+    return collections.Counter(re.findall(r"[a-z]\w*", product))
+
+
+def _order(product: collections.Counter[str]) -> tuple[Any, ...]:
+    return "v" in product, "z" in product and "u" in product, "z" not in product, product["u"], product.total()
+
+
+def refitted(function: Function, fits: Mapping[str, FloatArray], digits: int) -> Steps:
     """The steps of a function with these coefficients, of so many digits."""
 
-    def value_of(name: str, value: sympy.Expr) -> sympy.Expr:
-        if name not in fits:
-            return value
-        start, products = terms(name, value)
-        pairs = zip(rounded(fits[name], digits).tolist(), products, strict=True)
-        return sympy.Add(start, *(sympy.Float(c) * product for c, product in pairs))
+    def text_of(text: str, fitted: FloatArray) -> str:
+        values, parts = iter(rounded(fitted, digits).tolist()), list[str]()
+        for number, rest in terms(text):
+            part = rest
+            if number:
+                value = next(values)
+                shown = f"{abs(value):.0f}e0" if value.is_integer() else repr(abs(value))
+                part = f"{'-' if value < 0 else '+'} {shown}{'' if rest == '1.0' else f' * {rest}'}"
+            parts.append(part)
+        joined = " ".join(parts)
+        return joined.removeprefix("+ ") if joined.startswith("+") else joined.replace("- ", "-", 1)
 
-    return tuple((name, value_of(name, value)) for name, value in function.steps)
+    return {name: text_of(text, fits[name]) if name in fits else text for name, text in function.steps.items()}
 
 
-def rises(steps: tuple[Step, ...], result: str, ranges: Mapping[str, tuple[float, float]]) -> bool:
+def rises(steps: Steps, result: str, ranges: Mapping[str, tuple[float, float]]) -> bool:
     """Whether a function of islands is positive and rises with X, on a grid of the range."""
     x, mu = np.linspace(*ranges["X"], GRID), np.geomspace(MIN_MU, ranges["mu"][1], GRID)
     field = evaluate(steps, dict(zip(("X", "mu"), np.meshgrid(x, mu, indexing="ij"), strict=True)))[result]
@@ -221,15 +316,14 @@ def rises(steps: tuple[Step, ...], result: str, ranges: Mapping[str, tuple[float
 
 def certified(function: Function) -> tuple[Function, Certificate]:
     """A function with coefficients fitted again, as short as its error allows, and its certificate."""
-    fits = {name: coefficients(function, name, value) for name, value in function.steps if name in SUMS}
+    fits = {name: coefficients(function, name, text) for name, text in function.steps.items() if name in SUMS}
     is_total = function.form == "totals"
-    sets: list[Samples] = []
     if is_total:
-        sets += totals(TOTAL_POINTS, TOTAL_SEED), totals(TOTAL_HELD_OUT, TOTAL_HELD_OUT_SEED)
+        sets = [totals(TOTAL_POINTS, TOTAL_SEED), totals(TOTAL_HELD_OUT, TOTAL_HELD_OUT_SEED)]
     else:
-        sets += (islands(function.form, *some) for some in ((POINTS, FIT_SEED), (HELD_OUT, HELD_OUT_SEED)))
+        sets = [islands(function.form, *some) for some in ((POINTS, FIT_SEED), (HELD_OUT, HELD_OUT_SEED))]
 
-    def errors(steps: tuple[Step, ...], samples: Samples) -> FloatArray:
+    def errors(steps: Steps, samples: Samples) -> FloatArray:
         given, truth = samples
         return np.asarray(np.abs(evaluate(steps, given)[function.result] / truth[function.result] - 1))
 
@@ -242,7 +336,7 @@ def certified(function: Function) -> tuple[Function, Certificate]:
     if not is_total and not rises(steps, function.result, RANGES[function.form]):
         raise RuntimeError(f"{function.result} of the {function.form} form does not rise with X everywhere")
     # an island's c, and b and g where they are used, beside the coefficients
-    shape = 0 if is_total else 1 + sum(name in ("y", "v") for name, _ in steps)
+    shape = 0 if is_total else 1 + sum(name in ("y", "v") for name in steps)
     found = certificate(shape + sum(map(len, fits.values())), errors(steps, sets[1]), sets[1][0])
     title = re.sub(r"within .*", f"within {found.largest:g}.", function.title)
     return dataclasses.replace(function, steps=steps, title=title), found
@@ -251,10 +345,12 @@ def certified(function: Function) -> tuple[Function, Certificate]:
 @click.command()
 def formulas() -> None:
     """Fit and certify the closed forms; write their C and the Python module of their certificates (a minute)."""
-    found = [certified(function) for function in read_functions(HEADER.read_text(encoding="utf-8")).values()]
+    header, fitted = HEADER.read_text(encoding="utf-8"), dict[str, Function]()
     certificates: dict[str, dict[str, Certificate]] = {form: {} for form in RANGES}
-    for function, one in found:
+    for name, function in read_functions(header).items():
+        fitted[name], one = certified(function)
         certificates[function.form][function.result] = one
-        click.echo(f"{function.name}: largest held-out error {one.largest:.2e}")
-    write_forms([function for function, _ in found], RANGES, certificates)
+        click.echo(f"{name}: largest held-out error {one.largest:.2e}")
+    write_file(HEADER, header_text(header, fitted).encode())
+    write_file(MODULE, module_text(certificates).encode())
     click.echo(MODULE)

@@ -1,1 +1,0 @@
-"""Closed forms: fitted to exact solves, certified, written."""
