@@ -1,9 +1,8 @@
-"""The commands `mbma contact`, `curve`, `island`, `surfaces`, `fit` and `cost`."""
+"""The commands `mbma contact`, `curve`, `island`, `fit` and `cost`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,14 +10,12 @@ import click
 import numpy as np
 
 from mbma_tables.cli import options
-from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_json
+from mbma_tables.cli.format import Report, report_answer, shown_unit, to_json
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import unit_of
 from mbma_tables.scenes.specimen import Specimen
-from mbma_tables.surfaces.cases import CASES
-from mbma_tables.surfaces.surface import Surface
 
 if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
@@ -177,17 +174,6 @@ def island_command(
     report_answer("island", specimen, model, answer, values, units).write(output)
 
 
-@click.command("surfaces", short_help="The named surfaces.")
-@options.output_options
-def surfaces_command(output: options.Output) -> None:
-    """The paper's surfaces by name, with their numbers, each in its own unit of length."""
-    cases, surfaces = CASES.values(), [Surface.named(name) for name in CASES]
-    values: dict[str, Any] = {"name": list(CASES), "length_unit": [case.length_unit for case in cases]}
-    values |= {name: [getattr(surface, name) for surface in surfaces] for name in SURFACE_NUMBERS}
-    values["title"] = [case.title for case in cases]
-    Report("surfaces", "the paper's cases", [], {}, values).write(output)
-
-
 @click.command("fit", short_help="Evaluate a measured map or line scan, and its contact.")
 @click.argument("measurements", metavar="MAP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
@@ -226,7 +212,6 @@ def fit_command(
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
     scans = [measured(path, treatment) for path in measurements]
-    treated = scans[0][0]
     surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
     columns, told = table_of_loads(surface, scale, "simulated" if simulate else "calibrated")
@@ -234,17 +219,15 @@ def fit_command(
         BoundaryElements.of(surface).to_netcdf(output.out)
         told, output = [*told, f"{output.out} has the simulation"], output._replace(out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
-    facts: dict[str, Any] = {"length_unit": surface.unit, "stress_unit": stress_unit}
-    facts |= {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
-    facts |= {"provenance": surface.provenance, "notes": told}
+    facts: dict[str, Any] = {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
+    facts |= {"length_unit": surface.unit, "stress_unit": stress_unit, "provenance": surface.provenance, "notes": told}
     title = ", ".join(path.name for path in measurements)
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
-    report = Report("fit", title, [*described(surface), *told], facts, columns, own)
     picture = b""
     if plot is not None:
         label = pressure_label(unit_of("pressure", units))
-        picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
-    report.write(output, plot, picture)
+        picture = to_picture(draw(scans[0][0], surface, curves(surface, scale), title, label), plot.suffix[1:])
+    Report("fit", title, [*described(surface), *told], facts, columns, own).write(output, plot, picture)
 
 
 @click.command("cost", short_help="Computing time against accuracy.")
@@ -263,24 +246,19 @@ def cost_command(island_model: str | None, distance: bool, as_json: bool) -> Non
     from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
-    if distance:
-        if island_model is not None:
-            raise InputError("--island-model is for numerical error: leave it or --distance out")
-        _show("distance", shipped_distances(), costs.seconds, as_json)
-        return
-    rows = [row for row in costs.rows if row.island_model != UNIT]
+    rows: Any = shipped_distances() if distance else [row for row in costs.rows if row.island_model != UNIT]
     if island_model is not None:
+        if distance:
+            raise InputError("--island-model is for numerical error: leave it or --distance out")
         known = tuple(dict.fromkeys(row.island_model for row in rows))
-        rows = [row for row in rows if row.island_model == island_model]
-        if not rows:
+        if island_model not in known:
             raise InputError(f"--island-model must be one of {known}, got {island_model!r}")
-    _show("cost", rows, costs.seconds, as_json)
-
-
-def _show(title: str, rows: Sequence[Any], unit: float, as_json: bool) -> None:
+        rows = [row for row in rows if row.island_model == island_model]
+    unit = costs.seconds
     records = [row._asdict() | {"seconds": row.cost * unit} for row in rows]
     if as_json:
         echo(to_json({"unit_seconds": unit, "rows": records}))
         return
     columns = {name: [record[name] for record in records] for name in records[0]}
+    title = "distance" if distance else "cost"
     echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)
