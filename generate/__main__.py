@@ -21,6 +21,7 @@ COMMANDS = {
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
+    "score": "generate.pages.score",
     "tables": "generate.tables.commands",
 }
 
@@ -43,7 +44,7 @@ class Generator(click.Group):
         try:
             code = super().main(*args, **extra)
         except click.Abort:
-            click.echo("generate: interrupted; --resume continues from the chunks that are done", err=True)
+            click.echo("generate: interrupted", err=True)
             sys.exit(1)
         except ModuleNotFoundError as fault:
             click.echo(f"generate: {fault}; install the extra: pip install -e '.[generate]'", err=True)
