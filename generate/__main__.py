@@ -43,7 +43,7 @@ class Generator(click.Group):
         try:
             code = super().main(*args, **extra)
         except click.Abort:
-            click.echo("generate: interrupted; --resume continues from the chunks that are done", err=True)
+            click.echo("generate: interrupted", err=True)
             sys.exit(1)
         except ModuleNotFoundError as fault:
             click.echo(f"generate: {fault}; install the extra: pip install -e '.[generate]'", err=True)

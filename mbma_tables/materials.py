@@ -91,7 +91,7 @@ class Metal:
     nu: float  # Poisson's ratio
     hardness: tuple[float, float]  # of soft and of hard tempers [GPa], mean pressure of an indentation; may be equal
     conductivity: tuple[float, float]  # thermal, lowest and highest of what was found [W/(m K)]
-    source: str  # titles and addresses of the pages on which the numbers were read
+    source: str = ""  # titles and addresses of the pages on which the numbers were read
 
 
 def _mean_pressure(scale: str, number: float) -> float:
@@ -141,7 +141,7 @@ def get(name: str) -> Metal:
         return dataclasses.replace(_METALS[plain], name=name, hardness=(one, one))
     if str(name) not in _METALS:
         near = difflib.get_close_matches(str(name), METALS, 3, 0.4) or METALS
-        raise InputError(f"no metal is named {name!r}: there are {', '.join(near)}, each also with ' soft' or ' hard'")
+        raise InputError(f"no metal is named {name!r}: give a Metal, or {', '.join(near)}, or with ' soft', ' hard'")
     return _METALS[name]
 
 

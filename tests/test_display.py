@@ -36,7 +36,7 @@ def thing(request):
 def test_a_line_is_short_and_plain(thing):
     line = repr(thing)
     assert "\n" not in line
-    assert len(line) < 360
+    assert len(line) < 400
     assert line.startswith(type(thing).__name__)
     assert not re.search(r"np\.|array|object at", line)
 
@@ -117,7 +117,7 @@ def test_batches_are_summed_up():
     assert "hurst=<100 numbers, 0.2 to 0.9>" in repr(batch)
     answer = contact(batch, separation=1.0)
     assert "valid 0 of 100" in repr(answer)
-    assert len(repr(answer)) < 360
+    assert len(repr(answer)) < 400
     for single in (batch, answer, contact(ROAD, separation=0.1)):
         assert "<img" not in single._repr_html_()
         with pytest.raises(InputError):

@@ -82,6 +82,7 @@ class Contact(Interface, Displayed):
         if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
+        facts |= {name: shown(values, unit) for name, (values, unit) in self._stiffness().items()}
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
         if source.yields:
             more |= {"psi": self.psi, "yielded": self.yielded}
@@ -96,6 +97,15 @@ class Contact(Interface, Displayed):
             facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}
 
+    def _stiffness(self) -> dict[str, tuple[Any, str]]:
+        """Stiffnesses, and the conductance of named materials, with their units."""
+        found = {"stiffness": (self.stiffness, self.units["stiffness"])}
+        if self._source.yields:
+            found["unloading_stiffness"] = self.unloading_stiffness, self.units["unloading_stiffness"]
+        if self._source.materials is not None:
+            found["conductance"] = self.conductance(), "W/(m^2 K)"
+        return found
+
     def _variables(self) -> dict[str, Variable]:
         source = self._source
         known = {n: getattr(self, n) for n in MEANINGS if n not in (("energy",) if source.yields else OF_HARDNESS)}
@@ -108,7 +118,12 @@ class Contact(Interface, Displayed):
     def _figure(self) -> Any:
         source, unit = self._source, self.units["pressure"]
         title = f"hardness {shown(source.hardness, unit)}" if source.yields else ""
-        return draw_compression([self.curve()], title, pressure_label(unit))
+        order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
+        more: dict[str, dict[str, Any]] = {}
+        for name, (values, of_values) in self._stiffness().items():
+            label = f"{name.rpartition('_')[2]} [{of_values}]"
+            more.setdefault(label, {})[name.replace("_", " ")] = np.ravel(values)[order]
+        return draw_compression([self.curve()], title, pressure_label(unit), more=more)
 
     def curve(self, leakage: bool = False) -> Curve:
         """A line of pictures, of one surface at several separations; optionally with its leakage."""

@@ -26,18 +26,6 @@ BAD_INPUT = 2
 INTERRUPTED = 130  # as shells report Ctrl-C
 
 
-def _describe(fault: Exception) -> str:
-    """One line that describes the error, and for misuse of the command line a second one with a hint."""
-    if isinstance(fault, click.ClickException):
-        line = " ".join(fault.format_message().split())
-        if isinstance(fault, click.UsageError) and fault.ctx is not None:
-            return f"{line}\n(see '{fault.ctx.command_path} --help')"
-        return line
-    if isinstance(fault, OSError) and fault.strerror is not None:
-        return fault.strerror if fault.filename is None else f"{fault.filename}: {fault.strerror}"
-    return " ".join(str(fault).split())
-
-
 # texts for Python, in a shell
 SAID = {
     "surface.fit()": "--model self-affine",
@@ -52,23 +40,21 @@ SAID = {
 
 
 def _in_options(text: str, command: click.Command, words: list[str]) -> str:
-    """A message of the library with its argument names replaced by the options of a command.
-
-    English words among them, such as pressure, stand for an option at the beginning and in lists of names.
-    """
-    # messages of the command line itself, and messages on a file, which keep the file's own names
+    """A message of the library with its argument names, and English words at its begin, as options of a command."""
+    # messages on a file keep the file's own names
     if "--" in text or text.startswith(tuple(word + end for word in words for end in ":,")):
         return text
     for python, shell in SAID.items():
         text = text.replace(python, shell)
     options = {o.name: max(o.opts, key=len) for o in command.params if isinstance(o, click.Option) and o.name}
     names = "|".join(options) or "^$"
-    text = re.sub(rf"\b({names})=(['\w.-]+)", lambda m: f"{options[m[1]]} {m[2].strip(chr(39))}", text)
     signs = "|".join(name for name in options if re.search(r"[A-Z_\d]|^d[xy]$|^rtol$", name)) or "^$"
+    text = re.sub(rf"\b({names})=(['\w.-]+)", lambda m: f"{options[m[1]]} {m[2].strip(chr(39))}", text)
     # not in formulas, nor where a number was found
     outside = rf"(?<![\w/.*^'-])(?<![<>=] )({signs})(?![\w/(^*'.])(?! ?[<>]| ?=(?! '))"
-    text = re.sub(outside, lambda m: options[m[1]], text)
-    text = re.sub(rf"^({names})(?= (?:must|has|is)\b|: )", lambda m: options[m[1]], text)
+    for place in (outside, rf"^({names})(?= (?:must|has|is)\b|: )"):
+        text = re.sub(place, lambda m: options[m[1]], text)
+    # in lists with an option
     for _ in options:
         text = re.sub(rf"(--[\w-]+(?:,|,? and|,? or) )({names})\b", lambda m: m[1] + options[m[2]], text)
         text = re.sub(rf"(?<![\w-])({names})(?=,? (?:and |or )?--)", lambda m: options[m[1]], text)
@@ -95,7 +81,10 @@ class Program(click.Group):
             click.echo("mbma: interrupted", err=True)
             sys.exit(INTERRUPTED)
         except (click.ClickException, MbmaError, OSError) as fault:
-            said = _describe(fault)
+            text = fault.format_message() if isinstance(fault, click.ClickException) else str(fault)
+            said = " ".join(text.split())
+            if isinstance(fault, click.UsageError) and fault.ctx is not None:
+                said += f"\n(see '{fault.ctx.command_path} --help')"
             if isinstance(fault, MbmaError):
                 said = _in_options(said, next((self.commands[w] for w in words if w in self.commands), self), words)
             click.echo(f"mbma: {said}", err=True)
@@ -123,21 +112,10 @@ def main(context: click.Context) -> None:
 
 
 for command in (
-    commands.contact_command,
-    commands.curve_command,
-    batch.batch_command,
-    commands.island_command,
-    commands.surfaces_command,
-    commands.fit_command,
-    batch.sensitivity_command,
-    tables.tables_group,
-    tables.cache_command,
-    scene.joint_command,
-    scene.plan_command,
-    scene.run_command,
-    commands.cost_command,
-    export.export_command,
-    export.explore_command,
+    *(commands.contact_command, commands.curve_command, batch.batch_command, commands.island_command),
+    *(commands.fit_command, batch.sensitivity_command, tables.tables_group),
+    *(tables.cache_command, scene.joint_command, scene.plan_command, scene.run_command, commands.cost_command),
+    *(export.export_command, export.explore_command),
 ):
     command.format_options = functools.partial(format_options, command)  # type: ignore[method-assign]
     main.add_command(command)

@@ -12,10 +12,11 @@ import click
 
 from mbma_tables.cli import options
 from mbma_tables.cli.commands import COLUMNS
-from mbma_tables.cli.format import Report, shown_unit
+from mbma_tables.cli.format import Report, shown_unit, to_json
+from mbma_tables.cli.options import LOADS
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
-from mbma_tables.common.progress import doing
+from mbma_tables.common.progress import doing, echo
 from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, from_tables
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
@@ -23,7 +24,6 @@ from mbma_tables.surfaces.surface import Surface
 MAX_BYTES = 64 * 2**20
 MAX_COLUMNS, MAX_ROWS, MAX_CELL = 100, 1_000_000, 1000  # limits of a file of surfaces; letters of a cell
 OF_MAPS = ("dx", "dy", "detrend", "short_cutoff", "long_cutoff", "s_filter", "l_filter")
-LOADS = ("separation", "mean_separation", "pressure", "area")
 
 
 @click.command("batch", short_help="Many surfaces from a CSV file.")
@@ -148,10 +148,8 @@ def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: s
 @options.load_options(options.quantity_option)
 @options.specimen_options
 @options.theory_options
-@options.output_options
-def sensitivity_command(
-    loads: dict[str, Any], specimen: Specimen, model: options.Model, output: options.Output
-) -> None:
+@options.json_option("a table")
+def sensitivity_command(loads: dict[str, Any], specimen: Specimen, model: options.Model, as_json: bool) -> None:
     """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
@@ -162,22 +160,10 @@ def sensitivity_command(
     from mbma_tables.answers.sensitivity import sensitivity
 
     model = model.of(specimen.surface)
-    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, **vars(model))
-    parameters = list(found.parameters)
-    columns = {
-        "parameter": parameters,
-        "value": list(found.parameters.values()),
-        "unit": [shown_unit(name, found.units) for name in parameters],
-    }
-    columns |= {answer: [found.slopes[name][answer] for name in parameters] for answer in found.answers}
-    units = {name: shown_unit(name, found.units) for name in found.answers}
-
-    def with_unit(answer: str, text: str) -> str:
-        return f"{answer} {text} {units[answer]}".removesuffix(" -")
-
-    here = ", ".join(with_unit(name, f"{value:.6g}") for name, value in found.answers.items())
-    notes = [f"theory {model.theory}; d ln(answer)/d ln(parameter) at given {found.by}", f"here: {here}"]
-    notes.append("conductance is over the mean conductivity of the bodies")
-    facts = {"theory": model.theory, "answer_units": units}
-    facts |= {name: getattr(found, name) for name in ("by", "answers", "errors")}
-    Report("sensitivity", specimen.title, notes, facts, columns).write(output)
+    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, **model._asdict())
+    units = {name: shown_unit(name, found.units) for name in (*found.parameters, *found.answers)}
+    if as_json:
+        echo(to_json(vars(found) | {"theory": model.theory, "units": units}))
+        return
+    here = ", ".join(f"{name} {value:.6g} {units[name]}".removesuffix(" -") for name, value in found.answers.items())
+    echo(f"mbma sensitivity: {specimen.title}, theory {model.theory}\nhere: {here}\n\n{found}")

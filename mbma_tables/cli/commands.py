@@ -1,9 +1,8 @@
-"""The commands `mbma contact`, `curve`, `island`, `surfaces`, `fit` and `cost`."""
+"""The commands `mbma contact`, `curve`, `island`, `fit` and `cost`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,20 +10,18 @@ import click
 import numpy as np
 
 from mbma_tables.cli import options
-from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_json
+from mbma_tables.cli.format import Report, report_answer, shown_unit, to_json
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import unit_of
 from mbma_tables.scenes.specimen import Specimen
-from mbma_tables.surfaces.cases import CASES
-from mbma_tables.surfaces.surface import Surface
 
 if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
 
-MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
-EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
+LIGHTEST = 1e-4  # A/A0 at a curve's second point
+SEARCHED = 1 - np.append(np.geomspace(1e-3, 0.2, 60), np.linspace(0.2, 2.0, 141)[1:])  # d/h_max where areas are found
 MIN_POINTS = 5
 DRAWN = ("calibrated", "persson")  # theories shown beside the chosen one in a picture, where available
 COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
@@ -103,8 +100,8 @@ def curve_command(
 ) -> None:
     """Pressure and area from first contact (d = h_max) to full compression (d = -h_max).
 
-    Half of the points are geometric in (h_max - d)/h_max, from 0.001 to 0.2, since the force is proportional to
-    its power 7/2 at light contact; the rest are even, up to 2. Gaps where a theory has no finite force are omitted.
+    Contact areas are geometric, from 0.01% to the largest, between first contact and full compression. Gaps where a
+    theory has no finite force are omitted.
 
     The picture has Persson's theory beside the chosen one, and the calibrated law with its scatter as a band.
 
@@ -118,12 +115,14 @@ def curve_command(
 
     model, surface = model.of(specimen.surface), specimen.surface
     asked, modulus = model.keywords(specimen), 1.0 if specimen.E_star is None else specimen.E_star
-    # half geometric in h_max - d, half even
-    light, deep = (points - 1) // 2, points // 2
-    graded, even = np.geomspace(MIN_DEPTH, EVEN_FROM, light + 1)[:-1], np.linspace(EVEN_FROM, 2.0, deep)
-    gap = float(surface.h_max) * (1 - np.concatenate([[0.0], graded, even]))
+    gap = float(surface.h_max) * SEARCHED
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
+    area = np.asarray(contact(surface, separation=gap, **asked).area)
+    rising = slice(np.flatnonzero(area > 0)[0], int(area.argmax()) + 1)
+    wanted = np.geomspace(max(LIGHTEST, 1.5 * area[rising][0]), area[rising][-1], points - 1)
+    inner = np.interp(np.log(wanted[:-1]), np.log(area[rising]), gap[rising])
+    gap = np.concatenate([[surface.h_max], inner, gap[-1:]])
     answer = contact(surface, separation=gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
@@ -175,17 +174,6 @@ def island_command(
     report_answer("island", specimen, model, answer, values, units).write(output)
 
 
-@click.command("surfaces", short_help="The named surfaces.")
-@options.output_options
-def surfaces_command(output: options.Output) -> None:
-    """The paper's surfaces by name, with their numbers, each in its own unit of length."""
-    cases, surfaces = CASES.values(), [Surface.named(name) for name in CASES]
-    values: dict[str, Any] = {"name": list(CASES), "length_unit": [case.length_unit for case in cases]}
-    values |= {name: [getattr(surface, name) for surface in surfaces] for name in SURFACE_NUMBERS}
-    values["title"] = [case.title for case in cases]
-    Report("surfaces", "the paper's cases", [], {}, values).write(output)
-
-
 @click.command("fit", short_help="Evaluate a measured map or line scan, and its contact.")
 @click.argument("measurements", metavar="MAP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
@@ -224,7 +212,6 @@ def fit_command(
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
     scans = [measured(path, treatment) for path in measurements]
-    treated = scans[0][0]
     surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
     columns, told = table_of_loads(surface, scale, "simulated" if simulate else "calibrated")
@@ -232,17 +219,15 @@ def fit_command(
         BoundaryElements.of(surface).to_netcdf(output.out)
         told, output = [*told, f"{output.out} has the simulation"], output._replace(out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
-    facts: dict[str, Any] = {"length_unit": surface.unit, "stress_unit": stress_unit}
-    facts |= {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
-    facts |= {"provenance": surface.provenance, "notes": told}
+    facts: dict[str, Any] = {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
+    facts |= {"length_unit": surface.unit, "stress_unit": stress_unit, "provenance": surface.provenance, "notes": told}
     title = ", ".join(path.name for path in measurements)
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
-    report = Report("fit", title, [*described(surface), *told], facts, columns, own)
     picture = b""
     if plot is not None:
         label = pressure_label(unit_of("pressure", units))
-        picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
-    report.write(output, plot, picture)
+        picture = to_picture(draw(scans[0][0], surface, curves(surface, scale), title, label), plot.suffix[1:])
+    Report("fit", title, [*described(surface), *told], facts, columns, own).write(output, plot, picture)
 
 
 @click.command("cost", short_help="Computing time against accuracy.")
@@ -261,24 +246,19 @@ def cost_command(island_model: str | None, distance: bool, as_json: bool) -> Non
     from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
-    if distance:
-        if island_model is not None:
-            raise InputError("--island-model is for numerical error: leave it or --distance out")
-        _show("distance", shipped_distances(), costs.seconds, as_json)
-        return
-    rows = [row for row in costs.rows if row.island_model != UNIT]
+    rows: Any = shipped_distances() if distance else [row for row in costs.rows if row.island_model != UNIT]
     if island_model is not None:
+        if distance:
+            raise InputError("--island-model is for numerical error: leave it or --distance out")
         known = tuple(dict.fromkeys(row.island_model for row in rows))
-        rows = [row for row in rows if row.island_model == island_model]
-        if not rows:
+        if island_model not in known:
             raise InputError(f"--island-model must be one of {known}, got {island_model!r}")
-    _show("cost", rows, costs.seconds, as_json)
-
-
-def _show(title: str, rows: Sequence[Any], unit: float, as_json: bool) -> None:
+        rows = [row for row in rows if row.island_model == island_model]
+    unit = costs.seconds
     records = [row._asdict() | {"seconds": row.cost * unit} for row in rows]
     if as_json:
         echo(to_json({"unit_seconds": unit, "rows": records}))
         return
     columns = {name: [record[name] for record in records] for name in records[0]}
+    title = "distance" if distance else "cost"
     echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables import __version__
 from mbma_tables.cli import options
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import write_file
+from mbma_tables.common.files import read_file, write_file
 from mbma_tables.common.progress import echo
-from mbma_tables.export.again import again, made_by
 from mbma_tables.export.targets import AGAINST, Target, group, names, targets
+from mbma_tables.export.text import written_by
 from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
+MAX_BYTES = 1 << 30  # of an input file
 DEFAULTS = {"variant": "reported", "leakage": False, "check": False}
 
 
@@ -39,12 +41,6 @@ class _Export(click.Command):
     """The command, whose help lists the targets."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        if "--again" in args:
-            if len(args) != 2:
-                raise click.UsageError("--again FILE stands alone: leave the rest out", ctx)
-            version, args = again(Path(args[1]))
-            if version != __version__:
-                echo(f"{ctx.command_path} --again: was written by version {version}, this is {__version__}", err=True)
         ctx.meta["words"] = tuple(args)
         return super().parse_args(ctx, args)
 
@@ -55,7 +51,6 @@ class _Export(click.Command):
 
 @click.command("export", cls=_Export, short_help="A contact law, or the whole model, for other codes.")
 @click.argument("target", metavar="TARGET", type=_Target())
-@click.option("--again", metavar="FILE", expose_value=False, help="Instead: write FILE again by the command in it.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @options.optional_specimen_options
 @click.option("--rows", type=int, help="Number of rows of a table; else as few as --rtol needs.")
@@ -119,7 +114,12 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         raise InputError(f"--out of {target} must be NAME{kind.end}, got {out.name!r}")
     joint: dict[str, Any] = {name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")}
     ctx = click.get_current_context()
-    joint["made_by"] = made_by(ctx.meta["words"], out, [ctx.params[key] for key in ("file", "map") if ctx.params[key]])
+    inputs = [ctx.params[key] for key in ("file", "map") if ctx.params[key]]
+    for path in [path for path in inputs if path.suffix == ".toml"]:
+        table = tomllib.loads(read_file(path, MAX_BYTES).decode()).get("surface", {})
+        inputs += [path.parent / table[name] for name in ("map", "psd") if name in table]
+    digests = (f"input {path}: sha256 {hashlib.sha256(read_file(path, MAX_BYTES)).hexdigest()}" for path in inputs)
+    joint["made_by"] = *digests, written_by(ctx.meta["words"])
     if kind.rows:
         name = {"name": out.stem} if kind.end else {"name": given.pop("name")} if "name" in given else {}
         files = kind.files(_rows(kind, joint | given), **name)

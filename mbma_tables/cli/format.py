@@ -118,21 +118,18 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     known = {name: getattr(surface, name) for name in SURFACE_NUMBERS}
     # a spectrum that is no power law has no Hurst exponent
     numbers = {name: float(value) for name, value in known.items() if value is not None}
-    facts: dict[str, Any] = {"length_unit": surface.unit, **numbers}
     units = {name: shown_unit(name, specimen.units).strip("-") for name in numbers}
-    shown = [f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items()]
-    notes = ["surface: " + ", ".join(shown)]
+    shown = (f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items())
     assumed = [line for record in surface.provenance for line in record.get("assumed", ())]
     if isinstance(surface, Surface) and ASSUMED not in assumed:
         assumed.insert(0, ASSUMED)
-    notes += [f"assumed: {line}" for line in assumed]
-    facts["assumed"] = assumed
+    notes = [f"surface: {', '.join(shown)}", *(f"assumed: {line}" for line in assumed)]
     notes += [record["told"] for record in surface.provenance if "told" in record]
+    facts: dict[str, Any] = {"length_unit": surface.unit, **numbers, "assumed": assumed}
     facts["provenance"] = [dict(record) for record in surface.provenance]
     fit = getattr(surface, "fit", None)  # a field if given by five numbers, else a method
     if dataclasses.is_dataclass(fit):
-        values = {field.name: getattr(fit, field.name) for field in dataclasses.fields(fit)}
-        facts["fit"] = {name: v.tolist() if hasattr(v, "tolist") else v for name, v in values.items()}
+        facts["fit"] = {name: np.asarray(v).tolist() for name, v in vars(fit).items()}
         notes.append("fit: " + ", ".join(f"{name} {_rounded(v)}" for name, v in facts["fit"].items() if v is not None))
     return facts, notes
 

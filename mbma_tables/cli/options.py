@@ -19,9 +19,11 @@ from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import CASES
+from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import OF_MAPS, THEORIES
 
+LOADS = ("separation", "mean_separation", "pressure", "area")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
@@ -29,8 +31,7 @@ MANY = 20  # options of a command whose help has sections
 PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 
-@dataclasses.dataclass(frozen=True)
-class Model:
+class Model(NamedTuple):
     """Arguments of `contact` and `island` other than the surface and the gap."""
 
     island_model: str
@@ -49,11 +50,11 @@ class Model:
         from mbma_tables.theories import theory_name
 
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
-        return dataclasses.replace(self, theory=theory_name(surface, self.theory, **own))
+        return self._replace(theory=theory_name(surface, self.theory, **own))
 
     def keywords(self, specimen: Specimen) -> dict[str, Any]:
         """Keywords for `contact`."""
-        asked = vars(self) | {"E_star": specimen.modulus}
+        asked = self._asdict() | {"E_star": specimen.modulus}
         cap = asked.pop("hardness")
         return asked if cap is None else asked | {"hardness": hardness_in(specimen.units, cap)}
 
@@ -72,14 +73,12 @@ def _output(given: Mapping[str, Any]) -> Output:
     return Output(**given)
 
 
-def _parse_number(ctx: click.Context, param: click.Parameter, given: str | None) -> float | str | None:
+def _parse_number(ctx: click.Context, param: click.Parameter, given: Any) -> Any:
     """A number, or a number with its unit as text, which is converted later."""
-    if given is None:
-        return None
     try:
-        return float(given)
+        return None if given is None else float(given)
     except ValueError:
-        if not given.strip()[:1] or given.strip()[0] not in "+-.0123456789":
+        if not given.strip().startswith(tuple("+-.0123456789")):
             raise click.BadParameter(f"{given!r} is not a number, nor one with its unit.", ctx, param) from None
         return given
 
@@ -184,7 +183,7 @@ stress_unit_option = _option("stress_unit", "Unit of plain moduli and of the ans
 _SPECIMEN_OPTIONS = (
     _option(
         "surface",
-        "Surface: a case of the paper; `mbma surfaces` lists them.",
+        f"Surface: a case of the paper, {', '.join(CASES)}.",
         type=click.Choice([*CASES]),
         metavar="NAME",
     ),
@@ -287,29 +286,27 @@ plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PA
 
 # headings of help, and the options below them; others are below "Options"
 _SECTIONS = {
-    "What is known": "separation mean_separation pressure area",
-    "Surface": "surface file map",
-    "Measured map": f"{' '.join(specimens.MAP_OPTIONS)} model",
-    "Surface in numbers": "hurst q0 q1 zeta_1 h_rms h_max nominal_area m0 m2 m4",
-    "Surface by roughness parameters": "Rq Ra Sq Sa Rdq Sdq Rsm longest shortest Sds Spd Sp",
-    "Bodies": "E_star E1 nu1 E2 nu2 materials hardness conductivity length_unit stress_unit",
-    "Theory": "theory variant island_model rtol",
+    "What is known": LOADS,
+    "Surface": ("surface", "file", "map"),
+    "Measured map": (*specimens.MAP_OPTIONS, "model"),
+    "Surface in numbers": ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "nominal_area", "m0", "m2", "m4"),
+    "Surface by roughness parameters": ROUGHNESS,
+    "Bodies": (*specimens.MATERIAL, "hardness", "conductivity", "length_unit", "stress_unit"),
+    "Theory": ("theory", "variant", "island_model", "rtol"),
+    "Options": (),
 }
-_SECTION_OF = {name: title for title, names in _SECTIONS.items() for name in names.split()}
 
 
 def format_options(command: click.Command, context: click.Context, formatter: click.HelpFormatter) -> None:
     """The options of a command for its help, in sections where there are many."""
-    sections: dict[str, list[tuple[str, str]]] = {}
     parameters = [each for each in command.get_params(context) if isinstance(each, click.Option)]
-    for parameter in parameters:
-        record = parameter.get_help_record(context)
-        if record is not None:
-            title = _SECTION_OF.get(parameter.name or "", "Options") if len(parameters) > MANY else "Options"
-            sections.setdefault(title, []).append(record)
-    for title in sorted(sections, key=[*_SECTIONS, "Options"].index):
-        with formatter.section(title):
-            formatter.write_dl(sections[title])
+    titles = {name: title for title, names in reversed(_SECTIONS.items()) for name in names}
+    titles = titles if len(parameters) > MANY else {}
+    for title in _SECTIONS:
+        own = [each for each in parameters if titles.get(str(each.name), "Options") == title]
+        if own:
+            with formatter.section(title):
+                formatter.write_dl([each.get_help_record(context) or ("", "") for each in own])
 
 
 def check_plot(plot: Path | None, out: Path | None) -> None:

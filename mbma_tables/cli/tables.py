@@ -24,11 +24,9 @@ def _place(name: str) -> tuple[Path, str | None]:
     """Path and kind of a table; for a file, whose kind is unknown, None."""
     from mbma_tables.models.tables import shipped
 
-    if name in KINDS:
-        return shipped(name), name
-    if not Path(name).exists():
+    if name not in KINDS and not Path(name).exists():
         raise InputError(f"no table and no file is called {name!r}: the tables are {' and '.join(KINDS)}")
-    return Path(name), None
+    return (shipped(name), name) if name in KINDS else (Path(name), None)
 
 
 def _read(name: str) -> TableContent:

@@ -10,6 +10,7 @@ import io
 import itertools
 import re
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -113,18 +114,21 @@ def draw_compression(
     pressure_label: str = PRESSURE_LABEL,
     gap_label: str = GAP_LABEL,
     leakage_label: str = LEAKAGE_LABEL,
+    more: Mapping[str, Mapping[str, FloatArray]] = MappingProxyType({}),
 ) -> Figure:
     """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
 
-    A third one, flow coefficient against pressure, where a curve has leakage. Each curve is a line with its points as
-    they are; those without contact have no place on a logarithmic axis and are left out by it.
+    A third one, flow coefficient against pressure, where a curve has leakage, and one for each label of `more`, with
+    lines by name over the first curve's pressure. Each curve is a line with its points as they are; those without
+    contact have no place on a logarithmic axis and are left out by it.
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
     leaking = [curve for curve in curves if curve.leakage is not None]
-    panels = 3 if leaking else 2
+    panels = 2 + bool(leaking) + len(more)
     figure = new_figure(5 * panels, 4.5)
-    by_gap, by_pressure, *flow = figure.subplots(1, panels)
+    by_gap, by_pressure, *others = figure.subplots(1, panels)
+    flow = others[: len(others) - len(more)]
     for curve in curves:
         marker = "." if curve is curves[0] else ""
         by_gap.plot(curve.gap, curve.pressure, marker=marker, label=curve.label)
@@ -143,7 +147,12 @@ def draw_compression(
         axes.loglog(curve.pressure, k, marker=".", label=curve.label)
         _band(axes, curve.pressure, k, curve.leakage_scatter)
         axes.set(xlabel=pressure_label, ylabel=leakage_label)
-    for axes in (by_gap, by_pressure, *flow):
+    for axes, (label, lines) in zip(others[len(flow) :], more.items(), strict=True):
+        for name, values in lines.items():
+            axes.loglog(curves[0].pressure, values, marker=".", label=name)
+        axes.set(xlabel=pressure_label, ylabel=label)
+        axes.legend()
+    for axes in (by_gap, by_pressure, *others):
         axes.grid(True, which="major", alpha=0.3)
     by_gap.legend()
     figure.suptitle(title)

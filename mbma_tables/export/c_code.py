@@ -18,8 +18,7 @@ import numpy as np
 from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.again import written_by
-from mbma_tables.export.text import braces, core_file, filled, numerals, opening
+from mbma_tables.export.text import braces, core_file, filled, numerals, opening, written_by
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.universal import RECORD, UniversalModel
@@ -31,11 +30,7 @@ from mbma_tables.totals.contact import QUADRATURE_SHARE
 FORM = "standard"  # the form of island model "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
 CORE = ("phi.c", "totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
-MODEL = {
-    "mbma_model.h": "the MBMA model and the calibrated law of one surface in C11, declarations.",
-    "mbma_model.c": "the MBMA model and the calibrated law of one surface in C11.",
-    "mbma_data.c": "the tables of the MBMA model and of the calibrated law in C11.",
-}
+MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")
 # flags of the library; rounding does not depend on the compiler
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 USAGE = (
@@ -74,19 +69,17 @@ def c_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
     """Names and texts of the C sources, the self-test apart."""
     if variant.addition != "sum":
         raise InputError(f"exported code adds the areas of islands: variant {variant.name!r} takes their cover")
-    about = about_model(model, variant) + about_theories()
-    about.append(written_by(["c", "--variant", variant.name, "--out", "."]))
-    heads = {name: opening(header(f"{name}: {title}", USAGE, about), "/*") for name, title in MODEL.items()}
+    heads = {name: opening(header(name, "c", USAGE, model, variant), "/*") for name in MODEL}
     return core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
 
 
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
     """The calls of one surface, under the opening comments of their files."""
     form, certificates = RANGES[FORM], CERTIFICATES[FORM]
-    prototypes, forms = closed_forms()
+    _, prototypes, _, forms = core_file("closed_forms.h").split("\n\n", 3)
     parts = {
-        "PROTOTYPES": prototypes,
-        "CLOSED_FORMS": forms,
+        "PROTOTYPES": f"{prototypes}\n",
+        "CLOSED_FORMS": re.sub(r"(\d)e0\b", r"\1.0", forms),
         "FORM_X_LOW": repr(form["X"][0]),
         "FORM_X_HIGH": repr(form["X"][1]),
         "FORM_MU_HIGH": repr(form["mu"][1]),
@@ -101,12 +94,6 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
     return {name: filled(name, **parts, HEADER=heads[name]) for name in ("mbma_model.h", "mbma_model.c")}
 
 
-def closed_forms() -> tuple[str, str]:
-    """Declarations and definitions of the closed forms."""
-    _, declarations, _, definitions = core_file("closed_forms.h").split("\n\n", 3)
-    return f"{declarations}\n", re.sub(r"(\d)e0\b", r"\1.0", definitions)
-
-
 def tables(model: UniversalModel) -> dict[str, Any]:
     """The arrays of the tables by their names in C."""
     cells, places, _ = model.cells
@@ -118,7 +105,10 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
     """The tables, and the variant of the equations; with `later` as variables, for a program to fill in."""
     lines, law = ['#include "mbma_model.h"'], calibrated_table.shipped()
     for (name, values), kind in zip(tables(model).items(), ("mbma_cell", "int32_t", "float"), strict=True):
-        head, body = f"{kind} {name}[{len(values)}]", _cells if kind == "mbma_cell" else _items
+        head, body = (
+            f"{kind} {name}[{len(values)}]",
+            _cells if kind == "mbma_cell" else lambda numbers: _wrapped(numerals(numbers)),
+        )
         lines += ["", f"{head};"] if later else ["", f"static const {head} = {{", *body(values), "};"]
     X, buckets, flags = model.cells[2][:4], model.cells[2][4:].astype(int), variant.numbers[5:].astype(int)
     spline = "MBMA_SPLINE", law.cells, law.first, 1 / law.step, law.covered[:2, 0], law.covered[:2, 1]
@@ -147,11 +137,6 @@ def _wrapped(items: Sequence[str], first: str = "", last: str = "") -> list[str]
     return textwrap.wrap(text, 120, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
 
 
-def _items(values: Any) -> list[str]:
-    """Initialisers of numbers."""
-    return _wrapped(numerals(values))
-
-
 def _cells(cells: FloatArray) -> Iterator[str]:
     """Initialisers of mbma_cell."""
     for cell in cells:
@@ -160,20 +145,21 @@ def _cells(cells: FloatArray) -> Iterator[str]:
             yield from _wrapped([braces(*numerals(row)) for row in powers], "{", "}," if name == "F" else "}},")
 
 
-def header(title: str, usage: str, about: list[str]) -> list[str]:
-    """Paragraphs of a file's opening comment: description, origin, contents, conventions, licence."""
-    return [title, f"Written by mbma_tables {__version__}. {usage}", *about, CONVENTIONS, *LICENCE]
-
-
-def about_model(model: UniversalModel, variant: Variant) -> list[str]:
-    """The MBMA model, its variant, range and error."""
-    content = model.content
+def header(name: str, target: str, usage: str, model: UniversalModel, variant: Variant) -> list[str]:
+    """Paragraphs of a file's opening comment: origin, contents, variant, range, errors, conventions, licence."""
+    content, law = model.content, calibrated_table.shipped()
     found, (X, mu) = content.attributes, content.axes
     worst, visited = (
-        max(float(found[f"{which}largest_error_{name}"]) for name in ("F", "A")) for which in ("", "visited_")
+        max(float(found[f"{which}largest_error_{of}"]) for of in ("F", "A")) for which in ("", "visited_")
     )
     form, certificates = RANGES[FORM], CERTIFICATES[FORM]
+    ranges = [
+        f"{axis} in [{math.exp(low) if k else low:.4g}, {math.exp(high) if k else high:.4g}]"
+        for k, (axis, (low, high)) in enumerate(zip(("H", "zeta_1", "u/h_rms"), law.covered, strict=True))
+    ]
     return [
+        f"{name}: part of the MBMA model and the calibrated law of rough contact as source code.",
+        f"Written by mbma_tables {__version__}. {usage}",
         "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
         "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
         f"Variant: {variant.name} (density divisor {variant.density_divisor:.17g}, beta {variant.beta:.17g}, phi "
@@ -186,20 +172,12 @@ def about_model(model: UniversalModel, variant: Variant) -> list[str]:
         f"Closed form, {FORM}: for {form['X'][0]:g} <= X <= {form['X'][1]:g} and mu <= {form['mu'][1]:g}; largest "
         f"relative error {certificates['phi_F'].largest:.2g} of Phi_F, {certificates['phi_A'].largest:.2g} of Phi_A.",
         "Outside the table there is no answer, only a status: nothing is clamped or extrapolated.",
-    ]
-
-
-def about_theories() -> list[str]:
-    """The calibrated law by its table, and theories by a spectrum."""
-    table = calibrated_table.shipped()
-    ranges = [
-        f"{name} in [{math.exp(low) if k else low:.4g}, {math.exp(high) if k else high:.4g}]"
-        for k, (name, (low, high)) in enumerate(zip(("H", "zeta_1", "u/h_rms"), table.covered, strict=True))
-    ]
-    return [
         "Law calibrated on boundary elements, by a table of force over Hurst exponent, q1/q0 and mean separation, in C "
         f"also of any spectrum, as Persson's theory, by a sum over wavelengths. Table: {', '.join(ranges)}; other "
         "separations continue by the law's limits.",
-        f"Largest relative error of the table against the law: {table.error:.2g}. Simulations scatter about the law by "
+        f"Largest relative error of the table against the law: {law.error:.2g}. Simulations scatter about the law by "
         "percents to tens of percents, which the documentation lists.",
+        written_by([target, "--variant", variant.name, "--out", "."]),
+        CONVENTIONS,
+        *LICENCE,
     ]

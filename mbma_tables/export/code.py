@@ -21,11 +21,10 @@ from typing import NamedTuple
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
-from mbma_tables.export.again import written_by
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
 from mbma_tables.export.targets import Target
 from mbma_tables.export.text import filled, opening, wrapped
-from mbma_tables.models.tables import open_table
+from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.variants import Variant, get_variant
 
@@ -34,12 +33,12 @@ ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", 
 
 
 class Language(NamedTuple):
-    """A target's own files, each made from a template, with what each is; and how its self-test is built and run.
+    """A target's own files, each made from a template; and how its self-test is built and run.
 
     In the commands, `{0}` is the folder of the sources and `{1}` the one to build in; an empty one builds nothing.
     """
 
-    titles: dict[str, str]
+    files: tuple[str, ...]
     usage: str
     build: tuple[str, ...]
     run: tuple[str, ...]
@@ -47,17 +46,15 @@ class Language(NamedTuple):
 
 SOURCES = (*c_code.CORE, "mbma_model.c", "mbma_data.c", "mbma_selftest.c")
 IN_PLACE = tuple(f"{{0}}/{name}" for name in SOURCES)
-C_SELFTEST = {"mbma_selftest.c": "replays the conformance points of the MBMA model."}
 LANGUAGES = {
     "c": Language(
-        C_SELFTEST, c_code.USAGE, ("cc", *c_code.FLAGS, *IN_PLACE, "-lm", "-o", "selftest"), ("{1}/selftest",)
+        ("mbma_selftest.c",),
+        c_code.USAGE,
+        ("cc", *c_code.FLAGS, *IN_PLACE, "-lm", "-o", "selftest"),
+        ("{1}/selftest",),
     ),
     "fortran": Language(
-        {
-            "mbma.f90": "the MBMA model for Fortran 2008, an interface to the C files.",
-            "mbma_selftest.f90": "what mbma_selftest.c replays, in Fortran 2008.",
-        }
-        | C_SELFTEST,
+        ("mbma.f90", "mbma_selftest.f90", "mbma_selftest.c"),
         "Compile it with the C files but mbma_selftest.c, which these flags are for: gfortran "
         f"{' '.join(c_code.FLAGS[1:])} {' '.join(SOURCES[:-1])} mbma.f90 program.f90. Every procedure may be called "
         "from any thread.",
@@ -68,10 +65,7 @@ LANGUAGES = {
         ("{1}/selftest",),
     ),
     "javascript": Language(
-        {
-            "mbma.mjs": "the MBMA model for JavaScript, its C files as WebAssembly.",
-            "mbma_selftest.mjs": "replays the conformance points of the MBMA model in JavaScript.",
-        },
+        ("mbma.mjs", "mbma_selftest.mjs"),
         "import { total, totalSlopes, calibrated, phi } from './mbma.mjs', in any browser since 2021 "
         "and in node: one file, no dependency, nothing to fetch. Answers are objects with a status, which is STATUS.OK "
         "where they hold numbers; an argument that is not a number, or is NaN, throws a TypeError.",
@@ -81,17 +75,12 @@ LANGUAGES = {
 }
 
 
-def write_code(
-    target: str,
-    folder: os.PathLike[str] | str,
-    variant: str | Variant = "reported",
-    table: os.PathLike[str] | str = "universal",
-) -> list[pathlib.Path]:
+def write_code(target: str, folder: os.PathLike[str] | str, variant: str | Variant = "reported") -> list[pathlib.Path]:
     """Write the model as code into a folder, with conformance points and a self-test that replays them.
 
     The target "c" is C11, which C++ compiles too; "fortran" a Fortran 2008 module over that C; "javascript" an
     ECMAScript module with that C in it as WebAssembly, which the package ziglang compiles. A missing folder is made,
-    files of the same names are replaced; the table is a universal one. Returns the files written.
+    files of the same names are replaced. Returns the files written.
 
     Examples
     --------
@@ -101,10 +90,7 @@ def write_code(
     """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
-    rule = get_variant(variant)
-    model = open_table(table)
-    if not isinstance(model, UniversalModel):
-        raise InputError(f"code is written from a universal table, and {os.fspath(table)} is not one")
+    rule, model = get_variant(variant), universal_model()
     texts = {**source_texts(target, model, rule), POINTS_FILE: points_text(model, rule)}
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
@@ -113,14 +99,11 @@ def write_code(
 
 def source_texts(target: str, model: UniversalModel, variant: Variant) -> dict[str, str]:
     """Names and texts of a target's source files."""
-    language = LANGUAGES[target]
-    c_texts = c_code.c_texts(model, variant)
+    language, c_texts = LANGUAGES[target], c_code.c_texts(model, variant)
     texts = {} if target == "javascript" else c_texts
-    about = c_code.about_model(model, variant) + c_code.about_theories()
-    about.append(written_by([target, "--variant", variant.name, "--out", "."]))
     declarations = c_texts["mbma.h"] + c_texts["mbma_model.h"]
-    for name, title in language.titles.items():
-        lines = c_code.header(f"{name}: {title}", language.usage, about)
+    for name in language.files:
+        lines = c_code.header(name, target, language.usage, model, variant)
         parts = {"HEADER": opening(lines, "!" if name.endswith(".f90") else "/*")}
         if name == "mbma.f90":
             parts |= fortran_interface(declarations)

@@ -109,18 +109,10 @@ def status_rows(model: UniversalModel) -> Rows:
     """Points outside the table, and the expected status."""
     X, mu = model.content.axes
     middle = 0.5 * (X.low + X.high)
-    places = {
-        (X.low, 1.0): OK,
-        (X.high, 1.0): OK,
-        (middle, mu.high): OK,
-        (middle, 0.0): OK,
-        (np.nextafter(X.low, -np.inf), 1.0): X_BELOW,
-        (np.nextafter(X.high, np.inf), 1.0): X_ABOVE,
-        (middle, np.nextafter(mu.high, np.inf)): MU_ABOVE,
-        (math.nan, 1.0): INVALID,
-        (middle, math.nan): INVALID,
-        (middle, -1e-300): INVALID,
-    }
+    places = {(X.low, 1.0): OK, (X.high, 1.0): OK, (middle, mu.high): OK, (middle, 0.0): OK}
+    places |= {(np.nextafter(X.low, -np.inf), 1.0): X_BELOW, (np.nextafter(X.high, np.inf), 1.0): X_ABOVE}
+    places |= {(middle, np.nextafter(mu.high, np.inf)): MU_ABOVE}
+    places |= dict.fromkeys([(math.nan, 1.0), (middle, math.nan), (middle, -1e-300)], INVALID)
     yield from rows("status", np.array([*places]).T, [[*places.values()]])
 
 
@@ -143,19 +135,11 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
         "a row: kind, tolerance, how many arguments, these; each answer and what its difference is taken relative to",
         *(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
     ]
-    lines = [
-        # with the results and tolerances that are stored in the table
-        *rows(
-            "phi",
-            places,
-            (points["table_F"], points["table_A"], model.answer(*places).error),
-            None,
-            points["tolerance"],
-        ),
-        *(line for line in phi_rows(model, *places) if line.startswith("slopes")),
-        *status_rows(model),
-        *formula_rows(*places),
-    ]
+    # with the results and tolerances that are stored in the table
+    known = points["table_F"], points["table_A"], model.answer(*places).error
+    lines = [*rows("phi", places, known, None, points["tolerance"])]
+    lines += [line for line in phi_rows(model, *places) if line.startswith("slopes")]
+    lines += [*status_rows(model), *formula_rows(*places)]
     for surface in SURFACES:
         zeta_1 = surface[2] / surface[1]
         if zeta_1 > max(3.0, variant.floor_u):

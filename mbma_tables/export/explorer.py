@@ -34,7 +34,8 @@ from mbma_tables.theories import calibrated, calibrated_table, mbma
 
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
-SHOWN_READINGS = (REPORTED, PRINTED, FITTED)
+SHOWN_VARIANTS = (REPORTED, PRINTED, FITTED)
+VARIANT_NAMES = tuple(variant.name for variant in SHOWN_VARIANTS)
 SCRIPTS = ("model.js", "state.js", "hardness.js", "curves.js", "downloads.js", "charts.js", "main.js")
 FEW = 1000  # numbers up to which they stay doubles
 FRACTION_BITS, ORDER = 43, 3  # packed tables: steps of 1e-13; order of differences
@@ -43,6 +44,7 @@ MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
 K_S, NU = 50.0, 0.3  # first conductivity [W/(m K)] and Poisson's ratio
+NOTHING = np.array(None)  # null
 MAX_SAMPLES = 500  # samples of a spectrum, so that a step of a slider stays fast
 
 
@@ -64,28 +66,13 @@ def packed(values: Any) -> dict[str, Any]:
     return {"count": flat.size, "kind": kind, "differences": differences, "bits": FRACTION_BITS, "text": text}
 
 
-def _model(values: dict[str, Any]) -> dict[str, Any]:
-    """The compiled module and all data passed to it."""
-    return {
-        "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
-        "tables": {name: packed(value) for name, value in values.items()},
-        "variants": {
-            variant.name: {"numbers": variant.numbers.tolist(), "cover": variant.addition == "cover"}
-            for variant in SHOWN_READINGS
-        },
-    }
-
-
 def _limits() -> dict[str, Any]:
     """Tested ranges of theories, with the texts of `Contact.reasons`, and their scatter."""
-    table = calibrated_table.shipped()
+    table, quantities = calibrated_table.shipped(), calibrated_table.QUANTITIES
     return {
         "log_area": table.log_area.tolist(),
         "scatter": {
-            name: {
-                quantity: [float(x) if np.isfinite(x) else None for x in row]
-                for quantity, row in zip(calibrated_table.QUANTITIES, rows, strict=True)
-            }
+            name: dict(zip(quantities, np.where(np.isfinite(rows), rows, NOTHING).tolist(), strict=True))
             for name, rows in table.scatter.items()
         },
         "gradient": source.MAX_GRADIENT,
@@ -140,23 +127,23 @@ def explorer_page(
     (True, True, True)
     """
     measured = isinstance(surface, MeasuredSurface)
-    theory = theory or ("calibrated" if measured else "mbma")
+    theory, chosen = theory or ("calibrated" if measured else "mbma"), get_variant(variant)
     if theory == "mbma" and measured:
         raise InputError("MBMA in the page is of five numbers: take another theory, or surface.fit()")
-    if theory not in THEORIES:
-        raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
-    if get_variant(variant) not in SHOWN_READINGS:
-        raise InputError(f"the page has the variants {tuple(shown.name for shown in SHOWN_READINGS)}, got {variant!r}")
+    for what, given, known in (("theories", theory, THEORIES), ("variants", chosen.name, VARIANT_NAMES)):
+        if given not in known:
+            raise InputError(f"the page has the {what} {known}, got {given!r}")
     modulus = 1.0 if E_star is None else number_in("E_star", float(positive_array("E_star", E_star)), 1e-300, 1e300)
     units = Units(surface.unit, "1" if E_star is None else stress_unit)
+    cap = np.inf if hardness is None else float(hardness_in(units, hardness))
     start = _start(surface) | {
         "E_star": modulus,
         "k_s": K_S if surface.unit else 1.0,
         "theory": theory,
-        "variant": get_variant(variant).name,
+        "variant": chosen.name,
+        "nu": NU,
+        "hardness": number_in("hardness", cap, 1e-300, 1e300) if cap < np.inf else None,
     }
-    cap = np.inf if hardness is None else float(hardness_in(units, hardness))
-    start |= {"nu": NU, "hardness": number_in("hardness", cap, 1e-300, 1e300) if cap < np.inf else None}
     data = {
         "version": __version__,
         "title": title,
@@ -165,7 +152,13 @@ def explorer_page(
         "departures": list(surface.departures()),
         "note": MAP_NOTE if isinstance(surface, MeasuredSurface) and surface.bearing is not None else "",
         "limits": _limits(),
-        "model": _model(c_code.tables(universal_model())),
+        "model": {
+            "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
+            "tables": {name: packed(value) for name, value in c_code.tables(universal_model()).items()},
+            "variants": {
+                one.name: {"numbers": one.numbers.tolist(), "cover": one.addition == "cover"} for one in SHOWN_VARIANTS
+            },
+        },
     }
     # a script element with data ends only at its closing tag
     text = json.dumps(data).replace("<", "\\u003c")

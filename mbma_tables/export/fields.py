@@ -52,36 +52,10 @@ def _nearest(shape: Callable[[float], FloatArray], log_y: FloatArray) -> tuple[f
     return t, factor, shape(t) + factor - log_y
 
 
-def greenwood_tripp(law: LawTable) -> tuple[dict[str, float], NDArray[np.bool_], FloatArray]:
-    """MBDyn's Greenwood-Tripp numbers for the pressure of a film.
+def _greenwood_tripp(law: LawTable) -> tuple[dict[str, float], NDArray[np.bool_], FloatArray]:
+    """MBDyn's numbers for the pressure of a film: sigma, eta, beta, delta, and H0, below which a tangent follows.
 
-    Parameters
-    ----------
-    law : LawTable
-        Rows of a film.
-
-    Returns
-    -------
-    numbers : dict
-        sigma, eta, beta, delta in the units of the film, and H0, below which MBDyn continues with a tangent.
-    kept : ndarray of bool
-        Rows of the fit: from the least pressure that counts, or A/A0 = 0.001, to A/A0 = 0.1.
-    misfit : ndarray
-        ln(p of MBDyn/p of the law) there.
-
-    Raises
-    ------
-    InputError
-        Where fewer than three rows are in this range.
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface
-    >>> from mbma_tables.export.law_rows import describe_law
-    >>> bearing = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
-    >>> numbers, _, misfit = greenwood_tripp(describe_law(bearing, "110 GPa", length_unit="m", quantity="film"))
-    >>> f"{numbers['beta']:.1e} m, {abs(misfit).max():.0%}"
-    '7.0e-07 m, 9%'
+    With the rows of the fit, from the least pressure that counts to A/A0 = 0.1, and ln(p of MBDyn/p of the law) there.
     """
     pressure, area = law.more["pressure"][0], law.more["area"][0]
     sigma, E_star = law.facts["h_rms"][0], law.facts["E_star"][0]
@@ -99,7 +73,7 @@ def greenwood_tripp(law: LawTable) -> tuple[dict[str, float], NDArray[np.bool_],
 
 
 def _mbdyn(law: LawTable, name: str) -> str:
-    name, (numbers, kept, misfit) = checked_name(name, MAX_NAME), greenwood_tripp(law)
+    name, (numbers, kept, misfit) = checked_name(name, MAX_NAME), _greenwood_tripp(law)
     u, pressure, length = law.x[kept], law.more["pressure"][0][kept], law.x_unit
     slip = law.more["stiffness"][0][kept] / (pressure * tangential_ratio(NU))
     numbers |= {"E": law.facts["E_star"][0], "sigma0": math.exp(np.log(slip).mean())}
@@ -140,15 +114,12 @@ def _geos(law: LawTable, name: str) -> str:
         f"BartonBandis is fitted: ln(w/w of the table) is {misfit.std():.2g} root mean square, "
         f"{np.abs(misfit).max():.2g} at most. HydraulicApertureTable takes no stress; use one of both."
     )
-    laws = (
-        f'HydraulicApertureTable name="{name}" referenceAperture="{number(w[-1])}" apertureTableName="{name}_byJump"',
-        f'BartonBandis name="{name}_fitted" referenceAperture="{number(math.exp(factor))}" '
-        f'referenceNormalStress="{number(t * stress[-1])}"',
-    )
-    constitutive = "".join(f"    <{law}/>\n" for law in laws)
+    bandis = f'referenceAperture="{number(math.exp(factor))}" referenceNormalStress="{number(t * stress[-1])}"'
     return comment([said], "<!--") + (
-        f"<Problem>\n  <Functions>\n{functions}  </Functions>\n"
-        f"  <Constitutive>\n{constitutive}  </Constitutive>\n</Problem>\n"
+        f"<Problem>\n  <Functions>\n{functions}  </Functions>\n  <Constitutive>\n"
+        f'    <HydraulicApertureTable name="{name}" referenceAperture="{number(w[-1])}" '
+        f'apertureTableName="{name}_byJump"/>\n    <BartonBandis name="{name}_fitted" {bandis}/>\n'
+        "  </Constitutive>\n</Problem>\n"
     )
 
 
@@ -220,10 +191,5 @@ getdp = Grammar(
     named="rough",
 )
 lethe = Grammar("Lethe", "#", {"conductance": _lethe}, "For contacts pressed as hard as in this range.", units=SI)
-TARGETS = (
-    mbdyn.target("mbdyn"),
-    geos.target("geos"),
-    moose_function.target("moose-function"),
-    getdp.target("getdp"),
-    lethe.target("lethe"),
-)
+_NAMED = {"mbdyn": mbdyn, "geos": geos, "moose-function": moose_function, "getdp": getdp, "lethe": lethe}
+TARGETS = tuple(grammar.target(name) for name, grammar in _NAMED.items())

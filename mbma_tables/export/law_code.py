@@ -13,8 +13,14 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
-from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Language
-from mbma_tables.export.law_numbers import flow_numbers, law_numbers
+from mbma_tables.export.law_languages import (
+    FORTRAN_FUNCTION,
+    FORTRAN_INTERFACE,
+    LANGUAGES,
+    Language,
+    flow_numbers,
+    law_numbers,
+)
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import braces, checked_name, core_file, filled, numerals, opening, page_file, wrapped
 from mbma_tables.law import block as at

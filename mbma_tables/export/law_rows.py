@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.answers.film import FlowFactors, flow_factors
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows
+from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows, rounded
 from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
-from mbma_tables.export.film_rows import film_rows
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING
+from mbma_tables.laws.calibrated import TESTED_AREA
 from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
@@ -33,6 +34,9 @@ FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors 
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
 LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # mean separations of the last points, over h_max
 FILM_ROWS = 200
+FILM_RANGE = (0.2 * (1 + 1e-9), 10.0)  # u/h_rms
+NEAREST_GAP = 1e-9  # smallest overclosure of a film evaluated, over h_max
+FILM_NAMES = ("phi_x", "phi_y", "shear_x", "shear_y", "pressure")
 
 
 @hinted
@@ -65,8 +69,8 @@ def describe_law(
     ----------
     surface : Surface
         One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`) alone, of pressure as force.
-    E_star : float or str
-        Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+    E_star, variant, theory, hardness
+        As for `contact`; with a hardness the law of loading, and conductance by the stiffness of the frozen contact.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
     quantity : {"pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film"}
@@ -83,25 +87,17 @@ def describe_law(
     pressures : pair of float or str, optional
         Smallest and largest pressure of the user's problem: rows end at the largest, and the error holds from the
         smallest on. Else they end at full compression, or where the force turns down.
-    conductivity : float, optional
+    conductivity, conductivity_unit : float and str, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
     kappa : float or callable, optional
         Normal over tangential stiffness (`materials.tangential_ratio`), a number or a function of the contact area.
-    friction : float, optional
-        Coefficient of friction, for the friction cards of solvers; with `kappa`.
-    friction_pressure : float or str, optional
-        Pressure at which the one tangential stiffness of a friction card holds; by default the geometric mean of
-        `pressures`. Comments have the stiffness at other pressures.
-    variant : str or Variant
-        Of the MBMA model.
-    theory : str or theory
-        As for `contact`.
-    hardness : float or str
-        As for `contact`: the law of loading, and conductance by the stiffness of the frozen contact.
-    peklenik : float, optional
-        Of a film: as for `flow_factors`.
+    friction, friction_pressure : float, and float or str, optional
+        Coefficient of friction, for the friction cards of solvers, with `kappa`; the pressure at which their one
+        stiffness holds, by default the geometric mean of `pressures`. Comments have it at other pressures.
     evenly : bool
         Equally spaced rows instead, for comparison.
+    peklenik : float, optional
+        Of a film: as for `flow_factors`.
     made_by : tuple of str
         Lines for the header of a file that say how to write it again.
     direction : str or float, optional
@@ -115,8 +111,7 @@ def describe_law(
     Examples
     --------
     >>> from mbma_tables import Surface
-    >>> road = Surface.named("concrete")
-    >>> law = describe_law(road, "13.3 MPa", rows=20)
+    >>> law = describe_law(Surface.named("concrete"), "13.3 MPa", rows=20)
     >>> law.y_name, law.y_unit, law.x_unit, round(law.largest_error, 3)
     ('pressure', 'MPa', 'mm', 0.021)
     """
@@ -137,7 +132,7 @@ def describe_law(
     least, end = _range(exported, pressures)
     if film:
         count = whole_number_in("rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS)
-        return film_rows(exported, count, least, end if pressures else np.inf, peklenik)
+        return _film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
     scale, unit, facts, behaviour = 1.0, exported.stress, exported.facts, None
     said: list[str] = []
@@ -275,3 +270,58 @@ def _range(exported: ExportedLaw, pressures: tuple[float | str, float | str] | N
         least = f"{float(law.pressure(law.h_max)):.4g} {units.stress}"
         raise InputError(f"pressures must reach above {least}, that at c = 0, where rows begin, got {high:g}")
     return low, found
+
+
+def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float, peklenik: float | None) -> LawTable:
+    """Flow factors and asperity pressure at mean gaps whose ratios are equal."""
+    h_rms, h_max, length, stress = float(exported.surface.h_rms), exported.law.h_max, exported.length, exported.stress
+    u = rounded(np.geomspace(max(FILM_RANGE[0] * h_rms, h_max - end), FILM_RANGE[1] * h_rms, rows))
+    at = functools.partial(
+        flow_factors, exported.surface, peklenik=peklenik, theory=exported.theory, E_star=exported.modulus,
+        hardness=exported.hardness,
+    )  # fmt: skip
+    found = at(u)
+    tested = found.pressure[found.area >= TESTED_AREA[0]]
+    floor = least if least is not None else float(tested.min()) if tested.size else np.inf
+    units = dict.fromkeys((*FILM_NAMES, "area", "scatter"), "1")
+    units["pressure"] = stress
+    columns = {name: (getattr(found, name), unit) for name, unit in units.items()}
+    columns["stiffness"] = (np.asarray(exported.answer(u).unloading_stiffness), f"{stress}/{length}")
+    error = _film_error(at, found, floor)
+    comments = exported.header(
+        f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
+        f"mean separation u from {u[0]:.10g} to {u[-1]:.10g} {length}",
+        f"{rows} rows; largest error of linear interpolation {error:.1e}, relative, of flow factors and of pressures "
+        f"above {floor:.4g} {stress}, where flow factors are valid",
+        *_of_film(found, length),
+        end=h_max - min(u[0], h_max * (1 - NEAREST_GAP)),
+    )
+    facts = exported.facts | {"peklenik": (found.peklenik, "1")}
+    y, unit = columns.pop("phi_x")
+    names, theory = ("mean_separation", "phi_x"), exported.law.theory
+    return LawTable(u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts)
+
+
+def _film_error(at: Callable[[FloatArray], FlowFactors], found: FlowFactors, floor: float) -> float:
+    """Largest relative error of linear interpolation, in the middle of the intervals."""
+    u, error = found.mean_separation, 0.0
+    middle = at((u[1:] + u[:-1]) / 2)
+    for name in FILM_NAMES:
+        value, between = getattr(found, name), getattr(middle, name)
+        kept = middle.valid & (between > (floor if name == "pressure" else 0))
+        error = max(error, *np.abs((value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1), 0.0)
+    return float(error)
+
+
+def _of_film(found: FlowFactors, length: str) -> list[str]:
+    """Notes for the reader of flow factors."""
+    lines = [
+        "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
+        "stiffness is that of a small change of the gap, with the contact area as it is",
+        f"peklenik = {found.peklenik:.6g}: length of the roughness along x over that along y",
+        f"scatter: one standard deviation of ln phi; of ln shear_x, ln shear_y: {found.shear_scatter[0]:.2g}",
+    ]
+    for reason, bad in found.reasons.items():
+        gaps = found.mean_separation[bad]
+        lines.append(f"flow factors not valid from u = {gaps.min():.4g} to {gaps.max():.4g} {length}: {reason}")
+    return lines

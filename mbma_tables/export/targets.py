@@ -1,8 +1,4 @@
-"""Targets: programs and formats that laws are written for, each declared once, where it is written.
-
-A new one is a function and a `Target` in the tuple TARGETS of its module: what it is written from, the quantities and
-options that it takes, and, for rows, its comments, units, limits and what the program does outside them.
-"""
+"""Targets: programs and formats that laws are written for, each declared once, in TARGETS of a module of `GROUPS`."""
 
 from __future__ import annotations
 
@@ -40,32 +36,17 @@ AGAINST = {
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """Declaration of the output for one program, or in one format.
+    """Declaration of the output for one program, or in one format."""
 
-    Parameters
-    ----------
-    name : str
-        In the command `mbma export`.
-    write : callable
-        Of a `LawTable` and what is named: text or bytes, or several files by how their names end after that of the
-        first, whose own end is "". Of a law, where `rows` is False: of surface, E_star and options.
-    takes : frozenset of str
-        Options of the command.
-    end : str
-        Of the first file's name, where it must be that; functions are then called by the rest of it.
-    quantity : str
-        Of the rows, where none is asked for; "pressure" by default.
-    units : pair of str, optional
-        Of length and of stress, where the program asks for them.
-    """
-
-    name: str
+    name: str  # in the command `mbma export`
+    # of a `LawTable` and options by name; of surface, E_star and options where `rows` is False. Text or bytes, or
+    # several files by how their names end after that of the first, whose own end is ""
     write: Callable[..., Any]
-    takes: frozenset[str] = ROWS
+    takes: frozenset[str] = ROWS  # options of the command
     rows: bool = True
-    end: str = ""
-    quantity: str = "pressure"
-    units: tuple[str, str] | None = None
+    end: str = ""  # of the first file's name, where it must be that; functions are then called by the rest of it
+    quantity: str = "pressure"  # of the rows, where none is asked for
+    units: tuple[str, str] | None = None  # of length and of stress, where the program prescribes them
 
     def files(self, *given: Any, **options: Any) -> Mapping[str, bytes]:
         """The files by the ends of their names, that of the first being ""."""
@@ -89,14 +70,7 @@ class Grammar:
     friction: str = ""  # notes for the user of its friction card; empty without one
 
     def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
-        """The text of a file.
-
-        Raises
-        ------
-        InputError
-            For a quantity or units that the program does not take, more rows than it holds, and a name that it cannot
-            read.
-        """
+        """The text of a file; a law that the program does not take raises an `InputError`."""
         own, most = tuple(law.facts[fact][1] for fact in ("h_rms", "E_star")), self.most.get(law.y_name, law.x.size)
         taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
         for allowed, takes, got in (

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib.resources
 import re
+import shlex
 import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from mbma_tables import __version__
 from mbma_tables.common.errors import InputError
 
 COMMENT_WIDTH = 108
@@ -98,6 +100,11 @@ def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
     text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), template(name))
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
+
+
+def written_by(words: Iterable[str]) -> str:
+    """The line of a header with the arguments of `mbma export`."""
+    return f"written by mbma_tables {__version__}: mbma export {shlex.join(words)}"
 
 
 def csv_cell(text: str) -> str:

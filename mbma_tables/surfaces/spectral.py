@@ -209,6 +209,12 @@ class SpectralSurface(AnySurface):
             known["anisotropy"] = self.anisotropy
         beyond = "beyond, only 'calibrated' by a map was tested"
         mend = "theory='simulated' simulates the map" if by_map else beyond
+        if by_map and self.map is not None:
+            from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING
+
+            resolved = MIN_POINTS * max(self.map.steps)
+            if 2 * np.pi / self.q1 < resolved * (1 - ROUNDING):
+                mend += f" with a short_cutoff of {resolved:.4g}"
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()

@@ -201,6 +201,8 @@ class Calibrated(Theory):
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         area, (low, high) = answer.area, TESTED_AREA
+        broad = f"the longest wavelength is more than {TESTED_ZETA_1:g} times the shortest"
+        reasons: dict[str, Any]
         if isinstance(surface, MeasuredSurface):
             law = _own_law(surface)
             straight = None if law.curve is None else law.curve.straight(np.asarray(mean_separation) / law.h_rms)
@@ -208,13 +210,14 @@ class Calibrated(Theory):
                 "the light-load and near-full-contact approximations disagree for this map: stiffness is constant "
                 "over a range of forces"
             )
-            reasons = {} if straight is None else {text: straight & (area >= low)}
+            reasons = {broad: surface.q1 / surface.longest > TESTED_ZETA_1 * (1 + 1e-9)}
+            reasons |= {} if straight is None else {text: straight & (area >= low)}
         else:
             assert isinstance(surface, Surface)
             heights, (least, most) = np.asarray(surface.h_max / surface.h_rms), TESTED_HEIGHTS
             reasons = {
                 f"the Hurst exponent is below {TESTED_HURST:g}": surface.hurst < TESTED_HURST * (1 - 1e-9),
-                f"zeta_1 is above {TESTED_ZETA_1:g}": surface.zeta_1 > TESTED_ZETA_1 * (1 + 1e-9),
+                broad: surface.zeta_1 > TESTED_ZETA_1 * (1 + 1e-9),
                 f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < least) | (heights > most),
             }
         reasons[f"A/A0 is below {low:g}"] = (area > 0) & (area < low * (1 - 1e-9))

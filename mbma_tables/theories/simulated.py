@@ -160,7 +160,7 @@ class BoundaryElements(Theory):
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         area, left_out = answer.area, self.pressed.left_out
         coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
-        coarse += ": give a short_cutoff of so many steps"
+        coarse += f": give a short_cutoff of {MIN_POINTS:g} steps"
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         return {
             coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
@@ -184,7 +184,7 @@ class BoundaryElements(Theory):
         """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
         return self.pressed.flows(self.fit.x, self.fit.separation)
 
-    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
+    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked.
 
         Along an axis that closes at u1, ln K over ln(u - u1) is a monotone cubic, straight below the last open load;

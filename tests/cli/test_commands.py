@@ -17,7 +17,6 @@ from mbma_tables import Surface, contact, island, theories
 from mbma_tables.cli import main
 from mbma_tables.materials import effective_modulus
 from mbma_tables.scenes.specimen import MAP_OPTIONS, MATERIAL, NUMBERS, schema
-from mbma_tables.surfaces.cases import CASES
 from mbma_tables.theories import THEORIES
 
 YANG_PERSSON = {"hurst": 0.8, "q0": 60 * np.pi / 1040, "zeta_1": 216.0, "h_rms": 1.0, "h_max": 3.0}
@@ -191,15 +190,6 @@ def test_island_is_the_librarys_answer():
     assert found["units"] | {"D": "1/mm^2", "force": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
 
 
-def test_surfaces_lists_every_case():
-    columns = json.loads(run("surfaces", "--json"))["columns"]
-    assert columns["name"] == list(CASES)
-    assert columns["zeta_1"] == [float(Surface.named(name).zeta_1) for name in CASES]
-    assert columns["length_unit"] == [case.length_unit for case in CASES.values()]
-    rows = table_rows(run("surfaces"))
-    assert [row[0] for row in rows[1:]] == list(CASES)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -260,7 +250,10 @@ def test_bad_files(folder, content, message):
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        (FileNotFoundError(2, "No such file or directory", "a.txt"), "mbma: a.txt: No such file or directory\n"),
+        (
+            FileNotFoundError(2, "No such file or directory", "a.txt"),
+            "mbma: [Errno 2] No such file or directory: 'a.txt'\n",
+        ),
         (OSError("odd\nfault"), "mbma: odd fault\n"),
     ],
 )
@@ -414,7 +407,7 @@ def test_a_terminal_without_the_units_letters(folder):
     assert "h_max 1.1 um" in found.stdout.decode("utf-8")
 
 
-@pytest.mark.parametrize("command", ["", "contact", "curve", "island", "surfaces"])
+@pytest.mark.parametrize("command", ["", "contact", "curve", "island"])
 def test_help_answers_without_heavy_imports(command):
     code = (
         "import sys\n"

@@ -99,7 +99,6 @@ def test_check_names_what_is_missing(tmp_path, monkeypatch):
         (("c", "code", "guessed"), "variant must be one of"),
         (("c", "code", "fitted"), "takes their cover"),
         (("c", "a_file"), "a_file"),
-        (("c", "code", "reported", "island4d"), "universal"),
     ],
 )
 def test_bad_requests_leave_no_file(arguments, message, tmp_path, monkeypatch):

@@ -126,9 +126,12 @@ class TestAnswers:
         odd = Surface([0.1, 0.8, 0.8], 1.0, [64.0, 1000.0, 64.0], 1.0, [3.0, 3.0, 9.0])
         reasons = contact(odd, mean_separation=0.5, theory="calibrated").reasons
         assert [text.split(" is ")[0] for text in reasons if "gradient" not in text] == [
-            "the Hurst exponent", "zeta_1", "h_max/h_rms"]  # fmt: skip
+            "the Hurst exponent", "the longest wavelength", "h_max/h_rms"]  # fmt: skip
         gentle = Surface(0.8, 0.01, 0.64, 1.0, 3.3)
         assert contact(gentle, area=[0.0005, 0.02, 0.98], theory="calibrated").valid.tolist() == [False, True, False]
+        broad = Surface(0.8, 0.01, 1.29, 1.0, 3.3)
+        assert not contact(broad.combined(broad), area=0.02).valid
+        assert contact(gentle.combined(gentle), area=0.02).valid
 
 
 class TestScatter:

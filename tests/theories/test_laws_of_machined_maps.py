@@ -31,7 +31,9 @@ def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
     found = contact(surface_of(family, number), area=[0.01, 0.1, 0.5], theory="calibrated")
     assert not found.valid.any()
     (reason,) = (text for text in found.reasons if text.startswith(statistic))
-    assert "theory='simulated' simulates the map" in reason
+    assert reason.endswith("theory='simulated' simulates the map")
+    coarse = Surface.from_map(surface_of(family, number).map.heights[::2, ::2], 2.0, periodic=True)
+    assert any("the map with a short_cutoff of 8" in text for text in coarse.departures(by_map=True))
     assert (found.scatter > 0.13).all()
     assert (found.area_scatter > 0.07).all()
     assert (found.stiffness_scatter > 0.2).all()

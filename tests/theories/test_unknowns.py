@@ -81,8 +81,8 @@ def test_the_command():
     arguments = ["--surface", "challenge", "--E-star", "25MPa", "-p", "100kPa"]
     answer = json.loads(run("sensitivity", *arguments, "--json"))
     found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa")
-    assert answer["columns"]["area"] == [row["area"] for row in found.slopes.values()]
-    assert answer["columns"]["unit"] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
+    assert answer["slopes"] == found.slopes
+    assert [answer["units"][name] for name in found.parameters] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
     assert "MPa/um" in run("sensitivity", *arguments)
 
 
