@@ -174,7 +174,7 @@ class Units:
             unit = None if found is None else re.sub(r"[\s()*]", "", found[2]).replace("/m/K", "/mK")
             if found is None or unit not in CONDUCTIVITIES:
                 raise InputError(
-                    f"a conductivity is a number, or a text such as '45 W/(m K)' or '6e7 S/m', got {value!r}"
+                    f"conductivities are numbers, or all texts such as '45 W/(m K)' or '6e7 S/m', got {value!r}"
                 )
             numbers.append(float(found[1]))
             units.add(CONDUCTIVITIES[unit])
