@@ -100,7 +100,7 @@ def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none."""
     found = _NUMBER.fullmatch(text)
     if found is None:
-        raise InputError(f"{name} must be a number, or one with its unit, got {text!r}")
+        raise InputError(f"{name} must be a number, or one with its unit, got {text[:60]!r}")
     number, rest = float(found[1]), found[2].strip()
     if not rest:
         return number, None
