@@ -21,6 +21,7 @@ COMMANDS = {
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
+    "score": "generate.pages.score",
     "tables": "generate.tables.commands",
 }
 
