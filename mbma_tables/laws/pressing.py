@@ -120,7 +120,7 @@ class Press:
             found[load] = self(load)[0]
 
         with shown("boundary elements"):
-            for load in map(float, wanted):
+            for load in wanted.tolist():
                 add(load)
             for _ in range(MORE if more else 0):
                 low, high = min(found), max(found)
@@ -131,8 +131,7 @@ class Press:
                 if found[high][0] < HIGHEST and high * HEAVIER < self._cap * self.gradient:
                     add(high * HEAVIER)
         cache.trim()
-        loads = np.array(sorted(found))
-        return loads, np.array([found[load] for load in loads.tolist()]).T
+        return np.array(sorted(found)), np.array([found[load] for load in sorted(found)]).T
 
     def flow(self, load: float) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3] through the gaps under a load over A0 E*; 0 where blocked."""
@@ -180,28 +179,14 @@ class Press:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table:
-    """What was found of a map, without the map and its gaps.
+    """What was found of a map, without the map and its gaps."""
 
-    Attributes
-    ----------
-    rows : ndarray, shape (4, n)
-        F/(A0 E*), A/A0, u and U/(A0 E*).
-    flow_gaps, flow : ndarray, shape (m,) and (m, 3)
-        Mean gaps, falling, and flow coefficients xx, yy, xy [length^3].
-    points : float
-        Sampling steps along the shortest wavelength.
-    left_out : float
-        As of `Press`.
-    origin : str
-        Description of the map and of the simulation.
-    """
-
-    rows: FloatArray
-    flow_gaps: FloatArray
-    flow: FloatArray
-    points: float
-    left_out: float
-    origin: str
+    rows: FloatArray  # F/(A0 E*), A/A0, u and U/(A0 E*) of loads, shape (4, n)
+    flow_gaps: FloatArray  # mean gaps, falling, shape (m,),
+    flow: FloatArray  # and flow coefficients xx, yy, xy there [length^3], shape (m, 3)
+    points: float  # sampling steps along the shortest wavelength
+    left_out: float  # as of `Press`
+    origin: str  # description of the map and of the simulation
 
     def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
         """`flow_gaps` and `flow`."""
