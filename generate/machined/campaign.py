@@ -1,7 +1,5 @@
 """`python -m generate machined`: press maps as machines make them, and gather truth and answers into one file."""
 
-from __future__ import annotations
-
 import functools
 import pathlib
 from collections.abc import Callable

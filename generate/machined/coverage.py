@@ -8,8 +8,6 @@ Each form states a standard deviation with a few constants, the same for all map
 They cover 70% of errors once and 97.5% twice. `left_out` states for each family what the others give.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Beside it, what theories answer at these loads. Stiffness is -dF/du by a step of 3% of the pressure, of both alike.
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 from typing import Any
 
