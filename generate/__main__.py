@@ -13,10 +13,7 @@ from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 COMMANDS = {
-    **{
-        name: f"generate.{name}"
-        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
-    },
+    **{name: f"generate.{name}" for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")},
     **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas",

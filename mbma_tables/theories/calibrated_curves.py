@@ -128,12 +128,6 @@ class Curve:
         return np.asarray(np.where(pressure < lightest, light, np.exp((low + high) / 2 + full)))
 
 
-@functools.lru_cache(maxsize=32)
-def own_law(surface: MeasuredSurface) -> OwnLaw:
-    """The law of a surface, cached."""
-    return OwnLaw(surface)
-
-
 class OwnLaw:
     """The law of a surface given by a spectrum: by the spectrum alone, or with its heights or its map's curves."""
 
@@ -197,3 +191,6 @@ class OwnLaw:
         # beside h_max, with which it makes d
         require(quantity, wanted, u > np.finfo(float).eps * self.h_max, "less: the mean separation vanishes")
         return np.asarray(u)
+
+
+own_law = functools.lru_cache(maxsize=32)(OwnLaw)
