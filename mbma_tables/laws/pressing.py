@@ -25,8 +25,10 @@ TOLERANCE = 1e-5
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
 # loads added for the flow, at most: where its logarithm falls by more than this, and where an axis closes between
-# loads further apart than this in ln F
-FLOWS, STEEP, NARROW = 6, 1.2, 0.1
+# loads further apart than this in ln F, which counts as such a fall
+FLOWS, STEEP, NARROW, CLOSING = 6, 1.2, 0.1, 3.5
+# A/A0 up to which flow along both axes was open on most maps, so that its scatter is known; a fall beyond counts less
+AREA_OF_FLOW, BEYOND = 0.2, 0.6
 ROUNDING = 1e-6
 KEPT = "pressed 2"  # of what is cached: another text where this file finds other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
@@ -162,8 +164,9 @@ class Press:
                 K = np.array([found[own][:2] for own in at.tolist()])
                 with np.errstate(divide="ignore", invalid="ignore"):
                     fall = np.nan_to_num(np.log(K[:-1] / K[1:]), posinf=np.inf)
-                fall[np.isinf(fall) & (np.diff(at)[:, None] <= NARROW)] = 0.0
-                worst = fall.max(axis=1)
+                closing = np.where(np.diff(at) > NARROW, CLOSING, 0.0)[:, None]
+                heavy = np.array([self(float(np.exp(own)))[0][0] for own in at[:-1].tolist()]) > AREA_OF_FLOW
+                worst = np.where(np.isinf(fall), closing, fall).max(axis=1) * np.where(heavy, BEYOND, 1.0)
                 k = int(worst.argmax())
                 if worst[k] < STEEP:
                     break
