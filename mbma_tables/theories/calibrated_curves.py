@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 MAP_ERROR = 3e-2  # error of a map's curve, which is smoother than the nodes of its law, for nine maps in ten
 STRAIGHT, SAME = 1.0, 1e-9  # range of ln F over which constant stiffness is unreliable; differences due to rounding
 NODE_STEP, FINE = 0.2, 8  # steps of a map's curve in ln F and ln u, since its nodes are rough; parts of an integral
-
-
 ENDS = ", where the light-load and near-full-contact approximations of this map leave no gap: use theory='simulated'"
 
 
