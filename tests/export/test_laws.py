@@ -158,7 +158,7 @@ def test_text_holds_the_rows(target, rows):
         assert word in text
 
 
-@pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])
+@pytest.mark.parametrize(("target", "package"), [("parquet", "pyarrow")])
 def test_a_missing_package_is_named(target, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(MbmaError, match=f"pip install {package}"):
