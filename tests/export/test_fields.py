@@ -244,7 +244,7 @@ def test_data_of_a_film_come_back(name, tmp_path):
     elif name == "hdf5":
         h5py = pytest.importorskip("h5py")
         with h5py.File(path) as held:
-            assert held["pressure"].attrs["units"] == "Pa"
+            assert held["pressure"].attrs["units"] == b"Pa"
             found = {key: held[key][:] for key in film.columns}
     else:
         held = pytest.importorskip("pyarrow.parquet").read_table(path)
