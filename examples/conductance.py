@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 
 from mbma_tables import Surface, contact, materials
 from mbma_tables.common.plots import to_picture
-from mbma_tables.totals.conductance import cooper_mikic_yovanovich, mean_conductivity, mikic
+from mbma_tables.totals.conductance import cooper_mikic_yovanovich, mean_conductivity
 
 # both faces' roughness in one
 JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6)
@@ -62,7 +62,7 @@ def conductance_curve(points: int = 200) -> Curve:
         for hardness in (SOFT, middle, HARD, np.inf)
     }
     h = {p_m: K_MEAN / E_STAR * found.unloading_stiffness for p_m, found in joints.items()}
-    spread = np.exp(joints[middle].scatter)
+    spread, slope = np.exp(joints[middle].scatter), np.sqrt(2 * JOINT.m2 / np.pi)
     return Curve(
         pressure,
         joints[middle].unloading_stiffness,
@@ -72,7 +72,7 @@ def conductance_curve(points: int = 200) -> Curve:
         h[np.inf],
         K_MEAN / E_STAR * joints[middle].stiffness,
         cooper_mikic_yovanovich(JOINT, pressure, K_MEAN, E_STAR, middle),
-        mikic(JOINT, pressure, K_MEAN, E_STAR),
+        1.55 * K_MEAN * slope / JOINT.h_rms * (np.sqrt(2) * pressure / (slope * E_STAR)) ** 0.94,
     )
 
 

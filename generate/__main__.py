@@ -13,14 +13,12 @@ from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 COMMANDS = {
-    **{
-        name: f"generate.{name}"
-        for name in ("audit", "calibrated", "cost", "coverage", "explorer", "leakage_law", "wheels")
-    },
+    **{name: f"generate.{name}" for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")},
     **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
+    "score": "generate.pages.score",
     "tables": "generate.tables.commands",
 }
 
@@ -43,7 +41,7 @@ class Generator(click.Group):
         try:
             code = super().main(*args, **extra)
         except click.Abort:
-            click.echo("generate: interrupted; --resume continues from the chunks that are done", err=True)
+            click.echo("generate: interrupted", err=True)
             sys.exit(1)
         except ModuleNotFoundError as fault:
             click.echo(f"generate: {fault}; install the extra: pip install -e '.[generate]'", err=True)

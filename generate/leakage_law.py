@@ -76,6 +76,11 @@ class Case(Simulated):
         """Whether constants are fitted to surfaces like it."""
         return self.kind not in ("stretched", "yielded") and self.waves >= MIN_WAVES
 
+    @property
+    def plain(self) -> bool:
+        """Whether its errors are those that are stated."""
+        return self.isotropic and self.zeta_1 < LARGE
+
     def law(self, constants: Constants) -> tuple[FloatArray, FloatArray]:
         """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and a hardness, the last of `node`."""
         if self.kind == "yielded":
@@ -109,38 +114,27 @@ class Flow:
         at_area = force_at_area(self.area, light_factor(one.spectrum.alpha, constants), constants)
         load = at_area if one.kind == "yielded" else one.force
         self._gaps = leakage.gaps(one.spectrum, load, constants)
-        self._known: dict[FlowConstants, FloatArray] = {}
+
+    @functools.cache  # noqa: B019 - there are as many surfaces as the file has
+    def log_factor(self, flow: FlowConstants) -> FloatArray:
+        """ln R at the loads."""
+        return leakage.log_factor(self._gaps, flow)
 
     def medium(self, flow: FlowConstants, area: FloatArray | None = None, u: FloatArray | None = None) -> FloatArray:
         """The law; of another area and mean gap than the calibrated law's where given."""
-        own, gap = (self.area, self.u) if area is None or u is None else (area, u)
-        factor = self.factor(flow, own) if area is not None else self._log_factor(flow)
+        factor, gap = self.log_factor(flow), self.u if u is None else u
+        if area is not None:
+            # by interpolation between the loads
+            kept = self._gaps.area < flow.threshold - leakage.NEAREST
+            odds = log_odds(self._gaps.area[kept], flow.threshold)
+            inside = np.minimum(area, flow.threshold * (1 - 1e-9))
+            found = np.interp(log_odds(inside, flow.threshold), odds, factor[kept])
+            factor = np.where(area < flow.threshold, found, -np.inf)
         return np.asarray(factor + 3 * np.log(gap) + np.log(leakage.wide_gap(gap)))
-
-    def _log_factor(self, flow: FlowConstants) -> FloatArray:
-        """ln R at the loads, found once for each set of constants."""
-        if flow not in self._known:
-            self._known[flow] = leakage.log_factor(self._gaps, flow)
-        return self._known[flow]
-
-    def factor(self, flow: FlowConstants, area: FloatArray) -> FloatArray:
-        """ln R at any contact fractions, by interpolation between the loads."""
-        kept = self._gaps.area < flow.threshold - leakage.NEAREST
-        odds = log_odds(self._gaps.area[kept], flow.threshold)
-        inside = np.minimum(area, flow.threshold * (1 - 1e-9))
-        found = np.interp(log_odds(inside, flow.threshold), odds, self._log_factor(flow)[kept])
-        return np.where(area < flow.threshold, found, -np.inf)
 
     def closed_form(self, flow: FlowConstants) -> FloatArray:
         with np.errstate(divide="ignore"):
             return np.asarray(np.log(flow.closed_form(self.u, self.area)))
-
-    def parallel_plates(self, flow: FlowConstants) -> FloatArray:
-        return 3 * np.log(self.u)
-
-    def patir_cheng(self, flow: FlowConstants) -> FloatArray:
-        """Patir and Cheng (1978), isotropic: 1 - 0.9 exp(-0.56 u) beside u^3."""
-        return 3 * np.log(self.u) + np.log(1 - 0.9 * np.exp(-0.56 * self.u))
 
     def critical_junction(self, flow: FlowConstants) -> FloatArray:
         """Persson and Yang (2008): the cube of the gap u1 at the magnification at which contact percolates."""
@@ -200,14 +194,15 @@ LAWS: dict[str, Callable[[Flow, FlowConstants], FloatArray]] = {
     "Bruggeman, n = 1/(1 - 0.42)": lambda flow, c: flow.bruggeman(c, 1 / (1 - 0.42)),
     "Bruggeman, n = 2": lambda flow, c: flow.bruggeman(c, 2.0),
     "critical junction": Flow.critical_junction,
-    "Patir and Cheng": Flow.patir_cheng,
-    "parallel plates": Flow.parallel_plates,
+    # 1978, isotropic
+    "Patir and Cheng": lambda flow, _: 3 * np.log(flow.u) + np.log(1 - 0.9 * np.exp(-0.56 * flow.u)),
+    "parallel plates": lambda flow, _: 3 * np.log(flow.u),
 }
 SETS: dict[str, Callable[[Case], bool]] = {
-    "training": lambda one: one.isotropic and one.split == TRAINING and one.zeta_1 < LARGE,
-    "held-out surfaces": lambda one: one.isotropic and one.split == HELD_OUT_SURFACE and one.zeta_1 < LARGE,
-    "held-out spectra": lambda one: one.isotropic and one.split == HELD_OUT_SPECTRUM and one.zeta_1 < LARGE,
-    "held out": lambda one: one.isotropic and one.split != TRAINING and one.zeta_1 < LARGE,
+    "training": lambda one: one.plain and one.split == TRAINING,
+    "held-out surfaces": lambda one: one.plain and one.split == HELD_OUT_SURFACE,
+    "held-out spectra": lambda one: one.plain and one.split == HELD_OUT_SPECTRUM,
+    "held out": lambda one: one.plain and one.split != TRAINING,
     "plateaus": lambda one: one.kind == "plateau",
     "stretched": lambda one: one.kind == "stretched",
     "yielded": lambda one: one.kind == "yielded",
@@ -243,18 +238,15 @@ def noise_floor(found: Sequence[Case], edges: Sequence[float] = EDGES) -> FloatA
 
 def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, FloatArray]:
     """Errors by area and mean gap of other theories on self-affine surfaces; nothing was fitted to these."""
-    told = {}
+    told, seen = {}, [flow for flow in flows if flow.one.kind == "self_affine" and flow.one.isotropic]
     for theory in (Mbma(outside="nan"), Persson(), GreenwoodWilliamson()):
         parts = []
-        for flow in flows:
-            one = flow.one
-            if one.kind != "self_affine" or not one.isotropic:
-                continue
-            curve = TheoryCurve(theory, one)
-            kept = np.isfinite(curve.separation(one.force))
-            area, u = curve.area(one.force[kept]), curve.separation(one.force[kept])
-            log_k = np.full(one.force.shape, -np.inf)
-            log_k[kept] = flow.medium(constants, area, u)
+        for flow in seen:
+            curve = TheoryCurve(theory, flow.one)
+            area, u = curve.area(flow.one.force), curve.separation(flow.one.force)
+            kept = np.isfinite(u)
+            log_k = np.full(u.shape, -np.inf)
+            log_k[kept] = flow.medium(constants, area[kept], u[kept])
             parts.append(errors(flow, log_k))
         told[theory.name] = summary(parts)
     return told

@@ -10,14 +10,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
-from mbma_tables.common.errors import MbmaError
-
 Pool = concurrent.futures.Executor | None
 Key = TypeVar("Key")
-
-
-class WorkerError(MbmaError, RuntimeError):
-    """Worker processes that died."""
 
 
 @contextlib.contextmanager

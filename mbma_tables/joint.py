@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import os
 import pathlib
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +24,7 @@ from mbma_tables.common.units import Units
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.materials import Metal, Pair, hardness_in, pair
+from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import Theory
@@ -148,10 +148,7 @@ class Joint(Displayed):
         'aluminium 6061 hard'
         """
         path = pathlib.Path(path)
-        try:
-            content = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
-            raise InputError(f"{path}: is no TOML file: {fault}") from None
+        content = read_toml(path, "joint")
         for name in ("part_a", "part_b"):
             if isinstance(content.get(name), Mapping) and "map" in content[name]:
                 content[name]["map"] = path.parent / content[name]["map"]
@@ -308,23 +305,21 @@ class Joint(Displayed):
 
     def _figure(self) -> Figure:
         held = self._variables()
-        x = held["pressure"]
+        x, values = held["pressure"], {name: one.values for name, one in held.items()}
+        scatter = dict.fromkeys(
+            ("unloading_stiffness", "tangential_stiffness", "conductance"), values["stiffness_scatter"]
+        )
+        scatter |= {"area": values["area_scatter"]}
+        scatter |= {"mean_separation": values["separation_scatter"] / values["mean_separation"]}
         panels = {
-            "real contact area  A/A0": [("area", "area_scatter")],
-            f"mean gap [{held['mean_separation'].unit}]": [("mean_separation", "separation_scatter")],
-            f"stiffness [{held['stiffness'].unit}]": [
-                ("unloading_stiffness", "stiffness_scatter"), ("tangential_stiffness", "stiffness_scatter"),
-                ("stiffness", ""),
-            ],
-            f"thermal conductance [{CONDUCTANCE}]": [
-                ("total_conductance", ""), ("conductance", "stiffness_scatter"), ("gas_conductance", ""),
-            ],
-        }  # fmt: skip
-        relative = held["separation_scatter"].values / held["mean_separation"].values
-        bands = {name: held[name].values for name in held} | {"separation_scatter": relative, "": None}
+            "real contact area  A/A0": ("area",),
+            f"mean gap [{held['mean_separation'].unit}]": ("mean_separation",),
+            f"stiffness [{held['stiffness'].unit}]": ("unloading_stiffness", "tangential_stiffness", "stiffness"),
+            f"thermal conductance [{CONDUCTANCE}]": ("total_conductance", "conductance", "gas_conductance"),
+        }
         lines = {
-            label: [(name.replace("_", " "), held[name].values, bands[scatter]) for name, scatter in chosen]
-            for label, chosen in panels.items()
+            label: [(name.replace("_", " "), values[name], scatter.get(name)) for name in names]
+            for label, names in panels.items()
         }
         return draw_panels(x.values, lines, f"pressure F/A0 [{x.unit}]")
 

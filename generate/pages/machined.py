@@ -1,5 +1,6 @@
 """docs/machined.md: errors of answers on maps of machined surfaces by family, and how many their scatter covers."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -17,53 +18,51 @@ NAMES = {"simulated": "simulation", "law": "law of hardness on the simulated ela
 SHOWN, THINNED = 1, 6  # number of the map that is drawn of each family, and of its points one in so many
 
 
-def _by_family(data: xr.Dataset, form: str) -> str:
+def halves(values: FloatArray) -> str:
+    """Median and 90% quantile of magnitudes."""
+    return "{:.3f}, {:.3f}".format(*np.quantile(np.abs(values), (0.5, 0.9))) if values.size else ""
+
+
+def by_family(data: xr.Dataset, form: str) -> str:
     lines = []
     for family in FAMILIES:
         own = data.isel(surface=np.flatnonzero(data.family.values == family))
-        cells = []
-        for quantity in QUANTITIES:
-            found = np.abs(errors(own, form, quantity)[seen(own, form, quantity)])
-            cells.append("{:.3f}, {:.3f}".format(*np.quantile(found, (0.5, 0.9))) if found.size else "")
+        cells = [halves(errors(own, form, quantity)[seen(own, form, quantity)]) for quantity in QUANTITIES]
         valid = float(np.mean(own[f"{form}_valid"].values))
         lines.append([f"{family} ({own.sizes['surface']})", *cells, f"{valid:.0%}"])
     return table("family (maps) | ln A | ln F at equal u | ln stiffness | ln flow, A < 20% | valid", lines)
 
 
-def _left_out(data: xr.Dataset, form: str) -> str:
+def families_left_out(data: xr.Dataset, form: str) -> str:
+    """Shares of errors within one and two standard deviations that other families give."""
     columns = [left_out(data, form, quantity) for quantity in QUANTITIES]
     pooled = [{"all": np.concatenate([*column.values()]), **column} for column in columns]
-    rows = [[name, *(_shares(column[name]) for column in pooled)] for name in pooled[0]]
-    rows = [row for row in rows if any(row[1:])]
-    return table("family | area | pressure | stiffness | flow", rows)
+
+    def shares(ratio: FloatArray) -> str:
+        return f"{np.mean(ratio < 1):.2f}, {np.mean(ratio < 2):.2f} ({ratio.size})" if ratio.size else ""
+
+    rows = [[name, *(shares(column[name]) for column in pooled)] for name in pooled[0]]
+    return table("family | area | pressure | stiffness | flow", [row for row in rows if any(row[1:])])
 
 
-def _yielding(data: xr.Dataset) -> str:
+def yielding(data: xr.Dataset) -> str:
     """Errors of simulation and of the law with a hardness: median and 90% quantile, of all maps."""
-    found = {
-        name: data[f"hard_{name}"].values for name in ("area", "mean_separation", "yielded", "unloading_stiffness")
-    }
-    lines = []
-    for k, eta in enumerate(data.eta.values):
-        for way, name in enumerate(data.way.values[1:], 1):
-            own = {key: (values[:, way, k], values[:, 0, k]) for key, values in found.items()}
-            slope = data.hard_stiffness.values[:, k] / data.hard_pressure.values[:, k]
-            errors_of = [
-                np.log(own["area"][0] / own["area"][1]),
-                (own["mean_separation"][0] - own["mean_separation"][1]) * slope,
-                own["yielded"][0] - own["yielded"][1],
-                np.log(own["unloading_stiffness"][0] / own["unloading_stiffness"][1]),
-            ]
-            cells = ["{:.3f}, {:.3f}".format(*np.quantile(np.abs(error), (0.5, 0.9))) for error in errors_of]
-            lines.append([f"{eta:g}", NAMES[str(name)], *cells])
+    area, u, share, frozen = (
+        data[f"hard_{name}"].values for name in ("area", "mean_separation", "yielded", "unloading_stiffness")
+    )
+    slope, lines = data.hard_stiffness.values / data.hard_pressure.values, []
+    for (k, eta), (way, name) in itertools.product(enumerate(data.eta.values), enumerate(data.way.values[1:], 1)):
+        found = [
+            np.log(area[:, way, k] / area[:, 0, k]),
+            (u[:, way, k] - u[:, 0, k]) * slope[:, k],
+            share[:, way, k] - share[:, 0, k],
+            np.log(frozen[:, way, k] / frozen[:, 0, k]),
+        ]
+        lines.append([f"{eta:g}", NAMES[str(name)], *map(halves, found)])
     return table("p_m/(E* g) | by | ln A | ln F at equal u | yielded share | ln unloading stiffness", lines)
 
 
-def _shares(ratio: FloatArray) -> str:
-    return f"{np.mean(ratio < 1):.2f}, {np.mean(ratio < 2):.2f} ({ratio.size})" if ratio.size else ""
-
-
-def _figure(data: xr.Dataset) -> Any:
+def figure_of(data: xr.Dataset) -> Any:
     """One map of each family, its areas, and their errors."""
     rows = -(-len(FAMILIES) // 2)
     figure, axes = panels(rows, 6, (15, 2.2 * rows), gridspec_kw={"width_ratios": 2 * (1, 1.5, 1.5)})
@@ -102,8 +101,8 @@ def measure() -> Measured:
         for valid, name in ((True, "valid"), (False, "not valid")):
             found = [coverage(data, form, quantity, valid) for quantity in QUANTITIES]
             lines.append([form, name, *(f"{a:.2f}, {b:.2f} ({n})" if n else "" for a, b, n in found)])
-    parts = {form: _by_family(data, form) for form in FORMS}
-    parts |= {f"left_out_{form}": _left_out(data, form) for form in FORMS}
-    parts["yielding"] = _yielding(data)
+    parts = {form: by_family(data, form) for form in FORMS}
+    parts |= {f"left_out_{form}": families_left_out(data, form) for form in FORMS}
+    parts["yielding"] = yielding(data)
     parts["coverage"] = table("theory | entries | area | pressure | stiffness | flow", lines)
-    return parts, {"docs/figures/machined.svg": _figure(data)}
+    return parts, {"docs/figures/machined.svg": figure_of(data)}

@@ -1,29 +1,16 @@
-"""The exact islands that tables are made of, solved in chunks by worker processes, one file a finished chunk.
+"""The exact islands that tables are made of, solved in chunks, by worker processes where there are some."""
 
-A chunk's file is named by the hash of all that decides its values to the last bit: the solver's source, versions,
-tolerance and arguments. So a resumed run computes what is missing, and never mixes versions.
-"""
-
-import concurrent.futures
-import io
-import pathlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from generate.provenance import SOLVER, source_digest, versions
-from generate.workers import Pool, WorkerError, attempts
+from generate.workers import Pool
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tablefiles.netcdf import digest_arrays, digest_json
 
 CHUNK = 2000
-Work = Callable[..., FloatArray]
-Job = tuple[Any, ...]
-CODE = (*SOLVER, "generate.tables.chunks", "generate.tables.universal")
 
 
 def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
@@ -38,50 +25,24 @@ def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> Floa
     return found
 
 
-def chunk_key(work: Work, job: Job) -> str:
-    made_by = [source_digest(CODE), versions(), work.__name__]
-    return digest_json([made_by, digest_arrays({str(number): value for number, value in enumerate(job)})])
-
-
 class ChunkedSolver:
-    """Solves islands on an executor, None: here, and keeps finished chunks in a folder, None: nowhere."""
+    """Solves islands on an executor, None: here; the values are the same to the last bit."""
 
-    def __init__(self, executor: Pool = None, folder: pathlib.Path | None = None) -> None:
+    def __init__(self, executor: Pool = None) -> None:
         self.executor = executor
-        self.folder = folder
 
-    def map(self, label: str, work: Work, jobs: Sequence[Job]) -> list[FloatArray]:
-        """``work(*job)`` of each job, in order; WorkerError where a worker died. `label` names the progress bar."""
-        results, missing, paths = {}, {}, {}
-        for number, job in enumerate(jobs):
-            missing[number] = job
-            if self.folder is not None:
-                # written whole or not at all
-                paths[number] = self.folder / chunk_key(work, job)
-                if paths[number].exists():
-                    results[number] = np.asarray(np.load(paths[number]))
-                    del missing[number]
+    def map(self, label: str, work: Callable[..., FloatArray], jobs: Sequence[tuple[Any, ...]]) -> list[FloatArray]:
+        """``work(*job)`` of each job, in order. `label` names the progress bar."""
+        run = map if self.executor is None else self.executor.map
+        found = run(work, *zip(*jobs, strict=True))
         # silent where stderr is not a terminal
-        with tqdm(total=len(jobs), initial=len(results), desc=label, unit="chunk", disable=None) as bar:
-            try:
-                for number, finish in attempts(self.executor, work, missing):
-                    results[number] = finish()
-                    if number in paths:
-                        content = io.BytesIO()
-                        np.save(content, results[number])
-                        write_file(paths[number], content.getvalue(), make_folders=True)
-                    bar.update()
-            except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as fault:
-                text = f"a worker process died ({fault}); --resume continues from the finished chunks"
-                raise WorkerError(text) from None
-        return [results[number] for number in range(len(jobs))]
+        return list(tqdm(found, total=len(jobs), desc=label, unit="chunk", disable=None))
 
     def phi(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
         """`phi` of arrays of any one shape, shape (..., 2)."""
         flat = [np.ascontiguousarray(array, dtype=float).ravel() for array in (X, mu)]
-        jobs = [
-            (flat[0][k : k + CHUNK], flat[1][k : k + CHUNK], rtol, refinement) for k in range(0, flat[0].size, CHUNK)
-        ]
+        parts = (slice(k, k + CHUNK) for k in range(0, flat[0].size, CHUNK))
+        jobs = [(flat[0][part], flat[1][part], rtol, refinement) for part in parts]
         return np.concatenate(self.map(label, phi, jobs)).reshape((*np.shape(X), 2))
 
     def log_ratio(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:

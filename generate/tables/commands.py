@@ -2,19 +2,17 @@
 
 import os
 import pathlib
-import shutil
 
 import click
 
 from generate.files import ROOT
 from generate.tables import height_coefficients
-from generate.tables.certificate import UncertifiedError
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
 from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
 from generate.tables.writing import write_table
-from generate.workers import Pool, executor
+from generate.workers import executor
 from mbma_tables.common.errors import InputError
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
@@ -36,21 +34,6 @@ def destination(what: str, configuration: Configuration, out: pathlib.Path | Non
     return path
 
 
-def make_table(configuration: Configuration, target: pathlib.Path, pool: Pool) -> None:
-    """Build, certify and write one table; finished chunks are kept beside it until then."""
-    chunks = target.parent / f".{target.name}.chunks"
-    try:
-        content = KINDS[configuration.kind](configuration).build(ChunkedSolver(pool, chunks))
-        write_table(target, content)
-    except UncertifiedError:
-        # another resolution shares no chunks with this one
-        shutil.rmtree(chunks, ignore_errors=True)
-        raise
-    shutil.rmtree(chunks, ignore_errors=True)
-    errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
-    click.echo(f"{target}: {content.size}; largest held-out error {errors}; {target.stat().st_size} bytes")
-
-
 @click.command()
 @click.argument("what", type=click.Choice([*KINDS, "heights", "all"]))
 @click.option(
@@ -59,14 +42,12 @@ def make_table(configuration: Configuration, target: pathlib.Path, pool: Pool) -
 @click.option("--target", type=float, help="Largest relative error on held-out points.")
 @click.option("--out", type=click.Path(path_type=pathlib.Path), help="File (for all: folder); default tables/.")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
-@click.option("--resume", is_flag=True, help="Continue from the chunks that an earlier run finished.")
 def tables(
     what: str,
     config: pathlib.Path | None,
     target: float | None,
     out: pathlib.Path | None,
     workers: int,
-    resume: bool,
 ) -> None:
     """Make a table, the coefficients of the height integrals (heights), or all of them in order."""
     if what in ("all", "heights") and (config is not None or target is not None):
@@ -77,7 +58,8 @@ def tables(
         height_coefficients.main()
     with executor(workers) as pool:
         for configuration, path in zip(configurations, paths, strict=True):
+            content = KINDS[configuration.kind](configuration).build(ChunkedSolver(pool))
             path.parent.mkdir(parents=True, exist_ok=True)
-            if not resume:
-                shutil.rmtree(path.parent / f".{path.name}.chunks", ignore_errors=True)
-            make_table(configuration, path, pool)
+            write_table(path, content)
+            errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
+            click.echo(f"{path}: {content.size}; largest held-out error {errors}; {path.stat().st_size} bytes")

@@ -105,9 +105,9 @@ class Leakage(Displayed):
 
         @np.errstate(divide="ignore")
         def stated(by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> tuple[FloatArray]:
-            own = _simulated(by).flow_trust(surface, u, area)
-            if own is not None:
-                return (own[0],)
+            simulated = _simulated(by)
+            if simulated is not None:
+                return (simulated.flow_trust(surface, u, area)[0],)
             stated = shipped_flow().standard_deviation(by.elastic.name, area)
             if not isinstance(surface, MeasuredSurface) or surface.bearing is None:
                 return (stated,)
@@ -178,19 +178,20 @@ def leakage_of(contact: Any) -> Leakage:
     """The leakage of a contact."""
 
     def answer(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
-        own, volume = _simulated(theory).flow(surface, u), np.asarray(surface.h_rms) ** 3
-        if own is not None:
+        simulated = _simulated(theory)
+        if simulated is not None:
+            own = simulated.flow(surface, u)
             return np.sqrt(own[0]) * np.sqrt(own[1]), *own
-        K = flow(surface, u, share) * volume
+        K = flow(surface, u, share) * np.asarray(surface.h_rms) ** 3
         return K, K, K, np.zeros_like(K)
 
     K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact.area})
     return Leakage(K, x, y, xy, contact)
 
 
-def _simulated(theory: Theory) -> Theory:
-    """What the flow is of: of yielded gaps where these are simulated, else of the elastic contact's."""
-    return theory if type(theory).flow_trust is not Theory.flow_trust else theory.elastic
+def _simulated(theory: Theory) -> Any:
+    """The theory of simulated gaps, yielded ones where these are simulated, else the elastic contact's, if any."""
+    return next((one for one in (theory, theory.elastic) if hasattr(one, "flow_trust")), None)
 
 
 def degrees(direction: ArrayLike | str) -> FloatArray:
@@ -230,16 +231,17 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
 
 def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
     """Reasons why the flow is not valid, in addition to those for the contact."""
-    own = _simulated(theory).flow_trust(surface, u, area)
-    everywhere, found = np.ones(np.shape(area), bool), {} if own is None else dict(own[1])
-    if own is None:
+    simulated, everywhere = _simulated(theory), np.ones(np.shape(area), bool)
+    if simulated is not None:
+        found = dict(simulated.flow_trust(surface, u, area)[1])
+    else:
         many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
         far = f"leakage: the longest wavelength is more than {SIMULATED:g} times the shortest, beyond simulated flow"
         found = {many: area > LARGEST_AREA, far: everywhere & (np.asarray(surface.zeta_1) > SIMULATED)}
-    if own is None and isinstance(surface, MeasuredSurface) and surface.bearing is not None:
+    if simulated is None and isinstance(surface, MeasuredSurface) and surface.bearing is not None:
         spectrum = "leakage: channels and walls of a map are not in its isotropic spectrum"
         found[f"{spectrum}: theory='simulated' has its flow"] = everywhere
-    if _simulated(theory) is not theory:
+    if theory.elastic is not theory is not simulated:
         found["leakage: yielded contacts leak several times more"] = everywhere
     if isinstance(theory.elastic, Mbma):
         found["leakage: the mean separation of 'mbma' is wrong by factors"] = everywhere

@@ -85,15 +85,18 @@ def draw(
     treated: Treated, surface: MeasuredSurface, answers: Mapping[str, Any], title: str, pressure_label: str,
     simulated: Mapping[str, FloatArray] | None = None,
 ) -> Any:  # fmt: skip
-    """One picture: heights, spectrum with fit and cut-offs, heights' distribution, area and separation by pressure.
+    """One picture: heights, form removed, spectrum with fit and cut-offs, heights' distribution, area and separation.
 
     `answers` are those of `curves`; `simulated` has force, area and mean_separation of boundary elements, as points.
     """
     figure, unit = new_figure(12, 7.5), surface.unit or "length"
     parts: Any = figure.subfigures(2, 1)
     above, below = parts
-    heights, spectrum, distribution = above.subplots(1, 3)
-    _heights(above, heights, treated, unit)
+    heights, *form, spectrum, distribution = above.subplots(1, 3 if treated.form is None else 4)
+    _heights(above, heights, treated.heights, treated.steps, unit)
+    if form:
+        _heights(above, form[0], treated.form, treated.steps, unit)
+        form[0].set_title("form removed")
     _spectrum(spectrum, surface, unit)
     _distribution(distribution, surface)
     areas, separations = below.subplots(1, 2)
@@ -107,12 +110,11 @@ def draw(
     return figure
 
 
-def _heights(figure: Any, axes: Any, treated: Treated, unit: str) -> None:
-    values = treated.heights
-    sides = [count * step for count, step in zip(values.shape, treated.steps, strict=True)]
+def _heights(figure: Any, axes: Any, values: FloatArray, steps: tuple[float, ...], unit: str) -> None:
+    sides = [count * step for count, step in zip(values.shape, steps, strict=True)]
     axes.set(xlabel=f"x [{unit}]", ylabel=f"{'height' if values.ndim == 1 else 'y'} [{unit}]")
     if values.ndim == 1:
-        axes.plot(np.arange(values.size) * treated.steps[0], values, lw=0.5)
+        axes.plot(np.arange(values.size) * steps[0], values, lw=0.5)
         return
     low, high = np.quantile(values, [0.002, 0.998])
     ends = {"extent": (0, sides[0], 0, sides[1]), "vmin": low, "vmax": high}

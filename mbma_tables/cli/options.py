@@ -210,8 +210,6 @@ _SPECIMEN_OPTIONS = (
     _option("longest", "longest wavelength [length],"),
     _option("shortest", "or shortest wavelength [length],"),
     _option("rolloff", "wavelength from which on a power law follows a flat spectrum [length],"),
-    _option("Sds", "or summits per area [1/length^2],"),
-    _option("Spd", "the same by its newer name;"),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),
     _option("nominal_area", "or the nominal area [length^2], which determines the highest point."),
     _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),

@@ -9,7 +9,7 @@ import inspect
 import itertools
 import math
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
@@ -157,7 +157,7 @@ def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     return table.reshape(len(given), -1), shape
 
 
-def filled(fill: Callable[..., Any], columns: Sequence[Any], outputs: int, *more: Any) -> FloatArray:
+def filled(fill: Callable[..., Any], columns: Any, outputs: int, *more: Any) -> FloatArray:
     """Rows that a loop of the core, ``fill(*columns, *more, *rows)``, makes of flat columns of one length."""
     size = columns[0].size
     out = np.empty((outputs, size))
@@ -170,16 +170,8 @@ def filled(fill: Callable[..., Any], columns: Sequence[Any], outputs: int, *more
 
 def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> list[FloatArray]:
     """Rows computed by a loop of the core from the arguments, in their broadcast shape."""
-    shape = np.broadcast(*given).shape
-    known, out = np.empty((len(given), *shape)), np.empty((outputs, *shape))
-    for k, value in enumerate(given):
-        known[k] = value
-    flat, rows_out = known.reshape(len(given), -1), out.reshape(outputs, -1)
-    if flat.shape[1] <= BLOCK:
-        fill(*flat, *more, *rows_out)
-    else:
-        in_blocks(lambda some: fill(*flat[:, some], *more, *rows_out[:, some]), flat.shape[1], BLOCK)
-    return list(out)
+    columns, shape = rows(*given)
+    return list(filled(fill, columns, outputs, *more).reshape(outputs, *shape))
 
 
 def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:

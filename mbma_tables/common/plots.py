@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import io
-import itertools
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, finite_array, needed
+from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -56,19 +55,6 @@ class Curve:
     area_scatter: FloatArray | None = None  # and of ln A at the force
     leakage: FloatArray | None = None  # flow coefficient of the gaps, zero where blocked,
     leakage_scatter: FloatArray | None = None  # and standard deviation of its logarithm
-
-    def __post_init__(self) -> None:
-        shapes = set()
-        for name in ("gap", "pressure", "area"):
-            array = finite_array(f"{name} of {self.label!r}", getattr(self, name))
-            shapes.add(array.shape)
-            object.__setattr__(self, name, array)
-        others = (self.scatter, self.area_scatter, self.leakage, self.leakage_scatter)
-        shapes |= {np.shape(other) for other in others if other is not None}
-        if len(shapes) > 1 or self.gap.ndim != 1:
-            raise InputError(f"{self.label!r}: gap, force and area must be 1-D and of one length")
-        if not ((self.pressure > 0) & (self.area > 0)).any():
-            raise InputError(f"{self.label!r} has no contact to draw on logarithmic axes")
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -119,42 +105,37 @@ def draw_compression(
     """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
 
     A third one, flow coefficient against pressure, where a curve has leakage, and one for each label of `more`, with
-    lines by name over the first curve's pressure. Each curve is a line with its points as they are; those without
-    contact have no place on a logarithmic axis and are left out by it.
+    lines by name over the first curve's pressure. Points without contact, and blocked flow, have no place on a
+    logarithmic axis and are left out.
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
-    leaking = [curve for curve in curves if curve.leakage is not None]
-    panels = 2 + bool(leaking) + len(more)
-    figure = new_figure(5 * panels, 4.5)
-    by_gap, by_pressure, *others = figure.subplots(1, panels)
-    flow = others[: len(others) - len(more)]
-    for curve in curves:
-        marker = "." if curve is curves[0] else ""
-        by_gap.plot(curve.gap, curve.pressure, marker=marker, label=curve.label)
-        by_pressure.plot(curve.pressure, curve.area, marker=marker, label=curve.label)
-        _band(by_gap, curve.gap, curve.pressure, curve.scatter)
-        _band(by_pressure, curve.pressure, curve.area, curve.area_scatter)
-    by_gap.set_yscale("log", nonpositive="mask")
-    by_pressure.set_xscale("log", nonpositive="mask")
-    by_pressure.set_yscale("log", nonpositive="mask")
-    by_gap.set(xlabel=gap_label, ylabel=pressure_label)
-    by_pressure.set(xlabel=pressure_label, ylabel="real contact area  A/A0")
-    for axes, curve in itertools.product(flow, leaking):
-        # blocked contacts have no place on a logarithmic axis, nor have gaps before contact
-        k = np.asarray(curve.leakage, float)
-        k = np.where((k > 0) & (curve.pressure > 0), k, np.nan)
-        axes.loglog(curve.pressure, k, marker=".", label=curve.label)
-        _band(axes, curve.pressure, k, curve.leakage_scatter)
-        axes.set(xlabel=pressure_label, ylabel=leakage_label)
-    for axes, (label, lines) in zip(others[len(flow) :], more.items(), strict=True):
+    panels = [
+        ("gap", "pressure", "scatter", gap_label, pressure_label),
+        ("pressure", "area", "area_scatter", pressure_label, "real contact area  A/A0"),
+        ("pressure", "leakage", "leakage_scatter", pressure_label, leakage_label),
+    ][: 2 + any(curve.leakage is not None for curve in curves)]
+    figure = new_figure(5 * (len(panels) + len(more)), 4.5)
+    own, others = np.split(figure.subplots(1, len(panels) + len(more)), [len(panels)])
+    for axes, (x_name, y_name, scatter, x_label, y_label) in zip(own, panels, strict=True):
+        for curve in curves:
+            touches = (curve.pressure > 0) & (curve.area > 0)
+            if not touches.any():
+                raise InputError(f"{curve.label!r} has no contact to draw on logarithmic axes")
+            x, y = getattr(curve, x_name), getattr(curve, y_name)
+            if y is not None:
+                y = np.where(touches & (np.asarray(y) > 0), y, np.nan)
+                axes.plot(x, y, marker="." if curve is curves[0] else "", label=curve.label)
+                _band(axes, x, y, getattr(curve, scatter))
+        axes.set(xlabel=x_label, ylabel=y_label, xscale="linear" if x_name == "gap" else "log", yscale="log")
+    for axes, (label, lines) in zip(others, more.items(), strict=True):
         for name, values in lines.items():
             axes.loglog(curves[0].pressure, values, marker=".", label=name)
         axes.set(xlabel=pressure_label, ylabel=label)
-        axes.legend()
-    for axes in (by_gap, by_pressure, *others):
+    for axes in figure.axes:
         axes.grid(True, which="major", alpha=0.3)
-    by_gap.legend()
+    for axes in (figure.axes[0], *others):
+        axes.legend()
     figure.suptitle(title)
     return figure
 

@@ -19,56 +19,40 @@ from typing import Any
 from mbma_tables.common.errors import InputError
 
 _POUND_PER_INCH = Fraction("4.4482216152605") / Fraction("0.0254") ** 2
+_LENGTHS = (
+    "m=1 km=1e3 cm=1e-2 mm=1e-3 um=1e-6 nm=1e-9 angstrom=1e-10 pm=1e-12 ft=0.3048 in=0.0254 mil=254e-7 uin=254e-10"
+)
+_STRESSES = "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 TPa=1e12 bar=1e5 atm=101325"
 SIZES: dict[str, dict[str, Fraction]] = {
-    "length": {
-        "m": Fraction(1),
-        "km": Fraction(1000),
-        "cm": Fraction("1e-2"),
-        "mm": Fraction("1e-3"),
-        "um": Fraction("1e-6"),
-        "nm": Fraction("1e-9"),
-        "angstrom": Fraction("1e-10"),
-        "pm": Fraction("1e-12"),
-        "ft": Fraction("0.3048"),
-        "in": Fraction("0.0254"),
-        "mil": Fraction("0.0254e-3"),
-        "uin": Fraction("0.0254e-6"),
-    },
-    "stress": {
-        "Pa": Fraction(1),
-        "kPa": Fraction(10**3),
-        "MPa": Fraction(10**6),
-        "GPa": Fraction(10**9),
-        "TPa": Fraction(10**12),
-        "bar": Fraction(10**5),
-        "atm": Fraction(101325),
-        "psi": _POUND_PER_INCH,
-        "ksi": 1000 * _POUND_PER_INCH,
-        "Msi": 10**6 * _POUND_PER_INCH,
-    },
+    kind: {unit: Fraction(size) for unit, size in (pair.split("=") for pair in text.split())}
+    for kind, text in {"length": _LENGTHS, "stress": _STRESSES}.items()
 }
+SIZES["stress"] |= {"psi": _POUND_PER_INCH, "ksi": 1000 * _POUND_PER_INCH, "Msi": 10**6 * _POUND_PER_INCH}
 ALIASES = {"micron": "um", "Å": "angstrom", "inch": "in", "N/mm^2": "MPa", "N/mm2": "MPa", "N/m^2": "Pa", "N/m2": "Pa"}
 # powers of length and of stress of named quantities
 DIMENSIONS = {
-    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest", "rolloff"), (1, 0)),
-    **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
-    **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
-    **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "s_filter", "l_filter", "extrapolate_to"), (1, 0)),
-    **dict.fromkeys(("width", "mean_free_path", "displacement", "radius", "approach", "reference"), (1, 0)),
-    **dict.fromkeys(("viscosity", "pressure_drop", "pressure_in", "pressure_out"), (0, 1)),
-    **dict.fromkeys(("q0", "q1"), (-1, 0)),
-    **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),
-    **dict.fromkeys(("E_star", "E1", "E2", "hardness", "elastic_hardness"), (0, 1)),
-    **dict.fromkeys(("pressure", "pressures", "shear", "mean_pressure"), (0, 1)),
-    **dict.fromkeys(("m0", "nominal_area"), (2, 0)),
-    **dict.fromkeys(("stiffness", "unloading_stiffness"), (-1, 1)),
-    **dict.fromkeys(("plane_separation", "separation_scatter"), (1, 0)),
-    "leakage": (3, 0),
-    "conductance": (-1, 0),
-    "energy": (1, 1),
-    "island_force": (2, 1),
-    "island_area": (2, 0),
-    "island_density": (-3, 0),
+    name: powers
+    for powers, names in {
+        (1, 0): (
+            "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation mean_separation delta R_d R_u "
+            "sigma h_d overclosure separations mean_separations deltas dx dy short_cutoff long_cutoff "
+            "s_filter l_filter extrapolate_to width mean_free_path displacement radius approach reference "
+            "plane_separation separation_scatter"
+        ),
+        (0, 1): (
+            "viscosity pressure_drop pressure_in pressure_out E_star E1 E2 hardness elastic_hardness pressure "
+            "pressures shear mean_pressure"
+        ),
+        (-1, 0): "q0 q1 conductance",
+        (-2, 0): "D m4",
+        (2, 0): "m0 nominal_area island_area",
+        (-1, 1): "stiffness unloading_stiffness",
+        (3, 0): "leakage",
+        (1, 1): "energy",
+        (2, 1): "island_force",
+        (-3, 0): "island_density",
+    }.items()
+    for name in names.split()
 }
 CONDUCTIVITIES = {"W/mK": "W/(m^2 K)", "S/m": "S/m^2"}  # and the unit of conductance, over a length in metres
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "²": "2"})
@@ -109,15 +93,12 @@ def read(name: str, text: str) -> tuple[float, str | None]:
         raise InputError(f"{name} has no unit: leave {rest!r} out")
     kind, power = ("length", length) if length else ("stress", stress)
     base = rest.translate(_ASCII).replace("**", "^")
-    size = str(abs(power))
+    if power == 1:
+        return number, known(base, kind)
     # 1/mm^2, /mm2, mm^-2 and mm-2 for power -2
-    patterns = [rf"(.*?)\^?{power}"] if power != 1 else [r"(.*)"]
-    if power < 0:
-        patterns.append(r"1? ?/ ?(.*)" if power == -1 else rf"1? ?/ ?(.*?)\^?{size}")
-    for pattern in patterns:
-        whole = re.fullmatch(pattern, base)
-        if whole is not None:
-            return number, known(whole[1], kind)
+    whole = re.fullmatch(r"(1? ?/ ?)?(.*?)\^?(-?\d+)?", base)
+    if whole is not None and int(whole[3] or 1) * (-1 if whole[1] else 1) == power:
+        return number, known(whole[2], kind)
     sample = unit_of(name, Units(next(iter(SIZES["length"])), next(iter(SIZES["stress"]))))
     raise InputError(f"{name} = {text!r}: the unit must be like {sample}")
 
@@ -174,7 +155,7 @@ class Units:
             unit = None if found is None else re.sub(r"[\s()*]", "", found[2]).replace("/m/K", "/mK")
             if found is None or unit not in CONDUCTIVITIES:
                 raise InputError(
-                    f"a conductivity is a number, or a text such as '45 W/(m K)' or '6e7 S/m', got {value!r}"
+                    f"conductivities are numbers, or all texts such as '45 W/(m K)' or '6e7 S/m', got {value!r}"
                 )
             numbers.append(float(found[1]))
             units.add(CONDUCTIVITIES[unit])

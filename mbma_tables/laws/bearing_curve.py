@@ -53,11 +53,8 @@ def wavevectors(shape: tuple[int, ...], sizes: tuple[float, float]) -> tuple[Flo
 
 def half_plane_weights(shape: tuple[int, ...]) -> FloatArray:
     """Number of wavevectors represented by each column of the real transform."""
-    weights = np.full(shape[1] // 2 + 1, 2.0)
-    weights[0] = 1.0
-    if shape[1] % 2 == 0:
-        weights[-1] = 1.0
-    return weights
+    # the first and, of an even number, the last column are their own conjugates
+    return np.where(2 * np.arange(shape[1] // 2 + 1) % shape[1] == 0, 1.0, 2.0)
 
 
 def radial_bands(heights: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:

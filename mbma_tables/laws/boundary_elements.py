@@ -16,6 +16,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.laws.bearing_curve import wavevectors
 
 # F/(A0 E* g), g the rms gradient: from 0.1% to 97% contact of a Gaussian surface
 LOADS = (4.4e-4, 1e-3, 2e-3, 4.5e-3, 0.01, 0.02, 0.04, 0.07, 0.11, 0.17, 0.25, 0.37, 0.53, 0.75, 1.05)
@@ -39,16 +40,12 @@ def composed(modes: FloatArray, shape: tuple[int, ...], mirrored: bool = False) 
     return np.asarray(scipy.fft.irfft2(modes, s=shape, norm="forward"))
 
 
-def wavenumbers(shape: tuple[int, ...], sizes: tuple[float, ...], mirrored: bool = False) -> FloatArray:
+def wavenumbers(shape: tuple[int, ...], sizes: tuple[float, float], mirrored: bool = False) -> FloatArray:
     """Wavenumber of each of these amplitudes [1/length]."""
-    steps = [side / count for side, count in zip(sizes, shape, strict=True)]
-    if mirrored:
-        axes = [np.pi * np.arange(count) / side for count, side in zip(shape, sizes, strict=True)]
-    else:
-        axes = [
-            2 * np.pi * f(n, step) for f, n, step in zip((np.fft.fftfreq, np.fft.rfftfreq), shape, steps, strict=True)
-        ]
-    return np.asarray(np.hypot(axes[0][:, None], axes[1]))
+    if not mirrored:
+        return np.asarray(np.hypot(*wavevectors(shape, sizes)))
+    x, y = (np.pi * np.arange(count) / side for count, side in zip(shape, sizes, strict=True))
+    return np.asarray(np.hypot(x[:, None], y))
 
 
 def project(p: FloatArray, mean: float, cap: float) -> FloatArray:

@@ -61,20 +61,10 @@ class MapConstants:
 MAP_CONSTANTS = MapConstants()
 
 
-@dataclasses.dataclass(frozen=True)
-class PlateauConstants:
-    """Constants for maps whose light- and full-contact curves disagree at `area` contact, fitted to machined surfaces.
-
-    The valleys take over at a contact larger by `shift` (1 - exp(-(D/onset)^4)), D the difference of their
-    pressure-weighted heights there [h_rms]: below 0.1 on Gaussian maps, larger on plateaus and with pits.
-    """
-
-    shift: float = 0.45
-    onset: float = 0.8
-    area: float = 0.3
-
-
-PLATEAU_CONSTANTS = PlateauConstants()
+# of maps whose light- and full-contact curves disagree at 30% contact, fitted to machined surfaces: valleys take over
+# at a contact larger by shift (1 - exp(-(D/onset)^4)), D the difference of their pressure-weighted heights there
+# [h_rms], which is below 0.1 on Gaussian maps, larger on plateaus and with pits
+PLATEAU_SHIFT, PLATEAU_ONSET, PLATEAU_AREA = 0.45, 0.8, 0.3
 
 
 @functools.lru_cache(maxsize=256)
@@ -123,7 +113,7 @@ class MapLaw:
     anisotropy: float = 1.0
     constants: Constants = CONSTANTS
     map_constants: MapConstants = MAP_CONSTANTS
-    plateau_constants: PlateauConstants = PLATEAU_CONSTANTS
+    plateau_shift: float = PLATEAU_SHIFT
 
     @classmethod
     def from_curves(cls, known: Bearing, bands: RadialSpectrum) -> MapLaw:
@@ -235,9 +225,8 @@ class MapLaw:
         top = np.minimum(near * np.log(factor * contact) + (1 - near) * own, 0.0)
         tops = np.interp(top, np.log(FRACTIONS), self.weighted_height)
         # the highest parts have no influence in full contact
-        p = self.plateau_constants
-        apart = float(np.interp(p.area, contact, valleys - tops))
-        valley_area = m.valley_area - p.shift * np.expm1(-((apart / p.onset) ** 4))
+        apart = float(np.interp(PLATEAU_AREA, contact, valleys - tops))
+        valley_area = m.valley_area - self.plateau_shift * np.expm1(-((apart / PLATEAU_ONSET) ** 4))
         share = (contact / valley_area) ** 4 / np.maximum(1 - contact**4, 1e-12)
         difference = np.exp(-share) * (tops - valleys)
         # u is linear in H_p

@@ -86,15 +86,10 @@ def _records(kind: Any, path: pathlib.Path) -> tuple[Any, ...]:
     )
 
 
-def read_distances(path: pathlib.Path) -> tuple[Distance, ...]:
-    """Distances from a CSV file."""
-    return _records(Distance, path)
-
-
 @functools.cache
 def shipped_distances() -> tuple[Distance, ...]:
     """The distances that ship with the library."""
-    return read_distances(shipped_file("distance.csv"))
+    return _records(Distance, shipped_file("distance.csv"))
 
 
 def read_costs(path: pathlib.Path) -> Costs:

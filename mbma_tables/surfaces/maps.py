@@ -249,7 +249,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
         anisotropy=curves.anisotropy,
     ).scaled(scale, treated.unit)
     more = "" if treated.periodic else ", mirrored for the curves"
-    kept = dataclasses.replace(treated, uncut=None)
+    kept = dataclasses.replace(treated, uncut=None, form=None)
     return dataclasses.replace(known, map=kept, provenance=treated.history(*notes, more=more))
 
 

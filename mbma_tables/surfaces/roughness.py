@@ -19,10 +19,9 @@ from mbma_tables.surfaces import spectrum
 
 HEIGHTS = ("Rq", "Ra", "Sq", "Sa")
 SLOPES = ("Rdq", "Sdq", "Rsm")
-SUMMITS = ("Sds", "Spd")
 WAVES = ("longest", "shortest")
 TOPS = ("h_max", "Sp", "nominal_area")
-ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, "rolloff", *TOPS[1:])
+ROUGHNESS = (*HEIGHTS, *SLOPES, *WAVES, "rolloff", *TOPS[1:])
 ASSUMED = "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled or worn face"
 SAID = {
     "Rq": "h_rms = Rq: the profile is long and no filter removed wavelengths of the surface",
@@ -33,9 +32,6 @@ SAID = {
     "Sdq": "m2 = Sdq^2/2: the surface is isotropic, and Sdq was measured down to the shortest wavelength",
     "Rsm": "m2 = (2 pi h_rms/Rsm)^2: heights are Gaussian, every upward crossing of the mean line counts (Rice 1945);"
     " if an instrument omits small ones, the slope found here is a lower bound",
-    "Sds": "m4 = 6 pi sqrt(3) m2 Sds: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted",
-    "Spd": "m4 = 6 pi sqrt(3) m2 Spd: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted; where "
-    "small ones are pruned, as ISO 25178-2 does, the curvature found here is a lower bound",
     "longest": "q0 = 2 pi/longest: no roughness of longer wavelengths",
     "shortest": "q1 = 2 pi/shortest: no roughness of shorter wavelengths",
     "rolloff": "the spectrum is flat from the longest wave to this one, and one power law from there on",
@@ -60,17 +56,16 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     given, unit = resolve({name: value for name, value in numbers.items() if value is not None}, unit)
     height = _one_of(HEIGHTS, given, "the height of roughness")
     slope = _one_of(SLOPES, given, "the slope of roughness", needed=False)
-    summits = _one_of(SUMMITS, given, "the density of summits", needed=False)
     top = _one_of(TOPS, given, f"the highest point, which Rq and Ra do not determine ({TYPICAL})")
     if "hurst" not in given:
         raise InputError(
             "hurst is missing: a drawing does not tell it; 0.8 is common, and `sensitivity` gives its influence"
         )
-    band = [name for name in (slope, summits, *(wave for wave in WAVES if wave in given)) if name is not None]
-    if len(band) != 2 or band[0] in SUMMITS or (summits and not slope):
+    band = [name for name in (slope, *WAVES) if name in given]
+    if len(band) != 2:
         raise InputError(
-            "the band of wavelengths needs a slope (Rdq, Sdq or Rsm) with one of longest, shortest and Sds, or longest "
-            f"and shortest; got {' and '.join(band) or 'none'}"
+            "the band of wavelengths needs two of longest, shortest and Rdq (or Sdq, Rsm); "
+            f"got {' and '.join(band) or 'none'}"
         )
     if "rolloff" in given and slope is not None:
         raise InputError("rolloff needs longest and shortest: from a slope no band follows")
@@ -90,7 +85,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         long, short = at["longest"], at["shortest"]
         few = long <= spectrum.MIN_ZETA_1 * short
         require(f"longest{said}", long, ~few, f"more than 3 times shortest, {describe_entries(short, few)}")
-    q0, q1 = _band(at, h_rms, slope, summits)
+    q0, q1 = _band(at, h_rms, slope)
     used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
     record = {
@@ -120,26 +115,19 @@ def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
     return surface | {"q": np.array([q0, start, q1]), "C": C}
 
 
-def _band(
-    at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str | None, summits: str | None
-) -> tuple[FloatArray, FloatArray]:
+def _band(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str | None) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest wavenumber."""
-    ends = {wave: 2 * math.pi / at[wave] for wave in WAVES if wave in at}
+    ends = [2 * math.pi / at[wave] for wave in WAVES if wave in at]
     if slope is None:
-        return ends["longest"], ends["shortest"]
+        return ends[0], ends[1]
     m2 = {
         "Rdq": lambda: at["Rdq"] ** 2,
         "Sdq": lambda: at["Sdq"] ** 2 / 2,
         "Rsm": lambda: (2 * math.pi * h_rms / at["Rsm"]) ** 2,
     }[slope]()
-    if summits is not None:
-        q0, q1, _ = spectrum.band_from_moments(at["hurst"], h_rms**2, m2, spectrum.NAYAK * m2 * at[summits])
-        return q0, q1
-    if "longest" in ends:
-        zeta = _ratio(at["hurst"], m2 / (h_rms * ends["longest"]) ** 2, at[slope], slope, 0)
-        return ends["longest"], ends["longest"] * zeta
-    zeta = _ratio(at["hurst"], m2 / (h_rms * ends["shortest"]) ** 2, at[slope], slope, 2)
-    return ends["shortest"] / zeta, ends["shortest"]
+    from_longest = "longest" in at
+    zeta = _ratio(at["hurst"], m2 / (h_rms * ends[0]) ** 2, at[slope], slope, 0 if from_longest else 2)
+    return (ends[0], ends[0] * zeta) if from_longest else (ends[0] / zeta, ends[0])
 
 
 def _ratio(hurst: FloatArray, wanted: FloatArray, slope: FloatArray, name: str, power: int) -> FloatArray:

@@ -156,8 +156,6 @@ class SelfAffine(AnySurface):
         Rdq: Any = None,
         Sdq: Any = None,
         Rsm: Any = None,
-        Sds: Any = None,
-        Spd: Any = None,
         longest: Any = None,
         shortest: Any = None,
         rolloff: Any = None,
@@ -166,8 +164,8 @@ class SelfAffine(AnySurface):
     ) -> Any:
         """The surface that numbers of a drawing or a profilometer describe.
 
-        One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength (or slope
-        and density of summits); nothing is filled in. `provenance` holds the meaning assumed for each number;
+        One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength; nothing is
+        filled in. `provenance` holds the meaning assumed for each number;
         docs/surfaces.md has typical values. Lengths are numbers in one unit, or texts with their unit.
 
         Parameters
@@ -180,8 +178,6 @@ class SelfAffine(AnySurface):
             Root-mean-square or mean absolute height of a profile or of a map [length].
         Rdq, Sdq, Rsm : array_like, one of them, optional
             Root-mean-square slope of a profile, gradient of a map, or mean spacing of a profile's elements [length].
-        Sds, Spd : array_like, one of them, optional
-            Summits per area [1/length^2].
         longest, shortest : array_like, optional
             Wavelengths at which the roughness ends [length].
         rolloff : float or str, optional

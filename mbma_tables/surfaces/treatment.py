@@ -93,6 +93,7 @@ class Treated:
     waves: tuple[float, float] = (0.0, math.inf)  # smallest and largest wavenumber kept
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
     uncut: Any = None  # heights before the short cut-off, where there is one
+    form: Any = None  # what detrending removed, if more than a plane
 
     def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
         """The heights after a step, with its record."""
@@ -166,7 +167,9 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
             remedy = "plane" if more == 1 else "quadratic"
             told += f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} removes it"
             break
-    return known.after(flat, "detrend", told, mode=trend, h_rms_before=before, h_rms_after=after)
+    removed = None if trend in ("mean", "plane") else heights - flat
+    known = known.after(flat, "detrend", told, mode=trend, h_rms_before=before, h_rms_after=after)
+    return dataclasses.replace(known, form=removed)
 
 
 def _counted(count: int, size: int) -> str:

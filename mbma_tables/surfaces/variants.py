@@ -23,27 +23,6 @@ from mbma_tables.surfaces.spectrum import NAYAK
 class Variant:
     """One variant of the paper's equations; make another with ``dataclasses.replace``.
 
-    Attributes
-    ----------
-    name : str
-        Name of the variant in results.
-    density_divisor : float
-        Summit density is m4/(density_divisor m2), wherever one enters (Eqs. 2, 32, 39, 43a).
-    jacobian : {"printed", "exact"}
-        K1 of (47): 1 - 4 beta/3, or 1 - (4 beta/3)/sqrt(1 - zeta_1^(-2H)) as (46) with (27b) gives.
-    offset : bool
-        Whether islands are offset by h_d below z_max (Eqs. 35, 41).
-    summit_sigma : bool
-        sigma of an island and of the islands' heights is the summits' (Eqs. 32, 43a); else sqrt(m0).
-    beta : float
-        Share of the approach that deforms the sphere (B.6).
-    phi : float
-        Roughness over Hertz deformation below which roughness does not matter (28).
-    floor_d, floor_u : float
-        Smallest zeta_d (27a) and zeta_u (30a).
-    addition : {"sum", "cover"}
-        How areas of islands add: as printed (49), or as islands placed at random cover, A/A0 = 1 - exp(-sum).
-
     Raises
     ------
     InputError
@@ -59,15 +38,17 @@ class Variant:
     'no offset'
     """
 
-    name: str
-    density_divisor: float = NAYAK
+    name: str  # of the variant in results
+    density_divisor: float = NAYAK  # summit density is m4/(density_divisor m2), wherever one enters (2, 32, 39, 43a)
+    # K1 of (47): 1 - 4 beta/3, or "exact", 1 - (4 beta/3)/sqrt(1 - zeta_1^(-2H)) as (46) with (27b) gives
     jacobian: Literal["printed", "exact"] = "printed"
-    offset: bool = True
-    summit_sigma: bool = True
-    beta: float = 1 / 3
-    phi: float = 0.05
-    floor_d: float = 1.5
-    floor_u: float = 3.0
+    offset: bool = True  # whether islands are offset by h_d below z_max (35, 41)
+    summit_sigma: bool = True  # whether sigma of islands and of their heights is the summits' (32, 43a), or sqrt(m0)
+    beta: float = 1 / 3  # share of the approach that deforms the sphere (B.6)
+    phi: float = 0.05  # roughness over Hertz deformation below which roughness does not matter (28)
+    floor_d: float = 1.5  # smallest zeta_d (27a)
+    floor_u: float = 3.0  # and zeta_u (30a)
+    # areas of islands: as printed (49), or as islands placed at random "cover", A/A0 = 1 - exp(-sum)
     addition: Literal["sum", "cover"] = "sum"
 
     def __post_init__(self) -> None:

@@ -80,6 +80,8 @@ def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: Fl
 class Wrapped(Theory):
     """A user's theory, its stiffness by numerical differentiation."""
 
+    looks = FEW_LOOKS  # each may take long
+
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """None: its author is responsible."""
         return ()
@@ -100,10 +102,6 @@ class Wrapped(Theory):
         step = 0.01 * np.broadcast_to(np.asarray(surface.h_rms), u.shape).ravel()
         slope, _ = differences(force_at, step, np.zeros(u.size), np.zeros((1, u.size)))
         return TheoryAnswer(pressure, area, -slope[0].reshape(u.shape), np.full(u.shape, np.nan))
-
-    def looks(self, surface: AnySurface) -> int:
-        """Few, since each evaluation may take long."""
-        return FEW_LOOKS
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
 

@@ -61,6 +61,7 @@ class Theory(abc.ABC):
     name: str
     variant_name = island_model_name = ""  # names of its variant of the paper and its island model in results
     advice = origin = ""  # one line of advice; origin of its numbers, if not a shipped file
+    looks = LOOKS  # initial gaps of an inversion, for one surface
     reached = 0.0  # relative amount by which a wanted value may exceed the largest
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
 
@@ -124,16 +125,6 @@ class Theory(abc.ABC):
         """Of a simulated map, the theory that knows the flow through its gaps."""
         return None
 
-    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow coefficients xx, yy and xy [length^3], shape (3, ...), of simulated gaps, if there are any."""
-        return None
-
-    def flow_trust(
-        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
-    ) -> tuple[FloatArray, dict[str, Any]] | None:
-        """Standard deviation of ln of that flow, and reasons why it is not valid, with their masks."""
-        return None
-
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
         from scipy.integrate import tanhsinh
@@ -152,10 +143,6 @@ class Theory(abc.ABC):
         if not found.success.all():
             raise unfinished(~found.success.all(axis=0), "the elastic energy")
         return np.asarray(found.integral.sum(axis=0))
-
-    def looks(self, surface: AnySurface) -> int:
-        """Number of initial gaps of each surface in an inversion."""
-        return LOOKS if surface.shape == () else FEW_LOOKS
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Function for inversions: force or area of a surface against mean separation, without checks of arguments.
@@ -195,7 +182,7 @@ class Theory(abc.ABC):
             allowed = f"positive: there is no last contact in theory {self.name!r}"
             require(quantity, goal.reshape(shape), goal.reshape(shape) != 0, allowed)
         near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
-        shares = _shares(self.looks(surface)).reshape(-1, *[1] * len(shape))
+        shares = _shares(FEW_LOOKS if surface.shape else self.looks).reshape(-1, *[1] * len(shape))
         looked = np.asarray(first + (near - first) * shares)
         curve = self.curve(surface, quantity)
         value, steep, exact = curve(looked)

@@ -184,7 +184,7 @@ class BoundaryElements(Theory):
         """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
         return self.pressed.flows(self.fit.x, self.fit.separation)
 
-    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
+    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked.
 
         Along an axis that closes at u1, ln K over ln(u - u1) is a monotone cubic, straight below the last open load;

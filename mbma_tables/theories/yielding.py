@@ -126,6 +126,7 @@ class Yielding(Theory):
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
         self.elastic, self.hardness, self.reached = theory, np.asarray(hardness, dtype=float), REACHED
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
+        self.looks = FEW_LOOKS if self.hardness.size > MANY else theory.looks
         # whether the elastic area at a force needs no separation
         self.knows_areas = type(theory).area_at is not Theory.area_at
         self._bound: tuple[Any, Any] = None, None
@@ -187,9 +188,6 @@ class Yielding(Theory):
         low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
         return low, np.minimum(high, MAX_LEVEL * h_rms)
 
-    def looks(self, surface: AnySurface) -> int:
-        return FEW_LOOKS if self.hardness.size > MANY else self.elastic.looks(surface)
-
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force without the area, which is computed from it."""
         if quantity != "pressure":
@@ -201,12 +199,6 @@ class Yielding(Theory):
             return *closed(u, pressure, steep), exact
 
         return values
-
-    def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at a "pressure" (over E*, below the hardness) or an "area"."""
-        if np.isinf(self.hardness).all():
-            return np.asarray(self.elastic.mean_separation_at(surface, quantity, wanted))
-        return super().mean_separation_at(surface, quantity, wanted)
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """As of any theory; no force is beyond the hardness."""

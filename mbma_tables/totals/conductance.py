@@ -1,4 +1,4 @@
-"""Conductivity of two bodies, and older correlations for the conductance of their contact, thermal or electrical."""
+"""Conductivity of two bodies, and an older correlation for the conductance of their contact, thermal or electrical."""
 
 from __future__ import annotations
 
@@ -37,28 +37,6 @@ def cooper_mikic_yovanovich(
     >>> float(cooper_mikic_yovanovich(joint, 1e7, 100.0, 1e11, 1e9).round(-2))
     24600.0
     """
-    return _by_slope(surface, k_s, 1.25 * (np.asarray(pressure) / hardness) ** 0.95)
-
-
-def mikic(surface: Any, pressure: ArrayLike, k_s: ArrayLike, E_star: ArrayLike, hardness: Any = np.inf) -> Numbers:
-    """Conductance of elastic contacts, h = 1.55 k_s (m/sigma) (sqrt(2) p/(m E*))^0.94; hardness does not matter.
-
-    Model of B. B. Mikic, Int. J. Heat Mass Transfer 17 (1974) 205-214. The paper was not consulted: of two public
-    programs one has 1.55, one 1.54, both the power 0.94. This is within 4.3% of the model for sqrt(2) p/(m E*) of 1e-6
-    to 0.023.
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface
-    >>> from mbma_tables.totals.conductance import mikic
-    >>> joint = Surface(hurst=0.8, q0=6e3, q1=6e5, h_rms=1e-6, h_max=3.5e-6)  # m
-    >>> float(mikic(joint, 1e7, 100.0, 1e11).round(-2))
-    29100.0
-    """
-    slope = np.sqrt(2 * surface.m2 / np.pi)
-    return _by_slope(surface, k_s, 1.55 * (np.sqrt(2) * np.asarray(pressure) / (slope * E_star)) ** 0.94)
-
-
-def _by_slope(surface: Any, k_s: ArrayLike, number: Any) -> Numbers:
-    found: Numbers = (np.asarray(k_s) * np.sqrt(2 * surface.m2 / np.pi) / surface.h_rms * number)[()]
+    by_slope = np.asarray(k_s) * np.sqrt(2 * surface.m2 / np.pi) / surface.h_rms
+    found: Numbers = (by_slope * 1.25 * (np.asarray(pressure) / hardness) ** 0.95)[()]
     return found

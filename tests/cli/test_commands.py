@@ -196,7 +196,10 @@ def test_island_is_the_librarys_answer():
         (options(YANG_PERSSON | {"q1": 10.0}), "got --hurst, --q0, --q1, --h-rms, --h-max, --zeta-1"),
         (["--surface", "granite"], "'granite' is not one of 'yang-persson'"),
         (["--hurst", "0.8"], "(or --zeta-1 for --q1), or --hurst, --m0, --m2, --m4, --h-max, or roughness (--Rq, ...)"),
-        (["--hurst", "1", "--h-max", "1", "--Rq", "1"], "with one of --longest, --shortest and --Sds, or --longest"),
+        (
+            ["--hurst", "1", "--h-max", "1", "--Rq", "1"],
+            "needs two of --longest, --shortest and --Rdq (or --Sdq, --Rsm)",
+        ),
         ([], "one surface is needed"),
         (["--surface", "concrete", *options(CONCRETE)], "got --surface and numbers"),
         (["--surface", "concrete", "--file", "s.toml"], "got --surface and --file"),

@@ -34,7 +34,9 @@ def line_file(tmp_path):
 def test_it_tells_what_was_found_and_done(map_file, tmp_path):
     pytest.importorskip("matplotlib")
     picture = tmp_path / "own.png"
-    said = run("fit", map_file, "--short-cutoff", "2um", "--E-star", "100GPa", "--plot", picture)
+    said = run(
+        "fit", map_file, "--short-cutoff", "2um", "--detrend", "quadratic", "--E-star", "100GPa", "--plot", picture
+    )
     for text in ("h_rms", "heights: skewness", "slopes: anisotropy", "a short cut-off at 2 um removes", "GPa/um"):
         assert text in said
     assert "area depends on resolution" in said

@@ -4,10 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from small_tables import SMALL, small, small_build
+from small_tables import small, small_build
 
-from generate.__main__ import main
 from generate.tables.certificate import UncertifiedError
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.commands import KINDS
@@ -137,35 +135,6 @@ def test_a_target_that_is_missed_is_refused(nodes):
     tight = dataclasses.replace(kind.configuration, target=1e-6)
     with pytest.raises(UncertifiedError, match=r"the largest held-out error is .*, the target 1\.00e-06"):
         type(kind)(tight).certify(content.axes, content.coefficients, ChunkedSolver())
-
-
-def invoke(folder, text, kind="universal"):
-    path = folder / "own.toml"
-    path.write_text(text)
-    out = folder / "table.nc"
-    result = CliRunner().invoke(main, ["tables", kind, "--config", str(path), "--out", str(out), "--workers", "1"])
-    return result, sorted(p.name for p in folder.iterdir() if p != path)
-
-
-REFUSED = {
-    "too few coefficients allowed": (
-        lambda text: text.replace("max_nodes = 5000", "max_nodes = 100"),
-        "more than the 100 allowed; raise max_nodes or the target",
-    ),
-    "a range that no surface visits": (
-        lambda text: text.replace("6.0", "100.0").replace("low = -2.0", "low = 90.0"),
-        "hardly a surface visits these axes",
-    ),
-}
-
-
-@pytest.mark.parametrize(("change", "message"), REFUSED.values(), ids=REFUSED)
-def test_what_makes_no_table_is_one_message_and_nothing_written(change, message, tmp_path):
-    result, left = invoke(tmp_path, change(SMALL["universal"]))
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert len(result.stderr.splitlines()) == 1
-    assert left == []
 
 
 def bump(content, place, height):

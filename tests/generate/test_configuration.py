@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from small_tables import SMALL
 
 from generate.__main__ import main
 from generate.tables.commands import KINDS, TABLES
@@ -68,6 +69,19 @@ ISLAND4D = [
 )
 def test_a_bad_configuration_is_refused(kind, text, message, tmp_path):
     assert message in refused_file(kind, tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("max_nodes = 5000", "max_nodes = 100", "more than the 100 allowed; raise max_nodes or the target"),
+        ("low = -2.0\nhigh = 6.0", "low = 90.0\nhigh = 100.0", "hardly a surface visits these axes"),
+    ],
+)
+def test_what_makes_no_table_is_refused(before, after, message, tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(SMALL["universal"].replace(before, after))
+    assert message in refused("universal", tmp_path, "--config", str(path), "--out", str(tmp_path / "table.nc"))
 
 
 def test_misuse_of_the_command_line_is_refused(tmp_path):

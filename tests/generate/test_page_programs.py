@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate.__main__ import main
+from generate.__main__ import COMMANDS, main
 from generate.files import ROOT
 from generate.page import MARKED, fill
 from generate.pages import library, maps
@@ -24,9 +24,15 @@ def run(command, *arguments):
     return done.output
 
 
-@pytest.mark.parametrize("what", [[], ["tables"], ["formulas"], ["pages"]])
+@pytest.mark.parametrize("what", [[], ["pages"], *([name] for name in COMMANDS)])
 def test_every_command_has_help(what):
     assert run(main, *what, "--help").startswith(f"Usage: main {' '.join(what)}".rstrip())
+
+
+def test_every_command_of_the_docs_is_there():
+    texts = [path.read_text("utf-8") for path in (ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md"))]
+    named = {name for text in texts for name in re.findall(r"python -m generate (\w+)", text)}
+    assert {"score", "tables"} < named <= {"pages", *COMMANDS}
 
 
 def test_ratios_of_a_theory_to_itself_are_one():

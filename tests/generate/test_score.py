@@ -8,7 +8,8 @@ from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
 from scipy.special import erf
 
-from generate.pages.score import OTHERS, score, theories_of
+from generate.__main__ import main
+from generate.pages.score import OTHERS, theories_of
 from generate.theories_of_others import FORCES, Corrected
 from mbma_tables import InputError, Surface
 from mbma_tables.data import boundary_elements
@@ -40,7 +41,7 @@ theory = Exponential()
 
 
 def scored(path):
-    done = CliRunner().invoke(score, [str(path)], catch_exceptions=False)
+    done = CliRunner().invoke(main, ["score", str(path)], catch_exceptions=False)
     assert done.exit_code == 0
     return [[float(x) for x in re.findall(r"[\d.]+", line)] for line in done.stdout.splitlines()[2:]]
 

@@ -28,8 +28,6 @@ def drawn_from(surface):
         "Rdq": slope,
         "Sdq": math.sqrt(2) * slope,
         "Rsm": 2 * math.pi * surface.h_rms / slope,
-        "Sds": surface.summit_density,
-        "Spd": surface.summit_density,
         "longest": 2 * math.pi / surface.q0,
         "shortest": 2 * math.pi / surface.q1,
         "Sp": surface.h_max,
@@ -41,9 +39,9 @@ def drawn_from(surface):
 COMBINATIONS = [
     (height, slope, third, top)
     for height in ("Rq", "Ra", "Sq", "Sa")
-    for slope, third in [("Rdq", "longest"), ("Sdq", "shortest"), ("Rsm", "Sds"), ("Rsm", "longest")]
+    for slope, third in [("Rdq", "longest"), ("Sdq", "shortest"), ("Rsm", "shortest"), ("Rsm", "longest")]
     for top in ("h_max", "Sp")
-] + [("Ra", "longest", "shortest", "Sp"), ("Rq", "Sdq", "Spd", "h_max")]
+] + [("Ra", "longest", "shortest", "Sp"), ("Rq", "Sdq", "longest", "h_max")]
 
 
 @pytest.mark.parametrize("names", COMBINATIONS, ids="-".join)
@@ -104,13 +102,12 @@ test_numbers_that_are_refused = refusals(
         r"longest \[um\] .* 100, got 2",
     ),
     ({"Sdq": 0.3}, "the slope of roughness: give one of"),
-    ({"Rdq": None}, "the band of wavelengths needs a slope"),
+    ({"Rdq": None}, "the band of wavelengths needs two of longest, shortest and Rdq"),
     ({"shortest": 2.0}, "got Rdq and longest and shortest"),
     ({"Rdq": 1e-3}, "Rdq must be between .* for a band of 3 < q1/q0 < 1e8"),
     ({"Rdq": None, "Rsm": 1e4}, "Rsm must be between"),
     ({"h_max": "2 um"}, "without a unit beside numbers in um"),
     ({"longest": None, "shortest": 400.0}, "Rdq must be between"),
-    ({"longest": None, "Sds": 1e-12}, "alpha = m0 m4/m2"),
 )
 
 
