@@ -12,8 +12,6 @@ Mueser, Tribol. Lett. 65(3) (2017): S = 5/9 - 2/9 P^2 + 6/9 P^4. "Xu24" of these
 the energy with Wang and Mueser's S.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

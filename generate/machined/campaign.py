@@ -1,7 +1,5 @@
 """`python -m generate machined`: press maps as machines make them, and gather truth and answers into one file."""
 
-from __future__ import annotations
-
 import functools
 import pathlib
 from collections.abc import Callable
@@ -21,11 +19,9 @@ from generate.machined.makers import FAMILIES, Part
 from generate.machined.solve import answered, solved, surface_of
 from mbma_tables.data import FILE
 
-NUMBERS = 5  # parts of each family
-LARGE, SMOOTHEST = (
-    512,
-    2,
-)  # points a side of one more of each family, and its number: of the longest shortest wavelength
+NUMBERS = 10  # parts of each family
+# points a side of one more of each family, and its number: of the longest shortest wavelength
+LARGE, SMOOTHEST = 512, 2
 EVERY = 3  # part that is pressed with a hardness, too
 FORMS = ("calibrated", "corrected", "simulated")
 TEXTS = campaigns.TEXTS["groups"]["machined"]

@@ -2,13 +2,11 @@
 
 Each form states a standard deviation with a few constants, the same for all maps::
 
-    simulated, corrected   one for each contact area of the truth
+    simulated, corrected   one for each contact area of the truth, times a power of the map's sensitivity
     calibrated             root of s^2 + c^2, s that of Gaussian maps, one c for maps that are valid and one for others
 
-They cover 70% of errors once and 94.5% twice. `left_out` states for each family what the others give.
+They cover 70% of errors once and 97.5% twice. `left_out` states for each family what the others give.
 """
-
-from __future__ import annotations
 
 from typing import Any
 
@@ -19,8 +17,9 @@ from generate.machined.errors import errors, seen
 from generate.machined.makers import FAMILIES
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.theories.calibrated import MAP_SCATTER
+from mbma_tables.theories.simulated import POWER, TYPICAL
 
-ONCE, TWICE = 0.70, 0.945
+ONCE, TWICE = 0.70, 0.975
 
 
 def reached(ratio: FloatArray) -> float:
@@ -35,9 +34,15 @@ def valid_errors(data: xr.Dataset, form: str, quantity: str) -> tuple[FloatArray
     return errors(data, form, quantity), kept & own[..., None]
 
 
+def of_sensitivity(data: xr.Dataset, form: str) -> FloatArray:
+    """The factor by which the scatter of each surface differs from that of a typical one."""
+    return np.asarray((data[f"{form}_sensitivity"].max("load").values / TYPICAL) ** POWER)
+
+
 def by_area(data: xr.Dataset, form: str, quantity: str, rows: Any) -> FloatArray:
     """One constant for each load of the truth: as many errors of surfaces of these numbers are covered."""
     error, kept = valid_errors(data, form, quantity)
+    error = error / of_sensitivity(data, form)[:, None, None]
     found = [np.abs(error[rows, k][kept[rows, k]]) for k in range(error.shape[1])]
     return np.array([reached(own) if own.size else np.nan for own in found])
 
@@ -70,16 +75,21 @@ def scatter(data: xr.Dataset, form: str, quantity: str, rows: Any) -> FloatArray
         valid, other = calibrated(data, quantity, rows)
         added = np.where(data.calibrated_valid.values > 0.5, valid, other)
         return np.asarray(np.hypot(of_gaussian(data, quantity), added))
-    return np.broadcast_to(by_area(data, form, quantity, np.flatnonzero(rows)), data.area.shape)
+    return by_area(data, form, quantity, np.flatnonzero(rows)) * of_sensitivity(data, form)[:, None]
 
 
 def left_out(data: xr.Dataset, form: str, quantity: str) -> dict[str, FloatArray]:
-    """Errors of each family, where valid, over the standard deviations that the other families give."""
+    """Errors of each family, where valid, over the standard deviations that the other families give.
+
+    Of the calibrated law over those that other maps give, since one family alone is valid.
+    """
     error, kept = valid_errors(data, form, quantity)
-    found = {}
-    for family in FAMILIES:
-        others = data.family.values != family
-        ratio = np.abs(error) / scatter(data, form, quantity, others)[..., None]
-        own = kept & ~others[:, None, None] & np.isfinite(ratio)
-        found[family] = ratio[own]
-    return found
+    families = data.family.values
+    parts = data.surface.values if form == "calibrated" else families
+    found: dict[str, list[FloatArray]] = {family: [] for family in FAMILIES}
+    for part in np.unique(parts):
+        own = kept & (parts == part)[:, None, None]
+        if own.any():
+            ratio = np.abs(error) / scatter(data, form, quantity, parts != part)[..., None]
+            found[families[parts == part][0]].append(ratio[own & np.isfinite(ratio)])
+    return {family: np.concatenate([np.empty(0), *each]) for family, each in found.items()}

@@ -5,8 +5,6 @@ and 60% contact: of ln A at equal F, of ln F at equal u, and of ln of the stiffn
 map by itself, so that only differences between ways tell. Then the time of a map, and on how many it is the nearest.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

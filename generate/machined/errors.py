@@ -1,7 +1,5 @@
 """Errors of answers on maps of machined surfaces, from the file of the campaign."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

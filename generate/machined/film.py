@@ -4,8 +4,6 @@ Gaussian surfaces with lays up to 8:1; five mean gaps above contact, and five lo
 No constant of `mbma_tables.laws.film` was fitted to them; six minutes on one core.
 """
 
-from __future__ import annotations
-
 import click
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Maps that yield: boundary elements with a hardness at loads between those of `theory="simulated"`, and answers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

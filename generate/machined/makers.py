@@ -3,8 +3,6 @@
 Lengths in sampling steps. Every map is low-passed to its shortest wavelength, has mean zero and rms gradient 0.1.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import zlib
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 Beside it, what theories answer at these loads. Stiffness is -dF/du by a step of 3% of the pressure, of both alike.
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 from typing import Any
 
@@ -16,6 +14,7 @@ from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws.reynolds import flow_conductance
+from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
 
 AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)  # of the quick law, which never refuses them
@@ -50,7 +49,8 @@ def answered(part: Part, theory: str, truth: dict[str, Any]) -> dict[str, Any]:
     """A theory's answers at the loads of the truth, with its stated scatter; NaN where it refuses."""
     _, surface = surface_of(part)
     names = ["area", "mean_separation", "stiffness", "flow_x", "flow_y"]
-    names += [f"{name}_scatter" for name in ("pressure", "area", "stiffness", "flow")] + ["valid", "flow_valid"]
+    names += [f"{name}_scatter" for name in ("pressure", "area", "stiffness", "flow")]
+    names += ["valid", "flow_valid", "sensitivity"]
     rows = np.full((len(names), truth["pressure"].size), np.nan)
     for k, pressure in enumerate(map(float, truth["pressure"])):
         try:
@@ -61,5 +61,7 @@ def answered(part: Part, theory: str, truth: dict[str, Any]) -> dict[str, Any]:
         stiffness = pressure * (STEP - 1) / (found.mean_separation - beside.mean_separation)
         leakage = found.leakage
         of_it = (found.scatter, found.area_scatter, found.stiffness_scatter, leakage.scatter, found.valid)
-        rows[:, k] = found.area, found.mean_separation, stiffness, leakage.x, leakage.y, *of_it, leakage.valid
+        sensitivity = np.nan if theory == "calibrated" else of_map(theory, surface).sensitivity
+        answer = found.area, found.mean_separation, stiffness, leakage.x, leakage.y
+        rows[:, k] = *answer, *of_it, leakage.valid, sensitivity
     return dict(zip(names, rows, strict=True))

@@ -7,8 +7,6 @@ The constants of `mbma_tables.laws.lay` were fitted to the first set of surfaces
 exponents and lays. Two minutes a set on one core.
 """
 
-from __future__ import annotations
-
 import click
 import numpy as np
 from scipy.optimize import least_squares

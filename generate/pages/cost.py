@@ -1,7 +1,5 @@
 """docs/cost.md: error, and deviation from simulation, against time, as `python -m generate cost` measured them."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

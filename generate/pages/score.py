@@ -1,7 +1,5 @@
 """``python -m generate score``: deviations of theories from the held-out simulations of the data set."""
 
-from __future__ import annotations
-
 import functools
 import pathlib
 import runpy

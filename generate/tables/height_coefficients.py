@@ -4,6 +4,7 @@
 on every machine.
 """
 
+import functools
 import itertools
 import pathlib
 import re
@@ -11,6 +12,7 @@ from collections.abc import Callable
 
 import mpmath
 import numpy as np
+from mpmath import mpf
 from numpy.polynomial import chebyshev
 
 from mbma_tables.common.files import write_file
@@ -31,62 +33,50 @@ static const double MBMA_HEIGHT_WHOLE[2][3][20] = {
 DIGITS = 40
 TERMS = 20  # the hardest piece, F_{5/2} in [0, 1], needs as many for 2e-16
 SAMPLES = 48
-NOTHING = mpmath.mpf(10) ** -17  # of the least value of a piece
+NOTHING = mpf(10) ** -17  # of the least value of a piece
 DEEP_EDGE = -8  # below it: powers of 1/x^2
 MIDDLE_EDGES = (-8, -6, -4, -2, 0)  # polynomials in x
 SCALED_EDGES = (0, 1, 4, 40)  # polynomials in 1/(x + 1), exp(-x^2/2) taken out
 
-Function = Callable[[mpmath.mpf], mpmath.mpf]
 
-
-def height_integral(n: mpmath.mpf, x: mpmath.mpf) -> mpmath.mpf:
+def height_integral(n: mpf, x: mpf) -> mpf:
     """F_n(x) through the parabolic cylinder function U(n + 1/2, x)."""
-    half = mpmath.mpf(1) / 2
     scale = mpmath.gamma(n + 1) / mpmath.sqrt(2 * mpmath.pi)
-    return scale * mpmath.exp(-x * x / 4) * mpmath.pcfu(n + half, x)
+    return scale * mpmath.exp(-x * x / 4) * mpmath.pcfu(n + mpf(1) / 2, x)
 
 
-def _on_unit_interval(function: Function, low: mpmath.mpf, high: mpmath.mpf) -> list[mpmath.mpf]:
+def piece(function: Callable[[mpf], mpf], low: mpf, high: mpf) -> list[mpf]:
     """Monomial coefficients in t, for ``function((low + high)/2 + (high - low)/2 t)``, |t| <= 1."""
-    angles = [mpmath.pi * (k + mpmath.mpf(1) / 2) / SAMPLES for k in range(SAMPLES)]
+    angles = [mpmath.pi * (k + mpf(1) / 2) / SAMPLES for k in range(SAMPLES)]
     values = [function((low + high) / 2 + (high - low) / 2 * mpmath.cos(a)) for a in angles]
     series = [mpmath.fsum(v * mpmath.cos(j * a) for v, a in zip(values, angles, strict=True)) for j in range(TERMS)]
     return list(chebyshev.cheb2poly(np.array([series[0] / 2, *series[1:]]) * 2 / SAMPLES))
 
 
-def scaled_pieces(twice_n: int) -> list[list[mpmath.mpf]]:
+def scaled_pieces(twice_n: int) -> list[list[mpf]]:
     """The polynomial pieces of F_n, n = twice_n / 2, from 0 on, exp(-x^2/2)/(x + 1)^(n + 1) taken out."""
-    n = mpmath.mpf(twice_n) / 2
+    n = mpf(twice_n) / 2
 
-    def scaled(v: mpmath.mpf) -> mpmath.mpf:
+    def scaled(v: mpf) -> mpf:
         x = 1 / v - 1
         return height_integral(n, x) * mpmath.exp(x * x / 2) / v ** (n + 1)
 
-    return [
-        _on_unit_interval(scaled, mpmath.mpf(1) / (high + 1), mpmath.mpf(1) / (low + 1))
-        for low, high in itertools.pairwise(SCALED_EDGES)
-    ]
+    return [piece(scaled, mpf(1) / (b + 1), mpf(1) / (a + 1)) for a, b in itertools.pairwise(SCALED_EDGES)]
 
 
-def lower_pieces(twice_n: int) -> list[list[mpmath.mpf]]:
+def lower_pieces(twice_n: int) -> list[list[mpf]]:
     """The polynomial pieces of F_n below 0, from the deep end on."""
-    n = mpmath.mpf(twice_n) / 2
+    n = mpf(twice_n) / 2
 
-    def deep(s: mpmath.mpf) -> mpmath.mpf:
-        if s < mpmath.mpf(10) ** -30:
-            return mpmath.mpf(1)
-        return height_integral(n, -1 / mpmath.sqrt(s)) * s ** (n / 2)
+    def deep(s: mpf) -> mpf:
+        return height_integral(n, -1 / mpmath.sqrt(s)) * s ** (n / 2) if s >= mpf(10) ** -30 else mpf(1)
 
-    def middle(x: mpmath.mpf) -> mpmath.mpf:
-        return height_integral(n, x)
-
-    return [
-        _on_unit_interval(deep, mpmath.mpf(0), mpmath.mpf(1) / DEEP_EDGE**2),
-        *(_on_unit_interval(middle, mpmath.mpf(a), mpmath.mpf(b)) for a, b in itertools.pairwise(MIDDLE_EDGES)),
-    ]
+    middle = functools.partial(height_integral, n)
+    lowest = piece(deep, mpf(0), mpf(1) / DEEP_EDGE**2)
+    return [lowest, *(piece(middle, mpf(a), mpf(b)) for a, b in itertools.pairwise(MIDDLE_EDGES))]
 
 
-def row_text(row: list[mpmath.mpf]) -> str:
+def row_text(row: list[mpf]) -> str:
     """The coefficients of a piece, each with the digits that count, as an initializer."""
     unit = NOTHING * min(abs(mpmath.polyval(row[::-1], t)) for t in mpmath.linspace(-1, 1, 41))
     texts = []

@@ -263,7 +263,8 @@ def _places(
     gap = asked if by == "separation" else 2 * average - h_max
     if theory.ends_at_h_max:
         # without contact, both are the distance of the mean planes
-        average, gap = np.maximum(average, gap) if by == "separation" else average, np.minimum(gap, average)
+        average = np.maximum(average, gap) if by == "separation" else average
+        gap = np.minimum(gap, average)
     return {"separation": gap[()], "mean_separation": average[()]}, lighter
 
 
@@ -299,8 +300,11 @@ def _of_labelled(
     fields: dict[str, Any] = {name: named(found, name, units) for found, name in zip(outputs, names, strict=True)}
     fields["islands"] = None
     # the given quantity keeps its name and attributes
+    lowest, highest = (value, value) if source.theory.ends_at_h_max else (-np.inf, np.inf)
     if by == "separation":
-        fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
+        average = np.maximum((surface.h_max + value) / 2, lowest)
+        fields |= {by: value, "mean_separation": named(average, "mean_separation", units)}
     elif by == "mean_separation":
-        fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
+        gap = np.minimum(2 * value - surface.h_max, highest)
+        fields |= {by: value, "separation": named(gap, "separation", units)}
     return _made(source, fields)

@@ -31,7 +31,6 @@ SAID = {
     "surface.fit()": "--model self-affine",
     "outside='exact'": "--island-model exact",
     "ask method='full', or ": "give ",
-    "Surface.from_profile takes line scans": "--model measured takes line scans",
     "give the surface its unit": "give --length-unit",
     "force must be": "--pressure must be",
     "k1 must be": "--conductivity must be",

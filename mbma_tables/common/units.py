@@ -36,12 +36,11 @@ DIMENSIONS = {
         (1, 0): (
             "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation mean_separation delta R_d R_u "
             "sigma h_d overclosure separations mean_separations deltas dx dy short_cutoff long_cutoff "
-            "s_filter l_filter extrapolate_to width mean_free_path displacement radius approach reference "
+            "s_filter l_filter extrapolate_to width displacement radius approach reference "
             "plane_separation separation_scatter"
         ),
         (0, 1): (
-            "viscosity pressure_drop pressure_in pressure_out E_star E1 E2 hardness elastic_hardness pressure "
-            "pressures shear mean_pressure"
+            "viscosity pressure_drop E_star E1 E2 hardness elastic_hardness pressure pressures shear mean_pressure"
         ),
         (-1, 0): "q0 q1 conductance",
         (-2, 0): "D m4",
@@ -84,7 +83,7 @@ def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none."""
     found = _NUMBER.fullmatch(text)
     if found is None:
-        raise InputError(f"{name} must be a number, or one with its unit, got {text!r}")
+        raise InputError(f"{name} must be a number, or one with its unit, got {text[:60]!r}")
     number, rest = float(found[1]), found[2].strip()
     if not rest:
         return number, None

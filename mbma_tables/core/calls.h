@@ -141,9 +141,8 @@ static mbma_spline spline_of(const argument *a) {
        N(5) == N(0) * (size_t)I(3) * (I(4) ? 2 : 1), \
        (mbma_profile_totals(N(0), P(0), N(1) - 1, P(1), P(2), (int)I(3), (int)I(4), P(5)), 0)) \
     /* spline4.c */ \
-    FN(spline4, "D D L4 i w", \
-       N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(4) == N(0) / 4 * (I(3) ? 10 : 2), \
-       mbma_spline4(N(0) / 4, P(0), P(1), P(2), I(3) != 0, P(4))) \
+    FN(spline4, "D D L4 w", N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(3) == N(0) / 2, \
+       mbma_spline4(N(0) / 4, P(0), P(1), P(2), P(3))) \
     /* newton.c */ \
     FN(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2))) \
     FN(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0))) \

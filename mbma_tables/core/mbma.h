@@ -123,10 +123,8 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
 /* ---- spline4.c: islands by the four-number table ----------------------------------------------------------------- */
 
 /* Two functions f and g of four axes by their cubic tensor spline over equally spaced nodes. `places` is (4, n), from 0
- * to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2); `out` is (2, n), or
- * with `slopes` (10, n): f, its derivatives along the axes, g, its derivatives. */
-size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
-                    double *out);
+ * to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2); `out` is (2, n). */
+size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, double *out);
 
 /* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 

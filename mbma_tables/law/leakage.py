@@ -131,7 +131,7 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
 
 def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
     """Separation of a simulated map from which on it is open, and separations of kinks."""
-    ends = [2 * end - law.h_max for _, end in law.gaps.closing]
+    ends = [2 * end - law.h_max for _, end, _ in law.gaps.closing]
     shares = np.abs(np.sin(np.deg2rad([90.0, 0.0] if direction is None else [90.0 + direction, direction])))
     if direction is None:
         bottom = max(ends)

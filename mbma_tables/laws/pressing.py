@@ -25,8 +25,10 @@ TOLERANCE = 1e-5
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
 # loads added for the flow, at most: where its logarithm falls by more than this, and where an axis closes between
-# loads further apart than this in ln F
-FLOWS, STEEP, NARROW = 6, 1.2, 0.1
+# loads further apart than this in ln F, which counts as such a fall
+FLOWS, STEEP, NARROW, CLOSING = 6, 1.2, 0.1, 3.5
+# A/A0 up to which flow along both axes was open on most maps, so that its scatter is known; a fall beyond counts less
+AREA_OF_FLOW, BEYOND = 0.2, 0.6
 ROUNDING = 1e-6
 KEPT = "pressed 2"  # of what is cached: another text where this file finds other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
@@ -118,7 +120,7 @@ class Press:
             found[load] = self(load)[0]
 
         with shown("boundary elements"):
-            for load in map(float, wanted):
+            for load in wanted.tolist():
                 add(load)
             for _ in range(MORE if more else 0):
                 low, high = min(found), max(found)
@@ -129,8 +131,7 @@ class Press:
                 if found[high][0] < HIGHEST and high * HEAVIER < self._cap * self.gradient:
                     add(high * HEAVIER)
         cache.trim()
-        loads = np.array(sorted(found))
-        return loads, np.array([found[load] for load in loads.tolist()]).T
+        return np.array(sorted(found)), np.array([found[load] for load in sorted(found)]).T
 
     def flow(self, load: float) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3] through the gaps under a load over A0 E*; 0 where blocked."""
@@ -163,8 +164,9 @@ class Press:
                 K = np.array([found[own][:2] for own in at.tolist()])
                 with np.errstate(divide="ignore", invalid="ignore"):
                     fall = np.nan_to_num(np.log(K[:-1] / K[1:]), posinf=np.inf)
-                fall[np.isinf(fall) & (np.diff(at)[:, None] <= NARROW)] = 0.0
-                worst = fall.max(axis=1)
+                closing = np.where(np.diff(at) > NARROW, CLOSING, 0.0)[:, None]
+                heavy = np.array([self(float(np.exp(own)))[0][0] for own in at[:-1].tolist()]) > AREA_OF_FLOW
+                worst = np.where(np.isinf(fall), closing, fall).max(axis=1) * np.where(heavy, BEYOND, 1.0)
                 k = int(worst.argmax())
                 if worst[k] < STEEP:
                     break
@@ -177,28 +179,14 @@ class Press:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table:
-    """What was found of a map, without the map and its gaps.
+    """What was found of a map, without the map and its gaps."""
 
-    Attributes
-    ----------
-    rows : ndarray, shape (4, n)
-        F/(A0 E*), A/A0, u and U/(A0 E*).
-    flow_gaps, flow : ndarray, shape (m,) and (m, 3)
-        Mean gaps, falling, and flow coefficients xx, yy, xy [length^3].
-    points : float
-        Sampling steps along the shortest wavelength.
-    left_out : float
-        As of `Press`.
-    origin : str
-        Description of the map and of the simulation.
-    """
-
-    rows: FloatArray
-    flow_gaps: FloatArray
-    flow: FloatArray
-    points: float
-    left_out: float
-    origin: str
+    rows: FloatArray  # F/(A0 E*), A/A0, u and U/(A0 E*) of loads, shape (4, n)
+    flow_gaps: FloatArray  # mean gaps, falling, shape (m,),
+    flow: FloatArray  # and flow coefficients xx, yy, xy there [length^3], shape (m, 3)
+    points: float  # sampling steps along the shortest wavelength
+    left_out: float  # as of `Press`
+    origin: str  # description of the map and of the simulation
 
     def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
         """`flow_gaps` and `flow`."""

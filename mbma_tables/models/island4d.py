@@ -24,7 +24,7 @@ def at_places(coefs: FloatArray, places: FloatArray) -> FloatArray:
     """Two cubic functions of four axes, (2, entries), at positions in node units, (4, entries); NaN beyond the axes."""
     nodes, given = np.array(coefs.shape[:4]) - 2, np.ascontiguousarray(places, dtype=float)
     out = np.empty((2, given.shape[1]))
-    core.spline4(given, np.ascontiguousarray(coefs), nodes, 0, out)
+    core.spline4(given, np.ascontiguousarray(coefs), nodes, out)
     return out
 
 

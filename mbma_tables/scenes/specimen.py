@@ -87,10 +87,9 @@ def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
 
         surface = BoundaryElements.from_netcdf(path).surface
         return Specimen(in_unit(surface, unit), f"simulated map: {_printable(path)}")
-    if options.get("model", "measured") != "measured":
-        return Specimen(Surface.from_map(path, **options), f"fitted to the map {_printable(path)}")
-    options.pop("model", None)
-    return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
+    fitted, surface = options.pop("model", "measured") == "self-affine", measured(path, options)[1]
+    title = f"{'fitted to the map' if fitted else 'measured:'} {_printable(path)}"
+    return Specimen(surface.fit() if fitted else surface, title)
 
 
 def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated, MeasuredSurface]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, positive_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 
@@ -46,12 +46,9 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
     (5.33, array([5.13, 5.59]))
     """
     given = {"h_rms": h_rms, "m2": m2, "nominal_area": nominal_area, "probability": probability}
-    arrays = {name: finite_array(name, value) for name, value in given.items()}
-    for name in ("h_rms", "m2", "nominal_area"):
-        require(name, arrays[name], arrays[name] > 0, "positive")
-    chance = arrays["probability"]
-    require("probability", chance, (chance > 0) & (chance < 1), "between 0 and 1")
-    height, slope = arrays["h_rms"], arrays["m2"]
+    arrays = {name: positive_array(name, value) for name, value in given.items()}
+    height, slope, chance = arrays["h_rms"], arrays["m2"], arrays["probability"]
+    require("probability", chance, chance < 1, "between 0 and 1")
     area = np.broadcast_to(arrays["nominal_area"], broadcast_shape(**arrays))
     c = -np.log(chance) * (2 * math.pi) ** 1.5 * height / area * height / slope
     least = area * c / (LEAST * math.exp(-(LEAST**2) / 2))

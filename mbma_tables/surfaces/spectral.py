@@ -39,8 +39,8 @@ BY_SPECTRUM = {
 BY_MAP = {
     "skewness of heights": (-0.5, 0.5),
     "kurtosis of heights": (2.0, 4.0),
-    "kurtosis of slopes": (2.0, 4.0),
-    "anisotropy": (1.0, 1.4),
+    "kurtosis of slopes": (2.9, 3.1),
+    "anisotropy": (1.0, 1.2),
 }
 PRESSED = {"skewness of heights": (-3.1, 3.3), "kurtosis of slopes": (2.6, 16.5), "anisotropy": (1.0, 17.6)}
 WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried

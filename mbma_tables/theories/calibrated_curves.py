@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 MAP_ERROR = 3e-2  # error of a map's curve, which is smoother than the nodes of its law, for nine maps in ten
 STRAIGHT, SAME = 1.0, 1e-9  # range of ln F over which constant stiffness is unreliable; differences due to rounding
 NODE_STEP, FINE = 0.2, 8  # steps of a map's curve in ln F and ln u, since its nodes are rough; parts of an integral
-
-
 ENDS = ", where the light-load and near-full-contact approximations of this map leave no gap: use theory='simulated'"
 
 
@@ -128,12 +126,6 @@ class Curve:
         return np.asarray(np.where(pressure < lightest, light, np.exp((low + high) / 2 + full)))
 
 
-@functools.lru_cache(maxsize=32)
-def own_law(surface: MeasuredSurface) -> OwnLaw:
-    """The law of a surface, cached."""
-    return OwnLaw(surface)
-
-
 class OwnLaw:
     """The law of a surface given by a spectrum: by the spectrum alone, or with its heights or its map's curves."""
 
@@ -197,3 +189,6 @@ class OwnLaw:
         # beside h_max, with which it makes d
         require(quantity, wanted, u > np.finfo(float).eps * self.h_max, "less: the mean separation vanishes")
         return np.asarray(u)
+
+
+own_law = functools.lru_cache(maxsize=32)(OwnLaw)

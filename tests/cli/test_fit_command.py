@@ -115,6 +115,7 @@ def test_plain_lengths_of_a_map_are_in_the_unit_asked_for(map_file):
     assert (found[0]["h_rms"], found[1]["surface"]["h_rms"]) == (pytest.approx(own), pytest.approx(own))
 
 
-def test_five_numbers_of_a_line_are_refused_in_the_words_of_the_shell(line_file):
-    said = refused("contact", "--map", line_file, "--model", "self-affine", "-a", "0.1")
-    assert "--model measured takes line scans" in said
+def test_five_numbers_may_be_fitted_to_a_line(line_file):
+    said = run("contact", "--map", line_file, "--model", "self-affine", "-a", "0.1")
+    own = Surface.from_profile(line_file).fit()
+    assert f"fit: hurst {own.fit.hurst:.6g}" in said

@@ -70,16 +70,15 @@ def test_what_is_solved_and_answered_becomes_the_group(data, tmp_path, monkeypat
 
 
 def test_the_file_is_of_these_makers(data):
-    assert data.sizes["surface"] >= 60
+    assert data.sizes["surface"] == len(campaign.parts()) == 142
     assert set(data.family.values) == set(FAMILIES)
-    for name in ("honed_1_n256", "eroded_2_n256"):
-        family, number, _ = name.split("_")
-        values = heights(Part(family, int(number)))
+    for part in (Part("honed", 1), Part("eroded", 9), Part("worn", 2, 512)):
+        values, name = heights(part), part.name
         assert float(data.h_rms.sel(surface=name)) == pytest.approx(values.std(), rel=1e-6)
     assert {part.name for part in campaign.parts()} >= set(data.surface.values)
 
 
-@pytest.mark.parametrize(("quantity", "bar"), [("area", 0.03), ("pressure", 0.02), ("stiffness", 0.05)])
+@pytest.mark.parametrize(("quantity", "bar"), [("area", 0.03), ("pressure", 0.02), ("stiffness", 0.05), ("flow", 0.15)])
 def test_a_pressed_map_is_as_near_to_the_full_grid_as_asked(data, quantity, bar):
     found = page.errors(data, "simulated", quantity)
     kept = page.seen(data, "simulated", quantity)
@@ -105,9 +104,21 @@ def test_where_valid_the_scatter_covers_the_errors(data, form, quantity):
 @pytest.mark.parametrize("form", ["corrected", "simulated"])
 @pytest.mark.parametrize("quantity", page.QUANTITIES)
 def test_constants_of_the_other_families_cover_the_errors_of_one(data, form, quantity):
-    ratio = np.concatenate([*coverage.left_out(data, form, quantity).values()])
-    assert 0.6 < np.mean(ratio < 1) < 0.88
-    assert np.mean(ratio < 2) > 0.91
+    ratio = coverage.left_out(data, form, quantity)
+    every = np.concatenate([*ratio.values()])
+    assert 0.6 < np.mean(every < 1) < 0.93
+    assert np.mean(every < 2) > 0.95
+    for family, own in ratio.items():
+        # 92% but for the errors of few independent maps
+        assert np.mean(own < 2) > 0.84, family
+
+
+@pytest.mark.parametrize("quantity", ["area", "pressure", "stiffness"])
+def test_constants_of_the_other_maps_cover_the_errors_of_the_calibrated_law(data, quantity):
+    ratio = coverage.left_out(data, "calibrated", quantity)
+    assert [family for family, own in ratio.items() if own.size] == ["gaussian"]
+    assert 0.6 < np.mean(ratio["gaussian"] < 1) < 0.85
+    assert np.mean(ratio["gaussian"] < 2) > 0.92
 
 
 @pytest.mark.parametrize("theory", [BoundaryElements, Corrected])
@@ -125,7 +136,7 @@ def test_a_fit_finds_constants_that_are_known():
 
 
 def test_hardness_of_maps(data):
-    assert data.sizes["yielding"] >= 20
+    assert data.sizes["yielding"] >= 44
     area = data.hard_area.values
     simulated, law = (np.abs(np.log(area[:, k] / area[:, 0])) for k in (1, 2))
     assert np.quantile(simulated, 0.9) < 0.03
@@ -144,7 +155,8 @@ def test_the_quick_law_is_wrong_where_it_is_not_valid(data):
 
 def test_plateaus_are_nearer_by_the_constants_that_were_fitted_to_them(data):
     missed = {shift: [] for shift in (0.0, PLATEAU_SHIFT)}
-    names = [name for name in data.surface.values if name.startswith(("honed", "worn", "gaussian"))]
+    small = [name for name in data.surface.values if name.endswith("n256")]
+    names = [name for name in small if name.startswith(("honed", "worn", "gaussian"))]
     for name in names:
         one = data.sel(surface=name)
         family, number, _ = name.split("_")

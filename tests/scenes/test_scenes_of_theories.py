@@ -115,15 +115,6 @@ test_what_is_refused = refusals(
 )
 
 
-def test_energies_of_many_gaps_reach_beyond_a_law():
-    surface = Surface.named("concrete")
-    u = np.linspace(0.8, 0.98, 400) * surface.h_max
-    known = {"theory": "greenwood_williamson", "mean_separations": u, "rtol": 1e-5}
-    found = Scene(surface, effects=["pressure", "energy"], **known).run()
-    expected = contact(surface, mean_separation=u, theory="greenwood_williamson").energy
-    assert found.energy.values == pytest.approx(expected, rel=1e-5)
-
-
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
 PRESSED = {"surface": SURFACE, "pressures": [1.0, 30.0], "E_star": 100e3}
 

@@ -1,5 +1,6 @@
 """What metrologists bring: filters by their nesting index, several scans, forms and outliers that are told."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -96,6 +97,22 @@ class TestScans:
         ).all()
         assert "average of 16 scans: h_rms" in told(mean, "average")
         assert mean.h_rms == pytest.approx(float(whole.h_rms), rel=0.1)
+
+    def test_their_spread_adds_to_the_scatter(self, scans):
+        parts, areas, names = scans[1][:4], [0.03, 0.2], ("scatter", "area_scatter", "stiffness_scatter")
+        mean = average(parts)
+        found, alone = (contact(one, area=areas) for one in (mean, dataclasses.replace(mean, scans=())))
+        each = [contact(one, pressure=found.pressure, theory="calibrated") for one in parts]
+        # of ln F at equal u, and of the others at equal F
+        pressure = [one.mean_separation * found.stiffness / found.pressure for one in each]
+        logs = np.log([[one.area for one in each], [one.stiffness for one in each]])
+        expected = np.std([pressure, *logs], axis=1, ddof=1)
+        added = [np.sqrt(getattr(found, name) ** 2 - getattr(alone, name) ** 2) for name in names]
+        np.testing.assert_allclose(added, expected, rtol=1e-3)
+        assert (expected > 0.01).all()
+        twice, once = (contact(one, area=areas) for one in (average(2 * parts[:1]), parts[0]))
+        for name in names:
+            np.testing.assert_allclose(getattr(twice, name), getattr(once, name), rtol=1e-6)
 
     def test_the_average_of_one_scan_twice_is_that_scan(self, scans):
         one = scans[1][0]

@@ -83,16 +83,14 @@ HOSTILE = [np.nan, np.inf, -np.inf, 1e308, -1e308, -1.0, 1e-3 - 2, 1e9, 2.0**63,
 TINY = [5e-324, -5e-324, 2e-308, -0.0]
 
 
-@pytest.mark.parametrize("slopes", [False, True])
-def test_no_place_leaves_memory(slopes):
+def test_no_place_leaves_memory():
     coefs = coefficients(node_values(SHAPE), 3, 4)
     nodes = np.array(SHAPE)
-    rows = 10 if slopes else 2
     for axis in range(4):
         places = np.full((4, len(HOSTILE) + len(TINY)), 1.5)
         places[axis] = HOSTILE + TINY
-        out = np.empty((rows, places.shape[1]))
-        assert core.spline4(places, coefs, nodes, slopes, out) == len(HOSTILE)
+        out = np.empty((2, places.shape[1]))
+        assert core.spline4(places, coefs, nodes, out) == len(HOSTILE)
         assert np.isnan(out[:, : len(HOSTILE)]).all()
         assert np.isfinite(out[:, len(HOSTILE) :]).all()
 

@@ -121,7 +121,7 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
     assert labelled.dims == ("load",)
     for bad, says in (
         ((45.0, "167 W/(m K)"), "got 45.0"),
-        (("45 W/K",), "or a text such as '45 W/"),
+        (("45 W/K",), "texts such as '45 W/"),
         (("45 W/(m K)", "6e7 S/m"), "in one unit"),
         ((-1.0,), "k1 must be positive"),
     ):
@@ -234,7 +234,13 @@ def test_a_request_takes_few_calls_in_few_files():
 def test_bodies_apart(theory):
     found = contact(SURFACE, separation=50.0, theory=theory)
     ends = get_theory(theory).ends_at_h_max
-    assert found.mean_separation == (50.0 if ends else 26.5)
+    assert (found.separation, found.mean_separation) == (50.0, 50.0 if ends else 26.5)
+    xr = pytest.importorskip("xarray")
+    for name in ("separation", "mean_separation"):
+        plain = contact(SURFACE, **{name: [1.0, 50.0]}, theory=theory)
+        labelled = contact(SURFACE, **{name: xr.DataArray([1.0, 50.0], dims="gap")}, theory=theory)
+        assert labelled.separation.values.tolist() == plain.separation.tolist()
+        assert labelled.mean_separation.values.tolist() == plain.mean_separation.tolist()
     if ends:
         assert (found.pressure, found.area) == (0, 0)
         assert "the bodies are apart" in repr(found)

@@ -15,17 +15,17 @@ def surface_of(family, number):
     return Surface.from_map(heights(Part(family, number)), 1.0, periodic=True, unit="um")
 
 
-@pytest.mark.parametrize(("family", "number"), [("gaussian", 2), ("milled", 3)])
-def test_maps_like_gaussian_ones_are_valid(family, number):
-    found = contact(surface_of(family, number), area=[0.01, 0.1, 0.5], theory="calibrated")
+@pytest.mark.parametrize("number", [2, 3])
+def test_gaussian_maps_are_valid(number):
+    found = contact(surface_of("gaussian", number), area=[0.01, 0.1, 0.5], theory="calibrated")
     assert found.valid.all()
-    assert (found.scatter < 0.08).all()
-    assert ((found.area_scatter > 0.03) & (found.area_scatter < 0.05)).all()
+    assert ((found.scatter > 0.02) & (found.scatter < 0.06)).all()
+    assert ((found.area_scatter > 0.01) & (found.area_scatter < 0.03)).all()
 
 
 @pytest.mark.parametrize(
     ("family", "number", "statistic"),
-    [("honed", 1, "skewness of heights"), ("ground", 1, "anisotropy"), ("etched", 1, "kurtosis of slopes")],
+    [("honed", 1, "skewness of heights"), ("ground", 1, "anisotropy"), ("milled", 3, "kurtosis of slopes")],
 )
 def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
     found = contact(surface_of(family, number), area=[0.01, 0.1, 0.5], theory="calibrated")
