@@ -231,29 +231,21 @@ def fit_command(
 
 
 @click.command("cost", short_help="Computing time against accuracy.")
-@click.option("--island-model", help="Rows of this island model only.")
 @click.option("--distance", is_flag=True, help="Theories' deviation from simulation instead of numerical error.")
 @options.json_option("a table")
-def cost_command(island_model: str | None, distance: bool, as_json: bool) -> None:
+def cost_command(distance: bool, as_json: bool) -> None:
     """Error and time of every method, as measured on held-out surfaces.
 
     Costs are times relative to that of a fixed piece of work; seconds are those of the machine of the measurement.
     See docs/cost.md. With --distance: root mean squares of ln(theory/boundary elements), of area at equal force
     and force at equal separation, light at 1-10% contact and deep at 10-97%.
 
-    Example: mbma cost --island-model universal
+    Example: mbma cost --distance
     """
     from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
     rows: Any = shipped_distances() if distance else [row for row in costs.rows if row.island_model != UNIT]
-    if island_model is not None:
-        if distance:
-            raise InputError("--island-model is for numerical error: leave it or --distance out")
-        known = tuple(dict.fromkeys(row.island_model for row in rows))
-        if island_model not in known:
-            raise InputError(f"--island-model must be one of {known}, got {island_model!r}")
-        rows = [row for row in rows if row.island_model == island_model]
     unit = costs.seconds
     records = [row._asdict() | {"seconds": row.cost * unit} for row in rows]
     if as_json:

@@ -12,7 +12,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import click
 import numpy as np
 
 from mbma_tables import __version__
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
-# options on the output, and those that the report names separately
-NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "theory", "variant", "island_model", "rtol")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,13 +170,7 @@ def report_answer(
         f", variant {answer.variant}, island model {answer.island_model}, rtol {model.rtol:g}" if answer.variant else ""
     )
     notes += [f"theory {model.theory}{made}; {scale}", "error: relative, numerical, beside the theory's scatter"]
-    context = click.get_current_context()
     facts = {
-        "arguments": {
-            key: str(value) if isinstance(value, Path) else value
-            for key, value in context.params.items()
-            if key not in NOT_ARGUMENTS and value is not None and value is not False
-        },
         "theory": model.theory,
         "variant": answer.variant or None,
         "island_model": answer.island_model or None,

@@ -45,7 +45,8 @@ def chosen_rows(
         y = np.interp(x, fine_x, fine_y)
         y = rounded(y if evenly else balanced(x, y, fine_x, fine_y, floor))
         x[-1], y[-1] = _not_below(fine_x[-1]), _not_below(fine_y[-1])
-        error = chord_error(x, y, fine_x, fine_y, floor)
+        kept = fine_y > floor
+        error = float(np.abs(np.interp(fine_x[kept], x, y) / fine_y[kept] - 1).max())
         return (np.append(begin[0], x), np.append(begin[1], y), error) if jump else (x, y, error)
 
     if rows is not None:
@@ -98,12 +99,6 @@ def _cut(filled: FloatArray, x: FloatArray, count: int) -> FloatArray:
     places: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, x)
     places[0], places[-1] = x[0], x[-1]
     return places
-
-
-def chord_error(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float) -> float:
-    """Largest relative error of linear interpolation where y is above the floor."""
-    kept = fine_y > floor
-    return float(np.abs(np.interp(fine_x[kept], x, y) / fine_y[kept] - 1).max())
 
 
 def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float) -> FloatArray:

@@ -83,7 +83,7 @@ def matlab_reader(law: LawTable, name: str) -> bytes:
 
 
 def to_netcdf(law: LawTable) -> bytes:
-    """A netCDF-4 file with CF attributes."""
+    """A netCDF-4 file with CF attributes, which is an HDF5 file, too."""
     dataset = law.to_dataset()
     dataset.attrs = {
         "Conventions": "CF-1.11",
@@ -98,18 +98,7 @@ def to_netcdf(law: LawTable) -> bytes:
     return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole))
 
 
-def to_hdf5(law: LawTable) -> bytes:
-    """A plain HDF5 file: two datasets with units, the header as attributes."""
-    h5py = needed("h5py")
-    stream = io.BytesIO()
-    with h5py.File(stream, "w") as file:
-        for name, (values, unit) in law.columns.items():
-            file[name] = values
-            file[name].attrs["units"] = unit
-        file.attrs["comments"] = "\n".join(law.comments)
-        file.attrs["largest_error"] = law.largest_error
-        file.attrs["theory"] = law.theory
-    return stream.getvalue()
+to_hdf5 = to_netcdf
 
 
 def to_parquet(law: LawTable) -> bytes:
@@ -126,5 +115,5 @@ def _matlab(law: LawTable, name: str) -> dict[str, bytes]:
     return {"": to_matlab(law), ".m": matlab_reader(law, name)}
 
 
-_WRITE = {"csv": to_csv, "json": to_json, "netcdf": to_netcdf, "hdf5": to_hdf5, "parquet": to_parquet}
+_WRITE = {"csv": to_csv, "json": to_json, "netcdf": to_netcdf, "hdf5": to_netcdf, "parquet": to_parquet}
 TARGETS = (*(Target(name, write) for name, write in _WRITE.items()), Target("matlab", _matlab, end=".mat"))

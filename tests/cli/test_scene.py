@@ -10,7 +10,7 @@ from helpers import refused, run, told
 
 from mbma_tables import Surface, contact
 from mbma_tables.cli import main
-from mbma_tables.scenes.costs import Distance, shipped_costs, shipped_distances
+from mbma_tables.scenes.costs import UNIT, Distance, shipped_costs, shipped_distances
 
 JOINT = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_joint.toml")
 ROAD = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_road.toml")
@@ -56,15 +56,10 @@ test_mistakes_end_with_one_line = told(
 
 
 def test_the_table_has_a_line_for_each_row():
-    title, _, header, *lines = run("cost", "--island-model", "universal").splitlines()
-    assert len(lines) == sum(row.island_model == "universal" for row in shipped_costs().rows)
+    title, _, header, *lines = run("cost").splitlines()
+    assert len(lines) == sum(row.island_model != UNIT for row in shipped_costs().rows)
     assert "fixed piece of work" in title
     assert header.split() == ["island_model", "variant", "quantity", "error", "cost", "evaluations", "seconds"]
-    assert all(line.startswith("universal") for line in lines)
-
-
-def test_an_unknown_island_model_is_refused():
-    assert "--island-model must be one of" in refused("cost", "--island-model", "best")
 
 
 def test_distances_are_told_beside_times():
@@ -78,7 +73,6 @@ def test_distances_are_told_beside_times():
     for row, expected in zip(found["rows"], shipped_distances(), strict=True):
         assert (row["theory"], row["way"]) == (expected.theory, expected.way)
         assert row["seconds"] == pytest.approx(expected.cost * found["unit_seconds"], rel=1e-12, abs=0)
-    assert "leave it or --distance out" in refused("cost", "--distance", "--island-model", "exact")
 
 
 SURFACES = """name,hurst,q0,q1,h_rms,h_max,E_star

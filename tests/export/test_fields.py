@@ -220,6 +220,7 @@ def test_data_of_a_film_come_back(name, tmp_path):
     path.write_bytes(getattr(data, f"to_{name}")(film))
     if name == "json":
         again = json.loads(path.read_bytes())
+        assert (again["y_unit"], again["largest_error"]) == ("1", film.largest_error)
         assert again["facts"] == {key: list(fact) for key, fact in film.facts.items()}
         found = again["columns"]
     elif name == "csv":
@@ -230,16 +231,20 @@ def test_data_of_a_film_come_back(name, tmp_path):
         from scipy.io import loadmat
 
         held = loadmat(path, appendmat=False)
+        assert held["largest_error"].item() == film.largest_error
         found = {key: held[{"mean_separation": "x", "phi_x": "y"}.get(key, key)][:, 0] for key in film.columns}
     elif name == "netcdf":
         import xarray as xr
 
         with xr.open_dataset(path, engine="netcdf4") as held:
             assert held.pressure.attrs["units"] == "Pa"
+            # CF 1.11, section 2.5.1
+            assert all("_FillValue" not in variable.encoding for variable in held.variables.values())
             found = {key: held[key].values for key in film.columns}
     elif name == "hdf5":
         h5py = pytest.importorskip("h5py")
         with h5py.File(path) as held:
+            assert held["pressure"].attrs["units"] == b"Pa"
             found = {key: held[key][:] for key in film.columns}
     else:
         held = pytest.importorskip("pyarrow.parquet").read_table(path)

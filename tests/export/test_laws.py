@@ -1,7 +1,6 @@
 """Laws as rows: their error against the model, their spacing, their text in every target, and what is refused."""
 
 import dataclasses
-import io
 import json
 import sys
 
@@ -10,7 +9,7 @@ import pytest
 from helpers import refusals
 
 from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
-from mbma_tables.export import DATA, SOLVERS, chords, data, solvers
+from mbma_tables.export import SOLVERS, chords, data, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix, optistruct
 from mbma_tables.surfaces.variants import PRINTED
@@ -159,45 +158,11 @@ def test_text_holds_the_rows(target, rows):
         assert word in text
 
 
-@pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])
+@pytest.mark.parametrize(("target", "package"), [("parquet", "pyarrow")])
 def test_a_missing_package_is_named(target, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(MbmaError, match=f"pip install {package}"):
         getattr(data, f"to_{target}")(law_of())
-
-
-def data_of(target, path):
-    """Rows of a file by another program, and what it holds of the unit of y and of the error, if it does."""
-    if target == "csv":
-        assert "\noverclosure [mm],pressure [MPa]\n" in path.read_text()
-        return *np.array(parse(target, path.read_text())).T, "MPa", None
-    if target == "json":
-        content = json.loads(path.read_text())
-        return *content["columns"].values(), content["y_unit"], content["largest_error"]
-    if target == "matlab":
-        held = pytest.importorskip("scipy.io").loadmat(path, appendmat=False)
-        return held["x"][:, 0], held["y"][:, 0], held["y_unit"].item(), held["largest_error"].item()
-    if target == "netcdf":
-        with pytest.importorskip("xarray").open_dataset(path, engine="netcdf4") as held:
-            # CF 1.11, section 2.5.1
-            assert all("_FillValue" not in variable.encoding for variable in held.variables.values())
-            return held.overclosure.values, held.pressure.values, held.pressure.attrs["units"], None
-    if target == "hdf5":
-        with pytest.importorskip("h5py").File(path) as held:
-            return held["overclosure"][:], held["pressure"][:], held["pressure"].attrs["units"], None
-    held = pytest.importorskip("pyarrow.parquet").read_table(io.BytesIO(path.read_bytes()))
-    unit = json.loads(held.schema.metadata[b"y_unit"])
-    return held["overclosure"].to_numpy(), held["pressure"].to_numpy(), unit, None
-
-
-@pytest.mark.parametrize("target", DATA)
-def test_data_come_back(target, tmp_path):
-    law, path = law_of(), tmp_path / "law"
-    path.write_bytes(getattr(data, f"to_{target}")(law))
-    x, y, unit, error = data_of(target, path)
-    np.testing.assert_array_equal([x, y], [law.x, law.y])
-    assert unit == "MPa"
-    assert error in (None, law.largest_error)
 
 
 test_refused = refusals(

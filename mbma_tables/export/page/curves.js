@@ -149,7 +149,8 @@ function concernsOf(state, curve, h_rms, gradient) {
         zeta_1 = state.q1 / state.q0,
         [flat, high_peaks] = LIMITS.heights;
       reasons.push([`the Hurst exponent is below ${LIMITS.hurst}`, always(state.hurst < LIMITS.hurst * (1 - 1e-9))]);
-      reasons.push([`q₁/q₀ is above ${LIMITS.zeta_1}`, always(zeta_1 > LIMITS.zeta_1 * (1 + 1e-9))]);
+      const broad = `the longest wavelength is more than ${LIMITS.zeta_1} times the shortest`;
+      reasons.push([broad, always(zeta_1 > LIMITS.zeta_1 * (1 + 1e-9))]);
       reasons.push([`h_max/h_rms is outside ${flat} to ${high_peaks}`, always(ratio < flat || ratio > high_peaks)]);
     }
     reasons.push([`A/A0 is below ${low}`, (k) => curve.area[k] > 0 && curve.area[k] < low]);
