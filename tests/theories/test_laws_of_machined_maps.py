@@ -112,6 +112,14 @@ class TestDefaultTheory:
     def test_others_are_calibrated(self, surface):
         assert contact(surface(self), area=0.1).theory == "calibrated"
 
+    def test_its_law_with_a_hardness_is_as_accurate_as_its_answers(self):
+        wafer = Surface.from_map("docs/data/maps/top-1.top", short_cutoff="9.4 nm")
+        law = contact_law(wafer, E_star="70 GPa", hardness="12 GPa")
+        pressure = np.array([0.01, 0.1, 0.5, 2.0, 8.0])
+        truth = contact(wafer, pressure=pressure, E_star="70 GPa", hardness="12 GPa")
+        np.testing.assert_allclose(law.pressure(truth.mean_separation), pressure, rtol=law.error + truth.error.max())
+        assert law.error < 5e-5
+
     def test_a_map_that_is_not_resolved_is_not_valid(self):
         noise = Surface.from_map(0.1 * np.random.default_rng(1).standard_normal((64, 64)), 1.0, periodic=True)
         found = contact(noise, area=0.1, theory="corrected")
