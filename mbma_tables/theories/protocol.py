@@ -250,6 +250,19 @@ def _places(u: FloatArray, value: FloatArray, steep: FloatArray, end: FloatArray
     return np.array([np.log(value), np.log(u / (rest := 1 - u / end)), -value / (steep * u * rest)])
 
 
+def _through(places: FloatArray, goal: FloatArray) -> FloatArray:
+    """y at a goal by the polynomial through places, (3, places, n), and their rates, by divided differences."""
+    x, found = places[0].repeat(2, axis=0), places[1, 0]
+    difference, product = places[1].repeat(2, axis=0), 1.0
+    for order in range(1, len(x)):
+        difference = (difference[1:] - difference[:-1]) / (x[order:] - x[:-order])
+        if order == 1:
+            difference[::2] = places[2]
+        product = product * (goal - x[order - 1])
+        found = found + product * difference[0]
+    return np.asarray(found)
+
+
 def _middle(low: FloatArray, high: FloatArray) -> FloatArray:
     apart = np.where((high > 2 * low) & (low > 0), np.sqrt(low) * np.sqrt(high), 0.5 * (low + high))
     return np.where(high == np.inf, 2 * low, apart)
@@ -268,24 +281,24 @@ class Search:
         self.exact, self.wanted, self.end = exact, wanted, end
         # the branch of first contact: the first gap from there at which the value is reached
         reached, count = seen[1] >= wanted, seen.shape[1]
-        number = np.where(reached.any(axis=0), reached.argmax(axis=0), count) + np.array([[-1], [0]])
+        number = np.where(reached.any(axis=0), reached.argmax(axis=0), count) + np.arange(-2, 2)[:, None]
         column = np.arange(wanted.size) if seen.shape[2] == wanted.size else 0
         u, value, steep = seen[:, number.clip(0, count - 1), column]
         inside, goal = (number >= 0) & (number < count), np.log(wanted)
-        self.low, self.high = np.where(inside[1], u[1], low), np.where(inside[0], u[0], high)
+        self.low, self.high = np.where(inside[2], u[2], low), np.where(inside[1], u[1], high)
         known = inside & (value > 0) & (value < np.inf)
         around = np.where(known, _places(u, value, steep, end), np.nan)
-        (light, heavy), y, rates = around
-        nearer = known[1] & ~(goal - light <= heavy - goal)
-        self.before: FloatArray = np.where(nearer, around[:, 1], around[:, 0])
+        (_, light, heavy, _), y, _ = around
+        nearer = known[2] & ~(goal - light <= heavy - goal)
+        self.before: FloatArray = np.where(nearer, around[:, 2], around[:, 1])
         x0, y0, rate = self.before
-        apart, rise = heavy - light, y[1] - y[0]
-        t = (goal - light) / apart
-        found = y[0] + t * rise
+        straight = y[1] + (goal - light) / (heavy - light) * (y[2] - y[1])
+        found = np.where(heavy > light, straight, y0 + rate * (goal - x0))
         if exact:
-            curved = found + t * (1 - t) * ((1 - t) * (apart * rates[0] - rise) - t * (apart * rates[1] - rise))
-            found = np.where((curved <= y[0]) & (curved >= y[1]), curved, found)
-        found = np.where(apart > 0, found, y0 + rate * (goal - x0))
+            curved = _through(around, goal)
+            rises = (around[0, 1:] > around[0, :-1]).all(axis=0)
+            good = rises & (curved <= y[1]) & (curved >= y[2])
+            found = np.where(good, curved, found)
         ratio = np.exp(y0 + np.minimum(np.maximum(found - y0, -FARTHEST), FARTHEST))
         gap = ratio / (1 + ratio / end)
         self.gap = np.where((gap > self.low) & (gap < self.high), gap, _middle(self.low, self.high))
