@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import ctypes
 import dataclasses
@@ -11,7 +10,6 @@ import re
 import shutil
 import subprocess
 import urllib.parse
-import zlib
 
 import numpy as np
 import pytest
@@ -19,7 +17,7 @@ from helpers import random_map, refused, run
 
 from generate.explorer import c_sources, digest_of, law_sources
 from mbma_tables import InputError, Surface, contact
-from mbma_tables.export.explorer import MODULE, explorer_page, packed
+from mbma_tables.export.explorer import MODULE, explorer_page
 from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import page_file
 from mbma_tables.theories import Mbma
@@ -153,21 +151,6 @@ def test_curves_are_those_of_the_library(number, visit):
 @pytest.mark.parametrize(("module", "texts"), [(MODULE, c_sources()[0]), (LAW_MODULE, law_sources())])
 def test_the_modules_are_of_this_c(module, texts):
     assert page_file(module).endswith(digest_of(texts)), "run: python -m generate explorer"
-
-
-def test_tables_are_packed_to_the_last_digits_that_count():
-    rng = np.random.default_rng(0)
-    for values in (rng.uniform(-150, 20, 5000), 1e-9 * rng.uniform(size=3000)):
-        held = packed(values)
-        planes = np.frombuffer(zlib.decompress(base64.b64decode(held["text"])), np.uint8).reshape(-1, held["count"])
-        if held["differences"] == 0:
-            assert np.array_equal(planes.T.copy().view(float).ravel(), values)
-            continue
-        zigzag = sum(plane.astype(np.int64) << (8 * k) for k, plane in enumerate(planes))
-        whole = (zigzag >> 1) ^ -(zigzag & 1)
-        for _ in range(held["differences"]):
-            whole = np.cumsum(whole)
-        assert np.abs(np.ldexp(whole.astype(float), -held["bits"]) - values).max() <= 2.0 ** -(held["bits"] + 1)
 
 
 def test_one_file_of_at_most_four_megabytes_that_asks_for_nothing():

@@ -56,22 +56,6 @@ def test_levels_of_mean_gaps():
             assert level == pytest.approx(float(d), abs=1e-14, rel=1e-15)
 
 
-def test_derivatives_of_the_force():
-    u = np.geomspace(1e-4, 3.4, 30)
-    slope = derivative(lambda x: hardness.bearing_share(x, 3.5)[0], u, initial_step=0.02 * np.minimum(u, 3.5 - u)).df
-    assert hardness.bearing_share(u, 3.5)[1] == pytest.approx(slope, rel=1e-7)
-    elastic, share, eta = np.meshgrid([0.01, 0.3, 5.0], [0.001, 0.3, 0.9], [0.05, 0.4, 3.0])
-    elastic, share, eta = (part.ravel() for part in (elastic, share, eta))
-
-    def log_force(x, by_elastic, by_share, e, q, cap):
-        return np.log(hardness.force(e * np.exp(by_elastic * x), 0.0, q * np.exp(by_share * x), 0.0, cap)[0])
-
-    for by_elastic, by_share in ((1.0, 0.0), (0.0, 1.0), (1.0, -0.5)):
-        force, stiffness = hardness.force(elastic, -by_elastic * elastic, share, by_share * share, eta)
-        found = derivative(log_force, np.zeros(27), args=(by_elastic, by_share, elastic, share, eta), initial_step=0.05)
-        assert -stiffness / force == pytest.approx(found.df, rel=1e-6, abs=1e-9)
-
-
 def test_bearing_curve_of_a_map_is_that_of_its_heights():
     surface = heights(Recipe("worn", 0.8, 8, 4, 3, 128, 0.5))
     known = bearing(surface, (1.0, 1.0))

@@ -7,19 +7,6 @@ from helpers import random_map
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.laws.reynolds import flow_conductance, open_ways
 
-POINTS = 96
-X = (np.arange(POINTS) + 0.5) / POINTS
-
-
-def test_profiles_along_and_across():
-    # along: mean of h^3; across: 1/<h^-3> = (1 - a^2)^(5/2)/(1 + a^2/2) for h = 1 + a cos(x)
-    a = 0.4
-    gap = np.repeat(1 + a * np.cos(2 * np.pi * X)[:, None], 24, axis=1)
-    across, along = flow_conductance(gap, (1.0, 0.25))
-    assert along == pytest.approx(1 + 1.5 * a**2, rel=1e-12)
-    # a face's harmonic mean is a trapezoidal rule, which converges at once where periodic
-    assert across == pytest.approx((1 - a**2) ** 2.5 / (1 + a**2 / 2), rel=1e-10)
-
 
 def test_scale_of_gaps_and_sides():
     gap = np.exp(0.3 * np.random.default_rng(1).standard_normal((20, 40)))

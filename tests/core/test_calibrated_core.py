@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import NdBSpline
 from scipy.special import erf
 
-from mbma_tables import ConvergenceError, InputError, Surface
+from mbma_tables import ConvergenceError, InputError
 from mbma_tables.answers import leakage_table
 from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.core import GENERATIONS, core
@@ -280,28 +280,6 @@ class TestCurve:
         assert law.separation([1e-300, 20.0, 1e300]) == pytest.approx([3.0, 0.0, 0.0], rel=1e-15, abs=0)
         # as sharp as what is left of Gaussian tails: the slope of a surface without end
         assert law.contact(3 - 1e-9)[0] == pytest.approx(1e-9 * law.contact(3 - 1e-9)[2], rel=1e-6)
-
-
-def test_waves_hold_the_moments_of_the_spectrum():
-    for hurst, zeta_1 in SELF_AFFINE:
-        spectrum, alpha, gradient = Spectrum.self_affine(hurst, zeta_1), np.empty(1), np.empty(1)
-        core.self_affine(np.array([hurst]), np.log([zeta_1]), alpha, gradient)
-        assert spectrum.alpha == pytest.approx(alpha[0], rel=1e-13)
-        assert spectrum.gradient == pytest.approx(gradient[0], rel=1e-13)
-        assert spectrum.variance.sum() == pytest.approx(1, rel=1e-14)
-        assert spectrum.variance @ spectrum.x**2 == pytest.approx(gradient[0] ** 2, rel=1e-13)
-        assert np.all(np.diff(spectrum.x) >= 0)
-        assert np.all(np.diff(spectrum.below) >= 0)
-        assert 0 < spectrum.below[0] < 1e-15
-        assert spectrum.below[-1] == pytest.approx(1, rel=1e-4)
-    # a jump, and a gap in which there is nothing
-    q = np.array([1.0, 2.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    C = np.array([1.0, 0.5, 2.0, 1.0, 0.0, 0.7, 0.2])
-    split = Spectrum.from_samples(q, C)
-    assert not ((split.x > 3) & (split.x < 5)).any()
-    surface = Surface.from_spectrum(q, C, h_max=1.0)
-    assert split.gradient == pytest.approx(surface.rms_gradient / surface.h_rms / surface.q0, rel=1e-13)
-    assert split.alpha == pytest.approx(surface.alpha, rel=1e-13)
 
 
 @pytest.mark.parametrize("used", CORES)

@@ -10,7 +10,7 @@ import pytest
 from catalogue import random_surfaces
 
 from generate.tables.exact_geometry import DIGITS, divisor, exact_island
-from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
+from mbma_tables import OutOfRangeError, Surface, greenwood_tripp, island
 from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.surfaces.spectrum import BROADENING
@@ -138,16 +138,6 @@ def test_no_approach(surface, delta):
         island(surface, delta)
     assert caught.value.mask.shape == np.shape(delta)
     assert caught.value.mask.sum() == 1
-
-
-BAD = {"island_model": ("magic",), "variant": ("guessed",), "E_star": (0.0, -1.0, math.nan)}
-BAD |= {"rtol": (0.0, -1e-9, 2.0, math.nan)}
-
-
-@pytest.mark.parametrize(("option", "value"), [(option, value) for option in BAD for value in BAD[option]])
-def test_bad_options(surface, option, value):
-    with pytest.raises(InputError, match=option):
-        island(surface, 1.0, **{option: value})
 
 
 def test_a_band_that_ends_at_the_floor_of_zeta_u_is_refused():

@@ -182,11 +182,6 @@ def test_bad_options(option, value):
         greenwood_tripp.solve(1.0, 1.0, **{option: value})
 
 
-def test_nodes_are_bounded():
-    with pytest.raises(InputError, match=r"nodes must be a whole number in \[8, 1024\], got 4096"):
-        greenwood_tripp.solve(10.0, 10.0, nodes=4096)
-
-
 OTHERS = pytest.mark.skipif(find_spec("ContactMechanics") is None, reason="ContactMechanics is not installed")
 
 

@@ -68,17 +68,6 @@ def test_one_axis_against_scipy_and_more_components(degree, nodes):
     np.testing.assert_allclose(BSpline(knots, coefs, degree)(places), expected, rtol=1e-11, atol=1e-11)
 
 
-def test_the_last_node_belongs_to_the_table():
-    values = node_values(SHAPE)
-    coefs, last = coefficients(values, 3, 4), np.array([[n - 1.0] for n in SHAPE])
-    size = np.abs(values).max()
-    for place in (last, np.nextafter(last, 10.0)):
-        found = at_places(coefs, place)[:, 0]
-        np.testing.assert_allclose(found, values[-1, -1, -1, -1], rtol=0, atol=1e-13 * size)
-    found = at_places(coefs, np.full((4, 1), -1e-15))[:, 0]
-    np.testing.assert_allclose(found, values[0, 0, 0, 0], rtol=0, atol=1e-13 * size)
-
-
 HOSTILE = [np.nan, np.inf, -np.inf, 1e308, -1e308, -1.0, 1e-3 - 2, 1e9, 2.0**63, -(2.0**63)]
 TINY = [5e-324, -5e-324, 2e-308, -0.0]
 

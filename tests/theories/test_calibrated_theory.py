@@ -21,9 +21,9 @@ from generate.calibrated import errors
 from generate.files import dataset, evidence
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
 from mbma_tables.common.files import shipped_file
-from mbma_tables.laws.bearing_curve import FRACTIONS, QUANTILES, bearing, radial_spectrum
-from mbma_tables.laws.calibrated import CONSTANTS, Law, Spectrum, mean_top_height, self_affine_law
-from mbma_tables.laws.map_curves import MAP_CONSTANTS, MapLaw, hertz_ellipse
+from mbma_tables.laws.bearing_curve import QUANTILES
+from mbma_tables.laws.calibrated import CONSTANTS, Law, Spectrum, self_affine_law
+from mbma_tables.laws.map_curves import MAP_CONSTANTS, hertz_ellipse
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import get_variant
@@ -337,10 +337,6 @@ def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
     assert (np.abs(found.pressure / exact - 1) <= found.error).all()
 
 
-def map_law(heights, sizes):
-    return MapLaw.from_curves(bearing(heights, sizes), radial_spectrum(heights, sizes))
-
-
 def test_full_contact_holds_all_energy():
     # U = (1/4) sum q |h_q|^2
     surface = Spectrum.self_affine(0.8, 64.0)
@@ -389,35 +385,6 @@ class TestHertz:
         np.testing.assert_allclose(areas, [1.013, 1.036, 1.079, 1.113, 1.160, 1.192, 1.261, 1.320], atol=6e-4)
         np.testing.assert_allclose(gaps, [1.01, 1.025, 1.057, 1.086, 1.129, 1.16, 1.235, 1.31], atol=3e-3)
         assert hertz_ellipse(1.0) == (1.0, 1.0)
-
-    def test_gaussian_tops(self):
-        # M_G(a) = phi(z)/a
-        assert mean_top_height(0.5) == pytest.approx(math.sqrt(2 / math.pi))
-        assert mean_top_height(1e-4) == pytest.approx(3.959, abs=1e-3)
-
-
-def random_heights(low, high, power, seed, n=128):
-    return random_map(n, (low - 0.01) / n, (high + 0.01) / n, power, seed, phases=True)
-
-
-class TestMapLaw:
-    law = map_law(random_heights(3, 32, 1.8, 4), (1.0, 1.0))
-
-    def test_gaussian_pressures_are_their_own(self):
-        np.testing.assert_allclose(self.law.gaussian_force([0.2, 0.5, 1.0]), [0.2, 0.5, 1.0], rtol=0.03)
-
-    def test_stretching_leaves_the_height_factor_but_for_its_ellipse(self):
-        heights = random_heights(4, 40, 1.1, 5)
-        plain, stretched = (map_law(heights, (size, 1.0)) for size in (1.0, 6.0))
-        assert stretched.anisotropy == pytest.approx(6, rel=0.1)
-        factors = [law.height_factor / hertz_ellipse(round(law.anisotropy, 3))[1] for law in (plain, stretched)]
-        assert factors[0] > 0.81
-        assert factors[1] == pytest.approx(factors[0], rel=0.03)
-
-    def test_steeper_tops_carry_more_on_less_area(self):
-        top_gradient = self.law.top_gradient * np.where(FRACTIONS < 0.1, 2.0, 1.0)
-        steep = dataclasses.replace(self.law, top_gradient=top_gradient)
-        assert steep.area(0.005) == pytest.approx(self.law.area(0.005) / 2, rel=0.05)
 
 
 EDGES = ((0.1, 3.001), (0.1, 1e5), (1.0, 3.001), (1.0, 1e5))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers import refused, run
 from scipy.special import erf
+from small_tables import edited
 
 from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
@@ -82,18 +83,7 @@ def test_damage_and_other_files_are_refused(file, tmp_path):
 
 
 def test_a_file_that_was_edited_and_sealed_again_is_refused(file, tmp_path):
-    import hashlib
-
-    import netCDF4
-
-    from mbma_tables.tablefiles.netcdf import SEAL, read_sealed
-
-    bad = tmp_path / "edited.nc"
-    bad.write_bytes(read_sealed(file))
-    with netCDF4.Dataset(bad, "a") as dataset:
-        dataset["pressure"][0] = 1e-9
-    body = bad.read_bytes()
-    bad.write_bytes(body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
+    bad = edited(tmp_path / "edited.nc", file.read_bytes(), lambda dataset: dataset["pressure"].__setitem__(0, 1e-9))
     with pytest.raises(TableFileError, match="do not match their hash"):
         BoundaryElements.from_netcdf(bad)
 

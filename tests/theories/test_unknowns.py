@@ -62,11 +62,6 @@ def test_numbers_of_a_drawing_are_the_unknowns():
     assert "q1" in moved.parameters
 
 
-def test_a_table_of_slopes():
-    text = str(sensitivity(SURFACE, pressure=0.03, E_star=10.0, theory="calibrated"))
-    assert "10\n" not in text.splitlines()[1]
-
-
 test_what_is_refused = refusals(
     lambda changed: sensitivity(**({"surface": SURFACE, "E_star": 10.0} | changed)),
     ({}, "give exactly one of separation"),
