@@ -232,8 +232,7 @@ def fit_spectrum(
     _refuse_peak(below.q, beyond(below), MAX_EXCESS, f"the power law between {fit.q_low:.4g} and {fit.q_high:.4g}")
     _refuse_poor(fit, anisotropy or 1.0, forced=band is not None)
     # h_rms^2 is the integral of (6) between q0 and q1
-    z0, z1 = q0 / unit, q1 / unit
-    growth = -math.expm1(-2 * exponent * math.log(z1 / z0)) * z0 ** (-2 * exponent)
+    growth = -math.expm1(-2 * exponent * math.log(q1 / q0)) * (q0 / unit) ** (-2 * exponent)
     h_rms = unit * math.sqrt(math.pi * math.exp(log_k) * growth / exponent)
     return {"hurst": exponent, "q0": q0, "q1": q1, "h_rms": h_rms, "fit": fit}
 
