@@ -44,7 +44,8 @@ class Generator(click.Group):
             click.echo("generate: interrupted", err=True)
             sys.exit(1)
         except ModuleNotFoundError as fault:
-            click.echo(f"generate: {fault}; install the extra: pip install -e '.[generate]'", err=True)
+            extras = "wheels" if fault.name in ("abi3info", "lief", "ziglang") else "generate"
+            click.echo(f"generate: {fault}; install the extra: pip install -e '.[{extras}]'", err=True)
             sys.exit(2)
         except (click.ClickException, MbmaError, OSError, RuntimeError) as fault:
             text = fault.format_message() if isinstance(fault, click.ClickException) else str(fault)
