@@ -114,6 +114,12 @@ def flow_factors(
     -------
     FlowFactors
 
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For negative mean gaps, a Peklenik number outside its range, a batch of surfaces, and
+        surfaces without the map that `theory` needs.
+
     Examples
     --------
     >>> from mbma_tables import Surface, flow_factors

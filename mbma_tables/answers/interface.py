@@ -61,7 +61,13 @@ class Tangential:
         return found
 
     def shear(self, displacement: ArrayLike | str) -> Numbers:
-        """Shear stress F_t/A0 at a tangential displacement from rest [stress]; f p from `gross_slip` on."""
+        """Shear stress F_t/A0 at a tangential displacement from rest [stress]; f p from `gross_slip` on.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            Without a friction, with a hardness, and for negative displacements.
+        """
         normal, _, _, scale = self._known()
         delta = self._checked("displacement", displacement)
         found: Numbers = self.friction * (self.pressure - normal(self._moved(delta / scale)))

@@ -148,6 +148,11 @@ class Leakage(Displayed):
         width : array_like or str
             Of the seal, along the flow [length].
 
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For numbers that are not positive and finite, and units that cannot be converted.
+
         Examples
         --------
         >>> from mbma_tables import Surface, contact

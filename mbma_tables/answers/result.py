@@ -140,6 +140,11 @@ class Contact(Interface, Displayed):
     def map(self) -> ContactMap:
         """Pressure, gap and contact at every point of the surface's map, simulated on its full grid at this pressure.
 
+        Raises
+        ------
+        InputError
+            For several contacts, one with a hardness, and surfaces without a map.
+
         Examples
         --------
         >>> import numpy as np

@@ -98,6 +98,11 @@ def sensitivity(
     -------
     Sensitivity
 
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For a batch, unknown names, and where there is no contact.
+
     Examples
     --------
     >>> from mbma_tables import Surface, sensitivity

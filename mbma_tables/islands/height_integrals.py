@@ -31,6 +31,11 @@ def height_integral(n: float, x: ArrayLike) -> Any:
     numpy.ndarray or numpy.float64
         F_n(x), dimensionless, in the shape of `x`; beyond x = 38 zero.
 
+    Raises
+    ------
+    InputError
+        If `n` is not one of `ORDERS` or `x` holds NaN or infinity.
+
     Examples
     --------
     >>> from mbma_tables import height_integral

@@ -168,7 +168,13 @@ class ContactLaw(Law, Derived, Displayed):
         return LawValues(*self._values(("pressure", "area", "stiffness", "energy"), mean_separation, separation))
 
     def separation(self, *, pressure: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
-        """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero."""
+        """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero.
+
+        Raises
+        ------
+        OutOfRangeError
+            If the branch does not reach the value; the message has the branch's end.
+        """
         if (pressure is None) == (area is None):
             raise InputError("give pressure or area, one of them")
         name, given = ("area", area) if pressure is None else ("pressure", self.units.number("pressure", pressure))

@@ -63,7 +63,8 @@ def contact_law(
         As for `contact`.
     rtol : float
         Requested relative error of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; for
-        other theories at least a tenth of their own error, the median over gaps.
+        other theories at least a tenth of their own error, the median over gaps, or all of it where their answers are
+        not smooth below it.
     island_model, variant, E_star : optional
         As for `contact`.
     hardness, materials : optional
@@ -72,6 +73,13 @@ def contact_law(
     Returns
     -------
     ContactLaw
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For a batch of surfaces, and numbers outside these ranges.
+    ConvergenceError
+        Where polynomials do not reach `rtol`; the message names the remedy.
 
     Examples
     --------
@@ -166,8 +174,8 @@ def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str
 
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
     # far larger errors at some gaps, as at the lightest contact of a small map, are ignored
-    asked, own = min(rtol, RESOLVED), float(np.median(errors[0]))
-    tolerance = max(asked, SHARE * own)
+    own = float(np.median(errors[0]))
+    tolerance = max(min(rtol, RESOLVED), SHARE * own)
     bends = np.asarray(theory.bends(surface), dtype=float)
 
     width = highest if not ends else h_max / 2 if lowest else h_max
@@ -192,7 +200,7 @@ def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str
         return finish(tolerance, first, limits, beyond, errors, 0.0, facts)
     except ConvergenceError:
         # answers need not be smooth below their own error
-        if own <= max(asked, tolerance):
+        if own <= tolerance:
             raise
         return finish(own, first, limits, beyond, errors, 0.0, facts)
 

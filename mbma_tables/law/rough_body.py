@@ -158,6 +158,13 @@ def rough_contact(
     -------
     RoughContact
 
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For numbers that are not positive and finite, and loads beyond the layer's law.
+    ConvergenceError
+        Where the half-space's equation is not solved.
+
     Examples
     --------
     >>> from mbma_tables import Surface, rough_contact

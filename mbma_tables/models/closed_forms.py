@@ -45,6 +45,11 @@ class FormulaModel(Ranged):
     form : {"standard", "pocket", "long"}
         Which of the forms.
 
+    Raises
+    ------
+    InputError
+        For an unknown form.
+
     Examples
     --------
     >>> answer = FormulaModel().answer([1.0, 5.0], 2.0)
@@ -96,6 +101,11 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     -------
     ClosedTotals
         Force and area in the broadcast shape.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For surfaces and separations outside the range of the form, and for less contact than it describes.
 
     Examples
     --------

@@ -40,6 +40,11 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     table : {"universal", "island4d"} or path
         A shipped table, which is opened once, or a file, which is read on every call.
 
+    Raises
+    ------
+    TableFileError
+        If the file cannot be used; the message has the reason and the remedy.
+
     Examples
     --------
     >>> from mbma_tables import Surface, contact, open_table

@@ -94,6 +94,13 @@ def island(
     -------
     Island
 
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For approaches that are not positive and finite, and islands outside the table.
+    ConvergenceError
+        Where an exact island is not solved.
+
     Examples
     --------
     >>> from mbma_tables import Surface, island
