@@ -233,7 +233,7 @@ class Joint(Displayed):
         if not known[target].rows:
             options["kappa"] = self._kappa(None)
             file = known[target].files(self.surface, self.pair.E_star, **options, **named)[""]
-            return file if target.startswith("fmu") else file.decode()
+            return file if target == "fmu" else file.decode()
         if pressures is None:
             raise InputError(f"{target} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')")
         if self.friction is not None and "friction" in takes:

@@ -151,8 +151,14 @@ def contact(
     if derivatives and (yields or not isinstance(chosen, Mbma)):
         raise InputError("derivatives are of theory 'mbma' without a hardness; sensitivity() has relative ones of any")
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
-    make = _of_labelled if any_labelled(surface, value, E_star, hardness) else _contact
-    return make(surface, value, E_star, hardness, by, source, derivatives)
+    if not any_labelled(surface, value, E_star, hardness):
+        source, fields = _contact(surface, value, E_star, hardness, by, source, derivatives)
+    elif derivatives:
+        raise InputError("derivatives are of plain arrays: use .values of the DataArrays")
+    else:
+        fields = _of_labelled(surface, value, E_star, hardness, by, source)
+    fields |= {"theory": chosen.name, "variant": chosen.variant_name, "island_model": chosen.island_model_name}
+    return Contact(**fields, _source=source)
 
 
 def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
@@ -185,8 +191,8 @@ def one_known(**given: Any) -> tuple[str, Any]:
 
 def _contact(
     surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool
-) -> Contact:
-    """`contact` of plain arrays."""
+) -> tuple[Source, dict[str, Any]]:
+    """Fields of `contact` of plain arrays, and the source with the theory's answer."""
     asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
     cap = checked_hardness(hardness) if source.yields else np.asarray(np.inf)
     shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": cap})
@@ -194,14 +200,11 @@ def _contact(
     theory: Any = source.theory
     if source.yields:
         # what it needs of scipy takes long to import
-        from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
+        from mbma_tables.theories.yielding import with_hardness
 
-        with np.errstate(over="ignore"):  # beyond the largest number nothing yields
-            eta = cap / modulus
-        theory = WITH_HARDNESS.get(type(theory), Yielding)(theory, eta)
+        theory = with_hardness(theory, cap, modulus)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
-    held = by if by in QUANTITIES else None
-    if derivatives and held:
+    if derivatives and by in QUANTITIES:
         require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
         fields = theory.totals(surface, places["separation"], E_star, derivatives)._asdict() | places
@@ -212,12 +215,12 @@ def _contact(
         source = dataclasses.replace(source, answer=found, loaded=loaded)
         fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "islands": None} | places
         fields["error"] = spread(found.error, np.shape(found.pressure))[()]
-    if derivatives and held:
-        fields |= _at_fixed(by, fields, fields["pressure"] / E_star)
-    return _made(source, fields)
+    if derivatives and by in QUANTITIES:
+        fields |= _at_fixed(by, fields, E_star)
+    return source, fields
 
 
-def _at_fixed(held: str, fields: dict[str, Any], by_modulus: Any) -> dict[str, Any]:
+def _at_fixed(held: str, fields: dict[str, Any], E_star: Any) -> dict[str, Any]:
     """Derivatives at fixed pressure or area: of the separation, and of the other quantity."""
     other = "area" if held == "pressure" else "pressure"
     own, others = fields[f"{held}_by"], fields[f"{other}_by"]
@@ -226,15 +229,9 @@ def _at_fixed(held: str, fields: dict[str, Any], by_modulus: Any) -> dict[str, A
     gap = {held: 1 / steep} | {name: -own[name] / steep for name in names}
     free = {held: follows / steep} | {name: others[name] + follows * gap[name] for name in names}
     if held == "pressure":
-        gap["E_star"] = -by_modulus / steep
+        gap["E_star"] = -(fields["pressure"] / E_star) / steep
         free["E_star"] = follows * gap["E_star"]
     return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
-
-
-def _made(source: Source, fields: dict[str, Any]) -> Contact:
-    by = source.theory
-    names: dict[str, Any] = {"theory": by.name, "variant": by.variant_name, "island_model": by.island_model_name}
-    return Contact(**names, **fields, _source=source)
 
 
 def _places(
@@ -284,17 +281,15 @@ def _refuse_pressures(
 
 
 def _of_labelled(
-    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool
-) -> Contact:
-    """`contact` of DataArrays, lazily where they are."""
-    units, held = source.units, by if by in QUANTITIES else None
-    names = (*(("separation", "mean_separation") if held else ()), *QUANTITIES, "error")
-    if derivatives:
-        raise InputError("derivatives are of plain arrays: use .values of the DataArrays")
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source
+) -> dict[str, Any]:
+    """Fields of `contact` of DataArrays, lazily where they are."""
+    units = source.units
+    names = (*(("separation", "mean_separation") if by in QUANTITIES else ()), *QUANTITIES, "error")
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, cap, by, source, False)
-        return tuple(getattr(found, name) for name in names)
+        _, found = _contact(block, asked, modulus, cap, by, source, False)
+        return tuple(found[name] for name in names)
 
     outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star, "hardness": hardness}, len(names))
     fields: dict[str, Any] = {name: named(found, name, units) for found, name in zip(outputs, names, strict=True)}
@@ -307,4 +302,4 @@ def _of_labelled(
     elif by == "mean_separation":
         gap = np.minimum(2 * value - surface.h_max, highest)
         fields |= {by: value, "separation": named(gap, "separation", units)}
-    return _made(source, fields)
+    return fields

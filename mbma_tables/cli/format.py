@@ -20,6 +20,7 @@ from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units, unit_of
 from mbma_tables.export.text import csv_cell
+from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.roughness import ASSUMED
 from mbma_tables.surfaces.surface import Surface
@@ -184,7 +185,9 @@ def report_answer(
         limit = f"{answer.elastic_hardness:.4g} {stress}".rstrip()
         notes.append(f"elastic: area within 5% for hardnesses from {limit} on")
         if model.yields:
-            notes[-1] = f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to 1.1 (from {limit} on)"
+            notes[-1] = (
+                f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to {ELASTIC_PSI:g} (from {limit} on)"
+            )
         told, validity = _validity(answer)
         notes, facts = notes + told, facts | validity
     shown = {name: shown_unit(name, specimen.units) for name in values}

@@ -184,7 +184,7 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
     lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
     lines.append(_example(exported, language))
     first = 0.0 if exported.ends else (exported.law.h_max - exported.law.highest) / 2
-    numbers = {"H_MAX": exported.law.h_max, "FIRST": first, "TURN": exported.c_turn, "C_TURN": exported.c_turn}
+    numbers = {"H_MAX": exported.law.h_max, "FIRST": first, "C_TURN": exported.c_turn}
     numbers |= {"C_LEAST": exported.c_least, "C_MOST": exported.c_most}
     each = {what: language.number(ratio) for what, ratio in asked.slopes.items()}
     parts = {

@@ -77,12 +77,8 @@ def _contact(run: Run, step: Step) -> None:
     names += VALIDITY * ("validity" in wanted) + YIELDED * ("yield" in wanted)
     values = {name: getattr(found, name) for name in names if name != "area" or "subscale_area" not in problem.dropped}
     if "conductance" in wanted:
-        from mbma_tables.totals.conductance import mean_conductivity
-
         assert problem.conductivities is not None
-        k_s = mean_conductivity(*problem.conductivities)
-        # yielded points unload elastically
-        values["conductance"] = k_s / problem.E_star * found.unloading_stiffness
+        values["conductance"] = found.conductance(*problem.conductivities)
     if "leakage" in wanted:
         fields = {"": "K", "_valid": "valid", "_scatter": "scatter", "_blocked": "blocked"}
         values |= {f"leakage{end}": getattr(found.leakage, field) for end, field in fields.items()}
@@ -149,7 +145,7 @@ class OtherTheory(NamedTuple):
 def other_theory(
     name: str, surface: AnySurface, gap: FloatArray, E_star: float, hardness: float = math.inf
 ) -> OtherTheory:
-    """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
+    """A theory, one of `problem.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories import get_theory
     from mbma_tables.theories.numerical import answer_where_finite
 
@@ -160,9 +156,9 @@ def other_theory(
     else:
         theory = get_theory(name, surface)
     if hardness < math.inf:
-        from mbma_tables.theories.yielding import WITH_HARDNESS, Yielding
+        from mbma_tables.theories.yielding import with_hardness
 
-        theory = WITH_HARDNESS.get(type(theory), Yielding)(theory, hardness / E_star)
+        theory = with_hardness(theory, hardness, E_star)
     found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
     return OtherTheory(
         E_star * found.pressure, found.area, *(theory.scatter(surface, name, found.area) for name in found._fields[:2])

@@ -20,11 +20,21 @@ from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import SCATTER, log_bins
 from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface, resolution
-from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
+from mbma_tables.surfaces.treatment import (
+    LENGTHS,
+    MIN_POWER,
+    OPTIONS,
+    OVERLAP,
+    Treated,
+    Treatment,
+    mirrored,
+    squares,
+    treat,
+)
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
-WINDOW_OVERLAP = (35 / 18) ** 2  # Fourier components under that window that count as one independent component
+WINDOW_OVERLAP = OVERLAP**2  # along both axes
 MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
 S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum

@@ -19,13 +19,12 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.spectral import SpectralSurface
-from mbma_tables.surfaces.treatment import MIN_POWER, Treated
+from mbma_tables.surfaces.treatment import MIN_POWER, OVERLAP, Treated
 
 PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # panels between two nodes
 STRAIGHT = 1.0  # standard deviation of the change of slope, d ln C/d ln q, from node to node
 HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
-OVERLAP = 35 / 18  # Fourier components under a Hann window that count as one independent component
 END = 1e-3  # share of the squared gradient in the wavelengths above the surface's last
 LONGEST, ROLLED_OFF = 4, 0.5  # longest wavelengths of a trace: with half of the variance there is no roll-off
 MIN_NODES = 5

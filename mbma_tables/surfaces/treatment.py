@@ -24,6 +24,7 @@ MIN_GRID = 32  # points along each side: 16 wavenumbers, the first of which is d
 FREE_HOLES = 0.05  # share of undefined points that is filled without being requested
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
+OVERLAP = 35 / 18  # Fourier components along an axis under a Hann window that count as one independent component
 MIN_POWER = 1e-24  # power over that of the strongest wavelength: lower values are rounding
 LENGTHS = ("short_cutoff", "long_cutoff", "s_filter", "l_filter")  # options that are lengths
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported

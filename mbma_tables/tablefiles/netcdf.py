@@ -13,14 +13,16 @@ import os
 import pathlib
 import threading
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import netCDF4
 import numpy as np
 
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import read_file
 from mbma_tables.tablefiles import schema
+
+if TYPE_CHECKING:
+    import netCDF4
 
 REMEDY = "rebuild it with `python -m generate tables {}` or reinstall mbma_tables"
 SEAL = b"\nmbma-table sha256 "
@@ -81,6 +83,8 @@ def read_sealed(path: pathlib.Path, remedy: str = REMEDY.format("all")) -> bytes
 @contextlib.contextmanager
 def opened(path: os.PathLike[str] | str, remedy: str) -> Iterator[netCDF4.Dataset]:
     """The dataset of a table file whose checksum is right; all errors are `TableFileError` and name the remedy."""
+    import netCDF4
+
     source = pathlib.Path(path)
     body = read_sealed(source, remedy)
     try:

@@ -8,7 +8,6 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
-import netCDF4
 import numpy as np
 
 from mbma_tables.common.errors import InputError, TableFileError
@@ -42,6 +41,8 @@ def write_own(
     attributes: Mapping[str, str],
 ) -> None:
     """Write variables (dimensions, values, long_name, units) and attributes whole, or not at all."""
+    import netCDF4
+
     arrays = {name: np.asarray(entry[1], float) for name, entry in variables.items()}
     own = {"mbma_kind": KIND, "format_version": FORMAT, "values_sha256": netcdf.digest_arrays(arrays), **attributes}
 

@@ -16,12 +16,13 @@ from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
-from mbma_tables.theories.protocol import SCAN, Curve, Theory, TheoryAnswer, select
+from mbma_tables.theories.protocol import Curve, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import QUADRATURE_SHARE, Sums, Totals, totals_at
 from mbma_tables.totals.island import check_band
 from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
+SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
 SECTIONS = 24  # golden sections of a scan's step, to 1e-6
 
 MOST_WORKERS = 1024

@@ -28,14 +28,13 @@ def differences(
     side: FloatArray,
     scale: FloatArray,
     halvings: int = HALVINGS,
-    enough: float = ENOUGH,
 ) -> tuple[FloatArray, FloatArray]:
     """Derivatives at 0, shape (kinds, entries), and estimates of their errors.
 
     Differences of fourth order at two steps, extrapolated, or one-sided ones of sixth order.
 
     ``function(k, x)`` has kinds as rows, of entries `k` at x. `side` is 0, or the side of the steps; `scale` a size of
-    derivatives; steps are halved at most `halvings` times, until errors relative to the larger of both are `enough`.
+    derivatives; steps are halved at most `halvings` times, until errors relative to the larger of both are `ENOUGH`.
     """
     found, error = np.zeros(scale.shape), np.full(scale.shape, np.inf)
     for (places, weights), apart in ((CENTRAL, 0), (ONE_SIDED, 1)):
@@ -53,7 +52,7 @@ def differences(
             better = ~(miss >= error[:, left])
             found[:, left] = np.where(better, best, found[:, left])
             error[:, left] = np.where(better, miss, error[:, left])
-            rough = ~(miss <= enough * np.maximum(np.abs(best), scale[:, left])).all(axis=0)
+            rough = ~(miss <= ENOUGH * np.maximum(np.abs(best), scale[:, left])).all(axis=0)
             coarse, left, widths = fine[:, rough], left[rough], widths[-1:] / 2
     return found, error
 

@@ -22,7 +22,6 @@ from mbma_tables.theories import calibrated_table
 LOOKS, FEW_LOOKS = 128, 8  # initial gaps of an inversion, for one surface and for each of a batch,
 LOOKED_AT, FAR = 7.0, 12.0  # range of ln u - ln(h_max - u) for these, and largest u/h_rms without last contact
 STEPS, MISSED = 200, 0.5  # of an inversion; largest miss of ln of a value between two adjacent floats u
-SCAN = 49  # compressions at which a law is searched for a turning point
 # last steps of a logarithm (its error is about the square) and of y; product of the last two where slopes are not known
 SETTLED, SETTLED_STEP, SETTLED_BOTH = 1e-7, 1e-4, 1e-14
 FARTHEST = 40.0  # step of y

@@ -249,3 +249,10 @@ class Yielding(Theory):
 
 # what makes the theory with a hardness, of theories that have a way of their own
 WITH_HARDNESS: dict[type, Callable[[Any, ArrayLike], Yielding]] = {}
+
+
+def with_hardness(theory: Theory, hardness: ArrayLike, E_star: ArrayLike) -> Yielding:
+    """A theory with a hardness, both stresses in one unit."""
+    with np.errstate(over="ignore"):  # beyond the largest number nothing yields
+        eta = np.asarray(hardness) / E_star
+    return WITH_HARDNESS.get(type(theory), Yielding)(theory, eta)
