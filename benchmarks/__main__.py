@@ -5,8 +5,6 @@ processor times taken in turn, the median over the rounds, so that what else the
 docs/cost.md has error against time of every island model.
 """
 
-from __future__ import annotations
-
 import os
 
 os.environ["OMP_NUM_THREADS"] = "1"

@@ -1,7 +1,5 @@
 """Exported C beside the library: islands and totals, both in this process and on the same arrays."""
 
-from __future__ import annotations
-
 import ctypes
 import pathlib
 import subprocess

@@ -3,8 +3,6 @@
 `python benchmarks/import_circles.py [package]` prints one line a circle, and ends with 1 where there is one.
 """
 
-from __future__ import annotations
-
 import ast
 import pathlib
 import sys

@@ -5,8 +5,6 @@
 round, so that they compare across machines of one kind.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json

@@ -1,7 +1,5 @@
 """Simulated maps and bearing tables, each of a surface that was not asked about before."""
 
-from __future__ import annotations
-
 import os
 import time
 import timeit

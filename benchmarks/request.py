@@ -3,8 +3,6 @@
 python benchmarks/request.py
 """
 
-from __future__ import annotations
-
 import itertools
 import sys
 from collections import Counter

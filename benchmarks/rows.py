@@ -1,7 +1,5 @@
 """Rows of the table of ``python -m benchmarks``, and times of the processor taken in turns."""
 
-from __future__ import annotations
-
 import dataclasses
 import statistics
 import time

@@ -1,7 +1,5 @@
 """Random scenes: what they promised beside what they did, in error and in time."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -10,8 +10,6 @@ pressures; friction is viscous between the contacts and mu_b times the asperity 
 temperature; beyond the table the last flow factors. Run with ``python examples/bearing.py``. SI units.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 

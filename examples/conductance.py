@@ -14,8 +14,6 @@ Only what flows through the solid contact is counted, no gas, no radiation.
 Run with ``python examples/conductance.py``. SI units: m, Pa, W/(m K).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 

@@ -9,8 +9,6 @@ between the pressures p_w at the well and p_e at the edge is, exactly,
 Run with ``python examples/fracture.py``. SI units.
 """
 
-from __future__ import annotations
-
 import pathlib
 
 import click

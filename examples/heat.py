@@ -7,8 +7,6 @@ The bolt presses the plates around its hole. Where they touch, the flux is h (T1
 csv --conductivity` at the pressure there; elsewhere nothing flows. Axisymmetric, by quadratic elements; SI units.
 """
 
-from __future__ import annotations
-
 import pathlib
 
 import click

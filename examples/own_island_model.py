@@ -3,8 +3,6 @@
 Run with ``python examples/own_island_model.py``.
 """
 
-from __future__ import annotations
-
 import pathlib
 
 import click

@@ -5,8 +5,6 @@ and memory holds a few blocks and the forces. Run with ``python examples/scatter
 dask (``pip install '.[distributed]'``). Lengths in um; force is F/(A0 E*).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 

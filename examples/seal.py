@@ -10,8 +10,6 @@ Run with ``python examples/seal.py``; the simulation needs ``pip install tamaas`
 stresses in MPa.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import pathlib
 

@@ -3,8 +3,6 @@
 The public names load what they need when first used, so that importing the package is fast.
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import TYPE_CHECKING, Any
 

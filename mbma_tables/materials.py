@@ -7,8 +7,6 @@ the pressure that counts here. A ground or polished face is harder than its bulk
 it matters. The sources of the numbers are in tables/metals.csv.
 """
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import difflib

@@ -1,7 +1,5 @@
 """Random surfaces and gaps by a seed, and variants of one's own."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page of `mbma explore` in a headless Chromium: its curves are the library's, its controls do what they say."""
 
-from __future__ import annotations
-
 import csv
 import ctypes
 import dataclasses

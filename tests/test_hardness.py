@@ -1,7 +1,5 @@
 """Pure functions of contacts with a hardness, against mpmath and boundary elements."""
 
-from __future__ import annotations
-
 import json
 
 import mpmath

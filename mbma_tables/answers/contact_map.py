@@ -1,7 +1,5 @@
 """Pressures and gaps at every point of a map at one load, simulated by boundary elements."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

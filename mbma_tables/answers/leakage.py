@@ -1,7 +1,5 @@
 """Leakage of a contact: its flow coefficient with uncertainty, and leakage rates of liquids and gases."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import Any

@@ -4,8 +4,6 @@ The table holds ln R of `laws.effective_medium` over Hurst exponent, ln zeta_1 a
 tabulated contact ln R is proportional to A^m, as the obstruction is; above the largest R is a power of Ac - A.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

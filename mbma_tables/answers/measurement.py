@@ -1,7 +1,5 @@
 """Report on a measured map or line scan: text lines, a table of loads and one picture."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Sensitivity of results to each parameter of a surface: logarithmic derivatives."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Sequence

@@ -4,8 +4,6 @@ Bad input ends with one or two lines on stderr and exit code 2, before anything 
 need scipy are imported by the commands that use them, so that ``--help`` is fast.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 import sys

@@ -1,7 +1,5 @@
 """The commands `mbma batch`, many surfaces of a CSV file, and `mbma sensitivity`, one whose numbers vary."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """`mbma tables`: list tables, show their contents, verify their files; and `mbma cache`, stored simulations."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checks of arguments: one message per error, with the offending entries."""
 
-from __future__ import annotations
-
 import difflib
 import functools
 import importlib

@@ -4,8 +4,6 @@ The folder is that of the platform's caches; the environment variable `MBMA_TABL
 turns it off. Results that cannot be read or written are computed again, without a warning.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -1,7 +1,5 @@
 """The errors of this library, each a subclass of `MbmaError`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

@@ -1,7 +1,5 @@
 """Files: where the shipped data are, reading with a size limit, and writing a file whole or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import glob
 import os

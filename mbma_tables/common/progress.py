@@ -1,7 +1,5 @@
 """Progress on a terminal: one line for tasks of more than two seconds, erased at the end."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import threading

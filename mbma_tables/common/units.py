@@ -5,8 +5,6 @@ are converted to it. A requested unit converts values that have another one, and
 known yet. An error is raised for values that cannot be converted.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 import functools

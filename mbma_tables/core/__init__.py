@@ -5,8 +5,6 @@ MBMA_TABLES_CORE names another one, such as "x86_64_v3". `mbma.h` describes the 
 in the same order, without the counts of arrays.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 from collections.abc import Callable

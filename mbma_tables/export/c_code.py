@@ -4,8 +4,6 @@ Tables are text, in the shortest decimals that reproduce every bit, so that any 
 numbers; 150,000 numbers are 3 MB of text and a fraction of a second of compiling.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -5,8 +5,6 @@ y everywhere above a floor, and are then moved by half of it, so that the error 
 the curve, because a solver has no rows beyond it.
 """
 
-from __future__ import annotations
-
 import bisect
 from decimal import ROUND_CEILING, Context
 

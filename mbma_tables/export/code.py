@@ -3,8 +3,6 @@
 The interfaces in these languages are generated from the C headers, whose comments describe each call.
 """
 
-from __future__ import annotations
-
 import base64
 import functools
 import importlib.util

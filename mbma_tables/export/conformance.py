@@ -4,8 +4,6 @@ A row of the points' file contains: kind, tolerance, number of arguments, the ar
 of its difference. Lines that begin with # describe the kinds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from typing import Any

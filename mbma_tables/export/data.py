@@ -1,7 +1,5 @@
 """Contact laws as data: CSV, JSON, MATLAB, netCDF, HDF5, Parquet; each returns the bytes of a file."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

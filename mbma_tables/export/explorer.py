@@ -4,8 +4,6 @@ The module is compiled once, by `python -m generate explorer`, from C whose cons
 from the current tables, so that writing one needs no compiler.
 """
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import html

@@ -1,7 +1,5 @@
 """An exported law: the law of one surface with its units, and the header of all files written from it."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import hashlib

@@ -6,8 +6,6 @@ input manual and the deck `mbdyn_post_ehd_load_output_13.tst` of mboct-mbdyn-pkg
 Lethe's manual (Lagrangian physical properties) and `particle_heat_transfer.cc`. GetDP 3.2 was run.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

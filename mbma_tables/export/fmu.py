@@ -1,7 +1,5 @@
 """A contact law as a Functional Mock-up Unit, FMI 2.0, model exchange and co-simulation: C and binaries."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib.util
 import io

@@ -1,7 +1,5 @@
 """A contact law as source code that needs nothing else: the core's own C, or `law_numbers` in a template a language."""
 
-from __future__ import annotations
-
 import base64
 import functools
 import re

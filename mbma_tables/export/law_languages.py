@@ -11,8 +11,6 @@ against x = scale (d - blocked) with the gap d = h_max - 2 c; with a power the f
 zero at and below x = 0. Where bodies are apart, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

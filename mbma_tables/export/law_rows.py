@@ -4,8 +4,6 @@ Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): ze
 approach, so that -dp/du = dp/dc.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 CalculiX 2.20 was run with these cards, force and conductance; the others follow the manuals.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Writing text and numbers into other codes, so that no text of a user or a table is executed there."""
 
-from __future__ import annotations
-
 import importlib.resources
 import re
 import shlex

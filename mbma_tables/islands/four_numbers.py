@@ -1,7 +1,5 @@
 """Islands by the paper's four numbers: the axes of the four-parameter table."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -16,8 +16,6 @@ with floors of q_d and q_u at multiples of q_L, the spectrum's `longest`. On a s
 paper's equations; s/h_rms is (1 - zeta_1^(-2H))^(-1/2) on these and 1 on any other.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Height integrals of Gaussian summits, as polynomials of `generate/tables/height_coefficients.py`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from numpy.typing import ArrayLike

@@ -8,8 +8,6 @@ is therefore rational, symmetric and positive definite:
     I_kl = (1/(1 - 4 (k-l)^2) - 1/(1 - 4 (k+l+1)^2)) / 2
 """
 
-from __future__ import annotations
-
 import functools
 from typing import Any, NamedTuple
 

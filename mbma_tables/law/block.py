@@ -1,7 +1,5 @@
 """The block of a contact law (layout in `core/mbma.h`): its indices, and its inverse."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Force of a rough sphere or cylinder against its approach, its units, and as polynomials."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 import types

@@ -6,8 +6,6 @@ with any law in place of their asperities. Newton's unknown is w at the nodes of
 layer is rigid. Force and pressure are over E* here, and those of a cylinder are per length.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

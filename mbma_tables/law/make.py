@@ -1,7 +1,5 @@
 """`contact_law`: pressure and area of one surface by any theory, fitted by polynomials of the gap (`law.pieces`)."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import math

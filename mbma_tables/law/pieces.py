@@ -5,8 +5,6 @@ cut into equal buckets, doubled in number until every polynomial meets the toler
 are kept; the others bound the error of value and of slope.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Statistics of a height map: bearing curve, gradients of its highest parts, anisotropy, radial spectrum."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -5,8 +5,6 @@ Conjugate gradients run on the points that are free to move, and every step is p
 cosine transforms on its own points. Loading only, frictionless.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

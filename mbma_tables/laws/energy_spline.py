@@ -11,8 +11,6 @@ light load and as Gaussian pressures near full contact: ::
     light: F ~ (H - u)^n       heavy: F^2 linear in ln u       both: erfinv(A) ~ F
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

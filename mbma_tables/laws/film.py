@@ -1,7 +1,5 @@
 """Flow factors of a lubricated rough gap: an anisotropic effective medium of gaps; docs/lubrication.md."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Tangential stiffness of surfaces with a lay: the share c of stress that varies along shear; docs/joints.md."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Finite volumes with the harmonic mean of h^3 at faces; mean pressure gradients a
 factorisation. Closed gaps are found by labelling connected gaps, not by a small conductance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Island models: force, area and error of an island at (X, mu); totals accept any, by name or as an object."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable

@@ -5,8 +5,6 @@ Made by `python -m generate formulas`; do not edit.
 
 # fmt: off
 
-from __future__ import annotations
-
 from mbma_tables.models import Certificate
 
 RANGES: dict[str, dict[str, tuple[float, float]]] = {

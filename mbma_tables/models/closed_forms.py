@@ -1,7 +1,5 @@
 """Closed forms of `core/closed_forms.h` (docs/formula.md): the island model "formula", and total force and area."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple

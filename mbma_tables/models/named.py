@@ -1,7 +1,5 @@
 """Island models by name."""
 
-from __future__ import annotations
-
 from mbma_tables import models
 from mbma_tables.common.arguments import number_in
 from mbma_tables.common.errors import InputError

@@ -1,7 +1,5 @@
 """Opening tables: the shipped ones by kind, once per process, others from their file; verification of their results."""
 
-from __future__ import annotations
-
 import functools
 import os
 import pathlib

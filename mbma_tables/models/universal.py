@@ -1,7 +1,5 @@
 """The island model of the universal table: Phi_F and Phi_A over (X, mu)."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping
 

@@ -4,8 +4,6 @@ A cost is a time divided by that of a fixed piece of work timed in the same run;
 of that work on the machine that measured. `python -m generate cost` measures.
 """
 
-from __future__ import annotations
-
 import csv
 import functools
 import math

@@ -6,8 +6,6 @@ force and area by a factor (`AMPLIFICATION`) has the tolerance over that factor;
 other for the quadrature.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

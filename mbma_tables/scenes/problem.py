@@ -1,7 +1,5 @@
 """The problem defined by a scene, with its effects, checked on construction; `plan` and `run` solve it."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Statistics and profiles of islands, and the area without finer roughness."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Areal parameters of a height map: ISO 25178-2, with the core of the material ratio curve as in ISO 13565-2."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

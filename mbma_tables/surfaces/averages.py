@@ -1,7 +1,5 @@
 """Several scans of one surface as one: mean spectrum, heights and curves, and how much the scans differ."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

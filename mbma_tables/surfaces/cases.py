@@ -1,7 +1,5 @@
 """The paper's cases by name (Section 4), with the numbers that it reports for them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import pi
 from typing import Any, NamedTuple

@@ -6,8 +6,6 @@ Geometry of Random Fields, 1981), for high levels::
     N(x) = A0 (m2/h_rms^2) (2 pi)^(-3/2) x exp(-x^2/2),    P(max < x) = exp(-N(x))
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

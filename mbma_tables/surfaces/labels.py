@@ -3,8 +3,6 @@
 Blocks are evaluated by the same functions as plain arrays; dask schedules them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Height maps: radial spectrum, the surface given by it or fitted to it, extrapolation to shorter wavelengths."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import os

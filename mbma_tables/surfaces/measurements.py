@@ -1,7 +1,5 @@
 """Reading of measured maps and line scans: files, arrays, topographies of SurfaceTopography (the extra `maps`)."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -4,8 +4,6 @@ A place in the spectrum is a piece and a distance ln(upper end/q) below its uppe
 shortest wavelength keep their accuracy.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

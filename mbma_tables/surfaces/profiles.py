@@ -6,8 +6,6 @@ between nodes, as straight in its logarithms as the scatter of the measurement a
 height and gradient.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

@@ -4,8 +4,6 @@ Units: heights in s = h_rms / sqrt(1 - zeta_1^(-2H)), lengths in 1/q0. A band [z
 log(zb/za), so that narrow bands keep their accuracy.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

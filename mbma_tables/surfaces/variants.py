@@ -6,8 +6,6 @@ fitted to the contact area of boundary elements, and adds areas as a cover: its 
 its separation is no better than theirs.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Literal

@@ -1,7 +1,5 @@
 """Tables of a user's own surface: BEM results of one map, in a netCDF-4 file with a checksum like other tables."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import pathlib

@@ -3,8 +3,6 @@
 The core relies on these checks, and the text of attributes is written to exported files.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 F_G is the force on a surface without end; the end at h_max and the area are closed forms, applied by the core.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import pathlib

@@ -3,8 +3,6 @@
 As `theory="simulated"` with fewer loads and a larger tolerance; its flow is that of "simulated" at the same pressures.
 """
 
-from __future__ import annotations
-
 import functools
 from types import MappingProxyType
 

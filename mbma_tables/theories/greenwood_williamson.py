@@ -1,7 +1,5 @@
 """The theory of Greenwood and Williamson (Eqs. 11, 12)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

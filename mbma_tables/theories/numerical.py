@@ -1,7 +1,5 @@
 """Numerical derivatives, theories of users, and results of a theory where they are finite."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

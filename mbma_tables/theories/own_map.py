@@ -1,7 +1,5 @@
 """Preparation of a surface's map for boundary elements: its continuation, and the loads to simulate."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 

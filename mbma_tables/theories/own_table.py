@@ -1,7 +1,5 @@
 """A simulated map as a netCDF file that can be used without the map: its loads and flow, spectrum and curves."""
 
-from __future__ import annotations
-
 import dataclasses
 import datetime
 import json

@@ -3,8 +3,6 @@
 The double integral (19) is u_P of `mbma_tables.laws.calibrated` with the weight W = gamma P + (1 - gamma) P^3.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

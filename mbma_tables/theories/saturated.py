@@ -1,7 +1,5 @@
 """A simulated map with a hardness: boundary elements whose pressures end at it, for each hardness anew."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@ Force at a mean gap is closed between the elastic force and the bearing curve; a
 pressures capped at the hardness. u is the mean gap, points that yield flattened.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Contact islands: band, radii, densities, force and area."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws for the tests of exported laws, and points of them by the library."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

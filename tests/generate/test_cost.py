@@ -1,7 +1,5 @@
 """The study of costs on few islands and surfaces, its clock replaced: errors, counts, and what goes into the files."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

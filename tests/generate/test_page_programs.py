@@ -1,7 +1,5 @@
 """The programs that write pages: what they draw is what the library computes, and nothing else of a page changes."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

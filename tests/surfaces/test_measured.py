@@ -1,7 +1,5 @@
 """Surfaces given by a spectrum: moments, heights, two surfaces as one, the shortest waves, power laws beyond them."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath
