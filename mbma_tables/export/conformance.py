@@ -12,7 +12,6 @@ import numpy as np
 
 from mbma_tables.answers.contact import contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
@@ -22,6 +21,7 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
 
 Rows = Iterator[str]
+FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
 BY = ("separation", "hurst", "q0", "q1", "h_rms", "h_max")
 CONTACT = f"force, area, stiffness, error; derivatives of force, then of area, by {', '.join(BY)}"

@@ -9,7 +9,7 @@ import pytest
 
 from generate.formulas import HEADER, MODULE, header_text, module_text, read_functions
 from generate.pages.library import expressions
-from mbma_tables.export.code import SOURCES, write_code
+from mbma_tables.export.c_code import SOURCES, write_code
 from mbma_tables.models import closed_forms as shipped
 
 NAMES = [f"{form}_{result}" for form, results in shipped.FUNCTIONS.items() for result in results]
@@ -36,7 +36,7 @@ def library(tmp_path_factory):
     if compiler is None:
         pytest.skip("no C compiler is installed")
     path = tmp_path_factory.mktemp("forms") / "forms.so"
-    write_code("c", path.parent)
+    write_code(path.parent)
     strict = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wmissing-prototypes", "-Werror"]
     sources = [path.with_name(name) for name in SOURCES if name != "mbma_selftest.c"]
     subprocess.run([compiler, *strict, "-O2", "-shared", "-fPIC", *sources, "-o", path, "-lm"], check=True)
