@@ -16,7 +16,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.c_code import BuildError, built_by
 from mbma_tables.export.exported_law import ExportedLaw
-from mbma_tables.export.law_code import AskedLaw, asked_law, code_name, text_of
+from mbma_tables.export.law_code import AskedLaw, asked_law, text_of
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -64,9 +64,8 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     >>> zipfile.ZipFile(io.BytesIO(file)).namelist()
     ['modelDescription.xml', 'sources/road.c']
     """
-    code_name(name)
-    found = asked_law(surface, E_star, **asked)
-    law, exported = text_of("c-law", name, found), found.exported
+    found = asked_law(surface, E_star, name, **asked)
+    law, exported = text_of("c-law", found), found.exported
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, law)}}}"
     parts = {
         "LAW": law,
