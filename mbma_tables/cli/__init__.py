@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import batch, commands, export, scene, tables
+from mbma_tables.cli import commands, export, scene, tables
 from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
@@ -109,8 +109,8 @@ def main(context: click.Context) -> None:
 
 
 for command in (
-    *(commands.contact_command, commands.curve_command, batch.batch_command, commands.island_command),
-    *(commands.fit_command, batch.sensitivity_command, tables.tables_group),
+    *(commands.contact_command, commands.curve_command, commands.sensitivity_command, commands.island_command),
+    *(commands.fit_command, tables.tables_group),
     *(tables.cache_command, scene.joint_command, scene.plan_command, scene.run_command, commands.cost_command),
     *(export.export_command, export.explore_command),
 ):
