@@ -267,7 +267,7 @@ def cost_command(distance: bool, as_json: bool) -> None:
 
     Example: mbma cost --distance
     """
-    from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
+    from mbma_tables.scenes.plan import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
     rows: Any = shipped_distances() if distance else [row for row in costs.rows if row.island_model != UNIT]

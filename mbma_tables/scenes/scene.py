@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.common.arguments import finite_array, needed
@@ -111,13 +111,8 @@ class Scene(Problem):
         """The plan as text."""
         return self.plan().text()
 
-    def run(self, progress: Callable[[str, int, int], None] | None = None) -> xarray.Dataset:
+    def run(self) -> xarray.Dataset:
         """Compute the requested effects.
-
-        Parameters
-        ----------
-        progress : callable, optional
-            Called as ``progress(step, done, total)``.
 
         Returns
         -------
@@ -132,7 +127,7 @@ class Scene(Problem):
         needed("xarray")
         from mbma_tables.scenes.run import run_plan
 
-        return run_plan(self, self.plan(), progress)
+        return run_plan(self, self.plan())
 
 
 def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import pytest
 import xarray
 from helpers import refused, run, told
 
-from mbma_tables.scenes.costs import UNIT, Distance, shipped_costs, shipped_distances
+from mbma_tables.scenes.plan import UNIT, Distance, shipped_costs, shipped_distances
 
 JOINT = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_joint.toml")
 ROAD = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_road.toml")
@@ -29,24 +29,20 @@ def test_run_to_netcdf_and_csv(tmp_path):
         assert found.attrs["variant"] == "reported"
         assert found.attrs["error"] <= 1e-5
         assert found["nominal_pressure"].attrs["units"] == "Pa"
-    out, picture = tmp_path / "joint.csv", tmp_path / "joint.svg"
-    assert run("run", JOINT, "--out", out, "--plot", picture) == ""
-    assert b"svg" in picture.read_bytes()
+    out = tmp_path / "joint.csv"
+    assert run("run", JOINT, "--out", out) == ""
     assert "conductance" in out.read_text(encoding="utf-8")
 
 
-def test_run_as_table_json_and_picture(tmp_path):
-    picture = tmp_path / "road.png"
-    assert "persson_pressure" in run("run", ROAD, "--plot", picture)
-    assert picture.read_bytes().startswith(b"\x89PNG")
+def test_run_as_table_and_json():
+    assert "persson_pressure" in run("run", ROAD)
     content = json.loads(run("run", ROAD, "--json"))
-    assert content["variables"]["profile_pressure"]["dims"] == ["island", "node"]
+    assert content["data_vars"]["profile_pressure"]["dims"] == ["island", "node"]
 
 
 test_mistakes_end_with_one_line = told(
     lambda arguments: refused(*arguments),
     (["run", JOINT, "--out", "joint.txt"], "--out must end with"),
-    (["run", JOINT, "--plot", "joint.jpg"], "must end with one of .png, .svg, .pdf"),
     (["run", "none.toml"], "give the path of a scene file"),
     (["plan", "none.toml"], "give the path of a scene file"),
 )

@@ -9,7 +9,7 @@ import pytest
 from mbma_tables import Scene
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
+from mbma_tables.scenes.plan import Row, read_costs, shipped_costs
 from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
 from mbma_tables.scenes.specimen import schema
 from mbma_tables.theories import THEORIES
