@@ -60,7 +60,6 @@ MISTAKES = [
     (scene('theory = "persson"\nvariant = "printed"'), "variant: of theory 'mbma', not of 'persson'"),
     (scene(at="separations = [0.5]\npressures = [0.1]"), "prescribe one of"),
     (scene(at="separations = [-2.0]"), "at least -h_max"),
-    (scene(at="pressures = [0.01]\nover_h_rms = true"), "leave it out"),
     (
         scene(effects='on = ["pressure"]\noff = ["finite_height"]', at="pressures = [0.01]"),
         "leave finite_height on, or give separations",
