@@ -164,7 +164,7 @@ def test_one_file_of_at_most_four_megabytes_that_asks_for_nothing():
     [
         (["--surface", "concrete", "--theory", "greenwood_williamson"], "the page has the theories"),
         (["--surface", "concrete", "--variant", "mine"], "'mine' is not one of"),
-        (["--hurst", "0.8"], "--h-max"),
+        (["--hurst", "0.8"], "h_max"),
         ([], "one surface is needed"),
     ],
 )

@@ -12,7 +12,7 @@ from generate.pages import cost as pages_cost
 from generate.pages.cost import pareto_front
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.scenes.costs import read_costs, shipped_costs, shipped_distances
+from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.theories import THEORIES
 
 COST, SECONDS = 2.0, 1e-3
