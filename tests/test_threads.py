@@ -35,7 +35,7 @@ def questions():
         rng = np.random.default_rng(seed)
         many = Surface(rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0)
         found = contact(many, separation=rng.uniform(-3, 3, 60), rtol=1e-6)
-        return [found.pressure, found.area, found.error, found.stiffness]
+        return [found.pressure, found.area, found.stiffness, found.error]
 
     return [phi, laws, totals]
 
