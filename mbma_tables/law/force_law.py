@@ -160,6 +160,11 @@ class Body:
         area: Any = self.law.area(np.clip(at.u, *self.ends))
         return self.integral(at, at.p), self.integral(at, stiffness), self.integral(at, np.where(at.p > 0, area, 0.0))
 
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
+
     def smooth_approach(self, force: FloatArray) -> FloatArray:
         """Hertz's approach at a force over E*."""
         if not self.plane:

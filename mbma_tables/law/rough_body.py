@@ -88,8 +88,7 @@ class RoughContact(Displayed):
 
     def _facts(self) -> dict[str, str]:
         names = ("approach", "force", "stiffness", "area", "contact_radius", "valid")
-        shape = SHAPES[self._body.plane]
-        facts = {"body": f"{shape} of radius {self._body.radius:.10g} {self.units['approach']}"}
+        facts = {"body": self._body.name}
         facts |= {name: shown(getattr(self, name), self.units.get(name, "1")) for name in names}
         return facts | {"theory": self.layer.theory, "surface": repr(self._body.surface)}
 
