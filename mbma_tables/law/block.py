@@ -66,7 +66,7 @@ for _k in range(KEPT):
     MONOMIALS[_k, : _k + 1] = chebyshev.cheb2poly(np.eye(KEPT)[_k, : _k + 1])
     FROM_ZERO[_k] = [math.comb(_k, j) * 2.0**j * (-1.0) ** (_k - j) for j in range(KEPT)]
 _LOW, _HIGH, _N = Polynomial([0.5, -0.5]), Polynomial([0.5, 0.5]), DEGREE - 1
-_BASIS = np.stack([(_LOW ** (_N - j) * _HIGH**j * math.comb(_N, j)).coef for j in range(DEGREE)])
+_BASIS: Any = np.stack([(_LOW ** (_N - j) * _HIGH**j * math.comb(_N, j)).coef for j in range(DEGREE)])
 BERNSTEIN = np.concatenate([np.zeros((1, DEGREE)), np.arange(1.0, KEPT)[:, None] * np.linalg.inv(_BASIS)])
 
 Values = Callable[[FloatArray], FloatArray]
