@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.leakage import along, degrees, flow
-from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.answers.leakage import along, degrees, flow, shipped_flow
 from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
