@@ -78,8 +78,8 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["calculix", "--out", "law", *NUMBERS, "--E-star", "13.3MPa"], "--length-unit is missing"),
-        (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "--stress-unit is missing"),
+        (["calculix", "--out", "law", *NUMBERS, "--E-star", "13.3MPa"], "length_unit is missing"),
+        (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "stress_unit is missing"),
         (["calculix", "--out", "law", *WITHOUT["--E-star"]], "is given and no modulus"),
         (["calculix", "--out", "law", *WITHOUT["--surface"]], "one surface is needed"),
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),

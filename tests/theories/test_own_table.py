@@ -143,7 +143,7 @@ def test_on_the_command_line(tmp_path):
     own = BoundaryElements.from_netcdf(table).surface
     assert found["columns"]["area"] == pytest.approx(contact(own, pressure="5 MPa", E_star="1 GPa").area)
     assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
-    assert "leave --dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
+    assert "leave dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
     assert "not the map" in refused("fit", table)
 
 
