@@ -156,7 +156,7 @@ def flow_factors(
     units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units))
     kept = {text: mask for text, mask in reasons.items() if np.any(mask)}
     shear_scatter, valid = np.full(u.shape, OWN_SHEAR if own else SHEAR), ~np.logical_or.reduce(list(reasons.values()))
-    flows, asperities = (u, phi_x, phi_y, *shear), (np.ravel(found.pressure), area)
+    flows, asperities = (u, phi_x, phi_y, shear[0], shear[1]), (np.ravel(found.pressure), area)
     return FlowFactors(kept, float(gamma), surface, units, *flows, *asperities, scatter, shear_scatter, valid)
 
 
