@@ -15,7 +15,7 @@ from mbma_tables.common.plots import draw_compression, leakage_label, pressure_l
 from mbma_tables.common.units import unit_of
 from mbma_tables.laws.calibrated import self_affine_law, spectrum_of
 from mbma_tables.laws.effective_medium import LARGEST_AREA
-from mbma_tables.surfaces.labels import agree
+from mbma_tables.surfaces.any_surface import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory

@@ -17,9 +17,8 @@ from mbma_tables.common.files import numbers_of, read_file
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import ROUGHNESS
-from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
@@ -72,8 +71,7 @@ class Specimen:
 
 def from_name(name: str) -> Specimen:
     """A case of the paper."""
-    case = get_case(name)
-    return Specimen(Surface.named(name), case.title)
+    return Specimen(Surface.named(name), CASES[name].title)
 
 
 def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:

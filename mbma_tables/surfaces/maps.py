@@ -14,10 +14,10 @@ from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
-from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import SCATTER, log_bins
 from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface, resolution
+from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.treatment import (
     LENGTHS,
     MIN_POWER,

@@ -15,8 +15,8 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights, one_height
-from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.spectral import SpectralSurface
+from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.treatment import MIN_POWER, OVERLAP, Treated
 
 PER_DECADE = 10  # nodes of the spectrum

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,8 +25,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface, frozen
-from mbma_tables.surfaces.cases import get_case
-from mbma_tables.surfaces.extremes import of_area
+from mbma_tables.surfaces.heights import of_area
 from mbma_tables.surfaces.roughness import surface_of_roughness
 
 if TYPE_CHECKING:
@@ -35,6 +34,40 @@ if TYPE_CHECKING:
 LARGEST = 1e50  # limit of lengths and wavenumbers, so that their powers stay finite
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
+
+
+class Case(NamedTuple):
+    """A named surface of the paper (Section 4), with the numbers that it reports."""
+
+    title: str
+    unit: str | None  # of length; None if lengths are over h_rms
+    numbers: Mapping[str, float]  # arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments
+
+
+def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, top: float) -> dict[str, float]:
+    return {"hurst": hurst, "q0": q0, "q1": q0 * zeta_1, "h_rms": h_rms, "h_max": top * h_rms}
+
+
+def _moments(hurst: float, m0: float, m2: float, m4: float, h_max: float) -> dict[str, float]:
+    return {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4, "h_max": h_max}
+
+
+CASES = {
+    "yang-persson": Case(
+        "Yang-Persson molecular dynamics (Fig. 11)", "nm", _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0)
+    ),
+    "papangelo": Case(
+        "Papangelo Green's function simulation (Fig. 12)", "um", _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0)
+    ),
+    "concrete": Case("concrete road of Lorenz (Figs. 13a, 14a)", "mm", _moments(0.7, 0.071, 0.27, 62.0, 1.1)),
+    "asphalt": Case("asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _moments(0.85, 0.091, 2.67, 21000.0, 1.37)),
+    "challenge": Case("contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7)),
+} | {
+    f"resolution-{z}": Case(
+        f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)", None, _band(0.7, 0.1, z, 1.0, 3.0)
+    )
+    for z in (125, 250, 500, 1000)
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -229,10 +262,10 @@ class SelfAffine(AnySurface):
         >>> float(challenge.h_rms), challenge.unit
         (0.762, 'um')
         """
-        case = get_case(name)
-        if "m0" in case.numbers:
-            return cls.from_moments(**case.numbers, unit=case.length_unit)
-        return cls(**case.numbers, unit=case.length_unit)
+        if not isinstance(name, str) or name not in CASES:
+            raise InputError(f"no surface is named {name!r}; there are {', '.join(CASES)}")
+        _, unit, numbers = CASES[name]
+        return (cls.from_moments if "m0" in numbers else cls)(**numbers, unit=unit)
 
     @functools.cached_property
     def labelled(self) -> bool:

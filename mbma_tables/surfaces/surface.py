@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import hinted
+from mbma_tables.common.arguments import finite_array, hinted
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.power_laws import sorted_spectrum
 from mbma_tables.surfaces.self_affine import SelfAffine
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
@@ -33,7 +33,7 @@ class Surface(SelfAffine):
     h_rms : array_like
         Root-mean-square height, length.
     h_max, nominal_area : array_like, one of them
-        Highest point above the mid-plane, length; or A0, length^2, from which `surfaces.extremes` takes its median.
+        Highest point above the mid-plane, length; or A0, length^2, from which `surfaces.heights` takes its median.
     unit : str, optional
         The unit of length, such as "um"; None where it is not known. Results carry it.
     fit : SpectrumFit, optional
@@ -119,9 +119,14 @@ class Surface(SelfAffine):
         >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}, alpha = {surface.alpha:.1f}")
         h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
         """
+        if convention not in ("paper", "isotropic"):
+            raise InputError(f"convention must be 'paper' or 'isotropic', got {convention!r}")
+        if np.ma.is_masked(C) and np.shape(q) == np.shape(C):
+            shown = ~np.ma.getmaskarray(C)
+            q, C = np.asarray(q)[shown], np.asarray(C)[shown]
         known = None if heights is None else Heights.of(heights)
-        found = MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit, nominal_area=nominal_area)
-        return _modelled(found, model, band)
+        own = finite_array("C", C) * (1.0 if convention == "paper" else 1 / (4 * math.pi**2))
+        return _modelled(MeasuredSurface(q, own, h_max, known, unit=unit, nominal_area=nominal_area), model, band)
 
     @classmethod
     @hinted
