@@ -145,11 +145,10 @@ class AnySurface(Displayed, abc.ABC):
         return np.sqrt((1 - spectrum.BROADENING / self.alpha) * self.m0)
 
     def _facts(self) -> dict[str, str]:
-        units = Units(self.unit)
-        named = {"Hurst exponent": ("hurst", "1"), "q0": ("q0", ""), "q1": ("q1", ""), "zeta_1": ("zeta_1", "1")}
-        named |= {"h_rms": ("h_rms", ""), "h_max": ("h_max", ""), "rms gradient": ("rms_gradient", "1")}
-        known = {fact: (getattr(self, name), unit or unit_of(name, units)) for fact, (name, unit) in named.items()}
-        return {fact: shown(*value) for fact, value in known.items() if value[0] is not None}
+        titles = {"hurst": "Hurst exponent", "rms_gradient": "rms gradient"}
+        names = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "rms_gradient")
+        known = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return {titles.get(name, name): shown(value, unit_of(name, Units(self.unit))) for name, value in known.items()}
 
     def _variables(self) -> dict[str, Variable]:
         units = Units(self.unit)
@@ -161,8 +160,8 @@ class AnySurface(Displayed, abc.ABC):
             raise InputError("a batch has no single spectrum to draw: take one surface")
         q = np.geomspace(self.q0, self.q1, 200)[1:-1]
         length = self.unit or "length"
-        label = f"wavenumber q [1/{length}]"
-        return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
+        labels = f"wavenumber q [1/{length}]", f"spectrum C(q) [{length}^4]"
+        return draw_lines({"spectrum": (q, self.power_spectrum(q))}, *labels)
 
     def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
         """The equivalent rough surface of two in contact: spectra add, heights convolve.

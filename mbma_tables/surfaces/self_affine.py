@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,7 +41,7 @@ class Case(NamedTuple):
 
     title: str
     unit: str | None  # of length; None if lengths are over h_rms
-    numbers: Mapping[str, float]  # arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments
+    numbers: Mapping[str, Any]  # arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments
 
 
 def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, top: float) -> dict[str, float]:
@@ -80,6 +80,7 @@ class SelfAffine(AnySurface):
     h_rms: Any
     h_max: Any = None
     parameters = PARAMETERS
+    spectral: ClassVar[Any]  # `MeasuredSurface`
     unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
     provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
@@ -89,7 +90,11 @@ class SelfAffine(AnySurface):
         units = Units(self.unit)
         vars(self).update(unit=units.length)
         if nominal_area is not None:
-            self._reach(nominal_area)
+            # derived from the other numbers, which are checked for that
+            numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
+            like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
+            h_max, provenance = of_area(like, nominal_area, self.h_max)
+            vars(self).update(h_max=h_max, provenance=provenance)
         elif self.h_max is None:
             raise InputError("h_max is missing: the highest point above the mid-plane, or give the nominal_area")
         if self.labelled:
@@ -108,15 +113,6 @@ class SelfAffine(AnySurface):
         zeta_1 = np.asarray(self.zeta_1)
         require("q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3: q1 is the largest wavenumber")
         require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
-
-    def _reach(self, nominal_area: Any) -> None:
-        """Set the highest point of a Gaussian surface of that area."""
-        units = Units(self.unit)
-        numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
-        # derived from the other numbers; checked like them
-        like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
-        h_max, provenance = of_area(like, nominal_area, self.h_max)
-        vars(self).update(h_max=h_max, provenance=provenance)
 
     def __repr__(self) -> str:
         numbers = [f"{name}={_shown(getattr(self, name))}" for name in PARAMETERS]
@@ -145,14 +141,9 @@ class SelfAffine(AnySurface):
 
         Parameters
         ----------
-        hurst : array_like
-            Hurst exponent, in (0, 1].
+        hurst, h_max, nominal_area, unit : as for `Surface`
         m0, m2, m4 : array_like
             Variance of height [length^2], of a profile's slope, of its second derivative [1/length^2].
-        h_max, nominal_area : array_like, one of them
-            Height of the highest point above the mid-plane [length]; or A0 [length^2], as for `Surface`.
-        unit : str, optional
-            The unit of length.
 
         Returns
         -------
@@ -198,15 +189,13 @@ class SelfAffine(AnySurface):
         """The surface that numbers of a drawing or a profilometer describe.
 
         One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength; nothing is
-        filled in. `provenance` holds the meaning assumed for each number;
-        docs/surfaces.md has typical values. Lengths are numbers in one unit, or texts with their unit.
+        filled in. `provenance` holds the meaning assumed for each number; docs/surfaces.md has typical values.
 
         Parameters
         ----------
-        hurst : array_like
-            Hurst exponent, in (0, 1].
+        hurst, unit : as for `Surface`
         h_max, Sp, nominal_area : array_like, one of them
-            Height of the highest point above the mid-plane [length], or A0 [length^2], as for `Surface`.
+            Highest point above the mid-plane [length], or A0 [length^2], as for `Surface`.
         Rq, Ra, Sq, Sa : array_like, one of them
             Root-mean-square or mean absolute height of a profile or of a map [length].
         Rdq, Sdq, Rsm : array_like, one of them, optional
@@ -216,8 +205,6 @@ class SelfAffine(AnySurface):
         rolloff : float or str, optional
             Wavelength down from which the spectrum follows its power law [length]; between `longest` and it the
             spectrum is flat, as of most machined faces. Without, the law holds from `longest` on.
-        unit : str, optional
-            The unit of length.
 
         Returns
         -------
@@ -239,12 +226,8 @@ class SelfAffine(AnySurface):
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
         given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
-        return cls._made(surface_of_roughness(unit, given))
-
-    @classmethod
-    def _made(cls, numbers: dict[str, Any]) -> Any:
-        """Of numbers, which may be those of a spectrum."""
-        return cls(**numbers)
+        numbers = surface_of_roughness(unit, given)
+        return cls.spectral(**numbers) if "C" in numbers else cls(**numbers)
 
     @classmethod
     def named(cls, name: str) -> Self:
