@@ -24,14 +24,8 @@ def anisotropic_medium(
 ) -> tuple[FloatArray, FloatArray]:
     """Conductivities k [length^3] and gaps h_c [length] along x and y, each of shape (2, n).
 
-    Parameters
-    ----------
-    share, gap : ndarray, shape (n, m)
-        Shares of the nominal area and open gaps there [length].
-    blocked : ndarray, shape (n,)
-        (1 - Ac) (A/Ac)^m.
-    peklenik : ndarray, shape (n,)
-        gamma, positive.
+    `share` and `gap`, shape (n, m), are shares of the nominal area and open gaps there [length]; `blocked`, shape (n,),
+    is (1 - Ac) (A/Ac)^m, and `peklenik`, shape (n,), is gamma.
     """
     scale = np.sum(share * gap, axis=1)
     cube = (gap / scale[:, None]) ** 3

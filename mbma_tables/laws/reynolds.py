@@ -46,8 +46,7 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
                 # the same gap reached in two cells: a closed path around the periodic cell
                 winds[start] |= np.not_equal(met, place[there])
     component[~winds[component].any(axis=1)] = 0
-    along_x, along_y = winds.any(axis=0).tolist()
-    return component[labels], (along_x, along_y)
+    return component[labels], (bool(winds[:, 0].any()), bool(winds[:, 1].any()))
 
 
 def flow_conductance(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) -> FloatArray:
@@ -177,7 +176,7 @@ def _between_mirrors(gap: FloatArray, sizes: tuple[float, float], axis: int) -> 
     for side in (0, -1):
         # half a step from a mirror, where pressure is that of the end
         own = number.take(side, axis)
-        half = 2 * gap.take(side, axis)[own >= 0] ** 3 * steps[1 - axis] / steps[axis]
+        half = 2 * np.take(gap, side, axis)[own >= 0] ** 3 * steps[1 - axis] / steps[axis]
         ends.append(np.bincount(own[own >= 0], half, np.count_nonzero(open_)))
     pressure = _factors(faces, ends[0] + ends[1], None).solve(ends[1])
     return float(ends[0] @ pressure * sizes[axis] / sizes[1 - axis])

@@ -4,7 +4,7 @@ import dataclasses
 import math
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface, resolution
 from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.treatment import CALLED, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
 
+S = TypeVar("S", bound=SpectralSurface)
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
 MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
@@ -250,7 +251,7 @@ def measured_surface(
     return known if shortest is None else extrapolated(known, shortest, hurst)
 
 
-def extrapolated(surface: SpectralSurface, shortest: Any, hurst: Any) -> SpectralSurface:
+def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     """A measured spectrum continued to a shorter wavelength [length] by a given power law."""
     wave = number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30)
     exponent = number_in("extrapolate_hurst", hurst, 0.0, 1.0)

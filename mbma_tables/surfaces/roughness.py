@@ -92,7 +92,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
     record = {"given": shown, "unit": unit, "assumed": [ASSUMED, *(SAID[name] for name in used)]}
-    surface = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms, "unit": unit}
+    surface: dict[str, Any] = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms, "unit": unit}
     surface |= {"provenance": ({"step": "from_roughness", **record},)}
     surface["nominal_area" if top == "nominal_area" else "h_max"] = at[top]
     return surface if "rolloff" not in given else _rolled_off(surface, at["rolloff"])

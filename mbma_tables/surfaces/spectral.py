@@ -235,28 +235,21 @@ class SpectralSurface(AnySurface):
 
     def resized(self, up: float, along: float) -> Self:
         """The surface with its heights `up` times as large, and its lengths along the plane `along` times."""
-        known, bands, whole, slope = self.bearing, self.bands, self.map, up / along
+        known, bands, whole = self.bearing, self.bands, self.map
         if known is not None:
             moved = dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), up)
-            moved |= dict.fromkeys(("gradient", "tension_force", "tension"), slope)
+            moved |= dict.fromkeys(("gradient", "tension_force", "tension"), up / along)
             known = dataclasses.replace(known, **{name: by * getattr(known, name) for name, by in moved.items()})
         if bands is not None:
             bands = dataclasses.replace(bands, q=bands.q / along, variance=bands.variance * up**2)
         if whole is not None:
             steps = tuple(along * step for step in whole.steps)
             whole = dataclasses.replace(whole, heights=up * whole.heights, steps=steps)
-        return dataclasses.replace(
-            self,
-            q=self.q / along,
-            C=self.C * (up * along) ** 2,
-            h_max=self.h_max * up,
-            heights=self.heights.scaled(up),
-            bearing=known,
-            bands=bands,
-            map=whole,
-            table=None if self.table is None else self.table.resized(up, along),
-            scans=tuple(scan.resized(up, along) for scan in self.scans),
-        )
+        table = None if self.table is None else self.table.resized(up, along)
+        scans = tuple(scan.resized(up, along) for scan in self.scans)
+        parts: dict[str, Any] = {"bearing": known, "bands": bands, "map": whole, "table": table, "scans": scans}
+        parts |= {"q": self.q / along, "C": self.C * (up * along) ** 2}
+        return dataclasses.replace(self, **parts, h_max=self.h_max * up, heights=self.heights.scaled(up))
 
     def between(self, low: float, high: float) -> Self:
         """The wavelengths from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
@@ -279,10 +272,8 @@ class SpectralSurface(AnySurface):
         fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
         grid = np.unique(np.clip(np.concatenate([fine, self.q, other.q]), low, high))
         # both sides of every wavenumber, since the sum jumps at the ends of bands
-        above, below = (
-            self.laws.at(side) + other.laws.at(side) for side in (grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE))
-        )
-        q, C = np.repeat(grid, 2)[1:-1], np.stack([above, below], axis=1).ravel()
+        sides = np.stack([grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)], axis=1).ravel()
+        q, C = np.repeat(grid, 2)[1:-1], self.laws.at(sides) + other.laws.at(sides)
         kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
         told = []
         if self.bearing is not None or other.bearing is not None:
