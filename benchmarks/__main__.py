@@ -135,7 +135,7 @@ def one_step() -> dict[str, Callable[[], Any]]:
 
 
 def totals(rng: np.random.Generator) -> None:
-    """`contact` on many surfaces, and on many gaps of one surface."""
+    """`contact` on many surfaces."""
     surfaces, gaps = held_out(SURFACES, rng)
     taken = rounds(
         {

@@ -27,7 +27,7 @@ def exported(rng: np.random.Generator) -> None:
     X, mu = rng.uniform(-5.0, 40.0, POINTS), np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS))
     surfaces, apart = held_out(SURFACES, rng)
     heights = (surfaces.h_max - apart) / surfaces.h_rms, surfaces.h_max / surfaces.h_rms
-    islands, sums, bound = np.empty((POINTS, 3)), np.empty((SURFACES, 2)), np.empty(SURFACES)
+    islands, sums, bound = np.empty((POINTS, 3)), np.empty((SURFACES, 4)), np.empty(SURFACES)
     status = np.empty(SURFACES, np.uint8)
 
     def at(array: Any) -> ctypes.c_void_p:
@@ -51,7 +51,7 @@ def exported(rng: np.random.Generator) -> None:
             "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, 0, at(islands), None),
             "totals": lambda: contact(surfaces, separation=apart, rtol=RTOL),
             "C totals": lambda: library.mbma_totals(
-                many, *map(at, known), share, variant, table, 0, at(sums), at(bound), at(status), ctypes.byref(seen)
+                many, *map(at, known), share, variant, table, at(sums), at(bound), at(status), ctypes.byref(seen)
             ),
         }
     )
@@ -60,7 +60,7 @@ def exported(rng: np.random.Generator) -> None:
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (
         ("islands", POINTS, islands.T[:2], (phi.phi_F, phi.phi_A)),
-        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 1]), (total.pressure, total.area)),
+        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 2]), (total.pressure, total.area)),
     ):
         report(f"C, one of {entries} {name}", 1e3 * microseconds(taken[f"C {name}"], entries), "ns")
         most = 1.1 if name == "totals" else None

@@ -161,7 +161,7 @@ test_natural_mistakes_have_a_message_with_the_remedy = refusals(
     (lambda: contact(ROAD, separation=1.0, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
     (lambda: contact_law(ROAD, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
     (lambda: flow_factors("concrete", 1.0), "surface must be a Surface, got 'concrete'; a named"),
-    (lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))), "rtol, outside, workers take one value each"),
+    (lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))), "rtol, outside take one value each"),
     (lambda: contact(ROAD, separation=1.0, hardness=10**400), "hardness must be real numbers: entries of type obj"),
     (lambda: contact(ROAD, pressure=1.0, E_star=5e-324), "pressure must be at most what theory .mbma. reaches"),
     (lambda: contact(ROAD, pressure=1.0, E_star=5e-324, hardness=1.0), "pressure must be at most what theory .mbma."),

@@ -40,11 +40,7 @@ def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Contact(Interface, Displayed):
-    """Result of a contact: pressure, area and derived quantities; arrays of the broadcast shape, or DataArrays.
-
-    If pressure or area was given, that is held in derivatives in place of the separation, whose own are
-    `separation_by`, and "pressure" or "area" stands for "separation".
-    """
+    """Result of a contact: pressure, area and derived quantities; arrays of the broadcast shape, or DataArrays."""
 
     separation: Numbers  #: d, between the rigid plane and the mid-plane [length]
     mean_separation: Numbers  #: u = (h_max + d)/2 (50) [length]
@@ -57,10 +53,6 @@ class Contact(Interface, Displayed):
     variant: str
     island_model: str
     islands: int | None  #: number of islands evaluated; None if computed by dask or if the theory has none
-    #: partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held
-    pressure_by: dict[str, Numbers] | None = None
-    area_by: dict[str, Numbers] | None = None
-    separation_by: dict[str, Numbers] | None = None
     _source: Source = dataclasses.field(repr=False, kw_only=True)
 
     @property

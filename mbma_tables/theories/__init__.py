@@ -41,7 +41,7 @@ _HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson
 _HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by simulating it
 # of MBMA
-OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise", "workers": 1}
+OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise"}
 
 
 def __getattr__(name: str) -> Any:

@@ -163,7 +163,7 @@ def test_c_replays_its_points(c_folder):
     found = check("c", c_folder)
     assert found.failed == 0
     fixed = {"phi": 64, "slopes": 64, "geometry": 24, "status": 10}
-    fixed |= dict.fromkeys(("total", "calibrated", "total_by", "separation"), 12)
+    fixed |= dict.fromkeys(("total", "calibrated", "separation"), 12)
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
 
@@ -254,7 +254,7 @@ def totals(library, surface, gaps, E_star=1.0, rtol=1e-8):
     asked, found, told = (ctypes.c_void_p(array.ctypes.data) for array in (gaps, answers, status))
     numbers = ctypes.c_double(E_star), ctypes.c_double(rtol)
     given = ctypes.byref(CSurface(*surface)), ctypes.c_size_t(gaps.size), asked
-    library.mbma_totals_of(*given, *numbers, found, None, None, told)
+    library.mbma_totals_of(*given, *numbers, found, told)
     return answers, status
 
 
@@ -282,7 +282,7 @@ def test_no_contact_from_h_max_on(library):
 
 
 ASK = """
-import { STATUS, calibrated, formula, islandGeometry, phi, phiSlopes, total, totalSlopes } from "./mbma.mjs";
+import { STATUS, calibrated, formula, islandGeometry, phi, phiSlopes, total } from "./mbma.mjs";
 const surface = { hurst: 0.8, q0: 1, q1: 100, h_rms: 1, h_max: 3 };
 function outcome(ask) {
   try {
@@ -299,7 +299,7 @@ TYPE_ERRORS = (
     *("phi('3', '10')", "phi(3, '10')", "phi('a', 1)", "phi(NaN, 1)", "phi(1)", "phi(null, 1)", "phi([3], 1)"),
     *("phi(3n, 1)", "phi(true, 1)", "formula('3', '10')", "phiSlopes(1, NaN)", "islandGeometry(1, 0.8, '100')"),
     *("total(null, 1)", "total(surface, '1')", "total({ ...surface, hurst: '0.8' }, 1)", "total({}, 1)"),
-    *("total(surface, 1, 1, null)", "totalSlopes(surface, '1')", "calibrated(null, 1)", "calibrated(surface, '1')"),
+    *("total(surface, 1, 1, null)", "calibrated(null, 1)", "calibrated(surface, '1')"),
 )
 INVALIDS = (
     *("phi(1, -1)", "phiSlopes(1, -1)", "islandGeometry(0, 0.8, 100)", "total(surface, -3.1)", "total(surface, 1, 0)"),

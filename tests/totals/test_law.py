@@ -19,7 +19,8 @@ from mbma_tables.law import pieces as law_pieces
 from mbma_tables.law.block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import NAMED
-from mbma_tables.totals.contact import Pairs, Sums, sums_by_table
+from mbma_tables.theories import Mbma
+from mbma_tables.totals.contact import Sums, by_table
 from mbma_tables.totals.profile import profile
 
 # hurst, zeta_1, h_max/h_rms, variant
@@ -185,8 +186,9 @@ def test_a_function_of_c_keeps_its_law():
 
 def gap_by_gap(model, surface, c, variant):
     """Rows of force and area by the core's quadrature."""
-    how = Sums(model, variant, 1e-11)
-    return sums_by_table(model, Pairs.of(surface, c), how, "raise", slopes=False)[0][:, :, 0].T
+    rows = np.empty((3, c.size))
+    by_table(surface, c, np.arange(c.size), model, Sums(model, variant, 1e-11), rows)
+    return rows[:2]
 
 
 @pytest.mark.parametrize(
@@ -320,12 +322,12 @@ def test_a_narrow_dip_is_a_turning_point(at, width, sign):
 
 def slope_misses(surface, law, gap, variant="reported"):
     """Errors of the law's slopes over F/l and A/l, against derivatives of totals."""
-    truth = contact(surface, separation=gap, rtol=1e-11, derivatives=True, variant=variant)
-    for slope, by, value in (
-        (law.stiffness(separation=gap) / 2, truth.pressure_by, truth.pressure),
-        (law.area_slope(separation=gap), truth.area_by, truth.area),
+    truth = Mbma(variant=variant, rtol=1e-11).totals(surface, gap, slopes=True)
+    for slope, true, value in (
+        (law.stiffness(separation=gap) / 2, truth.pressure_slope, truth.pressure),
+        (law.area_slope(separation=gap), truth.area_slope, truth.area),
     ):
-        yield np.abs(slope + by["separation"]) / (value / (law.h_max - gap))
+        yield np.abs(slope + true) / (value / (law.h_max - gap))
 
 
 def test_inverses_stay_within_the_law():
