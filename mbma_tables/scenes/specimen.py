@@ -17,9 +17,8 @@ from mbma_tables.common.files import numbers_of, read_file
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import ROUGHNESS
-from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
@@ -181,7 +180,7 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
     if kind != "psd" and numbers:
         raise InputError(f"[surface]: {kind} and numbers ({', '.join(numbers)}) are given: leave one of them out")
     if kind == "name":
-        return Specimen(Surface.named(source), get_case(source).title).in_units(unit, None)
+        return Specimen(Surface.named(source), CASES[source].title).in_units(unit, None)
     path = folder / source
     if not path.is_file():
         raise InputError(
