@@ -17,22 +17,7 @@ from helpers import difference_weights, refusals, with_slopes
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.core import core
-from mbma_tables.law import block as law_block
-from mbma_tables.law.block import (
-    AREA,
-    CENTRE,
-    DEGREE,
-    EXPONENT,
-    FORCE,
-    FORCE_AT,
-    HEAD,
-    HIGH,
-    MINUS_ROWS,
-    QUANTITIES,
-    RATE,
-    RECORD,
-    RECORDS,
-)
+from mbma_tables.law import block as at
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import Mbma
@@ -69,7 +54,7 @@ def depths(law, seed, least=1e-9):
 
 
 def pieces_of(law):
-    centre, half = law.records[1:, CENTRE], 1 / law.records[1:, RATE]
+    centre, half = law.records[1:, at.CENTRE], 1 / law.records[1:, at.RATE]
     return 2 * law.h_max * (centre - half), 2 * law.h_max * (centre + half)
 
 
@@ -166,7 +151,7 @@ def test_a_pickle_is_the_same_law_and_small(case):
     assert len(kept) < 20_000
     back, gaps = pickle.loads(kept), law.h_max - depths(law, 53)
     assert isinstance(back, ContactLaw)
-    for name in QUANTITIES:
+    for name in at.QUANTITIES:
         np.testing.assert_array_equal(getattr(back, name)(separation=gaps), getattr(law, name)(separation=gaps))
     force = law.pressure(separation=law.h_max * np.array([0.9, 0.5, 0.1]))
     np.testing.assert_array_equal(back.separation(pressure=force), law.separation(pressure=force))
@@ -177,7 +162,7 @@ def test_a_pickle_is_the_same_law_and_small(case):
 
 def test_as_a_function_of_c():
     law = law_of(CASES[0])
-    for name in QUANTITIES:
+    for name in at.QUANTITIES:
         asked = law.compiled(name)
         assert asked.function(law.h_max + 1, asked.user_data) == 0.0
         for outside in (math.nextafter(-law.h_max, -9), math.nan, math.inf, -math.inf):
@@ -283,7 +268,7 @@ def test_laws_that_end_early_and_of_too_many_pieces(monkeypatch):
     surface = surface_of(*CASES[0][:3])
     labelled = Surface(xr.DataArray(0.8), surface.q0, surface.q1, surface.h_rms, surface.h_max)
     assert contact_law(labelled).pressure(separation=1.0) == law_of(CASES[0]).pressure(separation=1.0)
-    monkeypatch.setattr(law_block, "MAX_RECORDS", 3)
+    monkeypatch.setattr(at, "MAX_RECORDS", 3)
     with pytest.raises(ConvergenceError, match="more than 3 pieces") as caught:
         contact_law(surface)
     assert caught.value.mask
@@ -311,26 +296,26 @@ def test_slopes_are_within_their_bound(rtol):
 
 def rising_but_for(dip):
     """A law's one polynomial between x = 1/2 and 1 whose slope is that of `dip`, a polynomial in t."""
-    record = np.zeros((1, RECORD))
+    record = np.zeros((1, at.RECORD))
     integral = dip.integ()
-    record[0, [CENTRE, RATE]] = 0.75, 4.0
-    record[0, FORCE_AT : FORCE_AT + integral.coef.size] = integral.coef
+    record[0, [at.CENTRE, at.RATE]] = 0.75, 4.0
+    record[0, at.FORCE_AT : at.FORCE_AT + integral.coef.size] = integral.coef
     return record
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
-@pytest.mark.parametrize("at", np.linspace(-0.97, 0.99, 30))
+@pytest.mark.parametrize("place", np.linspace(-0.97, 0.99, 30))
 @pytest.mark.parametrize("width", [0.3, 1e-3, 1e-5])
-def test_a_narrow_dip_is_a_turning_point(at, width, sign):
-    t = np.polynomial.Polynomial([-at, 1.0])
+def test_a_narrow_dip_is_a_turning_point(place, width, sign):
+    t = np.polynomial.Polynomial([-place, 1.0])
     dip = (t**2 - width**2) * (1 + 0.3 * t**4)
-    assert dip.degree() < DEGREE
-    x, _ = law_block.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
+    assert dip.degree() < at.DEGREE
+    x, _ = at.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
     # compression goes from t = s to t = -s
-    expected = max(at - width, -1.0) if sign < 0 else min(at + width, 1.0)
+    expected = max(place - width, -1.0) if sign < 0 else min(place + width, 1.0)
     assert 4 * (x - 0.75) == pytest.approx(expected, abs=1e-9)
     above = rising_but_for(-sign * (dip + 2 * width**2))
-    assert law_block.first_falls(above, np.array([float(sign)]))[0][0] is None
+    assert at.first_falls(above, np.array([float(sign)]))[0][0] is None
 
 
 def slope_misses(surface, law, gap, variant="reported"):
@@ -408,7 +393,7 @@ def test_the_same_bits_however_asked(name):
     law = core_law_of(name)
     d = gaps_of(law)
     u, named = (d[d > law.lowest + 1e-9] + law.h_max) / 2, xr.DataArray(d.reshape(-1, 3), dims=("a", "b"))
-    for what in QUANTITIES:
+    for what in at.QUANTITIES:
         ask, asked = getattr(law, what), law.compiled(what)
         whole = ask(separation=d)
         assert np.isfinite(whole).all()
@@ -469,10 +454,10 @@ def test_gaps_outside_are_nan_and_counted(name):
 
 
 @pytest.mark.parametrize("name", SURFACES)
-@pytest.mark.parametrize("which", [FORCE, AREA])
+@pytest.mark.parametrize("which", [at.FORCE, at.AREA])
 def test_values_that_no_gap_has_are_nan_and_counted(name, which):
     law = core_law_of(name)
-    inverse = law._inverse_block(QUANTITIES[which])
+    inverse = law._inverse_block(at.QUANTITIES[which])
     most = float((law.pressure, law.area)[which](separation=inverse[5]))
     wanted = np.array([0.5 * most, math.nan, math.inf, -math.inf, -1.0, 1.001 * most, 1e300, 0.1 * most, -5e-324])
     gap, area, stiffness = np.empty((3, wanted.size))
@@ -480,11 +465,11 @@ def test_values_that_no_gap_has_are_nan_and_counted(name, which):
     for found in (gap, area, stiffness):
         assert np.isfinite(found).tolist() == [True, *[False] * 6, True, False]
     for bad in (math.nan, [math.inf], np.array([0.1 * most, math.nan])):
-        with pytest.raises(OutOfRangeError, match=f"{QUANTITIES[which]} must be finite"):
-            law.separation(**{QUANTITIES[which]: bad})
+        with pytest.raises(OutOfRangeError, match=f"{at.QUANTITIES[which]} must be finite"):
+            law.separation(**{at.QUANTITIES[which]: bad})
     for tiny in (0.0, 5e-324, 1e-310):
         if math.isinf(law.highest):
-            assert law.separation(**{QUANTITIES[which]: tiny}) == law.h_max
+            assert law.separation(**{at.QUANTITIES[which]: tiny}) == law.h_max
 
 
 def test_broken_blocks_are_refused():
@@ -495,13 +480,13 @@ def test_broken_blocks_are_refused():
         with pytest.raises(ValueError, match="sizes of the arrays of law_fill do not match"):
             core.law_fill(d, block, out, None, None, None, None)
 
-    for words in (0, 1, HEAD, int(law.block.view(np.int64)[RECORDS]), law.block.size - 1):
+    for words in (0, 1, at.HEAD, int(law.block.view(np.int64)[at.RECORDS]), law.block.size - 1):
         refused(law.block[:words].copy())
     for word, values in {
-        RECORDS: (-1, 0, HEAD - 1, HEAD, 1 << 62, -(1 << 63)),
-        EXPONENT: (-1, 0, 1022, 1 << 40, -(1 << 63)),
-        MINUS_ROWS: (-1, 1 << 40),
-        HIGH: (math.inf, math.nan, -1.0, 2.0),
+        at.RECORDS: (-1, 0, at.HEAD - 1, at.HEAD, 1 << 62, -(1 << 63)),
+        at.EXPONENT: (-1, 0, 1022, 1 << 40, -(1 << 63)),
+        at.MINUS_ROWS: (-1, 1 << 40),
+        at.HIGH: (math.inf, math.nan, -1.0, 2.0),
     }.items():
         for value in values:
             block = law.block.copy()
