@@ -87,7 +87,6 @@ def use():
         core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
     core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
 
-    open_table("island4d").lookup(np.linspace(1.0, 2.0, 100), 3.0, 20.0, 0.8)
     universal = open_table("universal")
     X, mu = np.linspace(-5, 40, 300), np.geomspace(1e-6, 1e5, 300)
     universal.answer(X, mu)
