@@ -297,8 +297,7 @@ class Joint(Displayed):
         facts = {"metals": f"{a.name} on {b.name}", "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa"}
         return facts | {"hardness": str(hardness), "theory": theory, "gas": self.gas, "surface": repr(self.surface)}
 
-    def _facts(self) -> dict[str, str]:
-        return self.facts()
+    _facts = facts
 
     def _variables(self) -> dict[str, Variable]:
         return self.quantities(self._range())

@@ -23,7 +23,7 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
-from mbma_tables.tablefiles.own import is_own
+from mbma_tables.tablefiles.netcdf import is_own
 
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")

@@ -13,7 +13,7 @@ from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.laws.pressing import Table
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.tablefiles.own import ADVICE, read_own, write_own
+from mbma_tables.tablefiles.netcdf import OWN_REMEDY, read_own, write_own
 
 ROWS = {
     "pressure": ("F/(A0 E*) of a load", "1"),
@@ -98,7 +98,7 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
             provenance=tuple(json.loads(own["provenance"])),
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
-        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {ADVICE}") from None
+        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {OWN_REMEDY}") from None
 
 
 def _plain(value: Any) -> Any:
