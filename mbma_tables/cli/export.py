@@ -103,7 +103,7 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     inputs = [ctx.params[key] for key in ("file", "map") if ctx.params[key]]
     for path in [path for path in inputs if path.suffix == ".toml"]:
         table = tomllib.loads(read_file(path, MAX_BYTES).decode()).get("surface", {})
-        inputs += [path.parent / table[name] for name in ("map", "psd") if name in table]
+        inputs += [path.parent / table["map"]] if "map" in table else []
     digests = (f"input {path}: sha256 {hashlib.sha256(read_file(path, MAX_BYTES)).hexdigest()}" for path in inputs)
     joint["made_by"] = *digests, written_by(ctx.obj[1:])
     if kind.rows:

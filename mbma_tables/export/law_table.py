@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.display import Displayed, Variable, shown
-from mbma_tables.common.plots import draw_lines
+from mbma_tables.common.plots import draw_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,4 +55,4 @@ class LawTable(Displayed):
 
     def _figure(self) -> Figure:
         labels = (f"{name} [{unit}]" for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit)))
-        return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
+        return draw_line(self.x[1:], self.y[1:], *labels)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_lines
+from mbma_tables.common.plots import draw_line
 from mbma_tables.common.units import Units, factor, unit_of
 from mbma_tables.surfaces import spectrum
 
@@ -161,7 +161,7 @@ class AnySurface(Displayed, abc.ABC):
         q = np.geomspace(self.q0, self.q1, 200)[1:-1]
         length = self.unit or "length"
         label = f"wavenumber q [1/{length}]"
-        return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
+        return draw_line(q, self.power_spectrum(q), label, f"spectrum C(q) [{length}^4]")
 
     def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
         """The equivalent rough surface of two in contact: spectra add, heights convolve.

@@ -130,7 +130,7 @@ def test_options_of_a_surface_are_arguments_of_the_library_and_names_of_scene_fi
     options = {parameter.name for parameter in main.commands["contact"].params}
     surface, material = (set(schema()["properties"][name]["properties"]) for name in ("surface", "material"))
     assert set(NUMBERS) | set(MAP_OPTIONS) | set(MATERIAL) <= options
-    assert surface - {"name", "psd", "convention"} <= options
+    assert surface - {"name"} <= options
     assert set(NUMBERS) | set(MAP_OPTIONS) <= surface
     assert material == {*MATERIAL, "stress_unit"}
     made_by = (Surface, Surface.from_moments, Surface.from_roughness, Surface.from_map)
