@@ -137,13 +137,12 @@ def one_step() -> dict[str, Callable[[], Any]]:
 
 
 def totals(rng: np.random.Generator) -> None:
-    """`contact` on many surfaces, with derivatives, and on many gaps of one surface."""
+    """`contact` on many surfaces."""
     surfaces, gaps = held_out(SURFACES, rng)
     taken = rounds(
         {
             "exact": lambda: contact(surfaces, separation=gaps, island_model="exact"),
             "value": lambda: contact(surfaces, separation=gaps),
-            "slopes": lambda: contact(surfaces, separation=gaps, derivatives=True),
         },
         3,
     )
@@ -157,20 +156,12 @@ def totals(rng: np.random.Generator) -> None:
     report("faster than our own exact island model", times_faster(taken, "exact", "value"), "x", 150)
     nominal = exact / NOMINAL_EXACT / statistics.median(taken["value"])
     report(f"faster than a solver of {NOMINAL_EXACT} islands/s at exact's island count", nominal, "x")
-    report("derivatives=True against the value alone", times_faster(taken, "slopes", "value"), "x", at_most=2)
     steps = one_step()
     if steps:
         one = Surface.named("concrete")
         both = rounds({"contact": lambda: contact(one, separation=0.4)} | steps)
         for name in steps:
             report(f"one contact is faster than one step of {name}", times_faster(both, name, "contact"), "x")
-    batch, gaps = held_out(10 * SURFACES, rng)
-    walls: dict[int, list[float]] = {1: [], 2: []}
-    for workers in (1, 2) * 4:
-        start = time.perf_counter()
-        contact(batch, separation=gaps, workers=workers)
-        walls[workers].append(time.perf_counter() - start)
-    report("two workers against one, by the clock", min(walls[1]) / min(walls[2]), "x", 1.8)
 
 
 def laws(rng: np.random.Generator) -> None:
@@ -287,7 +278,6 @@ FIRST = {
     "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
     "100,000 gaps of a law": "m.contact_law(S()).pressure(np.linspace(0.05, 2.95, 100_000))",
     "10,000 surfaces": "m.contact(S(10_000), separation=1.0)",
-    "10,000 surfaces with derivatives": "m.contact(S(10_000), separation=1.0, derivatives=True)",
     "an exact total": "m.contact(S(), separation=1.0, island_model='exact')",
 }
 

@@ -32,7 +32,6 @@ BEFORE: dict[str, float] = {
     "universal table with slopes, path": 2.758,
     "four-number table": 35.86,
     "totals, a new surface each": 311.4,
-    "totals with derivatives, a new surface each": 485.4,
     "1,000 gaps on a new surface": 34.41,
     "1,000 gaps on a known surface": 11.53,
     "100,000 gaps on a new surface": 4.454,
@@ -99,10 +98,6 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         "universal table with slopes, path": (lambda: universal.slopes(*path), MANY),
         "four-number table": (lambda: four.lookup(*raw, outside="nan"), MANY),
         "totals, a new surface each": (lambda: contact(surfaces, separation=gaps), SURFACES),
-        "totals with derivatives, a new surface each": (
-            lambda: contact(surfaces, separation=gaps, derivatives=True),
-            SURFACES,
-        ),
         "1,000 gaps on a new surface": (
             lambda: [contact(another(), separation=some) for _ in range(DESIGNS)],
             SOME * DESIGNS,

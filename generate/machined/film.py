@@ -10,7 +10,7 @@ import numpy as np
 from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables import Surface, flow_factors
-from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.answers.leakage import shipped_flow
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.effective_medium import wide_gap
 from mbma_tables.laws.film import factors

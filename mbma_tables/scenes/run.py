@@ -97,14 +97,12 @@ def _amplification(run: Run, theory: Mbma) -> float:
     slopes = bool(problem.outputs & {"stiffness", "conductance"})
     if not gap.size or not (slopes or problem.prescribed in INVERTED):
         return 1.0
-    found = theory.totals(run.surface, gap, derivatives="separation")
-    assert found.pressure_by is not None
-    assert found.area_by is not None
-    steep = -found.pressure_by["separation"] / found.pressure
+    found = theory.totals(run.surface, gap, slopes=True)
+    steep = -found.pressure_slope / found.pressure
     factor = 1.0
     if problem.prescribed in INVERTED:
         # pressures at prescribed areas: less accurate where the area hardly rises
-        by_area = steep * found.area / np.abs(found.area_by["separation"])
+        by_area = steep * found.area / np.abs(found.area_slope)
         factor += max(1.0, float(by_area.max())) if problem.prescribed == "areas" else 1.0
     # the stiffness is small only next to a turning point
     flat = 1 / ((h_max - gap) * np.abs(steep))
