@@ -17,9 +17,8 @@ from mbma_tables.common.files import read_file
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import ROUGHNESS
-from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
@@ -175,7 +174,7 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
     if treatment and source is None:
         raise InputError(f"[surface]: {', '.join(treatment)}: for a measured map, which is missing: give map = ...")
     if name is not None:
-        return Specimen(Surface.named(name), get_case(name).title).in_units(unit, None)
+        return Specimen(Surface.named(name), CASES[name].title).in_units(unit, None)
     if source is None:
         return from_numbers(numbers, unit, title)
     path = folder / source
