@@ -25,7 +25,6 @@ from typing import Any
 import click
 import numpy as np
 from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_spline
-from scipy.special import erf
 
 from benchmarks.exports import exported
 from benchmarks.kernels import BEFORE, held_out, measured
@@ -38,7 +37,6 @@ from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_tab
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.calibrated import Law, Spectrum
 from mbma_tables.theories import Calibrated
-from mbma_tables.theories.calibrated_table import shipped
 
 POINTS = 20_000
 HELD_OUT = 500
@@ -147,9 +145,7 @@ def totals(rng: np.random.Generator) -> None:
 def laws(rng: np.random.Generator) -> None:
     """A frozen surface against numpy and scipy."""
     surface = Surface.named("asphalt")
-    start = time.perf_counter()
     law = contact_law(surface)
-    spent = time.perf_counter() - start
     gaps = rng.uniform(0, 0.99995 * surface.h_max, MANY_GAPS)
     nodes = np.linspace(0, surface.h_max, 1000)
     values = law.pressure(nodes)
@@ -171,7 +167,6 @@ def laws(rng: np.random.Generator) -> None:
     some = gaps[:2000]
     truth = contact(surface, mean_separation=some, rtol=1e-10).pressure
     click.echo("\ncontact_law of one surface, asphalt")
-    report("making the first law", spent, "s")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
     report("law.pressure, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns")
     for what, key, most in (
@@ -182,7 +177,6 @@ def laws(rng: np.random.Generator) -> None:
     ):
         name = f"{what} against numpy.interp on 1000 nodes, same points"
         report(name, times_faster(taken, key, "numpy"), "x", at_most=most)
-    report("scalar call", microseconds(taken["scalar law"], CALLS), "us", at_most=0.3)
     report("scalar call against RegularGridInterpolator's", times_faster(taken, "scalar scipy", "scalar law"), "x", 25)
     report("largest error of the law", np.abs(law.pressure(some) / truth - 1).max(), "")
     report("largest error of numpy.interp", np.abs(np.interp(some, nodes, values) / truth - 1).max(), "")
@@ -198,20 +192,12 @@ def calibrated(rng: np.random.Generator) -> None:
     taken = rounds(
         {
             "table": lambda: theory.answer(surface, u),
-            "erf": lambda: erf(u),
             "law": lambda: law.contact(some)[::2],
         }
     )
     spent = microseconds(taken["table"], GAPS)
     report("force, area and stiffness of a random separation", 1e3 * spent, "ns", at_most=100)
-    report("the same in evaluations of scipy.special.erf", spent / microseconds(taken["erf"], GAPS), "")
     surfaces, gaps = held_out(SURFACES, rng)
-    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), surfaces.h_max])
-    table, at = shipped(), np.arange(SURFACES)
-    alone = rounds({"fill": lambda: table.prepared(columns, gaps.size)[0]((at, (gaps + columns[2]) / 2))})
-    report(
-        "the same with a new surface each, table alone", 1e3 * microseconds(alone["fill"], SURFACES), "ns", at_most=100
-    )
     asked_of = {"one surface": (surface, u), "one gap a surface": (surfaces, (gaps + surfaces.h_max) / 2)}
     for what, (batch, mean) in asked_of.items():
         asked = functools.partial(contact, batch, mean_separation=mean, theory="calibrated")

@@ -12,8 +12,7 @@ import numpy as np
 from benchmarks.kernels import held_out
 from benchmarks.rows import microseconds, report, rounds, times_faster
 from mbma_tables import contact, open_table
-from mbma_tables.export.c_code import FLAGS
-from mbma_tables.export.code import SOURCES, write_code
+from mbma_tables.export.c_code import FLAGS, SOURCES, write_code
 from mbma_tables.totals.contact import QUADRATURE_SHARE
 
 POINTS, SURFACES = 20_000, 2000
@@ -35,7 +34,7 @@ def exported(rng: np.random.Generator) -> None:
 
     with tempfile.TemporaryDirectory() as work:
         folder = pathlib.Path(work)
-        write_code("c", folder)
+        write_code(folder)
         sources = [str(folder / name) for name in SOURCES if name != "mbma_selftest.c"]
         subprocess.run([*COMPILER, *sources, "-lm", "-o", str(folder / "model.so")], check=True)
         library: Any = ctypes.CDLL(str(folder / "model.so"))

@@ -8,8 +8,8 @@ from generate.machined.makers import GRADIENT, Part
 from generate.machined.solve import surface_of
 from mbma_tables import contact
 from mbma_tables.laws.boundary_elements import Contact
-from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
+from mbma_tables.theories.saturated import of_map
 from mbma_tables.theories.yielding import Yielding
 
 ETA = (0.1, 0.4)  # p_m/(E* g)

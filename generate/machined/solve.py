@@ -14,8 +14,8 @@ from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws.reynolds import flow_conductance
-from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
+from mbma_tables.theories.saturated import of_map
 
 AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)  # of the quick law, which never refuses them
 STEP = 1.03  # of pressure, of the stiffness

@@ -12,7 +12,6 @@ import numpy as np
 
 from mbma_tables.answers.contact import contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
@@ -24,6 +23,7 @@ from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.contact import Sums, by_table
 
 Rows = Iterator[str]
+FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",

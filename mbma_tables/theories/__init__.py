@@ -71,7 +71,7 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     from mbma_tables.theories.protocol import Theory, UserTheory
 
     if isinstance(theory, str) and theory in OF_MAPS:
-        from mbma_tables.theories.corrected import of_map
+        from mbma_tables.theories.saturated import of_map
 
         return of_map(theory, surface)
     found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
@@ -107,6 +107,6 @@ def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, *
         return "simulated"
     if getattr(surface, "map", None) is None:
         return "calibrated"
-    from mbma_tables.theories.corrected import applies
+    from mbma_tables.theories.saturated import applies
 
     return "corrected" if applies(surface) else "calibrated"

@@ -12,8 +12,7 @@ from generate.machined import errors as page
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
 from generate.machined.solve import solved, surface_of
 from mbma_tables.laws.map_curves import PLATEAU_SHIFT, MapLaw
-from mbma_tables.theories.corrected import Corrected
-from mbma_tables.theories.simulated import BoundaryElements
+from mbma_tables.theories.saturated import BoundaryElements, Corrected
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from mbma_tables.common.errors import ConvergenceError, InputError, TableFileErr
 from mbma_tables.laws import boundary_elements, pressing
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.theories import BoundaryElements, own_map
-from mbma_tables.theories.corrected import of_map
+from mbma_tables.theories.saturated import of_map
 
 pytest.importorskip("tamaas")
 

@@ -15,7 +15,7 @@ import xarray as xr
 from helpers import difference_weights, refusals, with_slopes
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.law import pieces as law_pieces
+from mbma_tables.law import block as law_block
 from mbma_tables.law.block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import NAMED
@@ -270,7 +270,7 @@ def test_laws_that_end_early_and_of_too_many_pieces(monkeypatch):
     surface = surface_of(*CASES[0][:3])
     labelled = Surface(xr.DataArray(0.8), surface.q0, surface.q1, surface.h_rms, surface.h_max)
     assert contact_law(labelled).pressure(separation=1.0) == law_of(CASES[0]).pressure(separation=1.0)
-    monkeypatch.setattr(law_pieces, "MAX_RECORDS", 3)
+    monkeypatch.setattr(law_block, "MAX_RECORDS", 3)
     with pytest.raises(ConvergenceError, match="more than 3 pieces") as caught:
         contact_law(surface)
     assert caught.value.mask
@@ -312,12 +312,12 @@ def test_a_narrow_dip_is_a_turning_point(at, width, sign):
     t = np.polynomial.Polynomial([-at, 1.0])
     dip = (t**2 - width**2) * (1 + 0.3 * t**4)
     assert dip.degree() < DEGREE
-    x, _ = law_pieces.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
+    x, _ = law_block.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
     # compression goes from t = s to t = -s
     expected = max(at - width, -1.0) if sign < 0 else min(at + width, 1.0)
     assert 4 * (x - 0.75) == pytest.approx(expected, abs=1e-9)
     above = rising_but_for(-sign * (dip + 2 * width**2))
-    assert law_pieces.first_falls(above, np.array([float(sign)]))[0][0] is None
+    assert law_block.first_falls(above, np.array([float(sign)]))[0][0] is None
 
 
 def slope_misses(surface, law, gap, variant="reported"):
