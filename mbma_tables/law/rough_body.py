@@ -31,7 +31,7 @@ MOMENTS = 128  # nodes of the effective radius
 POINTS = 101  # points of a profile
 COUNTED = 0.1  # share of the force above which a reason against the layer's law applies
 # c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the width of the contact over the
-# mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate.rough_spheres`
+# mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate rough_spheres`
 CELLS, NARROWEST = (0.62, 0.8), 1.5
 WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 

@@ -1,7 +1,6 @@
 """The boundary-element campaign: its engine against closed forms and others' results, its surfaces, its file."""
 
 import dataclasses
-import functools
 import os
 import pathlib
 
@@ -12,7 +11,7 @@ from click.testing import CliRunner
 
 from generate import files
 from generate.boundary_elements.run import SOLVERS, TEXTS, boundary_elements, dataset, group, run
-from generate.boundary_elements.solve import Contact, simulate, simulate_to
+from generate.boundary_elements.solve import Contact, simulate
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Recipe, Task, campaign, heights
 from generate.calibrated_file import write_part
 from mbma_tables.laws.bearing_curve import FRACTIONS, bearing
@@ -167,7 +166,7 @@ class TestCampaign:
     @pytest.mark.parametrize("kind", ["hardness", "leakage"])
     def test_other_campaigns_keep_what_their_files_hold(self, kind, tmp_path):
         tasks = [Task(Recipe("self_affine", 0.8, 4, 2, 5, 32), "training")]
-        run(tasks, tmp_path, solve=functools.partial(simulate_to, solve=SOLVERS[kind]))
+        run(tasks, tmp_path, solve=SOLVERS[kind])
         shipped = files.dataset(kind)
         assert set(dataset(tasks, tmp_path, kind).variables) == set(shipped.variables)
         assert len(campaign(kind)) == shipped.sizes["surface"]

@@ -7,7 +7,6 @@ import pytest
 from small_tables import small, small_build
 
 from generate.tables.certificate import UncertifiedError
-from generate.tables.chunks import ChunkedSolver
 from generate.tables.commands import KINDS
 from generate.tables.configuration import load
 from generate.tables.island4d import evaluate
@@ -93,14 +92,14 @@ def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
     places[0][3] = content.axes[0].low
     monkeypatch.setattr(kind, "held_out", lambda *_: places)
     with pytest.raises(UncertifiedError, match="a held-out point lies on a node"):
-        kind.certify(content.axes, content.coefficients, ChunkedSolver())
+        kind.certify(content.axes, content.coefficients)
 
 
 def test_a_tighter_target_takes_more_cells_and_is_met(tmp_path):
     cells = []
     for target in (1e-4, 1e-6, 1e-8):
         configuration = load("universal", small(tmp_path, "universal"), target)
-        content = KINDS["universal"](configuration).build(ChunkedSolver())
+        content = KINDS["universal"](configuration).build()
         assert max(content.attributes[f"largest_error_{f}"] for f in "FA") <= target
         cells.append(len(content.coefficients))
     assert cells[0] < cells[1] < cells[2]
@@ -111,7 +110,7 @@ def test_a_tighter_target_takes_more_cells_and_is_met(tmp_path):
 def test_cells_end_where_they_must(tmp_path):
     """A cell that were an eighth of an octave longer would miss its aim."""
     configuration = load("universal", small(tmp_path, "universal"))
-    content = KINDS["universal"](configuration).build(ChunkedSolver())
+    content = KINDS["universal"](configuration).build()
     X_low, X_high, low, high = (content.auxiliary[name][1] for name in CELL_EDGES)
     aim = AIM * configuration.target
     for cell in np.flatnonzero(high < content.axes[1].high)[::3]:
@@ -125,7 +124,7 @@ def test_nodes_that_follow_the_target_meet_it(tmp_path):
     found = []
     for target in (1e-1, 2e-2):
         configuration = load("island4d", small(tmp_path, "island4d"), target)
-        content = KINDS["island4d"](configuration).build(ChunkedSolver())
+        content = KINDS["island4d"](configuration).build()
         found.append(max(content.attributes[f"largest_error_{f}"] for f in "FA"))
     assert found[1] < found[0] / 3
 
@@ -134,7 +133,7 @@ def test_a_target_that_is_missed_is_refused(nodes):
     kind, content = nodes
     tight = dataclasses.replace(kind.configuration, target=1e-6)
     with pytest.raises(UncertifiedError, match=r"the largest held-out error is .*, the target 1\.00e-06"):
-        type(kind)(tight).certify(content.axes, content.coefficients, ChunkedSolver())
+        type(kind)(tight).certify(content.axes, content.coefficients)
 
 
 def bump(content, place, height):
@@ -167,7 +166,7 @@ def test_what_no_islands_can_do_breaks_a_rule(nodes):
 def test_what_no_islands_can_do_breaks_a_rule_in_a_cell(tmp_path):
     configuration = load("universal", small(tmp_path, "universal"))
     kind = KINDS["universal"](configuration)
-    content = kind.build(ChunkedSolver())
+    content = kind.build()
     last = len(content.coefficients) - 1
     assert content.auxiliary["mu_low"][1][last] > 0
     for number, cell, terms, rule in (

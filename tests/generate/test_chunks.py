@@ -1,6 +1,5 @@
 """Islands solved in chunks: the same bits whoever computes them."""
 
-import concurrent.futures
 import json
 import os
 import subprocess
@@ -11,8 +10,9 @@ import pytest
 
 from generate.files import ROOT
 from generate.provenance import versions
-from generate.tables import chunks
-from generate.tables.chunks import ChunkedSolver, phi
+from generate.tables import certificate
+from generate.tables.certificate import Kind, phi
+from generate.tables.configuration import load
 from mbma_tables.models.tables import shipped
 from mbma_tables.tablefiles.netcdf import read_table
 
@@ -23,15 +23,13 @@ HASWELL = {
 }
 
 
-def test_any_executor_gives_the_same_bits(monkeypatch):
-    monkeypatch.setattr(chunks, "CHUNK", 10)
+def test_any_workers_give_the_same_bits(monkeypatch):
+    monkeypatch.setattr(certificate, "CHUNK", 10)
     X, mu = np.linspace(0.0, 5.0, 40), np.geomspace(1e-3, 10.0, 40)
     expected = phi(X, mu, 1e-6)
-    np.testing.assert_array_equal(ChunkedSolver().phi("test", X, mu, 1e-6), expected)
-    square = ChunkedSolver().phi("test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6)
-    np.testing.assert_array_equal(square, expected.reshape(8, 5, 2))
-    with concurrent.futures.ThreadPoolExecutor(3) as threads:
-        np.testing.assert_array_equal(ChunkedSolver(threads).phi("test", X, mu, 1e-6), expected)
+    for workers in (1, 2):
+        found = Kind(load("universal"), workers).phi("test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6)
+        np.testing.assert_array_equal(found, expected.reshape(8, 5, 2))
 
 
 @pytest.mark.slow
