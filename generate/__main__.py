@@ -20,7 +20,7 @@ COMMANDS = {
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
     "rough_spheres": "generate.rough_spheres",
-    "score": "generate.pages.score",
+    "score": "generate.distances",
     "tables": "generate.tables.commands",
 }
 

@@ -85,7 +85,7 @@ class Case(Simulated):
         """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and a hardness, the last of `node`."""
         if self.kind == "yielded":
             gradient = self.spectrum.gradient
-            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), self)
+            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), self.surface)
             return curve.area(self.force), curve.separation(self.force)
         law = Law(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)
@@ -242,7 +242,7 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
     for theory in (Mbma(outside="nan"), Persson(), GreenwoodWilliamson()):
         parts = []
         for flow in seen:
-            curve = TheoryCurve(theory, flow.one)
+            curve = TheoryCurve(theory, flow.one.surface)
             area, u = curve.area(flow.one.force), curve.separation(flow.one.force)
             kept = np.isfinite(u)
             log_k = np.full(u.shape, -np.inf)

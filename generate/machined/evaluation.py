@@ -8,12 +8,15 @@ Each form states a standard deviation with a few constants, the same for all map
 They cover 70% of errors once and 97.5% twice. `left_out` states for each family what the others give.
 """
 
+import itertools
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from generate.machined.makers import FAMILIES
+from generate.page import table
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.theories.calibrated import MAP_SCATTER
 from mbma_tables.theories.simulated import POWER, TYPICAL
@@ -104,3 +107,52 @@ def left_out(data: xr.Dataset, form: str, quantity: str) -> dict[str, FloatArray
             ratio = error / scatter(data, form, quantity, parts != part)[..., None]
             found[families[parts == part][0]].append(ratio[own & np.isfinite(ratio)])
     return {family: np.concatenate([np.empty(0), *each]) for family, each in found.items()}
+
+
+def halves(values: FloatArray) -> str:
+    """Median and 90% quantile of magnitudes."""
+    return "{:.3f}, {:.3f}".format(*np.quantile(np.abs(values), (0.5, 0.9))) if values.size else ""
+
+
+def by_family(data: xr.Dataset, form: str) -> str:
+    lines = []
+    for family in FAMILIES:
+        own = data.isel(surface=np.flatnonzero(data.family.values == family))
+        cells = [halves(errors(own, form, quantity)[seen(own, form, quantity)]) for quantity in QUANTITIES]
+        lines.append([f"{family} ({own.sizes['surface']})", *cells, f"{own[f'{form}_valid'].values.mean():.0%}"])
+    return table("family (maps) | ln A | ln F at equal u | ln stiffness | ln flow, A < 20% | valid", lines)
+
+
+def families_left_out(data: xr.Dataset, form: str) -> str:
+    """Shares of errors within one and two standard deviations that other families give."""
+    columns = [left_out(data, form, quantity) for quantity in QUANTITIES]
+    pooled = [{"all": np.concatenate([*column.values()])} | column for column in columns]
+    rows = [[name, *(shares(column[name] for column in pooled))] for name in pooled[0]]
+    return table("family | area | pressure | stiffness | flow", [row for row in rows if any(row[1:])])
+
+
+def shares(ratios: Iterable[FloatArray]) -> list[str]:
+    return [f"{np.mean(r < 1):.2f}, {np.mean(r < 2):.2f} ({r.size})" if r.size else "" for r in ratios]
+
+
+def yielding(data: xr.Dataset) -> str:
+    """Errors of simulation and of the law with a hardness: median and 90% quantile, of all maps."""
+    area, u, share, frozen = (
+        data[f"hard_{name}"].values for name in ("area", "mean_separation", "yielded", "unloading_stiffness")
+    )
+    slope, lines = data.hard_stiffness.values / data.hard_pressure.values, []
+    names = {1: "simulation", 2: "law of hardness on the simulated elastic contact"}
+    for (k, eta), (way, name) in itertools.product(enumerate(data.eta.values), names.items()):
+        found = [np.log(each[:, way, k] / each[:, 0, k]) for each in (area, frozen)]
+        found[1:1] = (u[:, way, k] - u[:, 0, k]) * slope[:, k], share[:, way, k] - share[:, 0, k]
+        lines.append([f"{eta:g}", name, *map(halves, found)])
+    return table("p_m/(E* g) | by | ln A | ln F at equal u | yielded share | ln unloading stiffness", lines)
+
+
+def covered(data: xr.Dataset) -> str:
+    """Shares of errors within one and two stated standard deviations, and numbers of errors."""
+    rows = []
+    for form, (of_valid, name) in itertools.product(RANGES, ((True, "valid"), (False, "not valid"))):
+        found = [coverage(data, form, quantity, of_valid) for quantity in QUANTITIES]
+        rows.append([form, name, *(f"{a:.2f}, {b:.2f} ({n})" if n else "" for a, b, n in found)])
+    return table("theory | entries | area | pressure | stiffness | flow", rows)

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import erf
 
 from generate.__main__ import main
-from generate.pages.score import OTHERS, theories_of
+from generate.distances import OTHERS, theories_of
 from generate.theories_of_others import FORCES, Corrected
 from mbma_tables import InputError, Surface
 from mbma_tables.data import boundary_elements
