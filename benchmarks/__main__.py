@@ -25,7 +25,6 @@ from typing import Any
 import click
 import numpy as np
 from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_spline
-from scipy.special import erf
 
 from benchmarks.exports import exported
 from benchmarks.kernels import BEFORE, held_out, measured
@@ -40,7 +39,6 @@ from mbma_tables.laws.calibrated import Law, Spectrum
 from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated
-from mbma_tables.theories.calibrated_table import shipped
 
 POINTS = 20_000
 HELD_OUT = 500
@@ -137,13 +135,12 @@ def one_step() -> dict[str, Callable[[], Any]]:
 
 
 def totals(rng: np.random.Generator) -> None:
-    """`contact` on many surfaces, with derivatives, and on many gaps of one surface."""
+    """`contact` on many surfaces."""
     surfaces, gaps = held_out(SURFACES, rng)
     taken = rounds(
         {
             "exact": lambda: contact(surfaces, separation=gaps, island_model="exact"),
             "value": lambda: contact(surfaces, separation=gaps),
-            "slopes": lambda: contact(surfaces, separation=gaps, derivatives=True),
         },
         3,
     )
@@ -157,28 +154,18 @@ def totals(rng: np.random.Generator) -> None:
     report("faster than our own exact island model", times_faster(taken, "exact", "value"), "x", 150)
     nominal = exact / NOMINAL_EXACT / statistics.median(taken["value"])
     report(f"faster than a solver of {NOMINAL_EXACT} islands/s at exact's island count", nominal, "x")
-    report("derivatives=True against the value alone", times_faster(taken, "slopes", "value"), "x", at_most=2)
     steps = one_step()
     if steps:
         one = Surface.named("concrete")
         both = rounds({"contact": lambda: contact(one, separation=0.4)} | steps)
         for name in steps:
             report(f"one contact is faster than one step of {name}", times_faster(both, name, "contact"), "x")
-    batch, gaps = held_out(10 * SURFACES, rng)
-    walls: dict[int, list[float]] = {1: [], 2: []}
-    for workers in (1, 2) * 4:
-        start = time.perf_counter()
-        contact(batch, separation=gaps, workers=workers)
-        walls[workers].append(time.perf_counter() - start)
-    report("two workers against one, by the clock", min(walls[1]) / min(walls[2]), "x", 1.8)
 
 
 def laws(rng: np.random.Generator) -> None:
     """A frozen surface against numpy and scipy."""
     surface = Surface.named("asphalt")
-    start = time.perf_counter()
     law = contact_law(surface)
-    spent = time.perf_counter() - start
     gaps = rng.uniform(0, 0.99995 * surface.h_max, MANY_GAPS)
     nodes = np.linspace(0, surface.h_max, 1000)
     values = law.pressure(nodes)
@@ -200,7 +187,6 @@ def laws(rng: np.random.Generator) -> None:
     some = gaps[:2000]
     truth = contact(surface, mean_separation=some, rtol=1e-10).pressure
     click.echo("\ncontact_law of one surface, asphalt")
-    report("making the first law", spent, "s")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
     report("law.pressure, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns")
     for what, key, most in (
@@ -211,7 +197,6 @@ def laws(rng: np.random.Generator) -> None:
     ):
         name = f"{what} against numpy.interp on 1000 nodes, same points"
         report(name, times_faster(taken, key, "numpy"), "x", at_most=most)
-    report("scalar call", microseconds(taken["scalar law"], CALLS), "us", at_most=0.3)
     report("scalar call against RegularGridInterpolator's", times_faster(taken, "scalar scipy", "scalar law"), "x", 25)
     report("largest error of the law", np.abs(law.pressure(some) / truth - 1).max(), "")
     report("largest error of numpy.interp", np.abs(np.interp(some, nodes, values) / truth - 1).max(), "")
@@ -227,20 +212,12 @@ def calibrated(rng: np.random.Generator) -> None:
     taken = rounds(
         {
             "table": lambda: theory.answer(surface, u),
-            "erf": lambda: erf(u),
             "law": lambda: law.contact(some)[::2],
         }
     )
     spent = microseconds(taken["table"], GAPS)
     report("force, area and stiffness of a random separation", 1e3 * spent, "ns", at_most=100)
-    report("the same in evaluations of scipy.special.erf", spent / microseconds(taken["erf"], GAPS), "")
     surfaces, gaps = held_out(SURFACES, rng)
-    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), surfaces.h_max])
-    table, at = shipped(), np.arange(SURFACES)
-    alone = rounds({"fill": lambda: table.prepared(columns, gaps.size)[0]((at, (gaps + columns[2]) / 2))})
-    report(
-        "the same with a new surface each, table alone", 1e3 * microseconds(alone["fill"], SURFACES), "ns", at_most=100
-    )
     asked_of = {"one surface": (surface, u), "one gap a surface": (surfaces, (gaps + surfaces.h_max) / 2)}
     for what, (batch, mean) in asked_of.items():
         asked = functools.partial(contact, batch, mean_separation=mean, theory="calibrated")
@@ -287,7 +264,6 @@ FIRST = {
     "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
     "100,000 gaps of a law": "m.contact_law(S()).pressure(np.linspace(0.05, 2.95, 100_000))",
     "10,000 surfaces": "m.contact(S(10_000), separation=1.0)",
-    "10,000 surfaces with derivatives": "m.contact(S(10_000), separation=1.0, derivatives=True)",
     "an exact total": "m.contact(S(), separation=1.0, island_model='exact')",
 }
 

@@ -11,42 +11,37 @@ import numpy as np
 
 from benchmarks.kernels import held_out
 from benchmarks.rows import microseconds, report, rounds, times_faster
-from mbma_tables import Surface, contact, open_table
-from mbma_tables.export.c_code import FLAGS
-from mbma_tables.export.code import SOURCES, write_code
-from mbma_tables.theories import Mbma
+from mbma_tables import contact, open_table
+from mbma_tables.export.c_code import FLAGS, SOURCES, write_code
 from mbma_tables.totals.contact import QUADRATURE_SHARE
 
-POINTS, SURFACES, GAPS = 20_000, 2000, 200
+POINTS, SURFACES = 20_000, 2000
 RTOL = 1e-8
 COMPILER = ("cc", *FLAGS, "-march=native", "-shared", "-fPIC")
 
 
 def exported(rng: np.random.Generator) -> None:
-    """Islands at random (X, mu), totals of as many surfaces as gaps, and derivatives at many gaps of one surface."""
-    model, surface = open_table("universal"), Surface.named("yang-persson")
+    """Islands at random (X, mu), and totals of as many surfaces as gaps."""
+    model = open_table("universal")
     X, mu = rng.uniform(-5.0, 40.0, POINTS), np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS))
     surfaces, apart = held_out(SURFACES, rng)
-    gaps = np.linspace(-0.5, 0.95, GAPS) * surface.h_max
-    numbers = np.array([surface.hurst, surface.q0, surface.q1, surface.h_rms, surface.h_max])
     heights = (surfaces.h_max - apart) / surfaces.h_rms, surfaces.h_max / surfaces.h_rms
-    islands, sums, bound = np.empty((POINTS, 3)), np.empty((SURFACES, 2)), np.empty(SURFACES)
-    contacts, by, status = np.empty((GAPS, 4)), np.empty((2, GAPS, 6)), np.empty(SURFACES, np.uint8)
+    islands, sums, bound = np.empty((POINTS, 3)), np.empty((SURFACES, 4)), np.empty(SURFACES)
+    status = np.empty(SURFACES, np.uint8)
 
     def at(array: Any) -> ctypes.c_void_p:
         return ctypes.c_void_p(array.ctypes.data)
 
     with tempfile.TemporaryDirectory() as work:
         folder = pathlib.Path(work)
-        write_code("c", folder)
+        write_code(folder)
         sources = [str(folder / name) for name in SOURCES if name != "mbma_selftest.c"]
         subprocess.run([*COMPILER, *sources, "-lm", "-o", str(folder / "model.so")], check=True)
         library: Any = ctypes.CDLL(str(folder / "model.so"))
     for function in (library.mbma_table, library.mbma_model_variant):
         function.restype = ctypes.c_void_p
     table, variant = (ctypes.c_void_p(function()) for function in (library.mbma_table, library.mbma_model_variant))
-    size, many, count = (ctypes.c_size_t(number) for number in (POINTS, SURFACES, GAPS))
-    one, rtol, share = (ctypes.c_double(number) for number in (1.0, RTOL, QUADRATURE_SHARE * RTOL))
+    size, many, share = ctypes.c_size_t(POINTS), ctypes.c_size_t(SURFACES), ctypes.c_double(QUADRATURE_SHARE * RTOL)
     known = [np.ascontiguousarray(column, dtype=float) for column in (surfaces.hurst, surfaces.zeta_1, *heights)]
     seen = ctypes.c_int64()
     taken = rounds(
@@ -55,25 +50,16 @@ def exported(rng: np.random.Generator) -> None:
             "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, 0, at(islands), None),
             "totals": lambda: contact(surfaces, separation=apart, rtol=RTOL),
             "C totals": lambda: library.mbma_totals(
-                many, *map(at, known), share, variant, table, 0, at(sums), at(bound), at(status), ctypes.byref(seen)
-            ),
-            "derivatives": lambda: Mbma(rtol=RTOL).totals(surface, gaps, derivatives=True),
-            "C derivatives": lambda: library.mbma_totals_of(
-                at(numbers), count, at(gaps), one, rtol, at(contacts), at(by[0]), at(by[1]), None
+                many, *map(at, known), share, variant, table, at(sums), at(bound), at(status), ctypes.byref(seen)
             ),
         }
     )
-    phi, total, near = (
-        model.answer(X, mu),
-        contact(surfaces, separation=apart, rtol=RTOL),
-        Mbma(rtol=RTOL).totals(surface, gaps),
-    )
+    phi, total = model.answer(X, mu), contact(surfaces, separation=apart, rtol=RTOL)
     unit = surfaces.q0 * surfaces.s
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (
         ("islands", POINTS, islands.T[:2], (phi.phi_F, phi.phi_A)),
-        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 1]), (total.pressure, total.area)),
-        ("derivatives", GAPS, contacts.T[:2], (near.pressure, near.area)),
+        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 2]), (total.pressure, total.area)),
     ):
         report(f"C, one of {entries} {name}", 1e3 * microseconds(taken[f"C {name}"], entries), "ns")
         most = 1.1 if name == "totals" else None

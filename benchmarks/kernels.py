@@ -1,4 +1,4 @@
-"""Every kernel of docs/lookup.md through the public interface, beside its time in the last version that used numba.
+"""Kernels through the public interface, beside their times in the last version that used numba.
 
 `BEFORE` was measured by ``python -m benchmarks.kernels`` with this file in a checkout of that version (33125d6, numba
 0.68.1, everything compiled), in turns with the present one. Times are in evaluations of `scipy.special.erf` of the same
@@ -32,18 +32,11 @@ BEFORE: dict[str, float] = {
     "universal table with slopes, path": 2.758,
     "four-number table": 35.86,
     "totals, a new surface each": 311.4,
-    "totals with derivatives, a new surface each": 485.4,
     "1,000 gaps on a new surface": 34.41,
     "1,000 gaps on a known surface": 11.53,
     "100,000 gaps on a new surface": 4.454,
     "one gap on a new surface": 1.036e05,
-    "a law": 8.074e04,
-    "law: pressure": 0.4774,
-    "law: pressure and stiffness": 0.6982,
-    "law: energy": 0.6291,
     "law: pressure, area, stiffness, energy": 1.371,
-    "law: gap, area and stiffness at a pressure": 1.731,
-    "law: pressure of one number": 21.55,
     "calibrated law, one surface": 3.809,
     "calibrated law, at a pressure": 14.11,
     "calibrated law, a new surface each": 30.37,
@@ -85,7 +78,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         return dataclasses.replace(one, h_max=one.h_max * (1 + 1e-9 * next(fresh)))
 
     law = contact_law(one)
-    forces, place = law.pressure(separation=many), float((one.h_max + many[0]) / 2)
+    place = float((one.h_max + many[0]) / 2)
     flat, u = Surface(0.8, 1.0, 64.0, 1.0, 3.3), rng.uniform(0.01, 3.3, MANY)
     mean = (gaps + surfaces.h_max) / 2
     calibrated, loads = contact(flat, mean_separation=u, theory="calibrated").pressure, {}
@@ -99,10 +92,6 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         "universal table with slopes, path": (lambda: universal.slopes(*path), MANY),
         "four-number table": (lambda: four.lookup(*raw, outside="nan"), MANY),
         "totals, a new surface each": (lambda: contact(surfaces, separation=gaps), SURFACES),
-        "totals with derivatives, a new surface each": (
-            lambda: contact(surfaces, separation=gaps, derivatives=True),
-            SURFACES,
-        ),
         "1,000 gaps on a new surface": (
             lambda: [contact(another(), separation=some) for _ in range(DESIGNS)],
             SOME * DESIGNS,
@@ -113,13 +102,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         ),
         "100,000 gaps on a new surface": (lambda: contact(another(), separation=many), MANY),
         "one gap on a new surface": (lambda: [contact(another(), mean_separation=place) for _ in range(50)], 50),
-        "a law": (lambda: [contact_law(another()) for _ in range(5)], 5),
-        "law: pressure": (lambda: law.pressure(separation=many), MANY),
-        "law: pressure and stiffness": (lambda: law.pressure_and_stiffness(separation=many), MANY),
-        "law: energy": (lambda: law.energy(separation=many), MANY),
         "law: pressure, area, stiffness, energy": (lambda: law.values(separation=many), MANY),
-        "law: gap, area and stiffness at a pressure": (lambda: law.at_pressure(forces), MANY),
-        "law: pressure of one number": (lambda: [law.pressure(place) for _ in range(CALLS)], CALLS),
         "calibrated law, one surface": (lambda: contact(flat, mean_separation=u, theory="calibrated"), MANY),
         "calibrated law, at a pressure": (lambda: contact(flat, pressure=calibrated, theory="calibrated"), MANY),
         "calibrated law, a new surface each": (

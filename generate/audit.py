@@ -197,7 +197,6 @@ OPTIONS: dict[str, list[Any]] = {
     "materials": METALS,
     "E_star": [1.0, "100 GPa", "2 MPa", *NUMBERS],
     "rtol": [1e-6, 1e-3, *NUMBERS],
-    "derivatives": [True, False, "no"],
     "island_model": ["universal", "formula", "rigid", "exact", "none", 1],
     "variant": ["reported", "printed", "fitted", "none"],
     "outside": ["raise", "exact", "nan", "clamp"],

@@ -16,7 +16,7 @@ from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import Law, Spectrum, area
-from mbma_tables.scenes.costs import Distance
+from mbma_tables.scenes.plan import Distance
 from mbma_tables.theories import Persson
 
 SIMULATED = "boundary elements"

@@ -6,6 +6,7 @@ import json
 import pathlib
 import shutil
 import statistics
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -17,13 +18,14 @@ from generate.page import Measured, table
 from mbma_tables import Surface
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
-from mbma_tables.export.code import web_assembly
 from mbma_tables.export.explorer import MODULE, explorer_page
 from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import core_file
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import REPORTED
 
+# with two numbers at a time, which browsers have learned by 2023
+ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", *c_code.FLAGS, "-s", "-msimd128")
 FUNCTIONS = (
     *("mbma_total_of", "mbma_calibrated_of", "mbma_message", "mbma_spectrum_of", "mbma_surface_spectrum_of"),
     *("mbma_spectrum_contact_of", "mbma_spectrum_separation_of"),
@@ -58,8 +60,8 @@ def law_sources() -> dict[str, str]:
 def compiled(texts: dict[str, str], names: Iterable[str]) -> bytes:
     """The module, with the digest of what it was compiled from in a section of its own at the end."""
     section = b"\x06digest" + digest_of(texts)
-    # two numbers at a time, which browsers have learned by 2023
-    module = web_assembly(texts, names, "-msimd128")
+    exports = [f"-Wl,--export={name}" for name in names]
+    module = c_code.built_by([sys.executable, *ZIG, *exports], texts, "mbma.wasm")
     return module + bytes([0, len(section)]) + section
 
 

@@ -18,15 +18,14 @@ def random_surfaces(
     *,
     hurst: tuple[float, float] = (0.1, 1.0),
     zeta_1: tuple[float, float] = (3.01, 1e8),
-    h_max: tuple[float, float] = (2.5, 4.7),
 ) -> Surface:
-    """A batch over these ranges (h_max in h_rms, zeta_1 even in its logarithm), their ends included again and again."""
+    """A batch over these ranges (zeta_1 even in its logarithm), their ends included again and again."""
     rng = np.random.default_rng(seed)
     hursts = rng.uniform(*hurst, count)
     hursts[::9], hursts[4::18] = hurst[1], hurst[0]
     zetas = np.exp(rng.uniform(*np.log(zeta_1), count))
     zetas[::7], zetas[::11] = zeta_1
-    return Surface(hursts, 0.2, 0.2 * zetas, 1.0, rng.uniform(*h_max, count))
+    return Surface(hursts, 0.2, 0.2 * zetas, 1.0, rng.uniform(2.5, 4.7, count))
 
 
 def random_gaps(surfaces: Surface, seed: int) -> np.ndarray:

@@ -44,8 +44,8 @@ def _json_digest(content):
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _plain(value):
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+def _attributes(owner):
+    return {name: np.asarray(owner.getncattr(name)).tolist() for name in owner.ncattrs()}
 
 
 class Reader:
@@ -53,12 +53,9 @@ class Reader:
 
     def __init__(self, path):
         with netCDF4.Dataset(path) as file:
-            self.attributes = {name: _plain(file.getncattr(name)) for name in file.ncattrs()}
+            self.attributes = _attributes(file)
             self.variables = {name: np.asarray(variable[...]) for name, variable in file.variables.items()}
-            self.described = {
-                name: {n: _plain(variable.getncattr(n)) for n in variable.ncattrs()}
-                for name, variable in file.variables.items()
-            }
+            self.described = {name: _attributes(variable) for name, variable in file.variables.items()}
             self.dimensions = {name: list(variable.dimensions) for name, variable in file.variables.items()}
         self.axes = self.dimensions.get("log_ratio_F")
 
@@ -101,10 +98,6 @@ class Reader:
             block = np.tensordot(weights(p - i), block[i : i + 4], axes=1)
         return float(block)
 
-    def error(self, function, X, mu):
-        """Bound on the relative error of an island of two numbers."""
-        return float(self.variables[f"error_{function}"][self.cell(X, mu)])
-
     def answer(self, **arguments):
         """What conformance points hold: Phi or hat values, by F and A."""
         return self.universal(**arguments) if self.attributes["mbma_kind"] == "universal" else self.island(**arguments)
@@ -128,11 +121,8 @@ class Reader:
         if low == 0:
             y = 2 * mu / high - 1
         else:
-            middle, slope = (
-                math.sqrt(low * high),
-                (math.sqrt(high) + math.sqrt(low)) / (math.sqrt(high) - math.sqrt(low)),
-            )
-            y = slope * (mu - middle) / (mu + middle)
+            a, b = math.sqrt(low), math.sqrt(high)
+            y = (b + a) / (b - a) * (mu - a * b) / (mu + a * b)
         sums = {f: chebyshev(x) @ self.variables[f"chebyshev_{f}"][cell] @ chebyshev(y) for f in "FA"}
         return {"F": mu * float(sums["F"]), "A": float(sums["A"])}
 
@@ -170,12 +160,10 @@ class Reader:
 
     def replay(self):
         """Largest of |own answer/stored - 1|/tolerance over the conformance points."""
-        names = [n.removeprefix("conformance_") for n in self.variables if n.startswith("conformance_")]
-        points = {name: self.variables[f"conformance_{name}"] for name in names}
-        known = [n for n in names if n != "tolerance" and n[:5] not in ("table", "exact")]
-        worst = 0.0
+        prefix, worst = "conformance_", 0.0
+        points = {n.removeprefix(prefix): values for n, values in self.variables.items() if n.startswith(prefix)}
+        known = [n for n in points if n != "tolerance" and n[:5] not in ("table", "exact")]
         for k, tolerance in enumerate(points["tolerance"]):
-            found = self.answer(**{name: float(points[name][k]) for name in known})
-            for f, value in found.items():
+            for f, value in self.answer(**{name: float(points[name][k]) for name in known}).items():
                 worst = max(worst, abs(value / points[f"table_{f}"][k] - 1) / tolerance)
         return worst

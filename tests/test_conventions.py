@@ -1,6 +1,5 @@
 """Table files as others open them: CF 1.11, xarray, ncdump, and a reader that follows docs/tables.md."""
 
-import math
 import pathlib
 import socket
 import warnings
@@ -21,19 +20,12 @@ def path(request, table_files):
     return SHIPPED / f"{kind}.nc" if shipped else table_files[kind]
 
 
-@pytest.fixture
-def offline(monkeypatch):
-    def refuse(self, address):
-        raise OSError(f"no network in tests: {address}")
-
-    monkeypatch.setattr(socket.socket, "connect", refuse)
-
-
-@pytest.mark.usefixtures("offline")
-def test_compliance_checker_finds_nothing(path, capsys, tmp_path):
+def test_compliance_checker_finds_nothing(path, tmp_path, monkeypatch):
     suite = pytest.importorskip("compliance_checker.suite")
     from compliance_checker.runner import ComplianceChecker
 
+    # without a network
+    monkeypatch.setattr(socket.socket, "connect", None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         suite.CheckSuite.load_all_available_checkers()
@@ -98,14 +90,3 @@ def test_seal_and_hashes_can_be_recomputed(path, tmp_path):
 
 def test_independent_reader_replays_every_conformance_point(path):
     assert Reader(path).replay() <= 1
-
-
-def test_error_field_is_read_where_the_library_reads_it(table_files):
-    from mbma_tables import open_table
-
-    model, reader = open_table(table_files["universal"]), Reader(table_files["universal"])
-    rng = np.random.default_rng(5)
-    X, mu = rng.uniform(0.5, 6, 40), np.exp(rng.uniform(math.log(1e-3), math.log(10), 40))
-    theirs = model.answer(X, mu).error
-    ours = [max(reader.error(f, *point) for f in "FA") for point in zip(X, mu, strict=True)]
-    np.testing.assert_array_equal(theirs, ours)

@@ -120,7 +120,6 @@ test_conflicts_in_python = refusals(
     (lambda: PLAIN.to("mm"), "the surface's unit is not known: make it with unit="),
     (lambda: Surface(0.8, 0.1, 10.0, 1.0, 3.0, unit="millimetre"), "no known unit of length"),
     (lambda: CONCRETE.to(1.0), "a unit of length is a text"),
-    (lambda: Scene(CONCRETE, separations=[0.5], length_unit="m"), r"ask for surface.to\('m'\)"),
     (lambda: Scene(PLAIN, separations=["1 um"]), "give the surface its unit"),
     (lambda: Scene(CONCRETE, pressures=["1 MPa"]), "needs a modulus"),
     (lambda: Scene(CONCRETE, pressures=["1 MPa"], E_star=9.0), "give E\\* with its unit"),
@@ -155,10 +154,7 @@ def test_conflicts_in_toml(content, said, tmp_path):
 
 test_conflicts_on_the_command_line = told(
     lambda arguments: refused("contact", *arguments.split()),
-    (
-        "--hurst 0.8 --q0 0.1/mm --zeta-1 50 --h-rms 800um --h-max 3 -d 1",
-        "--h-max without a unit beside numbers in mm",
-    ),
+    ("--hurst 0.8 --q0 0.1/mm --zeta-1 50 --h-rms 800um --h-max 3 -d 1", "h_max without a unit beside numbers in mm"),
     ("--hurst 0.8 --q0 0.1 --zeta-1 50 --h-rms 1 --h-max 3 -d 1mm", "give --length-unit"),
     ("--surface concrete -d 1 --stress-unit MPa", "no modulus"),
     ("--surface concrete -a 1mm", "area has no unit"),

@@ -25,8 +25,8 @@ from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.data import FILE
 from mbma_tables.laws import boundary_elements
 from mbma_tables.laws.reynolds import flow_conductance
-from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
+from mbma_tables.theories.saturated import of_map
 from mbma_tables.theories.yielding import Yielding
 
 NUMBERS = 10  # parts of each family

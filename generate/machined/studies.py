@@ -15,14 +15,13 @@ from generate.boundary_elements.tamaas_contact import Contact
 from generate.calibrated_file import rms, write_part
 from generate.machined.makers import FAMILIES, GRADIENT, Part, finished, heights, rough
 from mbma_tables import Surface, flow_factors
-from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.answers.leakage import shipped_flow
 from mbma_tables.common import cache
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 from mbma_tables.laws.bearing_curve import bearing
 from mbma_tables.laws.effective_medium import wide_gap
-from mbma_tables.laws.film import factors
-from mbma_tables.laws.lay import CONSTANTS, stress_shares
+from mbma_tables.laws.lay import CONSTANTS, factors, stress_shares
 from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.theories import BoundaryElements
 
@@ -157,7 +156,7 @@ def film_rows() -> FloatArray:
 def film() -> None:
     """Flow factors against Reynolds' equation on simulated gaps, for docs/lubrication.md: six minutes.
 
-    No constant of `mbma_tables.laws.film` was fitted to these surfaces.
+    No constant of `mbma_tables.laws.lay` was fitted to these surfaces.
     """
     lay, gamma, u, area, *columns = film_rows()
     flow, sheared, whole = np.reshape(columns, (3, 2, -1))

@@ -11,7 +11,7 @@ from generate.calibrated_file import rms
 from generate.distances import DEEP, HUES, LOW, THEORIES
 from generate.files import ROOT, dataset, read_csv
 from generate.page import Measured, panels, printed
-from mbma_tables.scenes.costs import shipped_costs
+from mbma_tables.scenes.plan import shipped_costs
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
 GAUGES = {"area_light": "contact area at a given pressure", "force_light": "pressure at a given gap"}

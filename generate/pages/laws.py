@@ -17,7 +17,7 @@ from generate.files import dataset
 from generate.leakage_law import EDGES, LAWS, Flow, cases, errors, noise_floor, summary
 from generate.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact, materials
-from mbma_tables.answers.leakage_table import GROUP, shipped_flow
+from mbma_tables.answers.leakage import GROUP, shipped_flow
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.files import shipped_file

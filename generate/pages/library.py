@@ -23,7 +23,7 @@ from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.tables import shipped
-from mbma_tables.scenes.costs import shipped_costs, shipped_distances
+from mbma_tables.scenes.plan import shipped_costs, shipped_distances
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.theories import THEORIES

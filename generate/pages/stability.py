@@ -154,12 +154,12 @@ def totals() -> dict[str, list[Outcome]]:
         found = contact(surface, separation=TOP - depth, island_model=name, variant=variant, rtol=rtol)
         return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
 
-    found: dict[str, list[Outcome]] = {}
+    exact, found = functools.partial(ask, "exact", rtol=TOTAL_TRUTH), dict[str, list[Outcome]]()
     # the four-number table is of one variant
     for names, variants in ((ISLAND_MODELS, VARIANTS), (["island4d"], VARIANTS[:1])):
         ways = {f"totals by {name}": functools.partial(ask, name) for name in names}
         corners = itertools.product(variants, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS)
-        found |= counted(ways, corners, lambda *corner: ask("exact", *corner, TOTAL_TRUTH)[0])
+        found |= counted(ways, corners, lambda *corner: exact(*corner)[0])
     return found
 
 

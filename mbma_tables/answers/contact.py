@@ -20,15 +20,13 @@ from mbma_tables.common.arguments import (
     hinted,
     positive_array,
     require,
-    require_flag,
     spread,
 )
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
 from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import QUANTITIES, AnyModel
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.labels import apply_to_surface
+from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import OPTIONS, THEORIES, default_theory, get_theory, theory_name
 from mbma_tables.theories.mbma import Mbma
@@ -53,8 +51,6 @@ def contact(
     E_star: ArrayLike = 1.0,
     rtol: float = 1e-8,
     outside: str = "raise",
-    derivatives: bool = False,
-    workers: int = 1,
 ) -> Contact:
     """Pressure, real contact area and stiffness of a surface at given separation, pressure or area.
 
@@ -96,11 +92,6 @@ def contact(
         Requested relative error of MBMA's sums, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
     outside : {"raise", "exact", "nan"}
         For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
-    derivatives : bool
-        Whether to compute `pressure_by`, `area_by` and `separation_by` of MBMA, without a hardness, from differentiated
-        sums; `sensitivity` has relative ones of any theory.
-    workers : int
-        Number of threads for MBMA's batches of surfaces and gaps; results are identical for any number.
 
     Returns
     -------
@@ -139,20 +130,13 @@ def contact(
     E_star, units = modulus_and_units(E_star, surface)
     value, stated = units.number(by, value), hardness is not None
     hardness = hardness_in(units, hardness) if stated else np.inf
-    require_flag("derivatives", derivatives)
-    chosen = chosen_theory(
-        surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside, workers=workers
-    )
+    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside)
     # what is no number is refused where it is checked
     known = np.asarray(hardness) if isinstance(hardness, float | np.ndarray) else None
     yields = stated and (known is None or known.dtype.kind != "f" or not known.size or bool((known != np.inf).any()))
-    if derivatives and (yields or not isinstance(chosen, Mbma)):
-        raise InputError("derivatives are of theory 'mbma' without a hardness; sensitivity() has relative ones of any")
     source = Source(chosen, surface, E_star, hardness, units, yields, materials=pair, stated=stated)
     if not any_labelled(surface, value, E_star, hardness):
-        source, fields = _contact(surface, value, E_star, hardness, by, source, derivatives)
-    elif derivatives:
-        raise InputError("derivatives are of plain arrays: use .values of the DataArrays")
+        source, fields = _contact(surface, value, E_star, hardness, by, source)
     else:
         fields = _of_labelled(surface, value, E_star, hardness, by, source)
     fields |= {"theory": chosen.name, "variant": chosen.variant_name, "island_model": chosen.island_model_name}
@@ -167,7 +151,7 @@ def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None,
         raise InputError(f"{', '.join(options)} take one value each, not an array") from None
     named = theory_name(surface, theory, **options) if theory is None else theory
     if isinstance(named, str) and named in THEORIES:
-        if not given and options.get("workers") is not True:
+        if not given:
             return default_theory(named)
         if named == "mbma":
             return Mbma(**options)
@@ -188,7 +172,7 @@ def one_known(**given: Any) -> tuple[str, Any]:
 
 
 def _contact(
-    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source, derivatives: bool
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source
 ) -> tuple[Source, dict[str, Any]]:
     """Fields of `contact` of plain arrays, and the source with the theory's answer."""
     asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
@@ -202,10 +186,9 @@ def _contact(
 
         theory = with_hardness(theory, cap, modulus)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
-    if derivatives and by in QUANTITIES:
-        require(by, value, value > 0, "positive where derivatives are requested: the separation has no slope there")
     if isinstance(theory, Mbma):
-        fields = theory.totals(surface, places["separation"], E_star, derivatives)._asdict() | places
+        found = theory.totals(surface, places["separation"], E_star)
+        fields = dict(zip((*QUANTITIES, "error", "islands"), found[:4], strict=True)) | places
     else:
         u = np.asarray(places["mean_separation"])
         loaded = theory.loaded(surface, u, lighter) if source.yields else None
@@ -213,23 +196,7 @@ def _contact(
         source = dataclasses.replace(source, answer=found, loaded=loaded)
         fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "islands": None} | places
         fields["error"] = spread(found.error, np.shape(found.pressure))[()]
-    if derivatives and by in QUANTITIES:
-        fields |= _at_fixed(by, fields, E_star)
     return source, fields
-
-
-def _at_fixed(held: str, fields: dict[str, Any], E_star: Any) -> dict[str, Any]:
-    """Derivatives at fixed pressure or area: of the separation, and of the other quantity."""
-    other = "area" if held == "pressure" else "pressure"
-    own, others = fields[f"{held}_by"], fields[f"{other}_by"]
-    steep, follows = own["separation"], others["separation"]
-    names = [name for name in own if name != "separation"]
-    gap = {held: 1 / steep} | {name: -own[name] / steep for name in names}
-    free = {held: follows / steep} | {name: others[name] + follows * gap[name] for name in names}
-    if held == "pressure":
-        gap["E_star"] = -(fields["pressure"] / E_star) / steep
-        free["E_star"] = follows * gap["E_star"]
-    return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
 
 
 def _places(
@@ -286,7 +253,7 @@ def _of_labelled(
     names = (*(("separation", "mean_separation") if by in QUANTITIES else ()), *QUANTITIES, "error")
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
-        _, found = _contact(block, asked, modulus, cap, by, source, False)
+        _, found = _contact(block, asked, modulus, cap, by, source)
         return tuple(found[name] for name in names)
 
     outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star, "hardness": hardness}, len(names))

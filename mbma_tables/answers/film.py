@@ -9,14 +9,14 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.answers.contact import contact
-from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.answers.leakage import shipped_flow
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, require
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import unit_of
 from mbma_tables.laws.calibrated import TESTED_AREA
-from mbma_tables.laws.film import LAY, OPEN, SHEAR, WIDEST_LAY, factors
+from mbma_tables.laws.lay import LAY, OPEN, SHEAR, WIDEST_LAY, factors
 from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.materials import Metal, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -91,7 +91,7 @@ def flow_factors(
     """Pressure and shear flow factors and asperity pressure at mean gaps, for average Reynolds equations.
 
     Before contact the factors are those of an effective medium of Gaussian gaps, in contact of that of the leakage law
-    (`mbma_tables.laws.film`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
+    (`mbma_tables.laws.lay`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
 
     With ``theory="simulated"`` they are those of the surface's own map: Reynolds' equation on its gaps, which boundary
     elements deform in contact, at knots of u (half a minute for 256 x 256 points).
@@ -126,14 +126,8 @@ def flow_factors(
     >>> print(film.phi_x.round(2), film.phi_y.round(2), film.shear_y.round(2))
     [1.05 1.06 1.02] [0.5 0.7 0.9] [0.84 0.68 0.37]
     """
-    found = contact(
-        surface,
-        mean_separation=mean_separation,
-        theory="calibrated" if theory is None else theory,
-        E_star=E_star,
-        hardness=hardness,
-        materials=materials,
-    )
+    bodies = {"E_star": E_star, "hardness": hardness, "materials": materials}
+    found = contact(surface, mean_separation=mean_separation, theory=theory or "calibrated", **bodies)  # type: ignore[arg-type]
     if surface.labelled or surface.shape != ():
         raise InputError("flow factors need one surface, not a batch")
     u, h_rms, own = np.ravel(found.mean_separation), float(surface.h_rms), found.theory == "simulated"
@@ -141,9 +135,9 @@ def flow_factors(
     require("mean_separation", u, (u >= low * h_rms) & (u <= high * h_rms), f"from {low:g} to {high:g} h_rms")
     gamma = _peklenik(surface) if peklenik is None else number_in("peklenik", peklenik, 1 / WIDEST_LAY, WIDEST_LAY)
     area, leak = np.ravel(found.area), found.leakage
-    if own and peklenik is not None:
-        raise InputError("peklenik is not of a map that is simulated: leave it out")
     if own:
+        if peklenik is not None:
+            raise InputError("peklenik is not of a map that is simulated: leave it out")
         (phi_x, phi_y), shear = _simulated(found, u)
         of_lay, far = 0.0, False
     else:
@@ -159,22 +153,11 @@ def flow_factors(
     reasons |= {f"the lay is longer than {WIDEST_LAY:g} to 1, beyond simulated flow": np.full(u.shape, far)}
     reasons |= {f"the model uncertainty of ln phi is above {USEFUL:g}": scatter > USEFUL}
     units = {name: found.units[name] for name in ("mean_separation", "pressure")}
-    return FlowFactors(
-        reasons={text: mask for text, mask in reasons.items() if np.any(mask)},
-        peklenik=float(gamma),
-        surface=surface,
-        units=units | dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units)),
-        mean_separation=u,
-        phi_x=phi_x,
-        phi_y=phi_y,
-        shear_x=shear[0],
-        shear_y=shear[1],
-        pressure=np.ravel(found.pressure),
-        area=area,
-        scatter=scatter,
-        shear_scatter=np.full(u.shape, OWN_SHEAR if own else SHEAR),
-        valid=~np.logical_or.reduce(list(reasons.values())),
-    )
+    units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units))
+    kept = {text: mask for text, mask in reasons.items() if np.any(mask)}
+    shear_scatter, valid = np.full(u.shape, OWN_SHEAR if own else SHEAR), ~np.logical_or.reduce(list(reasons.values()))
+    flows, asperities = (u, phi_x, phi_y, shear[0], shear[1]), (np.ravel(found.pressure), area)
+    return FlowFactors(kept, float(gamma), surface, units, *flows, *asperities, scatter, shear_scatter, valid)
 
 
 def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,25 +1,39 @@
-"""Leakage of a contact: its flow coefficient with uncertainty, and leakage rates of liquids and gases."""
+"""Leakage of a contact: its flow coefficient with uncertainty, and leakage rates of liquids.
+
+The contact factor R of self-affine surfaces is from a table of ln R of `laws.effective_medium` over Hurst exponent,
+ln zeta_1 and ln A/(Ac - A). Below the smallest tabulated contact ln R is proportional to A^m, as the obstruction is;
+above the largest R is a power of Ac - A.
+"""
 
 import dataclasses
 import functools
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.leakage_table import flow_of_spectrum, shipped_flow
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, positive_array, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.units import unit_of
-from mbma_tables.laws.calibrated import self_affine_law, spectrum_of
-from mbma_tables.laws.effective_medium import LARGEST_AREA
-from mbma_tables.surfaces.labels import agree
+from mbma_tables.core import core, in_blocks
+from mbma_tables.laws.calibrated import Spectrum, self_affine_law, spectrum_of
+from mbma_tables.laws.effective_medium import LARGEST_AREA, FlowConstants, contact_factor, wide_gap
+from mbma_tables.surfaces.any_surface import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, known_at, nodes_of, shipped_part
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
 
+GROUP = "leakage"
+AXES = ("hurst", "log_zeta_1", "log_odds")
+COVERED = np.array([[0.1, 1.0], [math.log(3.0), math.log(1e5)]])  # H and ln zeta_1, where the error was measured
+FEW = 8192  # entries per block, so that a block fits into the processor's cache
+LEAST = 1e-300  # smaller contact fractions count as zero
+OWN_NODES = 64  # contact fractions at which a spectrum's own factor is found
+KEPT = 64  # spectra whose factors are kept
 # standard deviations of ln k of maps by their isotropic spectrum, which come on top, of maps that are valid for the
 # calibrated law and of others; at these contacts of the data set's group machined
 MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
@@ -159,22 +173,17 @@ class Leakage(Displayed):
         >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.1e} um^2/s"
         '3.0e+02 um^2/s'
         """
-        eta, drop, length = self._numbers(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
-        return self.K * (drop / (12 * eta * length))
-
-    def _numbers(self, **given: Any) -> list[FloatArray]:
-        """Positive numbers in the units of surface and modulus."""
-        found: dict[str, Any] = {}
-        for name, value in given.items():
+        found: dict[str, Any] = {"viscosity": viscosity, "pressure_drop": pressure_drop, "width": width}
+        for name, value in found.items():
             if name == "viscosity" and isinstance(value, str):
                 value, stress, seconds = value.strip().rpartition(" ")
                 if seconds != "s" or not stress:
-                    raise InputError(f"viscosity = {given[name]!r} must be a stress times seconds, such as '1e-3 Pa s'")
+                    raise InputError(f"viscosity = {viscosity!r} must be a stress times seconds, such as '1e-3 Pa s'")
             number = self._contact._source.units.number(name, value)
             array = positive_array(name, number)
             found[name] = number if is_labelled(number) else array
         agree(K=self.K, **found)
-        return list(found.values())
+        return self.K * (found["pressure_drop"] / (12 * found["viscosity"] * found["width"]))
 
 
 def leakage_of(contact: Any) -> Leakage:
@@ -215,23 +224,6 @@ def along(direction: ArrayLike | str, x: Any, y: Any, xy: Any) -> Any:
     return x * cos**2 + y * sin**2 + 2 * xy * sin * cos
 
 
-def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
-    """K/h_rms^3 of mean separations u [length] and A/A0; 0 where blocked."""
-    (u, contact), shape = rows(np.asarray(mean_separation) / np.asarray(surface.h_rms), area)
-    if isinstance(surface, MeasuredSurface):
-        return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)
-    table = shipped_flow()
-    given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
-    number = np.arange(given.shape[1]).reshape(surface.shape)
-    owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
-    out = table.flow(given, owner, u, contact)
-    for row in np.flatnonzero(~table.covers(*given)):
-        mine = owner == row
-        law = self_affine_law(float(given[0, row]), float(np.exp(given[1, row])), None)
-        out[mine] = flow_of_spectrum(law.spectrum, u[mine], contact[mine])
-    return out.reshape(shape)
-
-
 def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray) -> dict[str, Any]:
     """Reasons why the flow is not valid, in addition to those for the contact."""
     simulated, everywhere = _simulated(theory), np.ones(np.shape(area), bool)
@@ -249,3 +241,104 @@ def reasons_against(theory: Theory, surface: Any, u: FloatArray, E_star: Any, ar
     if isinstance(theory.elastic, Mbma):
         found["leakage: the mean separation of 'mbma' is wrong by factors"] = everywhere
     return found
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FlowTable(SurfaceSpline):
+    """The group `leakage` of the shipped file: ln R."""
+
+    constants: FlowConstants
+    error: float  # largest error of ln R against the medium itself, at held-out surfaces
+    scatter: dict[str, FloatArray]  # by theory: root mean squares of ln(k/simulation)
+    contact: FloatArray  # at these contact fractions
+
+    def flow(self, surfaces: FloatArray, owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
+        """k of mean gaps [h_rms] and contact fractions; 0 where blocked. Columns of `surfaces`: H, ln zeta_1."""
+        given = *self.core_table, *surfaces, None, None, self.shared(surfaces, u.size)
+        return _flow(given, owner, u, area)
+
+    def standard_deviation(self, theory: str, area: FloatArray) -> FloatArray:
+        """Root mean square of ln(k/simulation) at contact fractions; NaN where not known or blocked."""
+        row = self.scatter.get(theory)
+        if row is None or not np.isfinite(row).any():
+            return np.full(np.shape(area), np.nan)
+        return np.where(np.asarray(area) < self.constants.threshold, known_at(self.contact, row, area), np.nan)
+
+
+@functools.cache
+def shipped_flow() -> FlowTable:
+    """The shipped table, read once."""
+    values, facts = shipped_part(GROUP)
+    constants = FlowConstants(*(float(facts[f"flow_{f.name}"]) for f in dataclasses.fields(FlowConstants)))
+    return FlowTable(
+        *nodes_of([values[name] for name in AXES]),
+        COVERED,
+        values["spline"],
+        (constants.threshold, constants.obstruction, 0.0),
+        constants,
+        float(facts["largest_error_log_factor"]),
+        dict(zip(facts["theories"].split(), values["stated_scatter"], strict=True)),
+        values["contact"],
+    )
+
+
+@np.errstate(all="ignore")
+def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
+    """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
+    numbers, found = given[1], np.empty(u.shape)
+    threshold, obstruction, first = numbers[10], numbers[11], numbers[2]
+    last = first + given[2][2] / numbers[5]
+
+    def fill(k: slice) -> None:
+        # contact fractions of Greenwood and Williamson exceed 1
+        a = area[k]
+        odds = np.log(np.maximum(a, LEAST) / np.maximum(threshold - a, LEAST))
+        value, slope = np.empty((2, odds.size))
+        core.spline_values(*given, owner[k], odds, value, slope)
+        unknown = np.isnan(u[k]) | np.isnan(value)
+        value += slope * np.maximum(odds - last, 0.0)
+        log_factor = np.minimum(value * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0)
+        wide = u[k] * u[k] * u[k] * wide_gap(u[k]) * np.exp(log_factor)
+        found[k] = np.where(unknown, np.nan, np.where(a < threshold, wide, 0.0))
+
+    in_blocks(fill, u.size, FEW)
+    return found
+
+
+@functools.lru_cache(KEPT)
+def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
+    """ln R over the table's odds of one spectrum, as `core.flow` takes it."""
+    from scipy.interpolate import PchipInterpolator
+
+    table = shipped_flow()
+    odds, step = np.linspace(table.first[2], table.last, OWN_NODES, retstep=True)
+    log_factor = contact_factor(spectrum, table.constants.threshold / (1 + np.exp(-odds)), table.constants)
+    cubics = PchipInterpolator(odds, np.minimum.accumulate(np.minimum(log_factor, 0.0))).c[::-1]
+    pieces = np.zeros((OWN_NODES - 1, 6))
+    pieces[:, :4] = (cubics * step ** np.arange(4)[:, None]).T
+    numbers = table.core_table[1].copy()
+    numbers[5] = 1 / step
+    anything = np.zeros(1)
+    return None, numbers, np.array([1, 1, OWN_NODES - 1]), anything, anything, None, None, pieces
+
+
+def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> FloatArray:
+    """k of mean gaps [h_rms] and contact fractions of one spectrum; 0 where blocked."""
+    return _flow(own_factor(spectrum), np.zeros(u.size, np.int64), u, area)
+
+
+def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
+    """K/h_rms^3 of mean separations u [length] and A/A0; 0 where blocked."""
+    (u, contact), shape = rows(np.asarray(mean_separation) / np.asarray(surface.h_rms), area)
+    if isinstance(surface, MeasuredSurface):
+        return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)
+    table = shipped_flow()
+    given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
+    number = np.arange(given.shape[1]).reshape(surface.shape)
+    owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
+    out = table.flow(given, owner, u, contact)
+    for row in np.flatnonzero(~table.covers(*given)):
+        mine = owner == row
+        law = self_affine_law(float(given[0, row]), float(np.exp(given[1, row])), None)
+        out[mine] = flow_of_spectrum(law.spectrum, u[mine], contact[mine])
+    return out.reshape(shape)

@@ -11,16 +11,16 @@ import numpy as np
 
 from mbma_tables.answers.interface import Interface
 from mbma_tables.answers.source import MEANINGS, Source, named, reasons_against
-from mbma_tables.common.arguments import Numbers, any_labelled
-from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled
+from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
+from mbma_tables.common.plots import Curve, draw_compression, new_figure, pressure_label, theory_label
+from mbma_tables.common.progress import shown as progress
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.theories.protocol import TheoryAnswer
 
 if TYPE_CHECKING:
-    from mbma_tables.answers.contact_map import ContactMap
     from mbma_tables.answers.leakage import Leakage
 
 OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
@@ -40,11 +40,7 @@ def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Contact(Interface, Displayed):
-    """Result of a contact: pressure, area and derived quantities; arrays of the broadcast shape, or DataArrays.
-
-    If pressure or area was given, that is held in derivatives in place of the separation, whose own are
-    `separation_by`, and "pressure" or "area" stands for "separation".
-    """
+    """Result of a contact: pressure, area and derived quantities; arrays of the broadcast shape, or DataArrays."""
 
     separation: Numbers  #: d, between the rigid plane and the mid-plane [length]
     mean_separation: Numbers  #: u = (h_max + d)/2 (50) [length]
@@ -57,10 +53,6 @@ class Contact(Interface, Displayed):
     variant: str
     island_model: str
     islands: int | None  #: number of islands evaluated; None if computed by dask or if the theory has none
-    #: partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held
-    pressure_by: dict[str, Numbers] | None = None
-    area_by: dict[str, Numbers] | None = None
-    separation_by: dict[str, Numbers] | None = None
     _source: Source = dataclasses.field(repr=False, kw_only=True)
 
     @property
@@ -143,7 +135,7 @@ class Contact(Interface, Displayed):
         Raises
         ------
         InputError
-            For several contacts, one with a hardness, and surfaces without a map.
+            For several contacts, and surfaces without a map.
 
         Examples
         --------
@@ -158,9 +150,27 @@ class Contact(Interface, Displayed):
         >>> f"{float(data.pressure.mean()):.3f} {data.pressure.units} on {float(data.contact.mean()):.0%} of the points"
         '0.010 GPa on 45% of the points'
         """
-        from mbma_tables.answers.contact_map import contact_map
+        from mbma_tables.laws import boundary_elements, pressing
+        from mbma_tables.theories.own_map import map_of, sides
 
-        return contact_map(self)
+        source, pressure = self._source, np.asarray(self.pressure, float)
+        if pressure.ndim or np.ndim(source.E_star) or np.ndim(source.hardness):
+            raise InputError("a map is of one contact: give one pressure, one modulus and one hardness")
+        surface: Any = source.surface
+        whole = map_of(surface)
+        modulus, force = float(source.E_star), float(pressure) / float(source.E_star)
+        if not 0 < force < np.inf:
+            raise InputError(f"a map needs a pressure above 0, got {float(pressure):g}")
+        values, sizes = whole.heights - whole.heights.mean(), sides(whole)
+        # of rms gradient one, heights of order one
+        scale, gradient = float(np.abs(values).max()), float(surface.bearing.gradient)
+        stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
+        cap = float(source.hardness) / modulus / gradient
+        engine = boundary_elements.Contact(values / scale, stretched, pressing.TOLERANCE, cap, not whole.periodic)
+        with progress("boundary elements"):
+            engine.press(force / gradient)
+        units = {"pressure": self.units["pressure"]} | dict.fromkeys(("gap", "heights"), source.units.length or "1")
+        return ContactMap(whole.steps, units, modulus * gradient * engine.traction, scale * engine.gap, values)
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
@@ -274,3 +284,47 @@ class Contact(Interface, Displayed):
     def reasons(self) -> dict[str, Any]:
         """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
         return self._source.reasons(*self._against)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ContactMap(Displayed):
+    """Contact of one map at one load, from `Contact.map`; arrays of shape (nx, ny), the first axis is x."""
+
+    steps: tuple[float, ...]  #: sampling steps along x and y [length]
+    units: dict[str, str]
+    pressure: FloatArray = quantity("contact pressure; zero where the gap is open [stress]")
+    gap: FloatArray = quantity("gap to the rigid plane; zero in contact [length]")
+    heights: FloatArray = quantity("height above the mean [length]")
+    _dims = ("x", "y")
+
+    contact = property(lambda self: self.pressure > 0, doc="True where the map is in contact.")
+
+    def _facts(self) -> dict[str, str]:
+        return {
+            "points": " x ".join(map(str, self.pressure.shape)),
+            "pressure": shown(self.pressure.mean(), self.units["pressure"]),
+            "contact": f"{self.contact.mean():.4g} of the points",
+            "largest_pressure": shown(self.pressure.max(), self.units["pressure"]),
+            "mean_gap": shown(self.gap.mean(), self.units["gap"]),
+        }
+
+    def _variables(self) -> dict[str, Variable]:
+        axes = zip("xy", self.pressure.shape, self.steps, strict=True)
+        places = {n: Variable(np.arange(count) * step, self.units["gap"], "", (n,)) for n, count, step in axes}
+        touching = {"contact": Variable(self.contact, "1", "whether the map touches", self._dims)}
+        return {**places, **super()._variables(), **touching}
+
+    def _figure(self) -> Any:
+        figure = new_figure(10, 4.2)
+        length, stress = {"1": "length"}.get(self.units["gap"], self.units["gap"]), self.units["pressure"]
+        sides = [count * step for count, step in zip(self.pressure.shape, self.steps, strict=True)]
+        fields = {
+            pressure_label(stress): (np.where(self.contact, self.pressure, np.nan), "magma_r"),
+            f"gap [{length}]": (np.where(self.contact, np.nan, self.gap), "viridis"),
+        }
+        for axes, (label, (values, colours)) in zip(figure.subplots(1, 2), fields.items(), strict=True):
+            picture = axes.imshow(values.T, origin="lower", extent=(0, sides[0], 0, sides[1]), cmap=colours)
+            axes.set_xlabel(f"x [{length}]")
+            axes.set_ylabel(f"y [{length}]")
+            figure.colorbar(picture, ax=axes, label=label, shrink=0.8)
+        return figure

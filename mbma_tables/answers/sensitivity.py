@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,6 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import OF_MAPS, theory_name
 from mbma_tables.theories.calibrated import Calibrated
-from mbma_tables.theories.numerical import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # step of the logarithm of a parameter
@@ -112,6 +111,8 @@ def sensitivity(
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.68'
     """
+    from scipy.differentiate import jacobian
+
     named = theory_name(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
     # a simulation is of one surface only
     named = "calibrated" if theory is None and named in OF_MAPS else named
@@ -127,38 +128,40 @@ def sensitivity(
     same = "mean_separation" if by == "separation" else by
     wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
     varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
-    places, asked = {name: j for j, name in enumerate(varied)}, cast(Callable[..., Any], contact)
 
     @np.errstate(all="ignore")
-    def logarithms(k: Any, x: FloatArray) -> FloatArray:
-        """Of the results at places of x, at each of which the logarithm of the parameter number k is moved by x."""
-        given = {n: number * np.exp(np.where(k == places.get(n), x, 0.0)) for n, number in numbers.items()}
+    def logarithms(x: FloatArray) -> FloatArray:
+        """Of the results, as rows, where the logarithms of the varied parameters are moved by rows of x."""
+        moved, back = np.unique(x.reshape(len(varied), -1), axis=1, return_inverse=True)
+        given = {name: np.full(moved.shape[1], number) for name, number in numbers.items()}
+        given |= {name: numbers[name] * np.exp(row) for name, row in zip(varied, moved, strict=True)}
         # there are no batches of spectra
-        each = [given] if batches else [{n: float(v[i]) for n, v in given.items()} for i in range(x.size)]
+        each: Any = [given] if batches else [{n: row[k] for n, row in given.items()} for k in range(moved.shape[1])]
         rows = []
         for own in each:
             modulus, cap, held = own.pop("E_star"), own.pop("hardness", np.inf), {by: own.pop(by)}
-            found: Any = asked(make(**own), **held, E_star=modulus, hardness=cap, theory=chosen)
+            found: Any = contact(make(**own), **held, E_star=modulus, hardness=cap, theory=chosen)
             values = {"conductance": found.unloading_stiffness / modulus}
             rows.append(np.log([values[name] if name in values else getattr(found, name) for name in wanted]))
-        return np.asarray(rows[0] if batches else np.transpose(rows))
+        table = np.asarray(rows[0] if batches else np.transpose(rows))
+        return table[:, back.ravel()].reshape(-1, *x.shape[1:])
 
-    here = np.exp(logarithms(-1, np.zeros(1)))[:, 0]
+    here = np.exp(logarithms(np.zeros((len(varied), 1))))[:, 0]
     if not (here > 0).all():
         raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
     # cut-offs only remove wavelengths; other parameters may be near a limit
     ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": numbers.get("hardness", np.inf)}
     ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
     ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
-    sides, shape = np.array([ways.get(name, 0.0) for name in varied]), (len(wanted), len(varied))
+    sides = np.array([ways.get(name, 0.0) for name in varied])
+    how = {"order": 4, "maxiter": 3 if batches else 2, "initial_step": STEP, "step_direction": sides}
     with np.errstate(all="ignore"):
-        steps = np.full(len(varied), STEP)
-        slopes, errors = differences(logarithms, steps, sides, np.ones(shape), 3 if batches else 1)
+        steep = jacobian(logarithms, np.zeros(len(varied)), **how)
         # a discontinuous result has no slope
-        slopes = np.where(errors <= MAX_ERROR * np.maximum(1, np.abs(slopes)), slopes, np.nan)
+        slopes = np.where(steep.error <= MAX_ERROR * np.maximum(1, np.abs(steep.df)), steep.df, np.nan)
     by_name, off = (
         {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.T.tolist(), strict=True)}
-        for table in (slopes, errors)
+        for table in (slopes, steep.error)
     )
     answers = dict(zip(wanted, here.tolist(), strict=True))
     return Sensitivity(by, {name: numbers[name] for name in varied}, answers, by_name, off, units)

@@ -5,7 +5,6 @@ need scipy are imported by the commands that use them, so that ``--help`` is fas
 """
 
 import functools
-import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -14,7 +13,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import batch, commands, export, scene, tables
+from mbma_tables.cli import commands, export, scene, tables
 from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
@@ -28,34 +27,8 @@ INTERRUPTED = 130  # as shells report Ctrl-C
 SAID = {
     "surface.fit()": "--model self-affine",
     "outside='exact'": "--island-model exact",
-    "ask method='full', or ": "give ",
     "give the surface its unit": "give --length-unit",
-    "force must be": "--pressure must be",
-    "k1 must be": "--conductivity must be",
-    "k2 must be": "--conductivity must be",
 }
-
-
-def _in_options(text: str, command: click.Command, words: list[str]) -> str:
-    """A message of the library with its argument names, and English words at its begin, as options of a command."""
-    # messages on a file keep the file's own names
-    if "--" in text or text.startswith(tuple(word + end for word in words for end in ":,")):
-        return text
-    for python, shell in SAID.items():
-        text = text.replace(python, shell)
-    options = {o.name: max(o.opts, key=len) for o in command.params if isinstance(o, click.Option) and o.name}
-    names = "|".join(options) or "^$"
-    signs = "|".join(name for name in options if re.search(r"[A-Z_\d]|^d[xy]$|^rtol$", name)) or "^$"
-    text = re.sub(rf"\b({names})=(['\w.-]+)", lambda m: f"{options[m[1]]} {m[2].strip(chr(39))}", text)
-    # not in formulas, nor where a number was found
-    outside = rf"(?<![\w/.*^'-])(?<![<>=] )({signs})(?![\w/(^*'.])(?! ?[<>]| ?=(?! '))"
-    for place in (outside, rf"^({names})(?= (?:must|has|is)\b|: )"):
-        text = re.sub(place, lambda m: options[m[1]], text)
-    # in lists with an option
-    for _ in options:
-        text = re.sub(rf"(--[\w-]+(?:,|,? and|,? or) )({names})\b", lambda m: m[1] + options[m[2]], text)
-        text = re.sub(rf"(?<![\w-])({names})(?=,? (?:and |or )?--)", lambda m: options[m[1]], text)
-    return text
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -82,8 +55,8 @@ class Program(click.Group):
             said = " ".join(text.split())
             if isinstance(fault, click.UsageError) and fault.ctx is not None:
                 said += f"\n(see '{fault.ctx.command_path} --help')"
-            if isinstance(fault, MbmaError):
-                said = _in_options(said, next((self.commands[w] for w in words if w in self.commands), self), words)
+            for python, shell in SAID.items():
+                said = said.replace(python, shell)
             click.echo(f"mbma: {said}", err=True)
             sys.exit(BAD_INPUT)
         sys.exit(code if isinstance(code, int) else 0)
@@ -109,8 +82,8 @@ def main(context: click.Context) -> None:
 
 
 for command in (
-    *(commands.contact_command, commands.curve_command, batch.batch_command, commands.island_command),
-    *(commands.fit_command, batch.sensitivity_command, tables.tables_group),
+    *(commands.contact_command, commands.curve_command, commands.sensitivity_command, commands.island_command),
+    *(commands.fit_command, tables.tables_group),
     *(tables.cache_command, scene.joint_command, scene.plan_command, scene.run_command, commands.cost_command),
     *(export.export_command, export.explore_command),
 ):

@@ -1,4 +1,4 @@
-"""The commands `mbma contact`, `curve`, `island`, `fit` and `cost`."""
+"""The commands `mbma contact`, `curve`, `sensitivity`, `island`, `fit` and `cost`."""
 
 from __future__ import annotations
 
@@ -149,6 +149,31 @@ def curve_command(
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 
 
+@click.command("sensitivity", short_help="Sensitivity of results to each parameter.")
+@options.load_options(options.quantity_option)
+@options.specimen_options
+@options.theory_options
+@options.json_option("a table")
+def sensitivity_command(loads: dict[str, Any], specimen: Specimen, model: options.Model, as_json: bool) -> None:
+    """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
+
+    Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
+    and lengths, h_max, cut-offs and the exponent of an extrapolation.
+
+    Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
+    """
+    from mbma_tables.answers.sensitivity import sensitivity
+
+    model = model.of(specimen.surface)
+    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, **model._asdict())
+    units = {name: shown_unit(name, found.units) for name in (*found.parameters, *found.answers)}
+    if as_json:
+        echo(to_json(vars(found) | {"theory": model.theory, "units": units}))
+        return
+    here = ", ".join(f"{name} {value:.6g} {units[name]}".removesuffix(" -") for name, value in found.answers.items())
+    echo(f"mbma sensitivity: {specimen.title}, theory {model.theory}\nhere: {here}\n\n{found}")
+
+
 @click.command("island", short_help="Contact islands at given approaches.")
 @options.numbers_option("--delta", help="Approach z_max - d of an island [length], positive; may be repeated.")
 @options.specimen_options
@@ -242,7 +267,7 @@ def cost_command(distance: bool, as_json: bool) -> None:
 
     Example: mbma cost --distance
     """
-    from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
+    from mbma_tables.scenes.plan import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
     rows: Any = shipped_distances() if distance else [row for row in costs.rows if row.island_model != UNIT]

@@ -87,8 +87,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law), subroutines of solvers
-    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of FMI 2 (fmu); c, fortran and javascript are
-    the whole model as code, of the paper's variants reported and printed.
+    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of FMI 2 (fmu); c is the whole model as code, of
+    the paper's variants reported and printed.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
@@ -101,7 +101,7 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     if "direction" in given and "leakage" not in given:
         raise InputError("--direction is of leakage: add --leakage or leave it out")
     if code:
-        _export_code(target, out, values["variant"], "check" in given)
+        _export_code(out, values["variant"], "check" in given)
         return
     specimen: Specimen | None = given.pop("specimen", None)
     if specimen is None:
@@ -156,13 +156,13 @@ def _rows(target: Target, asked: dict[str, Any]) -> LawTable:
     return law
 
 
-def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
-    from mbma_tables.export import code
+def _export_code(folder: Path, variant: str, check: bool) -> None:
+    from mbma_tables.export import c_code
 
-    for path in code.write_code(target, folder, variant):
+    for path in c_code.write_code(folder, variant):
         echo(path)
     if check:
-        found = code.check(target, folder)
+        found = c_code.check(folder)
         for kind, largest in found.largest.items():
             echo(f"{kind}: {found.points[kind]} points, largest relative difference {largest:.1e}")
         if found.failed:

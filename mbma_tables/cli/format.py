@@ -19,7 +19,6 @@ from mbma_tables.cli.options import Model, Output
 from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units, unit_of
-from mbma_tables.export.text import csv_cell
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.roughness import ASSUMED
@@ -78,8 +77,7 @@ class Report:
             content.write(f"# {line}\n")
         rows = csv.writer(content, lineterminator="\n")
         rows.writerow(self.columns)
-        for row in zip(*self.columns.values(), strict=True):
-            rows.writerow(csv_cell(cell) if isinstance(cell, str) else cell for cell in row)
+        rows.writerows(zip(*self.columns.values(), strict=True))
         return content.getvalue()
 
     def write(self, output: Output, plot: Path | None = None, picture: bytes = b"") -> None:

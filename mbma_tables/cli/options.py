@@ -18,8 +18,8 @@ from mbma_tables.models import ISLAND_MODELS
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.roughness import ROUGHNESS
+from mbma_tables.surfaces.self_affine import CASES
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import OF_MAPS, THEORIES
 
@@ -128,24 +128,17 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
 def _specimen(given: Mapping[str, Any]) -> Specimen:
     """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
     length, stress = given["length_unit"], given["stress_unit"]
-    numbers = {key: given[key] for key in specimens.NUMBERS if given[key] is not None}
-    used = [f"--{key}" for key in ("surface", "file", "map") if given[key] is not None] + ["numbers"] * bool(numbers)
-    if len(used) != 1:
-        raise InputError(
-            "one surface is needed: --surface NAME, --file TOML, --map MAP, --hurst --q0 --q1 (or --zeta-1) "
-            f"--h-rms --h-max, or --hurst --m0 --m2 --m4 --h-max; got {' and '.join(used) or 'none'}"
-        )
-    treatment = _given({name: given[name] for name in (*specimens.MAP_OPTIONS, "model")})
-    if treatment and given["map"] is None:
-        raise InputError(f"--{next(iter(treatment)).replace('_', '-')} is about a measured map: it goes with --map")
+    known = (*specimens.NUMBERS, *specimens.MAP_OPTIONS, "map", "model")
+    surface = _given({"name": given["surface"]} | {name: given[name] for name in known})
+    material = _given({name: given[name] for name in specimens.MATERIAL})
+    if (given["file"] is None) == (not surface):
+        got = ", ".join(["file"] * (given["file"] is not None) + list(surface)) or "none"
+        raise InputError(f"one surface is needed: --surface NAME, --file TOML, --map MAP, or its numbers; got {got}")
     if given["file"] is not None:
         specimen = specimens.read_specimen(given["file"])
-    elif given["map"] is not None:
-        specimen = specimens.from_map(given["map"], treatment | {"unit": length})
     else:
-        named = given["surface"]
-        specimen = specimens.from_numbers(numbers, length) if named is None else specimens.from_name(named)
-    material = {key: given[key] for key in specimens.MATERIAL if given[key] is not None}
+        tables = {"surface": surface | {"length_unit": length}}
+        specimen = specimens.from_tables(tables, Path(), "surface given by numbers")
     if material:
         modulus, unit = specimens.effective_modulus_of(material, stress)
         specimen = dataclasses.replace(specimen, E_star=modulus, stress_unit=unit or specimen.stress_unit)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -14,10 +13,10 @@ from mbma_tables.cli.format import Report, to_json
 from mbma_tables.cli.options import Output, check_plot, json_option, numbers_option, output_options, plot_option
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file, written_bytes
-from mbma_tables.common.progress import doing, echo
+from mbma_tables.common.progress import echo
 
 if TYPE_CHECKING:
-    import xarray
+    pass
 
 SUFFIXES = (".nc", ".csv")
 toml_file = click.argument("file", type=click.Path(path_type=Path))
@@ -52,9 +51,8 @@ def plan_command(file: Path, as_json: bool) -> None:
     metavar="FILE",
     help="Write it to result.nc or result.csv; - for CSV to stdout.",
 )
-@plot_option
 @json_option("a table")
-def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) -> None:
+def run_command(file: Path, out: Path | None, as_json: bool) -> None:
     """Compute the scene in FILE, and nothing that it does not ask for.
 
     CSV and the table hold what is known at gaps; netCDF and JSON hold everything.
@@ -63,15 +61,9 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
     """
     if out is not None and str(out) != "-" and out.suffix not in SUFFIXES:
         raise InputError(f"--out must end with one of {', '.join(SUFFIXES)}, got {out}")
-    check_plot(plot, out)
     from mbma_tables.scenes.scene import Scene
 
-    scene = Scene.from_toml(file)
-    if plot is not None:
-        scene = dataclasses.replace(scene, effects=(*scene.effects, "pressure", "area"))  # what is drawn
-    found = scene.run(lambda step, done, total: doing(f"{step}: {done} of {total}"))
-    if plot is not None:
-        write_file(plot, _picture(found, plot.suffix[1:]))
+    found = Scene.from_toml(file).run()
     # the quantities at gaps, or at islands if there are none at gaps
     dims = [field.dims for field in found.variables.values()]
     lines = next((lines for lines in (("gap",), ("island", "node")) if lines in dims), ())
@@ -89,27 +81,9 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
             if netcdf else report.to_csv().encode(),
         )  # fmt: skip
     if as_json:
-        variables = {
-            str(name): {"dims": list(field.dims), "units": field.attrs["units"], "values": field.values.tolist()}
-            for name, field in found.variables.items()
-        }
-        echo(to_json({"attributes": facts, "variables": variables}))
+        echo(to_json(found.to_dict()))
     elif out is None:
         echo(report.to_table(), nl=False)
-
-
-def _picture(found: xarray.Dataset, kind: str) -> bytes:
-    from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label, to_picture
-
-    gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
-    variant = found.attrs["variant"]
-    label = theory_label(found.attrs["theory"]) + (f", {variant}" if variant else "")
-    bands = [found[name].values if name in found else None for name in ("scatter", "area_scatter")]
-    curves: list[Any] = [Curve(label, gap, found["pressure"].values, found["area"].values, *bands)]
-    unit = found["pressure"].attrs["units"]
-    hardness = f", hardness {found.attrs['hardness']:.4g} {unit}" if "hardness" in found.attrs else ""
-    drawn = draw_compression(curves, found.attrs["title"] + hardness, pressure_label(unit))
-    return to_picture(drawn, kind)
 
 
 @click.command("joint", short_help="Stiffness, area, gap and conductance of two metal parts.")

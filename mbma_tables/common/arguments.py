@@ -51,6 +51,13 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
 
 
+def require_name(kind: str, name: Any, known: Iterable[str]) -> None:
+    """Reject a name that is not known, with the nearest one."""
+    names = list(known)
+    if name not in names:
+        raise InputError(f"no {kind} is named {name!r}; {nearest(str(name), names)}")
+
+
 def hinted(function: Callable[P, R]) -> Callable[P, R]:
     """Decorator: the error for an unknown argument names the nearest known one, or the meaning of a symbol."""
     parameters = inspect.signature(function).parameters

@@ -123,8 +123,8 @@ static mbma_spline spline_of(const argument *a) {
     FN(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3), \
        mbma_phi(N(0), P(0), P(1), CELLS(2), (int)I(5), P(6), P(7))) \
     /* totals.c */ \
-    FN(totals, "Dn Dn Dn Dn d D8 D J D6 i w wn bn l1", N(10) == N(0) * (I(9) ? 2 * MBMA_TOTALS_COLUMNS : 2), \
-       mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), (int)I(9), P(10), P(11), P(12), P(13))) \
+    FN(totals, "Dn Dn Dn Dn d D8 D J D6 w4n wn bn l1", true, \
+       mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), P(9), P(10), P(11), P(12))) \
     FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
        mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4))) \
     /* profile.c */ \

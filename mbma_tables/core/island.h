@@ -18,23 +18,23 @@
 
 /* Constants of a surface for its islands. */
 typedef struct {
-    double hurst, log_zeta_1, e;
+    double e;                    /* zeta_1^(-2H) */
     double rms_over_s;           /* h_rms/s = sqrt(1 - e) */
     double slope_d, slope_u;     /* sqrt(a) and sqrt(b) per x = delta/h_rms below the floors (27, 30) */
     double root_floor_d, root_floor_u, offset_floor_u; /* sqrt(a), sqrt(b) and b at the floors */
     double log_floor_d, log_floor_u, eta_factor;
     double kink_d, kink_u;       /* x at which zeta_d and zeta_u reach their floors */
     double map_scale;
-    double jacobian, jacobian_by_e; /* K1 (47) below kink_d; derivative of its logarithm by ln e */
+    double jacobian;             /* K1 (47) below kink_d */
     double p2, p4, over_p2, over_2H, rate, tilt, density, radius;
     double offset;               /* 1, or 0 without h_d */
 } surface;
 
-/* An island; force and area are those per Phi_F and Phi_A. The rest is for derivatives. */
+/* An island; force and area are those per Phi_F and Phi_A. */
 typedef struct {
     double X, mu, force, area, h_d, D_d, sigma_d;
     double narrowness, count; /* 1/sigma_d; islands by x, times exp(-height^2/2) (44) */
-    double m0, sigma, b, top, log_d, width, top2, below2, band2, top4, below4, band4, eta, R_d, R_u, D;
+    double sigma, log_d, width, eta, R_d, R_u, D;
 } island;
 
 /* floor^(-2H) - zeta_1^(-2H) without cancellation */
@@ -45,8 +45,6 @@ MBMA_INLINE double floor_offset(double hurst, double zeta_1, double floor) {
 MBMA_INLINE surface surface_of(double hurst, double zeta_1, const mbma_variant *v) {
     const double L = log(zeta_1);
     surface s;
-    s.hurst = hurst;
-    s.log_zeta_1 = L;
     s.e = exp(-2.0 * hurst * L);
     s.rms_over_s = sqrt(-expm1(-2.0 * hurst * L));
     s.slope_d = 4.0 / 3.0 * v->beta;
@@ -74,7 +72,6 @@ MBMA_INLINE surface surface_of(double hurst, double zeta_1, const mbma_variant *
     s.eta_factor = 0.75 * cbrt(MBMA_PI * D) * pow(1.5 * R, 2.0 / 3.0) / cbrt(v->phi);
     const double below = 1.0 - s.slope_d / (v->printed ? 1.0 : s.rms_over_s);
     s.jacobian = v->printed || v->offset ? below : 1.0;
-    s.jacobian_by_e = v->printed ? 0.0 : 0.5 * (1.0 - 1.0 / s.jacobian) * s.e / (s.rms_over_s * s.rms_over_s);
     return s;
 }
 
@@ -85,28 +82,28 @@ MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface
     const double root_a = floor_d ? s->root_floor_d : s->slope_d * x;
     const double root_b = floor_u ? s->root_floor_u : s->slope_u * x;
     const double a = root_a * root_a;
-    n.b = floor_u ? s->offset_floor_u : root_b * root_b;
+    const double b = floor_u ? s->offset_floor_u : root_b * root_b;
     /* both shrink with x below the floors, where the difference of squares would cancel */
-    n.m0 = floor_u ? a - n.b : (root_a - root_b) * (root_a + root_b);
-    n.top = s->e + a;
+    const double m0 = floor_u ? a - b : (root_a - root_b) * (root_a + root_b);
+    const double top = s->e + a;
     /* only the width needs its relative digits */
-    n.log_d = floor_d ? s->log_floor_d : -mbma_log(n.top) * s->over_2H;
-    n.width = mbma_log1p(n.m0 / (s->e + n.b)) * s->over_2H;
+    n.log_d = floor_d ? s->log_floor_d : -mbma_log(top) * s->over_2H;
+    n.width = mbma_log1p(m0 / (s->e + b)) * s->over_2H;
     /* zeta_d^p, (zeta_d^p - 1)/p and (zeta_u^p - zeta_d^p)/p for p = 2 - 2H; for 4 - 2H without the division */
     const double square = mbma_exp(2.0 * n.log_d);
-    n.top4 = square * square * n.top;
-    n.below4 = n.top4 - 1.0;
-    n.below2 = mbma_expm1(s->p2 * n.log_d) * s->over_p2;
-    n.top2 = mbma_fma(s->p2, n.below2, 1.0);
-    n.band2 = n.top2 * mbma_expm1(s->p2 * n.width) * s->over_p2;
-    n.band4 = n.top4 * mbma_expm1(s->p4 * n.width);
-    const double over_band2 = 1.0 / n.band2, over_below2 = 1.0 / n.below2;
-    n.D = s->density * n.band4 * over_band2;
-    n.D_d = s->density * n.below4 * over_below2;
-    n.sigma = sqrt(n.m0 - s->tilt * n.band2 * (n.band2 / n.band4));
-    n.sigma_d = sqrt(1.0 - n.top - s->tilt * n.below2 * (n.below2 / n.below4));
-    n.R_d = s->radius / sqrt(n.below4);
-    n.R_u = s->radius / sqrt(n.below4 + n.band4);
+    const double top4 = square * square * top;
+    const double below4 = top4 - 1.0;
+    const double below2 = mbma_expm1(s->p2 * n.log_d) * s->over_p2;
+    const double top2 = mbma_fma(s->p2, below2, 1.0);
+    const double band2 = top2 * mbma_expm1(s->p2 * n.width) * s->over_p2;
+    const double band4 = top4 * mbma_expm1(s->p4 * n.width);
+    const double over_band2 = 1.0 / band2, over_below2 = 1.0 / below2;
+    n.D = s->density * band4 * over_band2;
+    n.D_d = s->density * below4 * over_below2;
+    n.sigma = sqrt(m0 - s->tilt * band2 * (band2 / band4));
+    n.sigma_d = sqrt(1.0 - top - s->tilt * below2 * (below2 / below4));
+    n.R_d = s->radius / sqrt(below4);
+    n.R_u = s->radius / sqrt(below4 + band4);
     n.narrowness = 1.0 / n.sigma_d;
     n.count = n.D_d * n.narrowness * (s->rms_over_s / ROOT_TWO_PI);
     n.h_d = s->offset * root_a;

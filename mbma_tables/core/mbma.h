@@ -70,14 +70,12 @@ typedef struct {
 /* The island at delta = approach h_rms, approach >= MBMA_MIN_APPROACH. */
 int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbma_variant *variant, mbma_island *out);
 
-enum { MBMA_TOTALS_COLUMNS = 5 };
-
-/* F/(A0 E* q0 s) and A/A0 of surfaces and gaps: hurst in (0, 1], zeta_1 = q1/q0, compression (h_max - d)/h_rms and peak
- * h_max/h_rms. With `slopes` each is followed by its derivatives by hurst, ln(zeta_1), compression and peak. `error`
- * bounds the relative error, of quadrature to `rtol` and of the table; `islands` counts those looked up. */
+/* F/(A0 E* q0 s), A/A0 and after each its derivative by the compression, `out` (n, 2, 2), of surfaces and gaps: hurst in
+ * (0, 1], zeta_1 = q1/q0, compression (h_max - d)/h_rms and peak h_max/h_rms. `error` bounds the relative error, of
+ * quadrature to `rtol` and of the table; `islands` counts those looked up. */
 size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
-                   double rtol, const mbma_variant *variant, const mbma_cells *cells, int slopes, double *out,
-                   double *error, uint8_t *status, int64_t *islands);
+                   double rtol, const mbma_variant *variant, const mbma_cells *cells, double *out, double *error,
+                   uint8_t *status, int64_t *islands);
 
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 

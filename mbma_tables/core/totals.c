@@ -9,11 +9,9 @@
 #include "island.h"
 #include "phi.h"
 
-enum { MAX_INTERVALS = 200, BY_HURST = 1, BY_LOG_ZETA, BY_COMPRESSION, BY_PEAK, BELOW_KINK, COLUMNS };
-enum { BY_LOG_E = BY_LOG_ZETA }; /* over nodes, derivatives are by H at given e = zeta_1^(-2H), and by ln e */
+enum { MAX_INTERVALS = 200 };
 
 #define LEAST (-700.0) /* of exponents: below it a Gaussian is negligible */
-#define NEAR_ONE 0.1   /* p l below which a difference goes by its series */
 
 /* A Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8. With a lower floor
  * of zeta_d than the paper's the difference has a larger factor. */
@@ -41,70 +39,18 @@ typedef struct {
 typedef struct {
     double low, high, error;
     bool floor_d, floor_u, known;
-    double sums[2][COLUMNS];
+    double sums[2][2]; /* of force and area: value, and derivative by the compression */
 } interval;
 
 /* Numbers at the nodes of a rule: X, mu, what force and area add per Phi_F and Phi_A, and how both rise with the
- * compression; derivatives by H and by ln e of X, mu, ln force and ln area with their weights. */
+ * compression. */
 typedef struct {
     double X[MOST_NODES], mu[MOST_NODES], weight[2][MOST_NODES], rise[MOST_NODES];
-    double by[2][4][MOST_NODES];
 } at_nodes;
 
-/* Integral of l e^(p l) from 0 to `length`: the derivative by p of that of e^(p l), which is `growth`. */
-MBMA_INLINE double moment(double p, double length, double grown) {
-    const double y = p * length;
-    double series = 1.0 / 840.0 + y * (1.0 / 5760.0 + y / 45360.0);
-    series = 1.0 / 8.0 + y * (1.0 / 30.0 + y * (1.0 / 144.0 + y * series));
-    series = 0.5 + y * (1.0 / 3.0 + y * series);
-    return y < NEAR_ONE ? length * length * series : (length + (y - 1.0) * grown) / p;
-}
-
-/* Derivatives of X, mu and of ln force, ln area with their weights in the totals, the node being held: by H at given
- * e, or by ln e at given H; `eta_factor` and K1 are held. d_D is of ln D, and so on; those of e, a, b, m0, h_d, X,
- * height and of logarithms are of themselves. */
-MBMA_INLINE void node_slopes(bool by_hurst, double height, bool floor_d, bool floor_u, const island *n,
-                             const surface *s, double (*out)[MOST_NODES], int k) {
-    const double H = s->hurst, h = by_hurst ? 1.0 : 0.0, p2 = s->p2, p4 = s->p4, over_2H = s->over_2H;
-    const double d_e = by_hurst ? 0.0 : s->e, d_rms = -0.5 * d_e / (s->rms_over_s * s->rms_over_s);
-    const double low = s->e + n->b, floor_a = by_hurst ? -2.0 * s->log_floor_d * n->top : -d_e;
-    const double floor_b = by_hurst ? -2.0 * s->log_floor_u * low : -d_e;
-    const double d_a = floor_d ? floor_a : 0.0, d_b = floor_u ? floor_b : 2.0 * n->b * d_rms, d_m0 = d_a - d_b;
-    const double d_log_d = floor_d ? 0.0 : -d_e / n->top * over_2H - h * n->log_d / H;
-    const double d_width = (d_m0 - n->m0 * (d_e + d_b) / low) / n->top * over_2H - h * n->width / H;
-    /* of the p-th powers at the lower end; of what the band adds, and of what lies below it */
-    const double d_end2 = p2 * d_log_d - 2.0 * h * n->log_d, d_end4 = p4 * d_log_d - 2.0 * h * n->log_d;
-    const double grown2 = n->band2 / n->top2, grown4 = n->band4 / n->top4;
-    const double more2 = by_hurst ? 2.0 * moment(p2, n->width, grown2) / grown2 : 0.0;
-    const double more2_d = by_hurst ? 2.0 * moment(p2, n->log_d, n->below2) / n->below2 : 0.0;
-    const double d_band2 = d_end2 + (1.0 + p2 * grown2) * d_width / grown2 - more2;
-    const double d_band4 = d_end4 + (1.0 + grown4) * (p4 * d_width - 2.0 * h * n->width) / grown4;
-    const double d_below2 = n->top2 * d_log_d / n->below2 - more2_d, d_below4 = n->top4 * d_end4 / n->below4;
-    /* of summit densities, standard deviations, radii, as in `island_at` */
-    const double d_rate = 2.0 * h / p4, d_tilt = h / H - d_rate, d_R = d_rate + h / H;
-    const double part = s->tilt * n->band2 * (n->band2 / n->band4);
-    const double part_d = s->tilt * n->below2 * (n->below2 / n->below4);
-    const double d_D = d_rate + d_band4 - d_band2, d_D_d = d_rate + d_below4 - d_below2;
-    const double d_s2 = d_m0 - part * (d_tilt + 2.0 * d_band2 - d_band4);
-    const double d_s2_d = -(d_e + d_a + part_d * (d_tilt + 2.0 * d_below2 - d_below4));
-    const double d_sigma = 0.5 * d_s2 / (n->sigma * n->sigma);
-    const double d_sigma_d = 0.5 * d_s2_d / (n->sigma_d * n->sigma_d);
-    const double d_R_d = -0.5 * (d_R + d_below4);
-    const double d_R_u = -0.5 * (d_R + (n->below4 * d_below4 + n->band4 * d_band4) / (n->below4 + n->band4));
-    const double d_h_d = s->offset * 0.5 * d_a / s->root_floor_d;
-    const double d_root_b = floor_u ? 0.5 * floor_b / n->b : d_rms;
-    const double d_height = ((height * n->sigma_d + n->h_d) * d_rms - d_h_d) / n->sigma_d - height * d_sigma_d;
-    /* delta/h_rms is held, so the density is per h_rms: h_rms/s is part of it */
-    const double common = d_D_d - d_sigma_d + d_rms - height * d_height;
-    out[0][k] = ((n->X * n->sigma + n->h_d) * d_rms - d_h_d) / n->sigma - n->X * d_sigma;
-    out[1][k] = n->mu * (d_D + d_sigma + 0.5 * (d_R_d + d_R_u));
-    out[2][k] = 1.5 * d_sigma + 0.5 * d_R_d + common;
-    out[3][k] = (d_root_b - d_R_u) / 3.0 + d_D + d_R_u + d_R_d + 2.0 * d_sigma + common;
-}
-
-/* A loop over the nodes of an interval that vectorises: the floors and `slopes` are constants, nothing is called. */
-MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const interval *p, const rule *restrict r,
-                            const gap *g, at_nodes *restrict out) {
+/* A loop over the nodes of an interval that vectorises: the floors are constants, nothing is called. */
+MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, const interval *p, const rule *restrict r, const gap *g,
+                            at_nodes *restrict out) {
     const double half = 0.5 * (p->high - p->low), centre = 0.5 * (p->high + p->low), scale = g->s.map_scale;
     for (int k = 0; k < MOST_NODES; k++) {
         const double t = mbma_fma(half, r->nodes[k], centre);
@@ -121,11 +67,7 @@ MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const inter
         out->mu[k] = n.mu;
         out->weight[0][k] = n.force * weight;
         out->weight[1][k] = n.area * weight;
-        if (!slopes)
-            continue;
         out->rise[k] = height * g->s.rms_over_s * n.narrowness;
-        node_slopes(true, height, floor_d, floor_u, &n, &g->s, out->by[0], k);
-        node_slopes(false, height, floor_d, floor_u, &n, &g->s, out->by[1], k);
     }
 }
 
@@ -148,19 +90,19 @@ static int first_intervals(const gap *g, interval *intervals) {
 }
 
 /* One Kronrod rule over an interval: its sums, with K1 (47), and their relative error. */
-MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
+static int apply_rule(interval *p, gap *g) {
     const rule *const r = &g->r;
-    double sums[2][COLUMNS] = {{0.0}}, gauss[2] = {0.0};
+    double sums[2][2] = {{0.0}}, gauss[2] = {0.0};
     at_nodes at;
     /* loops of their own for compilers, with constants */
     if (p->floor_d && p->floor_u)
-        fill_nodes(true, true, slopes, p, r, g, &at);
+        fill_nodes(true, true, p, r, g, &at);
     else if (p->floor_d)
-        fill_nodes(true, false, slopes, p, r, g, &at);
+        fill_nodes(true, false, p, r, g, &at);
     else if (p->floor_u)
-        fill_nodes(false, true, slopes, p, r, g, &at);
+        fill_nodes(false, true, p, r, g, &at);
     else
-        fill_nodes(false, false, slopes, p, r, g, &at);
+        fill_nodes(false, false, p, r, g, &at);
     g->islands += COUNT;
     for (int k = 0; k < COUNT; k++) {
         const phi found = phi_at(g->cells, at.X[k], at.mu[k]);
@@ -171,11 +113,7 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
             const double term = at.weight[q][k] * found.value[q], share = r->kronrod[k] * at.weight[q][k];
             sums[q][0] = mbma_fma(r->kronrod[k], term, sums[q][0]);
             gauss[q] = mbma_fma(r->gauss[k], term, gauss[q]);
-            if (slopes)
-                sums[q][BY_COMPRESSION] += share * found.value[q] * at.rise[k];
-            for (int by = 0; by < 2 && slopes; by++)
-                sums[q][BY_HURST + by] += share * (found.value[q] * at.by[by][2 + q][k] +
-                                                   found.by_X[q] * at.by[by][0][k] + found.by_mu[q] * at.by[by][1][k]);
+            sums[q][1] += share * found.value[q] * at.rise[k];
         }
     }
     /* the larger of both: both integrands are resolved alike, and one may agree by chance */
@@ -183,16 +121,14 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
     const double scaled = g->safety * difference;
     p->error = sums[0][0] > 0.0 && sums[1][0] > 0.0 ? mbma_min(difference, scaled * sqrt(scaled)) : 0.0;
     p->known = true;
-    for (int q = 0; q < 2; q++) {
-        for (int c = 0; c < (slopes ? COLUMNS : 1); c++)
+    for (int q = 0; q < 2; q++)
+        for (int c = 0; c < 2; c++)
             p->sums[q][c] = sums[q][c] * (p->floor_d ? 1.0 : g->s.jacobian);
-        p->sums[q][BELOW_KINK] = p->floor_d ? 0.0 : p->sums[q][0];
-    }
     return MBMA_OK;
 }
 
 /* Integrates over the approaches to `rtol`. */
-static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], double *bound) {
+static int total(gap *g, double rtol, double sums[2][2], double *bound) {
     interval intervals[MAX_INTERVALS];
     int count = first_intervals(g, intervals);
     g->table_error = 0.0;
@@ -201,11 +137,11 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
         memset(sums, 0, 2 * sizeof *sums);
         for (int k = 0; k < count; k++) {
             interval *const p = &intervals[k];
-            const int status = p->known ? MBMA_OK : slopes ? apply_rule(true, p, g) : apply_rule(false, p, g);
+            const int status = p->known ? MBMA_OK : apply_rule(p, g);
             if (status != MBMA_OK)
                 return status;
             for (int q = 0; q < 2; q++) {
-                for (int c = 0; c < (slopes ? COLUMNS : 1); c++)
+                for (int c = 0; c < 2; c++)
                     sums[q][c] += p->sums[q][c];
                 errors[q] += p->sums[q][0] * p->error;
             }
@@ -236,43 +172,16 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
     }
 }
 
-/* The integrands of force and area over x = delta/h_rms. */
-static int integrand(double x, const gap *g, double out[2]) {
-    const island n = island_at(x, x >= g->s.kink_d, x > g->s.kink_u, &g->s);
-    const phi found = phi_at(g->cells, n.X, n.mu);
-    const double height = height_of(g->peak - (g->compression - x), &n, &g->s);
-    const double weight = n.count * exp(-0.5 * height * height);
-    out[0] = n.force * found.value[0] * weight;
-    out[1] = n.area * found.value[1] * weight;
-    return found.status;
-}
-
-/* Sums over nodes as derivatives by H, ln zeta_1, compression and peak: the upper limit moves with the compression, the
- * kink with H and zeta_1; K1 and `eta_factor` change. */
-static int end_slopes(const gap *g, double sums[2][COLUMNS]) {
+/* What the upper limit adds to the derivatives by the compression: the integrands of force and area there. */
+static int add_ends(const gap *g, double sums[2][2]) {
     const surface *const s = &g->s;
-    double edge[2], at_kink[2] = {0.0, 0.0};
-    int status = integrand(g->compression, g, edge);
-    const double K1 = g->compression > s->kink_d ? 1.0 : s->jacobian;
-    if (status == MBMA_OK && s->kink_d < g->compression)
-        status = integrand(s->kink_d, g, at_kink);
-    const double jump = 0.5 * (s->jacobian - 1.0) / (s->root_floor_d * s->slope_d);
-    const double kink_by_hurst = -2.0 * s->log_floor_d * (s->e + s->root_floor_d * s->root_floor_d);
-    /* of ln m2 over [1, zeta_1] */
-    const double grown = expm1(s->p2 * s->log_zeta_1) / s->p2, m2_by_log_zeta = s->p2 + 1.0 / grown;
-    const double m2_by_hurst = 1.0 / s->hurst - 2.0 * moment(s->p2, s->log_zeta_1, grown) / grown;
-    for (int q = 0; q < 2; q++) {
-        double *const by = sums[q];
-        const double by_hurst = by[BY_HURST] + jump * kink_by_hurst * at_kink[q];
-        const double by_log_e = by[BY_LOG_E] - jump * s->e * at_kink[q] + s->jacobian_by_e * by[BELOW_KINK];
-        /* eta_factor goes with m2^(-1/3) */
-        const double share = q == 1 ? by[0] / 3.0 : 0.0;
-        by[BY_HURST] = by_hurst - 2.0 * s->log_zeta_1 * by_log_e - share * m2_by_hurst;
-        by[BY_LOG_ZETA] = -2.0 * s->hurst * by_log_e - share * m2_by_log_zeta;
-        by[BY_PEAK] = -by[BY_COMPRESSION];
-        by[BY_COMPRESSION] += K1 * edge[q];
-    }
-    return status;
+    const island n = island_at(g->compression, g->compression >= s->kink_d, g->compression > s->kink_u, s);
+    const phi found = phi_at(g->cells, n.X, n.mu);
+    const double height = height_of(g->peak, &n, s), K1 = g->compression > s->kink_d ? 1.0 : s->jacobian;
+    const double weight = n.count * exp(-0.5 * height * height);
+    sums[0][1] += K1 * (n.force * found.value[0] * weight);
+    sums[1][1] += K1 * (n.area * found.value[1] * weight);
+    return found.status;
 }
 
 /* QUADPACK's Gauss-Kronrod rule of 31 nodes (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983), which is
@@ -304,9 +213,8 @@ static rule whole_rule(void) {
 }
 
 size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
-                   double rtol, const mbma_variant *v, const mbma_cells *cells, int slopes, double *out, double *error,
+                   double rtol, const mbma_variant *v, const mbma_cells *cells, double *out, double *error,
                    uint8_t *status, int64_t *islands) {
-    const size_t columns = slopes ? MBMA_TOTALS_COLUMNS : 1;
     double own_hurst = NAN, own_zeta_1 = NAN;
     size_t bad = 0;
     gap g;
@@ -315,7 +223,7 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
     g.safety = v->floor_d >= PAPER_FLOOR ? SAFETY : SAFETY_BELOW;
     g.r = whole_rule();
     for (size_t k = 0; k < n; k++) {
-        double sums[2][COLUMNS] = {{0.0}}, *const row = out + 2 * columns * k;
+        double sums[2][2] = {{0.0}};
         int found = MBMA_OK;
         error[k] = 0.0;
         g.compression = compression[k];
@@ -326,17 +234,16 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
         else if (g.compression > 0.0) {
             if (hurst[k] != own_hurst || zeta_1[k] != own_zeta_1)
                 g.s = surface_of(own_hurst = hurst[k], own_zeta_1 = zeta_1[k], v);
-            found = total(slopes != 0, &g, rtol, sums, &error[k]);
-            if (slopes && found == MBMA_OK && sums[0][0] > 0.0 && sums[1][0] > 0.0)
-                found = end_slopes(&g, sums);
+            found = total(&g, rtol, sums, &error[k]);
+            if (found == MBMA_OK && sums[0][0] > 0.0 && sums[1][0] > 0.0)
+                found = add_ends(&g, sums);
         }
-        for (size_t c = 0; c < 2 * columns; c++) {
-            row[c] = sums[c / columns][c % columns];
-            if (!(fabs(row[c]) < INFINITY) && found == MBMA_OK)
+        for (size_t c = 0; c < 4; c++)
+            if (!(fabs(sums[c / 2][c % 2]) < INFINITY) && found == MBMA_OK)
                 found = MBMA_UNRESOLVED;
-        }
-        for (size_t c = 0; c < 2 * columns && found != MBMA_OK; c++)
-            row[c] = error[k] = NAN;
+        for (size_t c = 0; c < 4; c++)
+            out[4 * k + c] = found == MBMA_OK ? sums[c / 2][c % 2] : NAN;
+        error[k] = found == MBMA_OK ? error[k] : NAN;
         status[k] = (uint8_t)found;
         bad += found != MBMA_OK;
     }

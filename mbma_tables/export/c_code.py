@@ -1,4 +1,4 @@
-"""The model as C: the core's own files, its tables as data beside them, and calls of one surface on top.
+"""The model as C: the core's own files, its tables as data beside them, and calls of one surface; built and replayed.
 
 Tables are text, in the shortest decimals that reproduce every bit, so that any compiler on any machine reads the same
 numbers; 150,000 numbers are 3 MB of text and a fraction of a second of compiling.
@@ -6,29 +6,39 @@ numbers; 150,000 numbers are 3 MB of text and a fraction of a second of compilin
 
 import dataclasses
 import math
+import os
+import pathlib
 import re
+import subprocess
+import tempfile
 import textwrap
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import write_file
+from mbma_tables.export.conformance import FORM, KINDS, POINTS_FILE, points_text
+from mbma_tables.export.targets import Target
 from mbma_tables.export.text import braces, core_file, filled, numerals, opening, written_by
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
+from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
-from mbma_tables.surfaces.variants import Variant
+from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.theories import calibrated_table, persson
 from mbma_tables.totals.contact import QUADRATURE_SHARE
 
-FORM = "standard"  # the form of island model "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
 CORE = ("phi.c", "totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
 MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")
+SELFTEST = "mbma_selftest.c"
+SOURCES = (*CORE, *MODEL[1:], SELFTEST)
+TIMEOUT = 300.0  # seconds, of a build or a replay
 # flags of the library; rounding does not depend on the compiler
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 USAGE = (
@@ -63,12 +73,13 @@ def core_texts() -> dict[str, str]:
     return dict(sorted(texts.items()))
 
 
-def c_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
-    """Names and texts of the C sources, the self-test apart."""
+def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
+    """Names and texts of the source files."""
     if variant.addition != "sum":
         raise InputError(f"exported code adds the areas of islands: variant {variant.name!r} takes their cover")
-    heads = {name: opening(header(name, "c", USAGE, model, variant), "/*") for name in MODEL}
-    return core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
+    heads = {name: opening(header(name, model, variant), "/*") for name in (*MODEL, SELFTEST)}
+    texts = core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
+    return texts | {SELFTEST: filled(SELFTEST, HEADER=heads[SELFTEST])}
 
 
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
@@ -143,7 +154,7 @@ def _cells(cells: FloatArray) -> Iterator[str]:
             yield from _wrapped([braces(*numerals(row)) for row in powers], "{", "}," if name == "F" else "}},")
 
 
-def header(name: str, target: str, usage: str, model: UniversalModel, variant: Variant) -> list[str]:
+def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     """Paragraphs of a file's opening comment: origin, contents, variant, range, errors, conventions, licence."""
     content, law = model.content, calibrated_table.shipped()
     found, (X, mu) = content.attributes, content.axes
@@ -157,7 +168,7 @@ def header(name: str, target: str, usage: str, model: UniversalModel, variant: V
     ]
     return [
         f"{name}: part of the MBMA model and the calibrated law of rough contact as source code.",
-        f"Written by mbma_tables {__version__}. {usage}",
+        f"Written by mbma_tables {__version__}. {USAGE}",
         "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
         "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
         f"Variant: {variant.name} (density divisor {variant.density_divisor:.17g}, beta {variant.beta:.17g}, phi "
@@ -175,7 +186,89 @@ def header(name: str, target: str, usage: str, model: UniversalModel, variant: V
         "separations continue by the law's limits.",
         f"Largest relative error of the table against the law: {law.error:.2g}. Simulations scatter about the law by "
         "percents to tens of percents, which the documentation lists.",
-        written_by([target, "--variant", variant.name, "--out", "."]),
+        written_by(["c", "--variant", variant.name, "--out", "."]),
         CONVENTIONS,
         *LICENCE,
     ]
+
+
+def write_code(folder: os.PathLike[str] | str, variant: str | Variant = "reported") -> list[pathlib.Path]:
+    """Write the model as C11, which C++ compiles too, with conformance points and a self-test that replays them.
+
+    A missing folder is made, files of the same names are replaced. Returns the files written.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [path.name for path in write_code(folder) if path.name.startswith("mbma_")]
+    ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
+    """
+    rule, model = get_variant(variant), universal_model()
+    texts = source_texts(model, rule) | {POINTS_FILE: points_text(model, rule)}
+    for name, text in texts.items():
+        write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
+    return [pathlib.Path(folder, name) for name in texts]
+
+
+class BuildError(InputError):
+    """A compiler or program that is not installed, or failed."""
+
+
+def built_by(command: Sequence[str], texts: Mapping[str, str], made: str, *last: str) -> bytes:
+    """The output of a compiler for the C sources among texts."""
+    with tempfile.TemporaryDirectory() as work:
+        for name, text in texts.items():
+            write_file(pathlib.Path(work, name), text.encode())
+        _run([*command, *(name for name in texts if name.endswith(".c")), "-o", made, *last], work, "did not compile")
+        return pathlib.Path(work, made).read_bytes()
+
+
+def _run(command: Sequence[str], folder: str, failure: str = "") -> str:
+    """What a program prints; with `failure` it must end without an error."""
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    except FileNotFoundError:
+        raise BuildError(f"{command[0]} is not installed") from None
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"{command[0]}: no end within {TIMEOUT:g} s") from None
+    if failure and done.returncode:
+        raise BuildError(f"{' '.join(command[:3])} {failure}: {done.stderr.strip()[:500]}")
+    return done.stdout
+
+
+class Replay(NamedTuple):
+    """Result of a self-test: by kind rows and largest relative difference; results that failed."""
+
+    points: dict[str, int]
+    largest: dict[str, float]
+    failed: int  # beyond their tolerance, or rejected
+
+
+def check(folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
+    """Compile what `write_code` wrote, and replay the points beside it, or others.
+
+    Raises
+    ------
+    BuildError
+        Where the compiler is not installed, and where it fails.
+    """
+    place = pathlib.Path(folder).absolute()
+    csv = place / POINTS_FILE if points is None else pathlib.Path(points).absolute()
+    if not csv.is_file():
+        raise InputError(f"{csv} does not exist; write_code({str(place)!r}) makes it")
+    with tempfile.TemporaryDirectory() as work:
+        _run(["cc", *FLAGS, *(str(place / name) for name in SOURCES), "-lm", "-o", "selftest"], work, "did not compile")
+        return read_report(_run([f"{work}/selftest", str(csv)], work))
+
+
+def read_report(text: str) -> Replay:
+    """The output of a self-test: kind, rows, largest difference; then the number of failures."""
+    rows = [line.split() for line in text.splitlines()]
+    failed = [int(words[1]) for words in rows if len(words) == 2 and words[0] == "failed"]
+    if not failed:
+        raise BuildError(f"the self-test did not end: {text[-500:]}")
+    kinds = [words for words in rows if len(words) == 3 and words[0] in KINDS]
+    return Replay({kind: int(n) for kind, n, _ in kinds}, {kind: float(most) for kind, _, most in kinds}, failed[0])
+
+
+TARGETS = (Target("c", write_code, frozenset({"variant", "check"})),)

@@ -12,31 +12,30 @@ import numpy as np
 
 from mbma_tables.answers.contact import contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.closed_forms import FUNCTIONS
+from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
+from mbma_tables.totals.contact import Sums, by_table
 
 Rows = Iterator[str]
+FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
-BY = ("separation", "hurst", "q0", "q1", "h_rms", "h_max")
-CONTACT = f"force, area, stiffness, error; derivatives of force, then of area, by {', '.join(BY)}"
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
     "slopes": "X, mu; the same, phi_F by X, phi_F by mu, phi_A by X, phi_A by mu",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness, error",
-    "total_by": f"the same; {CONTACT}",
     "status": "X, mu; the status",
     "formula": "X, mu; phi_F, phi_A by the closed form, its error",
     "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, error",
     "separation": "hurst, q0, q1, h_rms, h_max, force, E_star; mean separation by the calibrated law",
 }
-TOLERANCE, SLOPE_TOLERANCE = 1e-11, 1e-8
+TOLERANCE = 1e-11
 ANY = 1e300  # what the difference of a number that may be any is relative to
 OK, X_BELOW, X_ABOVE, MU_ABOVE, INVALID = 0, 1, 2, 3, 5  # of mbma.h
 SURFACES = (
@@ -79,19 +78,17 @@ def geometry_rows(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Varian
 
 
 def total_rows(surface: tuple[float, ...], separations: Any, variant: Variant, rtol: float = RTOL) -> Rows:
-    """Totals of one surface and their derivatives by the compiled runtime."""
-    gaps = np.asarray(separations)
-    found = contact(Surface(*surface), separation=gaps, variant=variant, rtol=rtol, derivatives=True)
-    slopes = np.array([[by[name] for name in BY] for by in (found.pressure_by, found.area_by) if by])
+    """Totals of one surface, gap by gap."""
+    own, gaps = Surface(*surface), np.asarray(separations)
+    sums, model = np.zeros((5, gaps.size)), universal_model()
+    how, compression = Sums(model, variant, rtol), (own.h_max - gaps) / own.h_rms
+    by_table(own, compression, np.arange(gaps.size), model, how, sums)
+    stress = own.q0 * own.s
+    pressure, area, stiffness = stress * sums[0], sums[1], 2 * stress / own.h_rms * sums[2]
     # at a maximum of force, stiffness is 0
-    stiffness, given = -2 * slopes[0, 0], (*surface, gaps, 1.0, rtol)
-    least = np.maximum(np.abs(stiffness), np.where(found.pressure == 0, 1.0, found.pressure) / surface[4])
-    values, units = (found.pressure, found.area, stiffness, 0.0), (found.pressure, found.area, least, ANY)
-    yield from rows("total", given, values, units)
-    # relative to themselves or the value over the parameter; by the gap over h_rms
-    over = np.divide.outer(np.array(values[:2]), [surface[3], *surface]).swapaxes(1, 2)
-    scales = np.maximum(np.abs(slopes), over).reshape(12, -1)
-    yield from rows("total_by", given, (*values, *slopes.reshape(12, -1)), (*units, *scales), SLOPE_TOLERANCE)
+    least = np.maximum(np.abs(stiffness), np.where(pressure == 0, 1.0, pressure) / surface[4])
+    values, units = (pressure, area, stiffness, 0.0), (pressure, area, least, ANY)
+    yield from rows("total", (*surface, gaps, 1.0, rtol), values, units)
 
 
 def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0) -> Rows:

@@ -35,9 +35,6 @@ THEORIES = ("mbma", "calibrated", "persson")
 SHOWN_VARIANTS = (REPORTED, PRINTED, FITTED)
 VARIANT_NAMES = tuple(variant.name for variant in SHOWN_VARIANTS)
 SCRIPTS = ("model.js", "state.js", "hardness.js", "curves.js", "downloads.js", "charts.js", "main.js")
-FEW = 1000  # numbers up to which they stay doubles
-FRACTION_BITS, ORDER = 43, 3  # packed tables: steps of 1e-13; order of differences
-MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # limits of integers in the page, and of numbers before they are scaled
 MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
@@ -47,21 +44,13 @@ MAX_SAMPLES = 500  # samples of a spectrum, so that a step of a slider stays fas
 
 
 def packed(values: Any) -> dict[str, Any]:
-    """Numbers as text: whole multiples of 2^-43, differenced, zigzag, by planes of bytes, deflated; or doubles."""
-    flat = np.ravel(values).astype(float)
-    largest = np.abs(flat).max()
-    # small numbers are errors, whose relative size counts
-    doubles = flat.size < FEW or not 1e-3 <= largest < MAX_WHOLE
-    whole = np.rint(np.ldexp(0 * flat if doubles else flat, FRACTION_BITS)).astype(np.int64)
-    for _ in range(ORDER):
-        whole = np.diff(whole, prepend=0)
-    zigzag = (whole << 1) ^ (whole >> 63)
-    doubles |= int(zigzag.max()) >= MAX_EXACT
-    planes = np.ascontiguousarray((flat if doubles else zigzag).view(np.uint8).reshape(-1, 8).T[: 8 if doubles else 7])
+    """Numbers as text: their bytes by planes, deflated; bits of single precision differenced twice before."""
+    flat, differences = np.ravel(values), 2 * (values.dtype == np.float32)
+    for _ in range(differences):
+        flat = np.diff(flat.view(np.int32), prepend=np.int32(0))
+    planes = np.ascontiguousarray(flat.view(np.uint8).reshape(flat.size, -1).T)
     text = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
-    differences = 0 if doubles else ORDER
-    kind = {"float32": "Float32Array", "int32": "Int32Array"}.get(values.dtype.name, "Float64Array")
-    return {"count": flat.size, "kind": kind, "differences": differences, "bits": FRACTION_BITS, "text": text}
+    return {"count": flat.size, "bytes": flat.itemsize, "differences": differences, "text": text}
 
 
 def _limits() -> dict[str, Any]:

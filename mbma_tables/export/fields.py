@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.law_rows import QUANTITIES
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import SI, Grammar
+from mbma_tables.export.targets import AGAINST, SI, Grammar
 from mbma_tables.export.text import checked_name, comment, number, opening
 from mbma_tables.materials import tangential_ratio
 
@@ -175,7 +174,7 @@ geos = Grammar(
 moose_function = Grammar(
     "MOOSE",
     "#",
-    dict.fromkeys(QUANTITIES, _moose),
+    dict.fromkeys(AGAINST, _moose),
     "Constant outside the rows. Of a conductance: type = GapFluxModelConduction, gap_conductivity_function, with "
     "gap_conductivity_function_variable = the contact pressure, and gap_conductivity and min_gap the same length, "
     "above all closed gaps.",
@@ -184,7 +183,7 @@ moose_function = Grammar(
 getdp = Grammar(
     "GetDP",
     "//",
-    dict.fromkeys(QUANTITIES, _getdp),
+    dict.fromkeys(AGAINST, _getdp),
     "GetDP 3.2 stops below the first row and continues the last chord beyond the last one.",
     named="rough",
 )

@@ -14,9 +14,9 @@ from xml.etree import ElementTree as ET
 from mbma_tables import __version__
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
-from mbma_tables.export.code import BuildError, built_by
+from mbma_tables.export.c_code import BuildError, built_by
 from mbma_tables.export.exported_law import ExportedLaw
-from mbma_tables.export.law_code import AskedLaw, asked_law, code_name, text_of
+from mbma_tables.export.law_code import AskedLaw, asked_law, text_of
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -44,7 +44,7 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
         As for `law_text`; a conductivity adds the output conductance, leakage the output leakage.
     binaries : {"here", "all", "none"}
         Beside the sources: a binary for this platform, by the system's C compiler or zig, where one of them is
-        installed; binaries for Linux, macOS and Windows, by zig (the extra "javascript"); or none.
+        installed; binaries for Linux, macOS and Windows, by zig (the extra "fmu"); or none.
 
     Returns
     -------
@@ -64,9 +64,8 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     >>> zipfile.ZipFile(io.BytesIO(file)).namelist()
     ['modelDescription.xml', 'sources/road.c']
     """
-    code_name(name)
-    found = asked_law(surface, E_star, **asked)
-    law, exported = text_of("c-law", name, found), found.exported
+    found = asked_law(surface, E_star, name, **asked)
+    law, exported = text_of("c-law", found), found.exported
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, law)}}}"
     parts = {
         "LAW": law,

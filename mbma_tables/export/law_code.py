@@ -3,7 +3,6 @@
 import base64
 import functools
 import re
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,15 +44,7 @@ MODELICA_NAMES = r"\b(?<!type )(\w+)(?:\[[^]]*\])? = [-\d{]|function (\w+)"
 _MADE = re.compile(r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M)
 
 
-def law_text(
-    target: str,
-    surface: AnySurface | ForceLaw,
-    E_star: float | str = 1.0,
-    *,
-    name: str = "law",
-    leakage: bool = False,
-    **asked: Any,
-) -> str:
+def law_text(target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any) -> str:
     """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
 
     Parameters
@@ -65,7 +56,7 @@ def law_text(
         As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit,
         kappa. Or the force law of a rough sphere or cylinder (`RoughContact.law`) alone: its "pressure" is force.
     name : str
-        What functions, modules or packages are called, or begin with.
+        What functions, modules or packages are called, or begin with; "law" by default.
     leakage : bool
         The function `leakage` as well, the flow coefficient K of the gaps [length^3], as `ContactLaw.leakage`.
 
@@ -87,36 +78,30 @@ def law_text(
     >>> "double road_with_tangent(double c, double *tangent);" in text, "size_t mbma_law_fill(" in text
     (True, True)
     """
-    return law_files(target, surface, E_star, name=name, leakage=leakage, **asked)[""]
+    return law_files(target, surface, E_star, **asked)[""]
 
 
-def law_files(
-    target: str,
-    surface: AnySurface | ForceLaw,
-    E_star: float | str = 1.0,
-    *,
-    name: str = "law",
-    leakage: bool = False,
-    **asked: Any,
-) -> dict[str, str]:
+def law_files(target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any) -> dict[str, str]:
     """The result of `law_text`, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
-    name, language = code_name(name), LANGUAGES[target]
-    if language.subroutine and (leakage or isinstance(surface, ForceLaw)):
+    language = LANGUAGES[target]
+    if language.subroutine and (asked.get("leakage") or isinstance(surface, ForceLaw)):
         raise InputError(f"{target} has no place for leakage, nor for the force of a body: leave it out")
-    if language.subroutine == "gapcon.c":
-        checked_conductivity(asked.get("conductivity"), asked.get("conductivity_unit"))
-    found = asked_law(surface, E_star, leakage=leakage, **asked)
-    files = {"": text_of(target, name, found)}
-    for end, other in language.beside:
-        files[end] = text_of(other, name, found) if other in LANGUAGES else text_of(target, name, found, other)
-    return files
+    if language.subroutine == "gapcon.c":  # which is of conductance alone
+        asked.setdefault("conductivity_unit", "")
+    found = asked_law(surface, E_star, **asked)
+    beside = (
+        (end, text_of(other, found) if other in LANGUAGES else text_of(target, found, other))
+        for end, other in language.beside
+    )
+    return {"": text_of(target, found), **dict(beside)}
 
 
 class AskedLaw(NamedTuple):
     """A law and the contents common to its files."""
 
+    name: str  # prefix of functions, or name of the module or package
     exported: ExportedLaw
     slopes: dict[str, float]  # ratios of functions to the slope of a law,
     sloped: ContactLaw  # of the contact without a hardness
@@ -124,16 +109,10 @@ class AskedLaw(NamedTuple):
     said: tuple[str, ...]
 
 
-def code_name(name: str) -> str:
-    """A valid prefix for the functions of a law, or name for its module or package."""
-    if checked_name(name, MAX_NAME).lower() in FUNCTIONS:
-        raise InputError(f"name must not be that of a function of the law, {', '.join(FUNCTIONS)}")
-    return name
-
-
 def asked_law(
     surface: AnySurface | ForceLaw,
     E_star: float | str = 1.0,
+    name: str = "law",
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     kappa: float | None = None,
@@ -141,6 +120,8 @@ def asked_law(
     **options: Any,
 ) -> AskedLaw:
     """The law for a requested file, made once; arguments as for `law_text`."""
+    if checked_name(name, MAX_NAME).lower() in FUNCTIONS:
+        raise InputError(f"name must not be that of a function of the law, {', '.join(FUNCTIONS)}")
     conducts = conductivity is not None or conductivity_unit is not None
     if isinstance(surface, ForceLaw) and (conducts or leakage):
         raise InputError("a force law has neither conductance nor leakage: leave conductivity and leakage out")
@@ -166,14 +147,14 @@ def asked_law(
         end=exported.c_turn,
         leakage=leakage,
     )
-    return AskedLaw(exported, {what: factor * ratio for what, ratio in slopes.items()}, sloped, more, said)
+    slopes = {quantity: factor * ratio for quantity, ratio in slopes.items()}
+    return AskedLaw(name, exported, slopes, sloped, more, said)
 
 
-def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
+def text_of(target: str, asked: AskedLaw, template: str = "") -> str:
     """The text of a target's own file, or of another template of it."""
-    language, exported = LANGUAGES[target], asked.exported
-    yields, leaks = asked.sloped is not exported.law, asked.more.get("leakage", "")
-    nested = target == "modelica-law"
+    language, name, exported = LANGUAGES[target], asked.name, asked.exported
+    yields, nested = asked.sloped is not exported.law, target == "modelica-law"
     if yields and language.array is not None and not nested:
         raise InputError(
             f"{target} has no place for an unloading stiffness, which conductance and tangential stiffness of yielded "
@@ -192,7 +173,7 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
         "LENGTH": exported.length,
         "STRESS": exported.stress,
         "ELASTIC": "yes" if yields else "",
-        "LEAKAGE": leaks,
+        "LEAKAGE": asked.more.get("leakage", ""),
         "CONDUCTANCE": each.get("conductance", ""),
         "SLOPED": "ELASTIC" if yields else "LAW",
         **{place: language.number(value) for place, value in numbers.items()},
@@ -201,10 +182,10 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
     if template:
         return filled(template, each, **parts)
     if language.array is None:
-        parts |= _core(target, name, asked)
+        parts |= _core(target, asked)
     else:
         parts |= _numbers(language, "", law_numbers(exported.law))
-        if leaks:
+        if parts["LEAKAGE"]:
             parts |= _numbers(language, "flow_", flow_numbers(exported.leakage))
         if nested:
             parts["SLOPED"] = "elastic.elastic_tangent" if yields else "tangent"
@@ -221,35 +202,31 @@ def text_of(target: str, name: str, asked: AskedLaw, template: str = "") -> str:
 
 def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[str, str]:
     """Numbers of a law by their placeholders."""
-    assert language.array is not None
-    texts = {"RECORDS": str(numbers["centre"].size)}
-    for what, value in numbers.items():
-        text = str(value) if isinstance(value, int) else ""
-        texts[what.upper()] = text or (language.number(value) if isinstance(value, float) else language.array(value))
-    return {f"{prefix}{what}".upper(): text for what, text in texts.items()}
+    write: dict[type, Any] = {int: str, float: language.number, np.ndarray: language.array}
+    texts = {what: write[type(value)](value) for what, value in numbers.items()}
+    return {
+        f"{prefix}{what}".upper(): text for what, text in (texts | {"records": str(len(numbers["centre"]))}).items()
+    }
 
 
-def _core(target: str, name: str, asked: AskedLaw) -> dict[str, str]:
+def _core(target: str, asked: AskedLaw) -> dict[str, str]:
     """The core, as C or compiled, and the law's own blocks."""
-    law, leaks, parts = asked.exported.law, asked.more.get("leakage", ""), {}
+    law, leaks, name = asked.exported.law, asked.more.get("leakage", ""), asked.name
     blocks = {"LAW": law.block} | ({"ELASTIC": asked.sloped.block} if asked.sloped is not law else {})
     if leaks:
-        blocks["FLOW"], parts["FLOW_H_RMS"] = asked.exported.leakage.block, repr(float(asked.exported.leakage.h_rms))
+        blocks["FLOW"] = asked.exported.leakage.block
+    parts = {"FLOW_H_RMS": repr(float(asked.exported.leakage.h_rms))} if leaks else {}
     if target == "javascript-law":
         held = {"WASM": page_file(LAW_MODULE)}
         held |= {f"{own}_BLOCK": block.astype("<f8", copy=False).tobytes() for own, block in blocks.items()}
         return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
     whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
-    laws = []
-    for own, block in blocks.items():
-        rows, records = block_rows(block)
-        laws.append(DATA.format(name=own, data=block_text(block), rows=rows, records=records))
     return parts | {
-        "CORE": core_text(["law.c"], name),
+        "CORE": core_text(name),
         "DECLARED": filled("law.h", dict.fromkeys(asked.slopes, ""), HEADER="", NAME=name, LEAKAGE=leaks).lstrip(),
         "INTERFACES": "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats),
         "FUNCTIONS": "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats),
-        "LAWS": "".join(laws).rstrip(),
+        "LAWS": "".join(_data(own, block) for own, block in blocks.items()).rstrip(),
     }
 
 
@@ -266,40 +243,29 @@ def _example(exported: ExportedLaw, language: Language) -> str:
     return f"Example: {said}"
 
 
-def core_text(sources: Iterable[str], prefix: str) -> str:
-    """Sources of the core and their headers as one text; a prefix to their functions lets a program hold several."""
-    texts = {name: core_file(name) for name in ("mbma.h", "elementary.h", *sources)}
-    made = (name for text in texts.values() for name in _MADE.findall(text))
-    renamed = [f"#define {name} {prefix}_{name}" for name in made]
-    parts = [re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts.values()]
+def core_text(prefix: str) -> str:
+    """Laws of the core with their headers; a prefix to the functions lets a program hold several."""
+    texts = [core_file(name) for name in ("mbma.h", "elementary.h", "law.c")]
+    renamed = [f"#define {name} {prefix}_{name}" for text in texts for name in _MADE.findall(text)]
+    parts = [re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts]
     return "\n".join(["/* functions of the core, which this file holds, under names of its own */", *renamed, *parts])
 
 
-def block_rows(block: FloatArray) -> tuple[int, int]:
-    """Numbers of rows and records of a law's block."""
-    first = int(block.view(np.int64)[at.RECORDS])
-    return (first - at.HEAD) // 2, (block.size - first) // at.RECORD
-
-
-def block_text(block: FloatArray) -> str:
-    """A law's block as the initializer of head, rows and records in C, every number as it is."""
-    rows, _ = block_rows(block)
-    whole, last = block.view(np.int64), at.HEAD + 2 * rows
-    head = braces(*numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD]))
+def _data(name: str, block: FloatArray) -> str:
+    """A law's block as the head, rows and records of a variable in C, every number as it is."""
+    whole = block.view(np.int64)
+    last = int(whole[at.RECORDS])
     records = [
         braces(*numerals(row[: at.FORCE_AT]), *np.split(row[at.FORCE_AT : -1], 2), *numerals(row[-1]))
         for row in block[last:].reshape(-1, at.RECORD)
     ]
-    parts = head, braces(*whole[at.HEAD : last].reshape(-1, 2)), braces(*records)
-    return ",\n".join(wrapped([part]) for part in parts)
+    head = braces(*numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD]))
+    rows = whole[at.HEAD : last].reshape(-1, 2)
+    data = ",\n".join(wrapped([part]) for part in (head, braces(*rows), braces(*records)))
+    return DATA.format(name=name, data=data, rows=len(rows), records=len(records))
 
 
 TARGETS = tuple(
-    Target(
-        name,
-        functools.partial(law_files, name),
-        CODE - {"leakage"} if language.subroutine else CODE,
-        rows=False,
-    )
+    Target(name, functools.partial(law_files, name), CODE - {"leakage"} if language.subroutine else CODE, rows=False)
     for name, language in LANGUAGES.items()
 )

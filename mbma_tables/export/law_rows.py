@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.answers.film import FlowFactors, flow_factors
+from mbma_tables.answers.film import flow_factors
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.chords import MAX_ROWS, MIN_ROWS, chosen_rows, rounded
 from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
-from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.law_table import MAX_ROWS, MIN_ROWS, LawTable, chosen_rows, rounded
+from mbma_tables.export.targets import AGAINST
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING
 from mbma_tables.laws.calibrated import TESTED_AREA
@@ -25,7 +25,6 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.protocol import Theory, UserTheory
 
-QUANTITIES = ("pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film")
 FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
@@ -113,8 +112,8 @@ def describe_law(
     >>> law.y_name, law.y_unit, law.x_unit, round(law.largest_error, 3)
     ('pressure', 'MPa', 'mm', 0.021)
     """
-    if quantity not in QUANTITIES:
-        raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+    if quantity not in AGAINST:
+        raise InputError(f"quantity must be one of {tuple(AGAINST)}, got {quantity!r}")
     of_body, heat, film = isinstance(surface, ForceLaw), quantity == "conductance", quantity == "film"
     for given, needs, names in (
         (of_body, quantity == "pressure", "a force law"),
@@ -124,8 +123,7 @@ def describe_law(
     ):
         if given and not needs:
             raise InputError(f"{names} does not belong to quantity={quantity!r}: leave it out")
-    if film and theory is None:
-        theory = "calibrated"
+    theory = "calibrated" if film and theory is None else theory
     exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by, direction)
     least, end = _range(exported, pressures)
     if film:
@@ -278,48 +276,35 @@ def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float
         flow_factors, exported.surface, peklenik=peklenik, theory=exported.theory, E_star=exported.modulus,
         hardness=exported.hardness,
     )  # fmt: skip
-    found = at(u)
+    found, middle = at(u), at((u[1:] + u[:-1]) / 2)
     tested = found.pressure[found.area >= TESTED_AREA[0]]
     floor = least if least is not None else float(tested.min()) if tested.size else np.inf
-    units = dict.fromkeys((*FILM_NAMES, "area", "scatter"), "1")
-    units["pressure"] = stress
+    error = 0.0  # largest of linear interpolation, in the middle of the intervals
+    for name in FILM_NAMES:
+        value, between = getattr(found, name), getattr(middle, name)
+        kept = middle.valid & (between > (floor if name == "pressure" else 0))
+        off = (value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1
+        error = float(np.abs(off).max(initial=error))
+    units = dict.fromkeys((*FILM_NAMES, "area", "scatter"), "1") | {"pressure": stress}
     columns = {name: (getattr(found, name), unit) for name, unit in units.items()}
     columns["stiffness"] = (np.asarray(exported.answer(u).unloading_stiffness), f"{stress}/{length}")
-    error = _film_error(at, found, floor)
+    gaps = {reason: found.mean_separation[bad] for reason, bad in found.reasons.items()}
     comments = exported.header(
         f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
         f"mean separation u from {u[0]:.10g} to {u[-1]:.10g} {length}",
         f"{rows} rows; largest error of linear interpolation {error:.1e}, relative, of flow factors and of pressures "
         f"above {floor:.4g} {stress}, where flow factors are valid",
-        *_of_film(found, length),
+        "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
+        "stiffness is that of a small change of the gap, with the contact area as it is",
+        f"peklenik = {found.peklenik:.6g}: length of the roughness along x over that along y",
+        f"scatter: one standard deviation of ln phi; of ln shear_x, ln shear_y: {found.shear_scatter[0]:.2g}",
+        *(
+            f"flow factors not valid from u = {bad.min():.4g} to {bad.max():.4g} {length}: {reason}"
+            for reason, bad in gaps.items()
+        ),
         end=h_max - min(u[0], h_max * (1 - NEAREST_GAP)),
     )
     facts = exported.facts | {"peklenik": (found.peklenik, "1")}
     y, unit = columns.pop("phi_x")
     names, theory = ("mean_separation", "phi_x"), exported.law.theory
     return LawTable(u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts)
-
-
-def _film_error(at: Callable[[FloatArray], FlowFactors], found: FlowFactors, floor: float) -> float:
-    """Largest relative error of linear interpolation, in the middle of the intervals."""
-    u, error = found.mean_separation, 0.0
-    middle = at((u[1:] + u[:-1]) / 2)
-    for name in FILM_NAMES:
-        value, between = getattr(found, name), getattr(middle, name)
-        kept = middle.valid & (between > (floor if name == "pressure" else 0))
-        error = max(error, *np.abs((value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1), 0.0)
-    return float(error)
-
-
-def _of_film(found: FlowFactors, length: str) -> list[str]:
-    """Notes for the reader of flow factors."""
-    lines = [
-        "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
-        "stiffness is that of a small change of the gap, with the contact area as it is",
-        f"peklenik = {found.peklenik:.6g}: length of the roughness along x over that along y",
-        f"scatter: one standard deviation of ln phi; of ln shear_x, ln shear_y: {found.shear_scatter[0]:.2g}",
-    ]
-    for reason, bad in found.reasons.items():
-        gaps = found.mean_separation[bad]
-        lines.append(f"flow factors not valid from u = {gaps.min():.4g} to {gaps.max():.4g} {length}: {reason}")
-    return lines

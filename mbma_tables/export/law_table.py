@@ -1,17 +1,32 @@
-"""Rows of a law, common to all files of rows: columns with names and units, and notes for the reader."""
+"""Rows of a law, common to all files of rows, and their choice by the error of linear interpolation.
+
+Linear interpolation over a step h has an error of about h^2 y''/8. Rows are spaced so that this is the same fraction of
+y everywhere above a floor, and are then moved by half of it, so that the error has both signs; the last row stays on
+the curve, because a solver has no rows beyond it.
+"""
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
 from collections.abc import Mapping
+from decimal import ROUND_CEILING, Context
 from typing import TYPE_CHECKING
 
-from mbma_tables.common.arguments import FloatArray
+import numpy as np
+
+from mbma_tables.common.arguments import FloatArray, number_in, whole_number_in
 from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_lines
+from mbma_tables.export.text import DIGITS, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+MIN_ROWS, MAX_ROWS = 3, 5000
+ROUNDS = 40  # rounds of making the errors of chords equal
+LAST = 1.5  # the last chord's error counts so much more, as its last row is not moved
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -30,10 +45,9 @@ class LawTable(Displayed):
     floor: float = 0.0  # value below which errors are relative to it
     behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
     more: Mapping[str, tuple[FloatArray, str]] = dataclasses.field(default_factory=dict)  # other columns, their units
-    facts: Mapping[str, tuple[float, str]] = dataclasses.field(
-        default_factory=dict
-    )  # of the joint; of friction the coefficient, and
-    # `stick`, the shear stress over displacement before slip, at one pressure, `stick_pressure`
+    # of the joint; of friction the coefficient, and `stick`, the shear stress over displacement before slip, at one
+    # pressure, `stick_pressure`
+    facts: Mapping[str, tuple[float, str]] = dataclasses.field(default_factory=dict)
 
     @property
     def quantity(self) -> str:
@@ -56,3 +70,103 @@ class LawTable(Displayed):
     def _figure(self) -> Figure:
         labels = (f"{name} [{unit}]" for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit)))
         return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
+
+
+def chosen_rows(
+    fine_x: FloatArray,
+    fine_y: FloatArray,
+    floor: float,
+    rows: int | None,
+    rtol: float | None,
+    evenly: bool = False,
+    jump: bool = False,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Rows of a curve given on fine points, as written to a file, and their largest relative error above `floor`."""
+    # with a jump the first two fine points are rows
+    begin = fine_x[:1], fine_y[:1]
+    if jump:
+        fine_x, fine_y = fine_x[1:], fine_y[1:]
+    if rows is not None and rtol is not None:
+        raise InputError("rows and rtol are both given: give one of them")
+
+    def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
+        count -= jump
+        places = np.linspace(fine_x[0], fine_x[-1], count) if evenly else spread(fine_x, fine_y, count, floor)
+        x = rounded(places)
+        y = np.interp(x, fine_x, fine_y)
+        y = rounded(y if evenly else balanced(x, y, fine_x, fine_y, floor))
+        x[-1], y[-1] = _not_below(fine_x[-1]), _not_below(fine_y[-1])
+        kept = fine_y > floor
+        error = float(np.abs(np.interp(fine_x[kept], x, y) / fine_y[kept] - 1).max())
+        return (np.append(begin[0], x), np.append(begin[1], y), error) if jump else (x, y, error)
+
+    if rows is not None:
+        x, y, error = with_rows(whole_number_in("rows", rows, MIN_ROWS, MAX_ROWS))
+    else:
+        asked = number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5)
+        # the error falls with the number of rows
+        fewest = bisect.bisect_left(range(MAX_ROWS + 1), -asked, MIN_ROWS, key=lambda count: -with_rows(count)[2])
+        if fewest > MAX_ROWS:
+            raise InputError(f"rtol = {asked:g} needs more than {MAX_ROWS} rows under linear interpolation")
+        x, y, error = with_rows(fewest)
+    if (np.diff(x) <= 0).any():
+        raise InputError("rows are too close to be told apart: take fewer rows, or a larger smallest pressure")
+    return x, y, error
+
+
+def rounded(values: FloatArray) -> FloatArray:
+    """Numbers as written to a file."""
+    return np.array([float(number(value)) for value in values])
+
+
+def _not_below(value: float) -> float:
+    """A number as written to a file, rounded up so that rows reach it, unless it equals one up to rounding."""
+    return float(Context(prec=DIGITS, rounding=ROUND_CEILING).create_decimal(float(value) * (1 - 1e-13)))
+
+
+def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray:
+    """Places of `count` rows along x whose chords have equal errors relative to max(y, floor), by iteration."""
+    scale = np.maximum(y, floor)
+    # logarithmic in y above the floor to begin with, linear below
+    filled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]) + np.linspace(0, 3, x.size)
+    places = _cut(filled, x, count)
+    best, found = np.inf, places
+    for _ in range(ROUNDS):
+        chords = np.interp(places, x, y)
+        step = np.clip(np.searchsorted(places, x, side="right") - 1, 0, count - 2)
+        error = np.zeros(count - 1)
+        np.maximum.at(error, step, np.abs(np.interp(x, places, chords) - y) / scale)
+        error[-1] *= LAST
+        if error.max() < best:
+            best, found = error.max(), places
+        # the error of a chord falls like the square of its length
+        root = np.sqrt(error + 1e-3 * error.max())
+        places = _cut(np.concatenate([[0.0], np.cumsum(root)]), places, count)
+    return found
+
+
+def _cut(filled: FloatArray, x: FloatArray, count: int) -> FloatArray:
+    """`count` places between which `filled` grows by equal amounts."""
+    places: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, x)
+    places[0], places[-1] = x[0], x[-1]
+    return places
+
+
+def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float) -> FloatArray:
+    """Rows moved by half of the error of the chords beside them, which halves the largest error."""
+    scale = np.maximum(fine_y, floor)
+    over = (np.interp(fine_x, x, y) - fine_y) / scale
+    step = np.clip(np.searchsorted(x, fine_x, side="right") - 1, 0, x.size - 2)
+    high, low = np.zeros(x.size - 1), np.zeros(x.size - 1)
+    np.maximum.at(high, step, over)
+    np.minimum.at(low, step, over)
+    middle = (high + low) / 2
+    beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
+    moved = np.maximum(y - beside * np.maximum(y, floor), 0.0)
+    moved[0], moved[-1] = y[0], y[-1]
+    # pressure increases and leakage decreases; conductance may decrease where the model's stiffness jumps
+    for keeps, accumulated in ((np.greater_equal, np.maximum), (np.less_equal, np.minimum)):
+        if keeps(np.diff(fine_y), 0).all():
+            moved = accumulated.accumulate(moved)
+    result: FloatArray = moved
+    return result

@@ -10,9 +10,8 @@ import numpy as np
 
 from mbma_tables.common.arguments import whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.law_rows import QUANTITIES
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import Grammar
+from mbma_tables.export.targets import AGAINST, Grammar
 from mbma_tables.export.text import DIGITS, checked_name, number, opening
 
 MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
@@ -151,13 +150,13 @@ optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
 comsol = Grammar(
     "COMSOL",
     "%",
-    dict.fromkeys(QUANTITIES, _columns),
+    dict.fromkeys(AGAINST, _columns),
     "Data format: Spreadsheet; functions by position in file. Interpolation: linear; extrapolation: none.",
 )
 moose = Grammar(
     "MOOSE",
     "#",
-    dict.fromkeys(QUANTITIES, _columns),
+    dict.fromkeys(AGAINST, _columns),
     "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns; constant outside the rows. Of more "
     "than two columns: xy_in_file_only = false, y_index_in_file = 1, 2, ...",
 )
@@ -165,7 +164,7 @@ moose = Grammar(
 modelica = Grammar(
     "Modelica",
     "#",
-    dict.fromkeys(QUANTITIES, _matrix),
+    dict.fromkeys(AGAINST, _matrix),
     "smoothness = Modelica.Blocks.Types.Smoothness.LinearSegments; no extrapolation",
     named="law",
     first="#1\n",

@@ -20,7 +20,7 @@ CODE = LAW | {"name", "leakage", "direction"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {
-    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "code",
+    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "c_code",
 }  # fmt: skip
 SI = ("m", "Pa")
 # by quantity: options for it alone, and the abscissa of its rows

@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.leakage import along, degrees, flow
-from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.answers.leakage import along, degrees, flow, shipped_flow
 from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
-from mbma_tables.law import block as at
-from mbma_tables.law import pieces as fit
+from mbma_tables.law import block as fit
 from mbma_tables.laws.effective_medium import wide_gap
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.labels import apply
+from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 RTOL, SHARE = 1e-4, 0.1  # tolerance of the polynomials, or this share of the law's own error
 MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow is a power
@@ -65,7 +62,7 @@ class LeakageLaw:
         found = np.empty(flat.size)
         core.law_fill(flat, self.block, found, *[None] * 4)
         # bodies farther apart
-        apart = (flat > self.block[at.HIGHEST]) & (flat < np.inf)
+        apart = (flat > self.block[fit.HIGHEST]) & (flat < np.inf)
         gap = (self.law.h_max + flat[apart]) / 2
         found[apart] = gap**3 * wide_gap(gap / self.h_rms)
         return found.reshape(np.shape(d))[()]
@@ -78,7 +75,7 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
     blocked at the lightest load.
     """
     h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
-    top = min(law.h_max, law.highest) if law.block.view(np.int64)[at.ENDS] else law.highest
+    top = min(law.h_max, law.highest) if law.block.view(np.int64)[fit.ENDS] else law.highest
     turns: tuple[float, ...] = ()
     if law.gaps is None:
         threshold = shipped_flow().constants.threshold
@@ -86,7 +83,7 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
         blocked = bool(law.area(separation=deepest) >= threshold)
         bottom = float(law.separation(area=threshold)) if blocked else law.lowest
         head = law.block
-        turns = tuple(head[k] * head[k + 1] for k in (at.KINK_SIGN, at.KINK_SIGN_2) if head[k])
+        turns = tuple(head[k] * head[k + 1] for k in (fit.KINK_SIGN, fit.KINK_SIGN_2) if head[k])
     else:
         bottom, turns = _ends(law, direction)
         blocked = bottom > law.lowest
@@ -118,8 +115,8 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
     except ConvergenceError:
         # jumps between the law's polynomials are amplified towards the blocked gap
         pieces = fit.side_pieces(side, max(RTOL, law.error))
-    block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[at.LOWEST], top))
-    block.view(np.int64)[at.ENDS] = blocked
+    block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[fit.LOWEST], top))
+    block.view(np.int64)[fit.ENDS] = blocked
     block.flags.writeable = False
     error = float(errors[:, 0].max()) + _between_nodes(pieces.records, values)
     if law.gaps is not None:
@@ -146,6 +143,6 @@ def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
 def _between_nodes(records: FloatArray, values: fit.Values) -> float:
     """Relative error midway between the nodes of the fit, because kinks of the flow may not affect its coefficients."""
     t = np.cos(np.pi * np.arange(fit.SAMPLES + 1) / fit.SAMPLES)
-    x = np.minimum(records[:, at.CENTRE, None] + t / records[:, at.RATE, None], 1.0)
-    found = np.polynomial.polynomial.polyval(t, records[:, at.FORCE_AT : at.AREA_AT].T)
+    x = np.minimum(records[:, fit.CENTRE, None] + t / records[:, fit.RATE, None], 1.0)
+    found = np.polynomial.polynomial.polyval(t, records[:, fit.FORCE_AT : fit.AREA_AT].T)
     return float(np.abs(found / values(x.ravel())[0].reshape(x.shape) - 1).max())

@@ -1,4 +1,4 @@
-"""`contact_law`: pressure and area of one surface by any theory, fitted by polynomials of the gap (`law.pieces`)."""
+"""`contact_law`: pressure and area of one surface by any theory, fitted by polynomials of the gap (`law.block`)."""
 
 import contextlib
 import functools
@@ -13,8 +13,7 @@ from mbma_tables.answers.contact import chosen_theory
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
-from mbma_tables.law import block as at
-from mbma_tables.law import pieces as fit
+from mbma_tables.law import block as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel
@@ -183,7 +182,7 @@ def theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str
         below = fit.Side(-1, start, lambda x: answer(h_max - width * x), tuple((h_max - bends) / width))
         sides, first = [below, above] if lowest else [below], fit.straight_record(below.values, start)
     elif lowest > 0:
-        sides, first = [above], (np.zeros(at.RECORD), np.zeros(2), (0.0, 0.0))
+        sides, first = [above], (np.zeros(fit.RECORD), np.zeros(2), (0.0, 0.0))
     else:
         octaves = range(3, MOST_OCTAVES)
         start, first = fit.first_record(
@@ -224,8 +223,8 @@ def _finish(
     fit.fill_energies(records, order, signs, scale, first[2][0], beyond)
     turns = [None if x is None else s * (x / scale - h_max) for x, s in fit.first_falls(records[order], signs)]
     # forces carry the modulus
-    records[:, at.FORCE_AT : at.AREA_AT] *= facts["E_star"]
-    records[:, at.ENERGY_AT] *= facts["E_star"]
+    records[:, fit.FORCE_AT : fit.AREA_AT] *= facts["E_star"]
+    records[:, fit.ENERGY_AT] *= facts["E_star"]
     block.flags.writeable = False
     error, own = float(errors[:, 0].max()), float(np.concatenate(own_errors).max())
     ends_at: dict[str, Any] = {"h_max": h_max, "lowest": lowest, "highest": highest, "error": error + own}

@@ -14,8 +14,7 @@ from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import new_figure
 from mbma_tables.islands.spectral import basis
-from mbma_tables.law.force_law import ForceLaw, force_law, forces, units_of
-from mbma_tables.law.half_space import RTOL, Body, Solved
+from mbma_tables.law.force_law import RTOL, Body, ForceLaw, Solved, force_law, forces, units_of
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.laws.calibrated import Spectrum, spectrum_of

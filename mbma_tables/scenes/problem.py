@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import finite_array, nearest, number_in, require, whole_number_in
+from mbma_tables.common.arguments import finite_array, number_in, require, require_name, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
+from mbma_tables.common.units import Units, modulus_and_units
 from mbma_tables.materials import hardness_in
 from mbma_tables.models import ISLAND_MODELS, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -58,8 +58,6 @@ class Problem:
     deltas: Any = None
     theories: Sequence[str] = ()
     points: int = 64
-    length_unit: str | None = None
-    stress_unit: str | None = None
     title: str = "scene"
     outputs: frozenset[str] = dataclasses.field(init=False)
     dropped: frozenset[str] = dataclasses.field(init=False)
@@ -75,8 +73,14 @@ class Problem:
         outputs, dropped = self.outputs, self.dropped
         if self.surface.labelled or self.surface.shape != ():
             raise InputError("a scene has one surface, not a batch: make a scene for each")
-        self._set_units()
-        number_in("E_star", self.E_star, 1e-300, 1e300)
+        E_star, units = modulus_and_units(self.E_star, self.surface)
+        vars(self).update(E_star=number_in("E_star", E_star, 1e-300, 1e300), units=units)
+        for name in ("separations", "mean_separations", "pressures", "deltas"):
+            vars(self)[name] = units.number(name, getattr(self, name))
+        vars(self).update(hardness=hardness_in(units, self.hardness))
+        if self.conductivities is not None:
+            conductivities, unit = units.conductivities(*self.conductivities)
+            vars(self).update(conductivities=conductivities, conductance_unit=unit)
         if self.theory is None:
             of_mbma = bool(dropped) or bool(outputs.intersection(OF_ISLANDS)) or self.island_model is not None
             named = "mbma" if of_mbma else theory_name(self.surface, None, variant=self.variant)
@@ -99,8 +103,7 @@ class Problem:
         """Set the requested outputs and the refinements switched off, checked against each other."""
         wanted, without = list(self.effects), list(self.without)
         for name in (*wanted, *without):
-            if name not in EFFECTS:
-                raise InputError(f"no effect is named {name!r}; {nearest(str(name), EFFECTS)}")
+            require_name("effect", name, EFFECTS)
         both = sorted(set(wanted) & set(without))
         if both:
             raise InputError(f"effect {both[0]!r} is both on and off: leave it in one of the two lists")
@@ -120,23 +123,6 @@ class Problem:
                 "pressure_profile is that of the deformed sphere: leave sphere_deformation on, or pressure_profile out"
             )
         vars(self).update(outputs=outputs, dropped=dropped)
-
-    def _set_units(self) -> None:
-        """Lengths in the surface's unit, stresses in that of E*."""
-        unit = None if self.length_unit is None else known(self.length_unit)
-        if None not in (unit, self.surface.unit) and unit != self.surface.unit:
-            raise InputError(
-                f"length_unit is {unit!r} and the surface's own {self.surface.unit!r}: ask for surface.to({unit!r})"
-            )
-        surface = in_unit(self.surface, unit)
-        E_star, units = modulus_and_units(self.E_star, surface, self.stress_unit)
-        derived = {"surface": surface, "E_star": E_star, "units": units, "length_unit": surface.unit}
-        for name in ("separations", "mean_separations", "pressures", "deltas"):
-            derived[name] = units.number(name, getattr(self, name))
-        derived["hardness"] = hardness_in(units, self.hardness)
-        if self.conductivities is not None:
-            derived["conductivities"], derived["conductance_unit"] = units.conductivities(*self.conductivities)
-        vars(self).update(derived)
 
     def _checked_gaps(self) -> Any:
         """The prescribed numbers; None if no effect needs gaps."""
@@ -183,19 +169,18 @@ class Problem:
 
     def _check_theories(self) -> None:
         """Names of theories and island models, and options of MBMA beside other theories."""
-        if isinstance(self.island_model, str) and self.island_model not in ISLAND_MODELS:
-            hint = nearest(self.island_model, ISLAND_MODELS)
-            raise InputError(f"no island model is named {self.island_model!r}; {hint}")
+        if isinstance(self.island_model, str):
+            require_name("island model", self.island_model, ISLAND_MODELS)
         if self.island_model is not None and "sphere_deformation" in self.dropped:
             raise InputError("sphere_deformation is off, which is the rigid sphere: leave island model out")
         if self.seconds is not None and not isinstance(self.island_model, str | None):
             raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
-        own = () if not isinstance(self.theory, str) else ((self.theory, (*THEORIES, *OF_MAPS)),)
-        for name, named in (*own, *((other, COMPARED) for other in self.theories)):
-            if name not in named:
-                raise InputError(f"no theory is named {name!r}; {nearest(str(name), named)}")
-        if not own:
+        if isinstance(self.theory, str):
+            require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
+        else:
             get_theory(self.theory)
+        for name in self.theories:
+            require_name("theory", name, COMPARED)
         if self.theory_name in self.theories:
             raise InputError(f"the scene is by theory {self.theory_name!r} itself: leave it out of theories")
         options = {

@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,13 +15,17 @@ import numpy as np
 from mbma_tables.answers.source import MEANINGS
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.progress import doing
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.models import RigidModel, answer_islands
+from mbma_tables.models.named import get_model
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
-from mbma_tables.surfaces.variants import get_variant
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.variants import Variant, get_variant
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +33,6 @@ if TYPE_CHECKING:
     from mbma_tables.theories.mbma import Mbma
     from mbma_tables.theories.protocol import Theory
 
-Progress = Callable[[str, int, int], None]
 VALIDITY = ("valid", "scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
 YIELDED = ("yielded", "mean_pressure", "plane_separation", "unloading_stiffness")
 
@@ -43,16 +45,12 @@ class Run:
     surface: AnySurface
     gap: Any = None  # separations d
     found: dict[str, tuple[tuple[str, ...], Any]] = dataclasses.field(default_factory=dict)
-    errors: dict[str, float] = dataclasses.field(default_factory=dict)
-    island_models: dict[str, str] = dataclasses.field(default_factory=dict)
+    errors: dict[str, float] = dataclasses.field(default_factory=dict)  # bounds that steps reached
     reasons: dict[str, list[int]] | None = None
 
-    def keep(self, step: Step, values: dict[str, Any], error: float) -> None:
-        """Record values at gaps, the error bound that a step reached, and its island model."""
-        self.found |= {name: (("gap",), array) for name, array in values.items()}
-        self.errors[step.name] = error
-        if step.island_model_name is not None:
-            self.island_models[step.name] = step.island_model_name
+    def keep(self, values: dict[str, Any], *dims: str) -> None:
+        """Record values over dimensions, gaps by default."""
+        self.found |= {name: (dims or ("gap",), array) for name, array in values.items()}
 
 
 def _contact(run: Run, step: Step) -> None:
@@ -65,8 +63,7 @@ def _contact(run: Run, step: Step) -> None:
 
         assert step.island_model is not None
         assert step.rtol is not None
-        outside = "exact" if step.island_model_name in TABLES else "raise"
-        theory = Mbma(step.island_model, problem.variant, step.rtol, outside)
+        theory = Mbma(step.island_model, problem.variant, step.rtol, _outside(step))
     assert problem.prescribed is not None
     known = {"separation": run.gap} if "finite_height" in problem.dropped else {problem.prescribed[:-1]: problem.gaps}
     if problem.hardness is not None:
@@ -75,19 +72,22 @@ def _contact(run: Run, step: Step) -> None:
     run.gap = found.separation if run.gap is None else run.gap
     names: list[str] = [name for name in OF_CONTACT[:4] if name in wanted]
     names += VALIDITY * ("validity" in wanted) + YIELDED * ("yield" in wanted)
-    values = {name: getattr(found, name) for name in names if name != "area" or "subscale_area" not in problem.dropped}
+    run.keep({n: getattr(found, n) for n in names if n != "area" or "subscale_area" not in problem.dropped})
     if "conductance" in wanted:
         assert problem.conductivities is not None
-        values["conductance"] = found.conductance(*problem.conductivities)
+        run.keep({"conductance": found.conductance(*problem.conductivities)})
     if "leakage" in wanted:
         fields = {"": "K", "_valid": "valid", "_scatter": "scatter", "_blocked": "blocked"}
-        values |= {f"leakage{end}": getattr(found.leakage, field) for end, field in fields.items()}
+        run.keep({f"leakage{end}": getattr(found.leakage, field) for end, field in fields.items()})
     if "validity" in wanted:
         run.reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in found.reasons.items()}
-    error = float(found.error.max())
-    if problem.theory == "mbma" and problem.hardness is None:
-        error *= _amplification(run, theory)
-    run.keep(step, values, error)
+    elastic = problem.theory == "mbma" and problem.hardness is None
+    run.errors[step.name] = float(found.error.max()) * (_amplification(run, theory) if elastic else 1.0)
+
+
+def _outside(step: Step) -> str:
+    """What `outside` is for islands of a step: those that a table does not cover are solved."""
+    return "exact" if step.island_model_name in TABLES else "raise"
 
 
 def _amplification(run: Run, theory: Mbma) -> float:
@@ -97,14 +97,12 @@ def _amplification(run: Run, theory: Mbma) -> float:
     slopes = bool(problem.outputs & {"stiffness", "conductance"})
     if not gap.size or not (slopes or problem.prescribed in INVERTED):
         return 1.0
-    found = theory.totals(run.surface, gap, derivatives="separation")
-    assert found.pressure_by is not None
-    assert found.area_by is not None
-    steep = -found.pressure_by["separation"] / found.pressure
+    found = theory.totals(run.surface, gap, slopes=True)
+    steep = -found.pressure_slope / found.pressure
     factor = 1.0
     if problem.prescribed in INVERTED:
         # pressures at prescribed areas: less accurate where the area hardly rises
-        by_area = steep * found.area / np.abs(found.area_by["separation"])
+        by_area = steep * found.area / np.abs(found.area_slope)
         factor += max(1.0, float(by_area.max())) if problem.prescribed == "areas" else 1.0
     # the stiffness is small only next to a turning point
     flat = 1 / ((h_max - gap) * np.abs(steep))
@@ -121,16 +119,84 @@ def _law(run: Run, step: Step) -> None:
     law = contact_law(run.surface, problem.theory, rtol=step.rtol, E_star=problem.E_star)
     if problem.prescribed in INVERTED:
         run.gap, error = law.separation(**{problem.prescribed[:-1]: problem.gaps}), AMPLIFICATION["inverse"]
-    names = problem.outputs & {"pressure", "area"}
-    run.keep(step, {name: getattr(law, name)(separation=run.gap) for name in names}, error * law.error)
+    run.keep({name: getattr(law, name)(separation=run.gap) for name in problem.outputs & {"pressure", "area"}})
+    run.errors[step.name] = error * law.error
 
 
-def _islands(run: Run, step: Step) -> None:
-    from mbma_tables.scenes import statistics
+def _asked(run: Run, step: Step) -> tuple[Any, Variant, float]:
+    """The surface as profiles take it, variant and tolerance of a step."""
+    assert step.rtol is not None
+    shape: Any = run.surface
+    if isinstance(shape, Surface):
+        shape = float(shape.hurst), float(shape.zeta_1), float(shape.h_max / shape.h_rms)
+    return shape, get_variant(run.problem.variant), step.rtol
 
-    fields, error = getattr(statistics, step.name.replace(" ", "_"))(run.problem, run.surface, run.gap, step)
-    run.found |= fields
-    run.keep(step, {}, error)
+
+def hertz_area(run: Run, step: Step) -> None:
+    """A/A0 with eta = 1 in Eq. 38 (C.1)."""
+    from mbma_tables.totals.profile import profile
+
+    shape, variant, rtol = _asked(run, step)
+    assert step.island_model is not None
+    depth = (float(run.surface.h_max) - run.gap) / float(run.surface.h_rms)
+    kept = profile(shape, get_model(step.island_model, rtol, variant), variant, rtol, _outside(step), rows=4)
+    area = np.zeros(depth.shape)
+    area[depth > 0] = kept.totals(depth[depth > 0])[3]
+    run.keep({"area": area})
+    run.errors[step.name] = kept.error
+
+
+def island_statistics(run: Run, step: Step) -> None:
+    """Number of islands at every gap; load, area, density along their approach (Eqs. 40, 42)."""
+    from mbma_tables.totals.island import islands_of, scale_area, scale_force
+    from mbma_tables.totals.profile import profile, source_of
+
+    problem, surface, (shape, variant, rtol) = run.problem, run.surface, _asked(run, step)
+    assert step.island_model is not None
+    h_rms = float(surface.h_rms)
+    depth = np.asarray(surface.h_max - run.gap) / h_rms
+    source, deepest = source_of(shape, variant), max(float(depth.max()), 0.0)
+    # approaches up to the deepest, graded towards first contact
+    t = np.linspace(0, 1, problem.points + 1)[1:] * np.arcsinh(np.sqrt(deepest / source.layer))
+    grid = source.layer * np.sinh(t) ** 2
+    number, density = np.zeros(depth.size), np.zeros((depth.size, grid.size))
+    # where no gap touches there is no distribution
+    pressure, area, error = np.zeros(grid.size), np.zeros(grid.size), 0.0
+    if deepest > 0:
+        # islands are counted without an island model
+        kept = profile(shape, RigidModel(), variant, rtol, rows=3)
+        number[depth > 0] = kept.totals(depth[depth > 0])[2]
+        g, s, q0 = islands_of(surface, grid * h_rms, variant)
+        phi = answer_islands(get_model(step.island_model, rtol, variant), g, _outside(step))
+        pressure = problem.E_star * s / q0 * scale_force(g) * phi.phi_F
+        share = g["eta"] if "subscale_area" in problem.dropped else 1.0
+        area = scale_area(g) * phi.phi_A / share / q0**2
+        shift, rate = source.heights(g, grid)
+        spread = source.density(g, grid, shift - rate * depth[:, None])
+        number, density = number * q0**2, np.where(grid <= depth[:, None], spread, 0.0) * q0**2 / s
+        error = max(kept.error, float(np.max(phi.error)))
+    run.keep({"island_number": number})
+    run.keep({"island_delta": grid * h_rms, "island_force": pressure, "island_area": area}, "approach")
+    run.keep({"island_density": density}, "gap", "approach")
+    run.errors[step.name] = error
+
+
+def profiles(run: Run, step: Step) -> None:
+    """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
+    from mbma_tables.islands import greenwood_tripp
+    from mbma_tables.totals.island import islands_of
+
+    problem = run.problem
+    delta = np.atleast_1d(np.asarray(problem.deltas, dtype=float)).ravel()
+    g, s, q0 = islands_of(run.surface, delta, get_variant(problem.variant))
+    assert step.rtol is not None
+    solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=step.rtol)
+    radius = np.sqrt(2 * g["R_d"] * g["sigma"])
+    run.keep({"profile_delta": delta}, "island")
+    pressure = problem.E_star * q0 * s * (g["sigma"] / radius)[:, None] * solved.pressure
+    fields = {"profile_radius": solved.rho * radius[:, None] / q0, "profile_pressure": pressure}
+    run.keep(fields | {"profile_gap": solved.gap * g["sigma"][:, None] * s}, "island", "node")
+    run.errors[step.name] = float(np.max(solved.error))
 
 
 class OtherTheory(NamedTuple):
@@ -170,46 +236,37 @@ def comparison(run: Run, step: Step) -> None:
     problem = run.problem
     cap = math.inf if problem.hardness is None else problem.hardness
     other = other_theory(step.name, problem.surface, run.gap, problem.E_star, cap)
-    run.found |= {f"{step.name}_pressure": (("gap",), other.pressure), f"{step.name}_area": (("gap",), other.area)}
+    run.keep({f"{step.name}_pressure": other.pressure, f"{step.name}_area": other.area})
 
 
-STEPS = {"contact": _contact, "law": _law}
-STEPS |= dict.fromkeys(("hertz area", "island statistics", "profiles"), _islands)
-
-
-def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
+def run_plan(problem: Problem, plan: Plan) -> xr.Dataset:
     """The quantities of a problem with units and provenance; raises if their error exceeds the tolerance."""
     surface, h_max = problem.surface, float(problem.surface.h_max)
-    if "finite_height" in problem.dropped:
-        plain: Any = surface
-        surface = dataclasses.replace(plain, h_max=height_without_end(problem, 0.1 * plan.rtol))
-    run, report = Run(problem, surface), progress or (lambda *_: None)
+    run = Run(problem, surface)
     if problem.prescribed in INVERTED:
-        name = "nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"
-        run.found[name] = (("gap",), problem.gaps)
+        run.keep({"nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area": problem.gaps})
     elif problem.gaps is not None:
         run.gap = problem.gaps if problem.prescribed == "separations" else 2 * problem.gaps - h_max
+        if "finite_height" in problem.dropped:
+            plain: Any = surface
+            # exp(-(d + t)^2/2) <= exp(-d^2/2) exp(-t^2/2), of which less than a tenth of the tolerance is left beyond
+            # this height; ten more for the powers before it, one s, or h_rms, for h_d
+            tail = math.sqrt(2 * (10 - math.log(0.1 * plan.rtol))) + 1
+            height = max(float(run.gap.max()), 0.0) + tail * float(getattr(surface, "s", surface.h_rms))
+            run.surface = dataclasses.replace(plain, h_max=height)
+    steps: dict[str, Any] = {"contact": _contact, "law": _law, "profiles": profiles}
+    steps |= {"hertz area": hertz_area, "island statistics": island_statistics}
     for step in plan.steps:
-        report(step.name, 0, step.count)
-        STEPS.get(step.name, comparison)(run, step)
-        report(step.name, step.count, step.count)
+        doing(f"{step.name}: {step.count}")
+        steps.get(step.name, comparison)(run, step)
     error = max(run.errors.values(), default=0.0)
     if error > plan.rtol:
         raise ConvergenceError(
             f"the error bound reached is {error:.2e}, above rtol = {plan.rtol:.2e}: give a larger rtol"
         )
     if run.gap is not None:
-        run.found |= {"separation": (("gap",), run.gap), "mean_separation": (("gap",), (h_max + run.gap) / 2)}
+        run.keep({"separation": run.gap, "mean_separation": (h_max + run.gap) / 2})
     return to_dataset(run, plan)
-
-
-def height_without_end(problem: Problem, rtol: float) -> float:
-    """Height [length] beyond which the whole Gaussian adds less than `rtol` at the largest gap."""
-    h_max = float(problem.surface.h_max)
-    gap = problem.gaps.max() if problem.prescribed == "separations" else 2 * problem.gaps.max() - h_max
-    # exp(-(d + t)^2/2) <= exp(-d^2/2) exp(-t^2/2); ten more for the powers before it, one s, or h_rms, for h_d
-    tail = math.sqrt(2 * (10 - math.log(rtol))) + 1
-    return max(float(gap), 0.0) + tail * float(getattr(problem.surface, "s", problem.surface.h_rms))
 
 
 def _units(problem: Problem) -> dict[str, tuple[str, str]]:
@@ -245,6 +302,7 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
     import xarray as xr
 
     problem, units = run.problem, _units(run.problem)
+    steps = [step for step in plan.steps if step.island_model is not None]
     variables = {
         name: xr.Variable(dims, values, {"units": units[name][0], "long_name": units[name][1]})
         for name, (dims, values) in run.found.items()
@@ -258,10 +316,10 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
         "errors": json.dumps(run.errors),
         "theory": problem.theory_name,
         "variant": get_variant(problem.variant).name if problem.theory == "mbma" else "",
-        "island_models": json.dumps(run.island_models),
+        "island_models": json.dumps({step.name: step.island_model_name for step in steps}),
         "switched_off": " ".join(sorted(problem.dropped)),
         "E_star": float(problem.E_star),
-        "table_hashes": json.dumps(_hashes(problem, set(run.island_models.values()))),
+        "table_hashes": json.dumps(_hashes(steps)),
     }
     # psi times the hardness
     stress = float(problem.E_star * problem.surface.rms_gradient)
@@ -277,14 +335,12 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
     return xr.Dataset(variables, attrs=facts).set_coords([name for name in named if name in variables])
 
 
-def _hashes(problem: Problem, island_models: set[str]) -> dict[str, str]:
+def _hashes(steps: list[Step]) -> dict[str, str]:
     """Hashes of the values of the tables used."""
-    used = sorted(island_models & set(TABLES))
-    if not used:
+    used: dict[Any, Any] = {step.island_model_name: step.island_model for step in steps}
+    if not used.keys() & set(TABLES):
         return {}
     from mbma_tables.models.tables import open_table
 
-    tables: dict[str, Any] = {name: open_table(name) for name in used}
-    if not isinstance(problem.island_model, str | None):
-        tables[problem.island_model.name] = problem.island_model
-    return {name: str(table.content.attributes["values_sha256"]) for name, table in tables.items() if name in used}
+    tables = {name: open_table(name) if used[name] == name else used[name] for name in TABLES if name in used}
+    return {name: str(table.content.attributes["values_sha256"]) for name, table in tables.items()}

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.common.arguments import finite_array, needed
+from mbma_tables.common.arguments import needed
 from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.plan import Plan, make_plan
-from mbma_tables.scenes.problem import INVERTED, PRESCRIBED, Problem
+from mbma_tables.scenes.problem import Problem
 from mbma_tables.scenes.specimen import check, from_tables, read_toml, schema
 
 if TYPE_CHECKING:
@@ -57,10 +57,6 @@ class Scene(Problem):
         For "comparison": names of other theories, or "persson_simplified".
     points : int
         Points of the distribution of "island_statistics", over the approach.
-    length_unit : str, optional
-        For a surface without a unit.
-    stress_unit : str, optional
-        Unit of `E_star`; a text with another unit is converted.
     title : str, optional
         For the result.
 
@@ -111,13 +107,8 @@ class Scene(Problem):
         """The plan as text."""
         return self.plan().text()
 
-    def run(self, progress: Callable[[str, int, int], None] | None = None) -> xarray.Dataset:
+    def run(self) -> xarray.Dataset:
         """Compute the requested effects.
-
-        Parameters
-        ----------
-        progress : callable, optional
-            Called as ``progress(step, done, total)``.
 
         Returns
         -------
@@ -132,41 +123,25 @@ class Scene(Problem):
         needed("xarray")
         from mbma_tables.scenes.run import run_plan
 
-        return run_plan(self, self.plan(), progress)
+        return run_plan(self, self.plan())
 
 
 def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> dict[str, Any]:
     """The arguments of `Scene` from a file's content; files that it names are relative to `folder`."""
     check(content, schema())
     specimen = from_tables(content, folder, title)
-
-    def lengths(table: dict[str, Any]) -> dict[str, Any]:
-        """The numbers of a table, in the surface's unit."""
-        if not table.pop("over_h_rms", False):
-            return table
-        return {name: finite_array(name, value) * float(specimen.surface.h_rms) for name, value in table.items()}
-
-    prescribed = dict(content.get("prescribed", {}))
-    for name in INVERTED:
-        if "over_h_rms" in prescribed and name in prescribed:
-            raise InputError(f"[prescribed]: over_h_rms is for lengths, {name} are not: leave it out")
-    if not prescribed and "prescribed" in content:
-        raise InputError(f"[prescribed] is empty: give one of {', '.join(PRESCRIBED)}")
-    statistics = content.get("island_statistics", {})
-    if statistics and "island_statistics" not in content["effects"]["on"]:
+    if content.get("island_statistics") and "island_statistics" not in content["effects"]["on"]:
         raise InputError("[island_statistics] is given and the effect is off: add it to on, or leave the table out")
     found: dict[str, Any] = {
         "surface": specimen.surface,
         "effects": content["effects"]["on"],
         "without": content["effects"].get("off", ()),
-        "E_star": 1.0 if specimen.E_star is None else specimen.E_star,
-        "stress_unit": specimen.stress_unit,
+        "E_star": specimen.modulus,
         "title": title,
     }
     found |= {name: content[name] for name in ("title", "theory", "variant") if name in content}
-    found |= lengths(prescribed) | lengths(dict(content.get("pressure_profile", {})))
-    found |= dict(content.get("accuracy", {})) | statistics | content.get("comparison", {})
-    found |= content.get("yield", {})
+    for name in ("prescribed", "pressure_profile", "accuracy", "island_statistics", "comparison", "yield"):
+        found |= content.get(name, {})
     if "conductance" in content:
         found["conductivities"] = (content["conductance"]["k1"], content["conductance"]["k2"])
     return found

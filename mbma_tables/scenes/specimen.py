@@ -17,9 +17,8 @@ from mbma_tables.common.files import numbers_of, read_file
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import ROUGHNESS
-from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
@@ -70,24 +69,16 @@ class Specimen:
         return dataclasses.replace(self, surface=in_unit(self.surface, length), E_star=modulus, stress_unit=unit)
 
 
-def from_name(name: str) -> Specimen:
-    """A case of the paper."""
-    case = get_case(name)
-    return Specimen(Surface.named(name), case.title)
-
-
-def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
+def _from_map(path: pathlib.Path, options: dict[str, Any], unit: str | None) -> Specimen:
     """The surface of a measured map or line scan, with options of `Surface.from_map`, or of its simulation's table."""
-    options = dict(treatment)
     if is_own(path):
-        unit = options.pop("unit", None)
         if options:
             raise InputError(f"{_printable(path)} is a table of a simulated map: leave {', '.join(options)} out")
         from mbma_tables.theories import BoundaryElements
 
         surface = BoundaryElements.from_netcdf(path).surface
         return Specimen(in_unit(surface, unit), f"simulated map: {_printable(path)}")
-    fitted, surface = options.pop("model", "measured") == "self-affine", measured(path, options)[1]
+    fitted, surface = options.pop("model", "") == "self-affine", measured(path, options | {"unit": unit})[1]
     title = f"{'fitted to the map' if fitted else 'measured:'} {_printable(path)}"
     return Specimen(surface.fit() if fitted else surface, title)
 
@@ -174,33 +165,28 @@ def from_tables(entries: Mapping[str, Any], folder: pathlib.Path, title: str) ->
 def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
     """The surface of a table [surface]."""
     numbers = dict(surface)
-    texts = {name: numbers.pop(name, None) for name in ("name", "map", "psd", "convention", "length_unit")}
-    given = [name for name in ("name", "map", "psd") if texts[name] is not None]
-    if len(given) > 1:
-        raise InputError(f"[surface]: {' and '.join(given)} are given: one of name, map, psd or numbers")
+    convention, unit = (numbers.pop(name, None) for name in ("convention", "length_unit"))
+    sources = {name: numbers.pop(name) for name in ("name", "map", "psd") if name in numbers}
     treatment = {name: numbers.pop(name) for name in (*MAP_OPTIONS, "model") if name in numbers}
-    if treatment and given != ["map"]:
+    (kind, source), *more = sources.items() or [("numbers", "")]
+    if more:
+        raise InputError(f"[surface]: {' and '.join(sources)} are given: one of name, map, psd or numbers")
+    if treatment and kind != "map":
         raise InputError(f"[surface]: {', '.join(treatment)}: for a measured map, which is missing: give map = ...")
-    if given in (["name"], ["map"]) and numbers:
-        raise InputError(f"[surface]: {given[0]} and numbers ({', '.join(numbers)}) are given: leave one of them out")
-    if texts["convention"] is not None and given != ["psd"]:
+    if convention is not None and kind != "psd":
         raise InputError("[surface]: convention belongs to a psd: give psd = ..., or leave it out")
-    unit = texts["length_unit"]
-    if given == ["name"]:
-        return from_name(str(texts["name"])).in_units(unit, None)
-    if given == ["map"]:
-        return from_map(_file(folder, str(texts["map"]), "map"), treatment | {"unit": unit})
-    if given == ["psd"]:
-        path = _file(folder, str(texts["psd"]), "psd")
-        return _from_psd(path, numbers, texts["convention"] or "paper", unit)
-    return from_numbers(numbers, unit, title)
-
-
-def _file(folder: pathlib.Path, name: str, key: str) -> pathlib.Path:
-    path = folder / name
+    if kind == "numbers":
+        return from_numbers(numbers, unit, title)
+    if kind != "psd" and numbers:
+        raise InputError(f"[surface]: {kind} and numbers ({', '.join(numbers)}) are given: leave one of them out")
+    if kind == "name":
+        return Specimen(Surface.named(source), CASES[source].title).in_units(unit, None)
+    path = folder / source
     if not path.is_file():
-        raise InputError(f"[surface]: {key} = {name!r} is not a file; paths are relative to the file that names them")
-    return path
+        raise InputError(
+            f"[surface]: {kind} = {source!r} is not a file; paths are relative to the file that names them"
+        )
+    return _from_map(path, treatment, unit) if kind == "map" else _from_psd(path, numbers, convention or "paper", unit)
 
 
 def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, unit: str | None) -> Specimen:

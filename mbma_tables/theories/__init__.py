@@ -41,7 +41,7 @@ _HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson
 _HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by simulating it
 # of MBMA
-OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise", "workers": 1}
+OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise"}
 
 
 def __getattr__(name: str) -> Any:
@@ -71,7 +71,7 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     from mbma_tables.theories.protocol import Theory, UserTheory
 
     if isinstance(theory, str) and theory in OF_MAPS:
-        from mbma_tables.theories.corrected import of_map
+        from mbma_tables.theories.saturated import of_map
 
         return of_map(theory, surface)
     found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
@@ -107,6 +107,6 @@ def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, *
         return "simulated"
     if getattr(surface, "map", None) is None:
         return "calibrated"
-    from mbma_tables.theories.corrected import applies
+    from mbma_tables.theories.saturated import applies
 
     return "corrected" if applies(surface) else "calibrated"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, require, whole_number_in
+from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.models import QUANTITIES, AnyModel, check_outside, island_model_name
 from mbma_tables.models.named import get_model
@@ -25,7 +25,6 @@ GOLDEN = (5**0.5 - 1) / 2
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
 SECTIONS = 24  # golden sections of a scan's step, to 1e-6
 
-MOST_WORKERS = 1024
 MAX_AREA = 0.1  # above it islands begin to overlap (docs/fidelity.md)
 
 
@@ -34,7 +33,7 @@ class Mbma(Theory):
 
     Parameters
     ----------
-    island model, variant, rtol, outside, workers
+    island model, variant, rtol, outside
         As for `mbma_tables.contact`.
     """
 
@@ -47,57 +46,54 @@ class Mbma(Theory):
         variant: str | Variant = "reported",
         rtol: float = 1e-8,
         outside: str = "raise",
-        workers: int = 1,
     ) -> None:
         check_outside(outside)
         self.island_model, self.variant, self.rtol, self.outside = island_model, get_variant(variant), rtol, outside
-        self.workers = whole_number_in("workers", workers, 1, MOST_WORKERS)
         self.variant_name, self.island_model_name = self.variant.name, island_model_name(island_model)
 
     @functools.cached_property
     def sums(self) -> Sums:
         """The island model as an object, and how its islands are summed."""
         model = get_model(self.island_model, self.rtol, self.variant)
-        return Sums(model, self.variant, self.rtol, self.outside, self.workers)
+        return Sums(model, self.variant, self.rtol, self.outside)
 
     @functools.cached_property
     def _scanned(self) -> Mbma:
         """The same theory, but with NaN instead of errors for islands that are not covered."""
         if self.outside != "raise":
             return self
-        return Mbma(self.island_model, self.variant, self.rtol, "nan", self.workers)
+        return Mbma(self.island_model, self.variant, self.rtol, "nan")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Mbma, (self.island_model, self.variant, self.rtol, self.outside, self.workers)
+        return Mbma, (self.island_model, self.variant, self.rtol, self.outside)
 
     def totals(
         self,
         surface: AnySurface,
         separation: FloatArray,
         E_star: ArrayLike = 1.0,
-        derivatives: bool | str = False,
+        slopes: bool = False,
     ) -> Totals:
         """Force and area at separations d [length] of the surface's broadcast shape."""
         gap = np.asarray(separation, float)
         require("separation", gap, gap >= -surface.h_max, "at least -h_max, where the model ends at full compression")
         if isinstance(surface, Surface):
             check_band(surface, self.variant)
-        return totals_at(surface, gap, self.sums, E_star, derivatives)
+        return totals_at(surface, gap, self.sums, E_star, slopes)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
         u = np.asarray(mean_separation, dtype=float)
-        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives="separation")
+        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), slopes=True)
         # du = dd/2
-        stiffness = -2 * found.pressure_by["separation"]  # type: ignore[index]
-        return TheoryAnswer(found.pressure, found.area, stiffness, found.error)
+        return TheoryAnswer(found.pressure, found.area, -2 * found.pressure_slope, found.error)
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         h_max, which = np.asarray(surface.h_max), QUANTITIES.index(quantity)
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
-            found = totals_at(surface, 2 * u - h_max, self.sums, 1.0, "separation")
-            steep = -2 * found.pressure_by["separation"]  # type: ignore[index]
+            found = totals_at(surface, 2 * u - h_max, self.sums, 1.0, slopes=True)
+            steep = -2 * found.pressure_slope
             return (found.area, found.area * steep / found.pressure, False) if which else (found.pressure, steep, True)
 
         return values

@@ -5,7 +5,6 @@ The double integral (19) is u_P of `mbma_tables.laws.calibrated` with the weight
 
 import functools
 import math
-from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -30,14 +29,27 @@ def _own_law(surface: MeasuredSurface) -> Law:
     return Law(spectrum_of(surface), None, YANG_PERSSON)
 
 
-def _light(law: Law) -> tuple[float, float]:
-    """u0/h_rms and log of lambda over the rms gradient, Eq. (21)."""
-    s = law.spectrum
-    log_g = np.log(s.below) / 2
-    shares = s.x * s.variance / (4 * s.gradient) * np.exp(-log_g)
-    total = float(shares.sum())
-    light = math.log(LAMBDA / math.sqrt(2)) + float(shares @ log_g) / total
-    return YANG_PERSSON.weight * math.sqrt(8 / math.pi) * total, light
+class _Light:
+    """The light-load form (20) of a law: u0/h_rms and ln of lambda over the rms gradient, Eq. (21)."""
+
+    def __init__(self, law: Law) -> None:
+        s = law.spectrum
+        log_g = np.log(s.below) / 2
+        shares = s.x * s.variance / (4 * s.gradient) * np.exp(-log_g)
+        total = float(shares.sum())
+        self.log_lambda = math.log(LAMBDA / math.sqrt(2)) + float(shares @ log_g) / total
+        self.u0 = YANG_PERSSON.weight * math.sqrt(8 / math.pi) * total
+
+    def contact(self, u: FloatArray) -> tuple[FloatArray, ...]:
+        pressure = np.exp(self.log_lambda - u / self.u0)
+        return pressure, pressure, pressure / self.u0
+
+    def separation_persson(self, load: FloatArray) -> tuple[FloatArray]:
+        """Negative beyond lambda E*."""
+        return (self.u0 * (self.log_lambda - np.log(load)),)
+
+    def energy(self, load: FloatArray) -> FloatArray:
+        return self.u0 * load
 
 
 class Persson(Theory):
@@ -72,43 +84,24 @@ class Persson(Theory):
             raise InputError(f"method must be 'full' or 'simplified', got {method!r}")
         self.method: Method = method
 
-    def _by_law(self, surface: AnySurface, given: FloatArray, answer: Callable[[Law, FloatArray], Any]) -> FloatArray:
-        """Rows of ``answer(law, entries of given)`` of each distinct law, in the places of its entries."""
+    def _by_law(self, surface: AnySurface, quantity: str, given: FloatArray) -> FloatArray:
+        """Rows of what a method of each distinct law answers to its entries, in their places."""
         if isinstance(surface, MeasuredSurface):
             if self.method == "simplified":
                 raise InputError("the simplified form (20) needs self-affine surfaces: method='full', or surface.fit()")
-            return np.asarray(answer(_own_law(surface), given))
+            return np.asarray(getattr(_own_law(surface), quantity)(given))
         assert isinstance(surface, Surface)
-        if not surface.shape:
-            law = self_affine_law(float(surface.hurst), float(surface.zeta_1), None, YANG_PERSSON)
-            return np.asarray(answer(law, given))
-        pairs = np.stack([np.broadcast_to(part, given.shape).ravel() for part in (surface.hurst, surface.zeta_1)])
-        known, inverse = np.unique(pairs, axis=1, return_inverse=True)
-        laws = [self_affine_law(*pair, None, YANG_PERSSON) for pair in known.T.tolist()]
-        groups = grouped(inverse.ravel())
-        parts = [np.asarray(answer(laws[k], given.ravel()[mine])) for k, mine in groups]
-        out = np.empty((len(parts[0]), given.size))
-        out[:, np.concatenate([mine for _, mine in groups])] = np.concatenate(parts, axis=1)
-        return out.reshape(-1, *given.shape)
-
-    def _forces(self, law: Law, u: FloatArray) -> Any:
-        """Force over A0 E* g and -dF/du at u/h_rms."""
-        if self.method == "full":
-            return law.contact(u)[::2]
-        u0, log_lambda = _light(law)
-        pressure = np.exp(log_lambda - u / u0)
-        return pressure, pressure / u0
-
-    def _separations(self, law: Law, load: FloatArray) -> Any:
-        """u/h_rms of Eqs. (19) or (20) at loads over A0 E* g, negative beyond lambda E*."""
-        if self.method == "full":
-            return law.separation_persson(load)[:1]
-        u0, log_lambda = _light(law)
-        return (u0 * (log_lambda - np.log(load)),)
-
-    def _energies(self, law: Law, load: FloatArray) -> Any:
-        """Elastic energy over A0 E* g h_rms at loads over A0 E* g."""
-        return ((law.energy(load) if self.method == "full" else _light(law)[0] * load),)
+        pairs = np.stack([np.ravel(surface.hurst), np.ravel(surface.zeta_1)])
+        known, number = np.unique(pairs, axis=1, return_inverse=True)
+        laws: list[Any] = [self_affine_law(*pair, None, YANG_PERSSON) for pair in known.T.tolist()]
+        laws = [_Light(law) for law in laws] if self.method == "simplified" else laws
+        if len(laws) == 1:
+            return np.asarray(getattr(laws[0], quantity)(given))
+        groups = grouped(np.broadcast_to(number.reshape(surface.shape), given.shape).ravel())
+        parts = [np.asarray(getattr(laws[k], quantity)(given.ravel()[mine])) for k, mine in groups]
+        out = np.empty((*parts[0].shape[:-1], given.size))
+        out[..., np.concatenate([mine for _, mine in groups])] = np.concatenate(parts, axis=-1)
+        return out.reshape(*out.shape[:-1], *given.shape)
 
     def scatter_name(self, surface: AnySurface) -> str:
         """One name per form: they differ by more than their scatter against boundary elements."""
@@ -127,7 +120,7 @@ class Persson(Theory):
         allowed = u >= 0 if self.method == "simplified" else u > 0
         require("mean_separation", u, allowed, "zero or positive, and positive for the full form")
         h_rms, gradient = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient)
-        pressure, stiffness = self._by_law(surface, u / h_rms, self._forces)
+        pressure, _, stiffness = self._by_law(surface, "contact", u / h_rms)
         normal = np.isfinite(stiffness) & (pressure >= LEAST)
         require("mean_separation", u, normal, "where force and stiffness are normal numbers")
         pressure = pressure * gradient
@@ -149,7 +142,7 @@ class Persson(Theory):
         pressure = finite_array("pressure", wanted)
         require("pressure", pressure, pressure > 0, "positive: u is infinite at zero load")
         pressure = np.broadcast_to(pressure, np.broadcast_shapes(pressure.shape, surface.shape))
-        u = self._by_law(surface, pressure / np.asarray(surface.rms_gradient), self._separations)[0] * surface.h_rms
+        u = self._by_law(surface, "separation_persson", pressure / np.asarray(surface.rms_gradient))[0] * surface.h_rms
         require("pressure", pressure, u >= 0, "at most lambda E*, where the simplified form (20) reaches u = 0")
         return np.asarray(u)
 
@@ -160,4 +153,4 @@ class Persson(Theory):
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         gradient = np.asarray(surface.rms_gradient)
         load = self.answer(surface, mean_separation).pressure / gradient
-        return np.asarray(self._by_law(surface, load, self._energies)[0] * gradient * surface.h_rms)
+        return np.asarray(self._by_law(surface, "energy", load) * gradient * surface.h_rms)

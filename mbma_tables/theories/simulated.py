@@ -21,7 +21,6 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import own_map
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.calibrated_curves import own_law
-from mbma_tables.theories.own_table import read_surface, write_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 # A/A0 of the 142 maps of `python -m generate machined` at which scatter was measured
@@ -122,12 +121,12 @@ class BoundaryElements(Theory):
 
         A file that cannot be written is a `TableFileError`.
         """
-        write_table(self, path)
+        own_map.write_table(self, path)
 
     @classmethod
     def from_netcdf(cls, path: os.PathLike[str] | str) -> BoundaryElements:
         """Open such a table (`TableFileError` if damaged or edited); for its `.surface` "simulated" is the default."""
-        return cls.of(read_surface(path))
+        return cls.of(own_map.read_surface(path))
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """None: the theory is of this map."""

@@ -8,8 +8,6 @@ In units of s and 1/q0,
 and A/A0 likewise.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 
@@ -17,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, grouped, spread
-from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.core import OK, REASONS, UNRESOLVED, core, in_blocks
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.core import OK, UNRESOLVED, core, in_blocks
 from mbma_tables.models import AnyModel, exact_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -28,8 +26,6 @@ from mbma_tables.totals.profile import profile
 
 QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
 BLOCK = 256  # pairs between two checks for interrupts
-# of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
-COLUMNS, BY_COMPRESSION = 5, 3
 # most surfaces evaluated by profiles, in numpy; of more surfaces, those with enough gaps each for this to cost less
 FEW_SURFACES, MANY_GAPS = 16, 300
 LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
@@ -42,77 +38,41 @@ class Sums(NamedTuple):
     variant: Variant
     rtol: float
     outside: str = "raise"
-    workers: int = 1
-
-
-class Pairs(NamedTuple):
-    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
-
-    hurst: FloatArray
-    zeta_1: FloatArray
-    compression: FloatArray  # (h_max - d)/h_rms
-    peak: FloatArray  # h_max/h_rms
-
-    @classmethod
-    def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
-        """The pairs of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
-        scaled = depth / surface.h_rms, surface.h_max / surface.h_rms
-        return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
-
-    def some(self, chosen: Any) -> Pairs:
-        """The pairs at these indices."""
-        return Pairs(*(field[chosen] for field in self))
 
 
 class Totals(NamedTuple):
-    """Force and area of the MBMA model at given separations, with the fields of `Contact`.
-
-    `error` bounds that of quadrature and islands, relative to the island model. Derivatives on a surface given by a
-    spectrum are by the separation only.
-    """
+    """Force and area of the MBMA model at given separations, with the fields of `Contact`."""
 
     pressure: Any
     area: Any
-    error: Any
+    error: Any  # bound on that of quadrature and islands, relative to the island model
     islands: int
-    pressure_by: dict[str, Any] | None = None
-    area_by: dict[str, Any] | None = None
+    pressure_slope: Any = None  # derivatives by the separation
+    area_slope: Any = None
 
 
-def totals_at(
-    surface: AnySurface, gap: FloatArray, how: Sums, modulus: Any = 1.0, derivatives: bool | str = False
-) -> Totals:
-    """Force and area at separations d >= -h_max of the surface's broadcast shape; `derivatives` "separation" alone."""
-    shape, variant = gap.shape, how.variant
-    depth = np.asarray(surface.h_max - gap)
-    pressure_by = area_by = None
+def totals_at(surface: AnySurface, gap: FloatArray, how: Sums, modulus: Any = 1.0, slopes: bool = False) -> Totals:
+    """Force and area, perhaps with their slopes, at separations d >= -h_max of the surface's broadcast shape."""
+    shape, depth = gap.shape, np.asarray(surface.h_max - gap)
     stress = modulus * surface.q0 * surface.s if isinstance(surface, Surface) else modulus
     try:
-        if isinstance(surface, Surface) and derivatives is True:
-            pairs = Pairs.of(surface, depth)
-            columns, error, islands, _ = sums_by_table(how.model, pairs, how, how.outside)
-            pressure, area = columns[:, 0, 0], columns[:, 1, 0]
-            pressure_by, area_by = _by_parameter(surface, columns.reshape((*shape, *columns.shape[1:])), pairs, stress)
-        else:
-            (pressure, area, *slopes, error), islands = _sums(surface, depth, how, bool(derivatives))
-            if derivatives:
-                force_slope, area_slope = (slope.reshape(shape) / surface.h_rms for slope in slopes)
-                pressure_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
+        rows, islands = _sums(surface, depth, how, slopes)
     except (ConvergenceError, OutOfRangeError) as fault:
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
         raise
+    force, area, *_, error = rows
     # nearly vanishing values have few digits
-    least = np.minimum(pressure, area)
-    if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(pressure, area) > 0)).any():
+    least = np.minimum(force, area)
+    if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(force, area) > 0)).any():
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
-    if variant.addition == "cover":
-        if area_by is not None:
-            kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
-            area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
-        area = variant.area_of(area)
-    pressure = (pressure.reshape(shape) * stress)[()]
-    return Totals(pressure, area.reshape(shape)[()], error.reshape(shape)[()], islands, pressure_by, area_by)
+    by: list[Any] = [-row.reshape(shape) / surface.h_rms for row in rows[2:-1]]
+    by[:1] = [stress * slope for slope in by[:1]]
+    if how.variant.addition == "cover":
+        by[1:] = [slope * np.exp(-area.reshape(shape)) for slope in by[1:]]  # dA = exp(-sum) dsum
+        area = how.variant.area_of(area)
+    pressure, area, error = (force.reshape(shape) * stress)[()], area.reshape(shape)[()], error.reshape(shape)[()]
+    return Totals(pressure, area, error, islands, *(slope[()] for slope in by))
 
 
 def _by_profiles(
@@ -149,8 +109,30 @@ def _by_profiles(
         # usually all gaps are of one surface and in contact, and slices are faster
         chosen: Any = slice(None) if mine.size == gaps.size else mine
         rows[-1, chosen] = kept.error
-        rows[:-1, chosen] = kept.totals(gaps[chosen], len(rows) > 3, how.workers)
+        rows[:-1, chosen] = kept.totals(gaps[chosen], len(rows) > 3)
     return islands, np.sort(np.concatenate(left)), why
+
+
+def by_table(
+    surface: Surface, compression: FloatArray, places: Any, model: UniversalModel, how: Sums, rows: FloatArray
+) -> tuple[int, NDArray[np.intp]]:
+    """The same by the universal table, gap by gap."""
+    shape, fields = compression.shape, (surface.hurst, surface.zeta_1, compression, surface.h_max / surface.h_rms)
+    pairs = [spread(field, shape).ravel()[places] for field in fields]
+    bound, status, out = np.empty(places.size), np.empty(places.size, np.uint8), np.empty((places.size, 2, 2))
+    options = QUADRATURE_SHARE * how.rtol, how.variant.numbers, *model.cells
+
+    def fill(block: slice) -> int:
+        islands = np.zeros(1, np.int64)
+        core.totals(*(pair[block] for pair in pairs), *options, out[block], bound[block], status[block], islands)
+        return int(islands[0])
+
+    islands = sum(in_blocks(fill, places.size, BLOCK))
+    if (bad := places[status == UNRESOLVED]).size:
+        raise ConvergenceError("quadrature did not reach its tolerance", np.isin(np.arange(compression.size), bad))
+    rows[-1, places] = bound
+    rows[:-1, places] = out[:, :, : len(rows) // 2].T.reshape(len(rows) - 1, -1)
+    return islands, places[status != OK]
 
 
 def _sums(surface: AnySurface, depth: FloatArray, how: Sums, slopes: bool) -> tuple[FloatArray, int]:
@@ -161,86 +143,25 @@ def _sums(surface: AnySurface, depth: FloatArray, how: Sums, slopes: bool) -> tu
     size, islands, model, why = depth.size, 0, how.model, None
     compression = np.asarray(depth / surface.h_rms)
     rows, left = np.zeros((5 if slopes else 3, size)), np.flatnonzero(compression > 0)
-    by_table = isinstance(surface, Surface) and isinstance(model, UniversalModel)
-    if not by_table or math.prod(surface.shape) <= max(FEW_SURFACES, size // MANY_GAPS):
+    tabulated, ranges = isinstance(surface, Surface) and isinstance(model, UniversalModel), ""
+    if not tabulated or math.prod(surface.shape) <= max(FEW_SURFACES, size // MANY_GAPS):
         islands, left, why = _by_profiles(surface, compression, left, model, how, rows)
-    if by_table and left.size:
-        assert isinstance(surface, Surface)
-        outside, every = "nan" if how.outside == "exact" else how.outside, Pairs.of(surface, depth)
-        found, bound, more, missing = sums_by_table(model, every, how, outside, slopes)
-        rows[-1, left] = bound[left]
-        rows[:-1, left] = found[left][:, :, [0, BY_COMPRESSION] if slopes else [0]].T.reshape(len(rows) - 1, -1)
-        islands, left = islands + more, np.intersect1d(left, missing)
+    if left.size and isinstance(surface, Surface) and isinstance(model, UniversalModel):
+        more, left = by_table(surface, compression, left, model, how, rows)
+        X, mu = model.content.axes
+        islands, why, ranges = islands + more, None, f" ({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g})"
     if left.size and how.outside == "exact":
         more, left, why = _by_profiles(surface, compression, left, exact_model(how.rtol), how, rows)
         islands += more
     if left.size and (how.outside != "nan" or isinstance(why, ConvergenceError)):
+        numbers = {"h_max - d": depth}
+        if isinstance(surface, Surface):
+            numbers |= {"hurst": surface.hurst, "zeta_1": surface.zeta_1}
+        first = (f"{name} = {spread(n, depth.shape).ravel()[left[0]]:g}" for name, n in numbers.items())
         raise type(why or OutOfRangeError(""))(
-            f"islands of {left.size} of {size} entries lie outside of island model {model.name!r}, the first at "
-            f"h_max - d = {depth.ravel()[left[0]]:g}; outside='exact' solves these{f' ({why})' if why else ''}",
+            f"islands of {left.size} of {size} entries lie outside of island model {model.name!r}{ranges}, the first "
+            f"at {', '.join(first)}; outside='exact' solves these{f' ({why})' if why else ''}",
             np.isin(np.arange(size), left),
         )
     rows[:, left] = np.nan
     return rows, islands
-
-
-def sums_by_table(
-    model: AnyModel, pairs: Pairs, how: Sums, outside: str, slopes: bool = True
-) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
-    """Totals by the universal table gap by gap, (pairs, 2, COLUMNS or 1), bounds on their errors, and the islands.
-
-    Also returns the pairs that the table does not cover, whose totals are NaN.
-    """
-    if not isinstance(model, UniversalModel):
-        raise InputError(f"derivatives come from island model 'universal', {model.name!r} has none")
-    if slopes and outside == "exact":
-        raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
-    count = pairs.compression.size
-    status, bound = np.empty(count, np.uint8), np.empty(count)
-    out = np.empty((count, 2, COLUMNS if slopes else 1))
-
-    def fill(block: slice) -> int:
-        islands = np.zeros(1, np.int64)
-        own = *pairs.some(block), QUADRATURE_SHARE * how.rtol, how.variant.numbers, *model.cells, int(slopes)
-        core.totals(*own, out[block], bound[block], status[block], islands)
-        return int(islands[0])
-
-    islands = sum(in_blocks(fill, count, BLOCK, how.workers))
-    if (status == UNRESOLVED).any():
-        raise ConvergenceError("quadrature did not reach its tolerance", status == UNRESOLVED)
-    missing = np.flatnonzero(status != OK)
-    if missing.size and outside == "raise":
-        first = int(missing[0])
-        X, mu = model.content.axes
-        raise OutOfRangeError(
-            f"islands of {missing.size} of {count} entries lie outside the universal table "
-            f"({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g}), the first at hurst = {pairs.hurst[first]:g}, "
-            f"zeta_1 = {pairs.zeta_1[first]:g}, (h_max - d)/h_rms = {pairs.compression[first]:g} "
-            f"({REASONS[int(status[first])]}); outside='exact' solves these",
-            status != OK,
-        )
-    return out, bound, islands, missing
-
-
-def _by_parameter(
-    surface: Surface, sums: FloatArray, pairs: Pairs, stress: FloatArray
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Chain rule from H, log(zeta_1), compression and peak to the gap and the surface's own parameters."""
-    shape = sums.shape[:-2]
-    hurst, zeta_1, compression, peak = (field.reshape(shape) for field in pairs)
-    h_rms, q0, q1 = surface.h_rms, surface.q0, surface.q1
-    # log(s/h_rms) by H and by log(zeta_1): (h_rms/s)^2 = 1 - zeta_1^(-2H)
-    power = -2 * hurst * np.log(zeta_1)
-    lift = np.exp(power) / np.expm1(power)
-
-    def slopes(number: int, scale: Any) -> dict[str, Any]:
-        value, by_H, by_zeta, by_compression, by_peak = np.moveaxis(sums[..., number, :], -1, 0)
-        # force carries q0 s
-        own = np.zeros_like(value) if number else value
-        by_H, by_zeta = by_H + own * lift * np.log(zeta_1), by_zeta + own * lift * hurst
-        by_h_rms = (own - compression * by_compression - peak * by_peak) / h_rms
-        found = {"separation": -by_compression / h_rms, "hurst": by_H, "q0": (own - by_zeta) / q0, "q1": by_zeta / q1}
-        found |= {"h_rms": by_h_rms, "h_max": (by_compression + by_peak) / h_rms}
-        return {name: (scale * slope)[()] for name, slope in found.items()}
-
-    return slopes(0, stress), slopes(1, 1.0)

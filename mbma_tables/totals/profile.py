@@ -24,7 +24,7 @@ from mbma_tables.core import core, in_blocks
 from mbma_tables.islands.geometry import floors_of, geometry, kinks, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.power_laws import Place
+from mbma_tables.surfaces.spectrum import Place
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
@@ -187,14 +187,14 @@ class Profile:
         """The largest compression covered."""
         return float(self.edges[-1]) * (1 + 1e-14)
 
-    def totals(self, compression: FloatArray, slopes: bool = False, workers: int = 1) -> FloatArray:
+    def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
         """Totals at (h_max - d)/h_rms > 0 within the profile, shape (rows, gaps), and slopes by the compression below.
 
         F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area and the Hertz area; of a
         measured surface F/(A0 E*).
         """
         if compression.size > BLOCK:
-            parts = in_blocks(lambda block: self.totals(compression[block], slopes), compression.size, BLOCK, workers)
+            parts = in_blocks(lambda block: self.totals(compression[block], slopes), compression.size, BLOCK)
             return np.concatenate(parts, axis=1)
         rows = self.series.shape[1]
         out = np.empty((2 * rows if slopes else rows, compression.size))

@@ -86,9 +86,9 @@ def test_the_same_in_toml(map_file, tmp_path):
     ("words", "message"),
     [
         (["fit", "absent.sur"], "there is no file"),
-        (["contact", "--surface", "concrete", "--outliers", "8", "-a", "0.1"], "goes with --map"),
-        (["fit", "MAP", "--dx", "1um"], "leave --dx and --dy out (--length-unit ... sets their unit)"),
-        (["fit", "MAP", "--extrapolate-to", "0.1um"], "--extrapolate-to and --extrapolate-hurst: give both"),
+        (["contact", "--surface", "concrete", "--outliers", "8", "-a", "0.1"], "for a measured map, which is missing"),
+        (["fit", "MAP", "--dx", "1um"], "leave dx and dy out (unit=... sets their unit)"),
+        (["fit", "MAP", "--extrapolate-to", "0.1um"], "extrapolate_to and extrapolate_hurst: give both"),
         (["fit", "MAP", "--channel", "7"], "has channels 0 to 0"),
     ],
 )
@@ -99,7 +99,7 @@ def test_mistakes(words, message, map_file):
 def test_an_array_in_a_file_needs_its_step(tmp_path):
     path = tmp_path / "own.npy"
     np.save(path, 0.02 * random_map(POINTS, 0.03, 1, 1.7))
-    assert "give the sampling step --dx" in refused("fit", path)
+    assert "give the sampling step dx" in refused("fit", path)
     assert json.loads(run("fit", path, "--dx", "500nm", "--json"))["length_unit"] == "nm"
     found = json.loads(run("fit", path, "--dx", "500nm", "--length-unit", "um", "--short-cutoff", "2", "--json"))
     own = Surface.from_map(path, dx=0.5, unit="um", short_cutoff="2000 nm")

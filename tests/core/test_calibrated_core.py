@@ -10,8 +10,8 @@ from scipy.interpolate import NdBSpline
 from scipy.special import erf
 
 from mbma_tables import ConvergenceError, InputError
-from mbma_tables.answers import leakage_table
-from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.answers import leakage
+from mbma_tables.answers.leakage import shipped_flow
 from mbma_tables.core import GENERATIONS, core
 from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum
 from mbma_tables.theories.calibrated_table import shipped
@@ -52,7 +52,7 @@ def separations(rows, owner, force, used=core, pieces=None):
 
 
 def flow(rows, owner, u, area, pieces=None):
-    return leakage_table._flow((*FLOW.core_table, *rows[:2], None, None, pieces), owner, u, area)
+    return leakage._flow((*FLOW.core_table, *rows[:2], None, None, pieces), owner, u, area)
 
 
 def pieces_of(table, rows, used=core):

@@ -1,12 +1,10 @@
-"""Exported C, Fortran and JavaScript: what is written and refused, and answers as the runtime's, under sanitizers."""
+"""The model as C: what is written and refused, answers as the runtime's under sanitizers; texts that never are code."""
 
 import copy
 import csv
 import ctypes
 import dataclasses
-import importlib.util
 import io
-import json
 import math
 import pathlib
 import re
@@ -20,8 +18,8 @@ import pytest
 
 import mbma_tables.core
 from mbma_tables import InputError, Surface, __version__
-from mbma_tables.export import CODE, SOLVERS, code, conformance, data, solvers
-from mbma_tables.export.code import SOURCES, check, read_report, write_code
+from mbma_tables.export import SOLVERS, c_code, conformance, data, solvers
+from mbma_tables.export.c_code import SOURCES, check, read_report, write_code
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.text import checked_name
 from mbma_tables.models.tables import universal_model
@@ -29,17 +27,12 @@ from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.variants import Variant, get_variant
 
 
-@pytest.fixture
-def no_compiler(monkeypatch):
-    monkeypatch.setattr(code, "web_assembly", lambda *given: b"wasm")
-
-
-@pytest.mark.usefixtures("no_compiler")
-@pytest.mark.parametrize("target", CODE)
-def test_every_file_says_what_it_is(target, tmp_path):
+def test_every_file_says_what_it_is(tmp_path):
     attributes = universal_model().content.attributes
-    written = write_code(target, tmp_path / "code", variant="printed")
+    written = write_code(tmp_path / "code", variant="printed")
     assert sorted(written) == sorted((tmp_path / "code").iterdir())
+    included = {name for path in written for name in re.findall(r'#include "(.*)"', path.read_text())}
+    assert included | {*SOURCES, "mbma_conformance.csv"} == {path.name for path in written}
     largest = max(attributes["largest_error_F"], attributes["largest_error_A"])
     core = pathlib.Path(mbma_tables.core.__file__).parent
     of_all = (f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause", "Variant: printed")
@@ -50,55 +43,46 @@ def test_every_file_says_what_it_is(target, tmp_path):
             continue
         text = path.read_text(encoding="utf-8")
         assert not re.search("@[A-Z_]+@", text)
-        head = " ".join(word for word in text[:5000].split() if word not in ("*", "!", "#"))
+        head = " ".join(word for word in text[:5000].split() if word not in ("*", "#"))
         assert attributes["values_sha256"] in head
         for fact in (path.name, *of_all, *of_tables) if path.suffix != ".csv" else ():
             assert fact in head, fact
 
 
-def test_headers_of_the_core_come_with_their_sources(tmp_path):
-    written = {path.name for path in write_code("c", tmp_path)}
-    included = {name for path in tmp_path.glob("*.[ch]") for name in re.findall(r'#include "(.*)"', path.read_text())}
-    assert included | set(code.SOURCES) | {"mbma_conformance.csv"} == written
-
-
 @pytest.mark.skipif(shutil.which("cc") is None, reason="cc is not installed")
 def test_a_wrong_number_is_seen(tmp_path):
-    write_code("c", tmp_path)
+    write_code(tmp_path)
     table = tmp_path / "mbma_data.c"
     text = table.read_text(encoding="utf-8")
     before, variant = text.split("mbma_variant MBMA_VARIANT")
     assert variant.count(", 0.05, ") == 1
     changed = variant.replace(", 0.05, ", ", 0.0500000001, ")
     table.write_text(f"{before}mbma_variant MBMA_VARIANT{changed}", encoding="utf-8")
-    found = check("c", tmp_path)
+    found = check(tmp_path)
     assert found.failed > 0
     assert 1e-11 < found.largest["geometry"] < 1e-7
     (tmp_path / "points.csv").write_text("phi,1e-11,1.0\n", encoding="utf-8")
-    assert check("c", tmp_path, tmp_path / "points.csv").failed == 1
+    assert check(tmp_path, tmp_path / "points.csv").failed == 1
     (tmp_path / "phi.c").write_text("int broken\n", encoding="utf-8")
     with pytest.raises(InputError, match="did not compile"):
-        check("c", tmp_path)
+        check(tmp_path)
 
 
 def test_check_names_what_is_missing(tmp_path, monkeypatch):
-    with pytest.raises(InputError, match="target must be one of"):
-        check("cobol", tmp_path)
     with pytest.raises(InputError, match="does not exist"):
-        check("c", tmp_path)
-    write_code("fortran", tmp_path)
+        check(tmp_path)
+    write_code(tmp_path)
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(InputError, match="gfortran is not installed"):
-        check("fortran", tmp_path)
+    with pytest.raises(InputError, match="cc is not installed"):
+        check(tmp_path)
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("cobol", "code"), "target must be one of"),
-        (("c", "code", "guessed"), "variant must be one of"),
-        (("c", "code", "fitted"), "takes their cover"),
-        (("c", "a_file"), "a_file"),
+        (("code", "guessed"), "variant must be one of"),
+        (("code", "fitted"), "takes their cover"),
+        (("a_file",), "a_file"),
     ],
 )
 def test_bad_requests_leave_no_file(arguments, message, tmp_path, monkeypatch):
@@ -127,23 +111,14 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 def needs(*programs):
     linux = sys.platform.startswith("linux")
     # elsewhere, gcc and nm may be other programs of those names
-    missing = [name for name in programs if shutil.which(name) is None or not (linux or name in ("cc", "node"))]
-    if "node" in programs and importlib.util.find_spec("ziglang") is None:
-        missing.append("ziglang")
+    missing = [name for name in programs if shutil.which(name) is None or not (linux or name == "cc")]
     return pytest.mark.skipif(bool(missing), reason=f"not installed: {', '.join(missing)}")
 
 
 @pytest.fixture(scope="module")
 def c_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("c")
-    write_code("c", folder)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def js_folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("javascript")
-    write_code("javascript", folder)
+    write_code(folder)
     return folder
 
 
@@ -160,10 +135,10 @@ def c_command(compiler, options, folder):
 
 @needs("cc")
 def test_c_replays_its_points(c_folder):
-    found = check("c", c_folder)
+    found = check(c_folder)
     assert found.failed == 0
     fixed = {"phi": 64, "slopes": 64, "geometry": 24, "status": 10}
-    fixed |= dict.fromkeys(("total", "calibrated", "total_by", "separation"), 12)
+    fixed |= dict.fromkeys(("total", "calibrated", "separation"), 12)
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
 
@@ -185,37 +160,12 @@ def test_cpp_compiles_it(c_folder, tmp_path):
 
 
 @pytest.mark.slow
-@needs("gcc", "gfortran")
-def test_fortran_equals_the_runtime(tmp_path):
-    written = write_code("fortran", tmp_path)
-    assert max(len(line) for path in written if path.suffix == ".f90" for line in path.read_text().splitlines()) <= 132
-    (tmp_path / "message.f90").write_text(
-        "program message\n  use mbma\n  write (*, '(3a)') mbma_message(MBMA_OK), '|', mbma_message(-1)\nend program\n"
-    )
-    options = (*WARNINGS, "-Wpedantic", "-O1", *SANITIZERS)
-    c = ["gcc", "-std=c11", *options, "-c", "-DMBMA_OTHER_REPLAY", *SOURCES]
-    objects = [name.replace(".c", ".o") for name in SOURCES if name != "mbma_selftest.c"]
-    strict = ["gfortran", "-std=f2008", *options, "-fcheck=all", *objects, "mbma.f90"]
-    selftest = [*strict, "mbma_selftest.o", "mbma_selftest.f90", "-o", "selftest"]
-    commands = [c, selftest, [*strict, "message.f90", "-o", "message"]]
-    code_points.assert_equal_to_runtime(build_and_replay(commands, tmp_path, code_points.write_points(tmp_path)))
-    said = subprocess.run(["./message"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
-    assert said.stdout == "no error|no such status\n"
-
-
-@pytest.mark.slow
-@needs("node")
-def test_javascript_equals_the_runtime(js_folder, tmp_path):
-    code_points.assert_equal_to_runtime(check("javascript", js_folder, code_points.write_points(tmp_path)))
-
-
-@pytest.mark.slow
 @needs("cc")
 def test_the_printed_variant(tmp_path):
-    write_code("c", tmp_path, variant="printed")
-    found = check("c", tmp_path, code_points.write_points(tmp_path, "printed"))
+    write_code(tmp_path, variant="printed")
+    found = check(tmp_path, code_points.write_points(tmp_path, "printed"))
     code_points.assert_equal_to_runtime(found)
-    assert check("c", tmp_path, code_points.write_points(tmp_path, "reported")).failed > code_points.SURFACES
+    assert check(tmp_path, code_points.write_points(tmp_path, "reported")).failed > code_points.SURFACES
 
 
 @needs("gcc", "nm")
@@ -254,7 +204,7 @@ def totals(library, surface, gaps, E_star=1.0, rtol=1e-8):
     asked, found, told = (ctypes.c_void_p(array.ctypes.data) for array in (gaps, answers, status))
     numbers = ctypes.c_double(E_star), ctypes.c_double(rtol)
     given = ctypes.byref(CSurface(*surface)), ctypes.c_size_t(gaps.size), asked
-    library.mbma_totals_of(*given, *numbers, found, None, None, told)
+    library.mbma_totals_of(*given, *numbers, found, told)
     return answers, status
 
 
@@ -281,53 +231,9 @@ def test_no_contact_from_h_max_on(library):
     assert not answers.any()
 
 
-ASK = """
-import { STATUS, calibrated, formula, islandGeometry, phi, phiSlopes, total, totalSlopes } from "./mbma.mjs";
-const surface = { hurst: 0.8, q0: 1, q1: 100, h_rms: 1, h_max: 3 };
-function outcome(ask) {
-  try {
-    const { status, ...numbers } = ask();
-    const nothing = Object.values(numbers).every(Number.isNaN);
-    return status === STATUS.INVALID && nothing ? "INVALID" : status === STATUS.OK && !nothing ? "OK" : "wrong";
-  } catch (fault) {
-    return fault.name;
-  }
-}
-console.log(JSON.stringify([ASKED].map(outcome)));
-"""
-TYPE_ERRORS = (
-    *("phi('3', '10')", "phi(3, '10')", "phi('a', 1)", "phi(NaN, 1)", "phi(1)", "phi(null, 1)", "phi([3], 1)"),
-    *("phi(3n, 1)", "phi(true, 1)", "formula('3', '10')", "phiSlopes(1, NaN)", "islandGeometry(1, 0.8, '100')"),
-    *("total(null, 1)", "total(surface, '1')", "total({ ...surface, hurst: '0.8' }, 1)", "total({}, 1)"),
-    *("total(surface, 1, 1, null)", "totalSlopes(surface, '1')", "calibrated(null, 1)", "calibrated(surface, '1')"),
-)
-INVALIDS = (
-    *("phi(1, -1)", "phiSlopes(1, -1)", "islandGeometry(0, 0.8, 100)", "total(surface, -3.1)", "total(surface, 1, 0)"),
-    *("total(surface, 1, 1, 1)", "total(surface, Infinity)", "total({ ...surface, hurst: 2 }, 1)", "formula(1, -1)"),
-    "calibrated(surface, -1)",
-)
-VALID = (
-    *("phi(3, 10)", "phiSlopes(3, 10)", "formula(3, 10)"),
-    *("islandGeometry(1, 0.8, 100)", "total(surface, 1)", "calibrated(surface, 1)"),
-)
-
-
-@pytest.mark.slow
-@needs("node")
-def test_javascript_checks_its_arguments(js_folder):
-    asked = (*TYPE_ERRORS, *INVALIDS, *VALID)
-    script = ASK.replace("ASKED", ", ".join(f"() => {ask}" for ask in asked))
-    (js_folder / "ask.mjs").write_text(script, encoding="utf-8")
-    done = subprocess.run(["node", "ask.mjs"], cwd=js_folder, capture_output=True, text=True, timeout=60, check=True)
-    found = dict(zip(asked, json.loads(done.stdout), strict=True))
-    assert {ask for ask, outcome in found.items() if outcome == "TypeError"} == set(TYPE_ERRORS)
-    assert {ask for ask, outcome in found.items() if outcome == "INVALID"} == set(INVALIDS)
-    assert {ask for ask, outcome in found.items() if outcome == "OK"} == set(VALID)
-
-
 HOSTILE = (
     "x */ int evil(void); /* \n*INCLUDE, INPUT=evil\r\nsystem('evil') ??/\u2028evil()\x0cevil\x85"
-    "@WASM@ @CLOSED_FORMS@ </script><script>evil()//\x00\\"
+    "@CLOSED_FORMS@ </script><script>evil()//\x00\\"
 )
 COMMENT_MARKS = {"calculix": "**", "abaqus": "**", "lsdyna": "$", "optistruct": "$", "comsol": "%", "moose": "#"} | {
     "modelica": "#"
@@ -343,9 +249,7 @@ def hostile_law(law):
     return dataclasses.replace(law, comments=(HOSTILE, *law.comments[1:], HOSTILE), x_unit=HOSTILE, y_unit=HOSTILE)
 
 
-@pytest.mark.parametrize("target", CODE)
-def test_source_code(target, monkeypatch):
-    monkeypatch.setattr(code, "web_assembly", lambda *given: b"wasm")
+def test_source_code():
     content = copy.copy(universal_model().content)
     # a certificate's numbers are numbers in any case; the rest is text of the file
     texts = {name: HOSTILE for name, value in content.attributes.items() if isinstance(value, str)}
@@ -356,16 +260,15 @@ def test_source_code(target, monkeypatch):
     def live(texts):
         return [
             line
-            for name, text in texts.items()
+            for text in texts.values()
             for line in re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).splitlines()
-            if line.strip() and not (line.startswith("!") and name.endswith(".f90"))
+            if line.strip()
         ]
 
-    found = code.source_texts(target, model, variant)
+    found = c_code.source_texts(model, variant)
     assert any("int evil" in text for text in found.values())
-    assert live(found) == live(code.source_texts(target, universal_model(), get_variant("reported")))
+    assert live(found) == live(c_code.source_texts(universal_model(), get_variant("reported")))
     assert all(text.isascii() for text in found.values())
-    assert "</script" not in found.get("mbma.mjs", "")
     points, plain = (
         [line for line in conformance.points_text(*of).splitlines() if not line.startswith("#")]
         for of in ((model, variant), (universal_model(), get_variant("reported")))

@@ -9,7 +9,7 @@ import pytest
 from helpers import refusals
 
 from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
-from mbma_tables.export import SOLVERS, chords, data, solvers
+from mbma_tables.export import SOLVERS, data, law_table, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix, optistruct
 from mbma_tables.surfaces.variants import PRINTED
@@ -92,7 +92,7 @@ def test_fewest_rows(monkeypatch):
     law = law_of(rows=None, rtol=1e-2)
     assert law.largest_error <= 1e-2
     assert law_of(rows=law.x.size - 1).largest_error > 1e-2
-    monkeypatch.setattr(chords, "MAX_ROWS", 30)
+    monkeypatch.setattr(law_table, "MAX_ROWS", 30)
     with pytest.raises(InputError, match="needs more than 30 rows under linear interpolation"):
         law_of(rows=None, rtol=1e-6)
     assert law_of(rows=None, rtol=0.2).x.size <= 30

@@ -1,19 +1,17 @@
-"""The boundary-element campaign: its engine against closed forms and others' results, its surfaces, its file."""
+"""The boundary-element campaign: its engine against closed forms, its surfaces, its file."""
 
 import dataclasses
-import os
-import pathlib
 
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 
 from generate import files
-from generate.boundary_elements.run import SOLVERS, TEXTS, boundary_elements, dataset, group, run
+from generate.boundary_elements.run import SOLVERS, TEXTS, dataset, group, run
 from generate.boundary_elements.solve import Contact, simulate
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Recipe, Task, campaign, heights
 from generate.calibrated_file import write_part
+from mbma_tables import InputError
 from mbma_tables.laws.bearing_curve import FRACTIONS, bearing
 
 pytest.importorskip("tamaas")
@@ -61,123 +59,96 @@ def test_force_is_the_derivative_of_energy():
     assert energy[-1] - energy[0] == pytest.approx(work, rel=1e-3)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [0, 1])
-def test_maps_solved_by_others(number):
-    folder = os.environ.get("MBMA_REFERENCE_MAPS")
-    if folder is None:
-        pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
-    path = pathlib.Path(folder)
-    table = (path.parent / f"rolloff_{number}.csv").read_text().splitlines()
-    rows = np.array([[float(x) for x in line.split(",")[:4]] for line in table if line[:1].isdigit()])
-    contact = Contact(np.load(path / f"rolloff_{number}.npy"), SQUARE)
-    for force, area, area_raw, gap in rows[:6]:
-        result = contact.press(force)
-        assert result["area"] == pytest.approx(area, rel=1e-6)
-        assert result["area_raw"] == pytest.approx(area_raw, rel=1e-6)
-        assert result["mean_separation"] == pytest.approx(gap, rel=1e-6)
+def test_spectrum_and_anisotropy_are_those_asked_for():
+    # h_rms and gradient of fixed amplitudes |k|^-(1+H) on the lattice
+    k = np.hypot(*np.meshgrid(np.arange(-16, 17), np.arange(-16, 17)))
+    lattice = k[(k >= 2) & (k <= 16)]
+    gradient = np.sqrt(np.sum(lattice**-1.6) / np.sum(lattice**-3.6)) * 2 * np.pi
+    known = bearing(heights(RECIPE), SQUARE)
+    assert (known.gradient, known.h_rms) == pytest.approx((gradient, 1), rel=1e-12)
+    stretched = Recipe("stretched", 0.8, 8, 4, 1, 128, 4.0)
+    assert bearing(heights(stretched), stretched.sizes).anisotropy == pytest.approx(4, rel=1e-6)
 
 
-class TestSurfaces:
-    def test_spectrum_is_the_one_asked_for(self):
-        # h_rms and gradient of fixed amplitudes |k|^-(1+H) on the lattice
-        k = np.hypot(*np.meshgrid(np.arange(-16, 17), np.arange(-16, 17)))
-        lattice = k[(k >= 2) & (k <= 16)]
-        gradient = np.sqrt(np.sum(lattice**-1.6) / np.sum(lattice**-3.6)) * 2 * np.pi
-        known = bearing(heights(RECIPE), SQUARE)
-        assert known.gradient == pytest.approx(gradient, rel=1e-12)
-        assert known.h_rms == pytest.approx(1, rel=1e-12)
-
-    def test_seed_gives_the_same_surface_on_every_grid(self):
-        fine = heights(dataclasses.replace(RECIPE, points=256))
-        np.testing.assert_allclose(fine[::4, ::4], heights(RECIPE), atol=1e-12)
-
-    @pytest.mark.parametrize(("kind", "shape"), [("peaks", 0.5), ("valleys", 0.5), ("worn", 1.0), ("patchy", 0.6)])
-    def test_transforms_skew_and_normalise(self, kind, shape):
-        z = heights(Recipe(kind, 0.8, 4, 4, 3, 128, shape))
-        assert abs(z.mean()) < 1e-12
-        assert z.std() == pytest.approx(1)
-        skewness, kurtosis = np.mean(z**3), np.mean(z**4)
-        assert {"peaks": skewness > 0.5, "valleys": skewness < -0.5, "worn": skewness < -0.3}.get(kind, kurtosis > 3.5)
-
-    def test_stretched_gradients(self):
-        recipe = Recipe("stretched", 0.8, 8, 4, 1, 128, 4.0)
-        assert bearing(heights(recipe), recipe.sizes).anisotropy == pytest.approx(4, rel=1e-6)
-
-    def test_filters_pass_half_at_their_cutoffs(self):
-        z = heights(Recipe("filtered", 0.5, 8, 4, 1, 256))
-        power = np.abs(np.fft.rfft2(z)) ** 2
-        plain = np.arange(1, 65.0) ** -3
-        passed = np.sqrt(power[0, 1:65] / plain)
-        # amplitudes: L-filter half at 4, S-filter half at 32 waves
-        assert passed[3] / passed[15] == pytest.approx(
-            0.5 * (1 - 2**-64) / (1 - 2**-16) * 2 ** (-((4 / 32) ** 2) + (16 / 32) ** 2), rel=1e-3
-        )
-
-    def test_bearing_of_a_paraboloid(self):
-        n = 401
-        x = (np.arange(n) - n // 2) / n
-        heap = np.maximum(1 - 8 * (x[:, None] ** 2 + x[None, :] ** 2), 0)
-        known = bearing(heap, SQUARE)
-        # M(a) of the cap: the mean height of its highest share falls linearly
-        share = FRACTIONS[60]
-        base = np.pi / 8
-        top = 1 - heap.mean()
-        assert known.mean_height[60] == pytest.approx(top - share / base / 2, abs=2e-4)
+def test_seed_gives_the_same_surface_on_every_grid():
+    fine = heights(dataclasses.replace(RECIPE, points=256))
+    np.testing.assert_allclose(fine[::4, ::4], heights(RECIPE), atol=1e-12)
 
 
-class TestCampaign:
-    def test_design_holds_out_whole_spectra_and_whole_surfaces(self):
-        tasks = campaign()
-        assert len({task.recipe.name for task in tasks}) == len(tasks)
+@pytest.mark.parametrize(("kind", "shape"), [("peaks", 0.5), ("valleys", 0.5), ("worn", 1.0), ("patchy", 0.6)])
+def test_transforms_skew_and_normalise(kind, shape):
+    z = heights(Recipe(kind, 0.8, 4, 4, 3, 128, shape))
+    assert abs(z.mean()) < 1e-12
+    assert z.std() == pytest.approx(1)
+    skewness, kurtosis = np.mean(z**3), np.mean(z**4)
+    assert {"peaks": skewness > 0.5, "valleys": skewness < -0.5, "worn": skewness < -0.3}.get(kind, kurtosis > 3.5)
 
-        def spectra(split):
-            return {dataclasses.replace(task.recipe, seed=0) for task in tasks if task.split == split}
 
-        assert not spectra(TRAINING) & spectra(HELD_OUT_SPECTRUM)
-        assert {r.kind for r in spectra(TRAINING)} == {r.kind for r in spectra(HELD_OUT_SPECTRUM)}
-        assert len({task.recipe.seed for task in tasks}) > 150
+def test_bearing_of_a_paraboloid():
+    n = 401
+    x = (np.arange(n) - n // 2) / n
+    heap = np.maximum(1 - 8 * (x[:, None] ** 2 + x[None, :] ** 2), 0)
+    known = bearing(heap, SQUARE)
+    # M(a) of the cap: the mean height of its highest share falls linearly
+    share = FRACTIONS[60]
+    base = np.pi / 8
+    top = 1 - heap.mean()
+    assert known.mean_height[60] == pytest.approx(top - share / base / 2, abs=2e-4)
 
-    def test_runs_resumes_and_collects(self, tmp_path):
-        tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "held_out_surface")]
-        run(tasks[:1], tmp_path)
-        before = (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns
-        target = tmp_path / "evidence.nc"
-        write_part(target, dataset(tasks, tmp_path), "elastic")
+
+def test_design_holds_out_whole_spectra_and_whole_surfaces():
+    tasks = campaign()
+    assert len({task.recipe.name for task in tasks}) == len(tasks)
+
+    def spectra(split):
+        return {dataclasses.replace(task.recipe, seed=0) for task in tasks if task.split == split}
+
+    assert not spectra(TRAINING) & spectra(HELD_OUT_SPECTRUM)
+    assert {r.kind for r in spectra(TRAINING)} == {r.kind for r in spectra(HELD_OUT_SPECTRUM)}
+    assert len({task.recipe.seed for task in tasks}) > 150
+
+
+def test_runs_resumes_and_collects(tmp_path):
+    tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "held_out_surface")]
+    run(tasks[:1], tmp_path)
+    before = (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns
+    target = tmp_path / "evidence.nc"
+    write_part(target, dataset(tasks, tmp_path), "elastic")
+    run(tasks, tmp_path)
+    assert (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns == before
+    write_part(target, dataset(tasks, tmp_path), "elastic")
+    with xr.open_dataset(target, group="elastic") as data:
+        assert data.split.values.tolist() == [SPLITS.index(task.split) for task in tasks]
+        assert all("units" in v.attrs or "flag_meanings" in v.attrs for v in data.data_vars.values())
+        own = simulate(RECIPE)
+        np.testing.assert_array_equal(data.area[0, : len(own["force"])], own["area"].astype("f4"))
+        np.testing.assert_allclose(data.band_energy[0, : len(own["force"])], own["band_energy"], rtol=2.0**-10)
+        np.testing.assert_allclose(own["band_energy"][:15].sum(axis=1), own["energy"][:15], rtol=1e-6)
+        identity = data.mean_separation + 2 * data.energy / data.force
+        np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", list(TEXTS["groups"]))
+def test_groups_name_the_code_that_made_them(kind):
+    made = group(kind, {}, engine="x").attrs
+    assert set(made) >= set(files.dataset(kind).attrs) - {"versions", "code_sha256"}
+    assert made["title"] == files.dataset(kind).attrs["title"]
+
+
+@pytest.mark.parametrize("kind", ["hardness", "leakage"])
+def test_other_campaigns_keep_what_their_files_hold(kind, tmp_path):
+    tasks = [Task(Recipe("self_affine", 0.8, 4, 2, 5, 32), "training")]
+    run(tasks, tmp_path, solve=SOLVERS[kind])
+    shipped = files.dataset(kind)
+    assert set(dataset(tasks, tmp_path, kind).variables) == set(shipped.variables)
+    assert len(campaign(kind)) == shipped.sizes["surface"]
+
+
+def test_failures_come_last_and_are_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("generate.boundary_elements.tamaas_contact.MAX_ITERATIONS", 2)
+    tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
+    with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
         run(tasks, tmp_path)
-        assert (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns == before
-        write_part(target, dataset(tasks, tmp_path), "elastic")
-        with xr.open_dataset(target, group="elastic") as data:
-            assert data.split.values.tolist() == [SPLITS.index(task.split) for task in tasks]
-            assert all("units" in v.attrs or "flag_meanings" in v.attrs for v in data.data_vars.values())
-            own = simulate(RECIPE)
-            np.testing.assert_array_equal(data.area[0, : len(own["force"])], own["area"].astype("f4"))
-            np.testing.assert_allclose(data.band_energy[0, : len(own["force"])], own["band_energy"], rtol=2.0**-10)
-            np.testing.assert_allclose(own["band_energy"][:15].sum(axis=1), own["energy"][:15], rtol=1e-6)
-            identity = data.mean_separation + 2 * data.energy / data.force
-            np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
-
-    @pytest.mark.parametrize("kind", list(TEXTS["groups"]))
-    def test_groups_name_the_code_that_made_them(self, kind):
-        made = group(kind, {}, engine="x").attrs
-        assert set(made) >= set(files.dataset(kind).attrs) - {"versions", "code_sha256"}
-        assert made["title"] == files.dataset(kind).attrs["title"]
-
-    @pytest.mark.parametrize("kind", ["hardness", "leakage"])
-    def test_other_campaigns_keep_what_their_files_hold(self, kind, tmp_path):
-        tasks = [Task(Recipe("self_affine", 0.8, 4, 2, 5, 32), "training")]
-        run(tasks, tmp_path, solve=SOLVERS[kind])
-        shipped = files.dataset(kind)
-        assert set(dataset(tasks, tmp_path, kind).variables) == set(shipped.variables)
-        assert len(campaign(kind)) == shipped.sizes["surface"]
-
-    def test_failures_come_last_and_are_named(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("generate.boundary_elements.tamaas_contact.MAX_ITERATIONS", 2)
-        tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
-        with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
-            run(tasks, tmp_path)
-        assert not list(tmp_path.iterdir())
-
-    def test_command_refuses_an_empty_folder(self, tmp_path):
-        empty = CliRunner().invoke(boundary_elements, ["--folder", str(tmp_path), "--collect", str(tmp_path / "a.nc")])
-        assert "no surface" in str(empty.exception)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(InputError, match="no surface of this campaign is in"):
+        dataset(tasks, tmp_path)

@@ -2,17 +2,13 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from small_tables import SMALL
 
 from generate.__main__ import main
 from generate.tables.commands import KINDS, TABLES
-from generate.tables.configuration import MIN_SHIPPED_POINTS, SCHEMAS, load
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.four_numbers import band_fields
-from mbma_tables.surfaces.variants import VARIANTS
+from generate.tables.configuration import MIN_SHIPPED_POINTS, load
 
 
 def refused(kind, folder, *arguments):
@@ -28,37 +24,27 @@ def refused(kind, folder, *arguments):
     return result.stderr
 
 
-def refused_file(kind, folder, text):
-    path = folder / "own.toml"
-    path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    message = refused(kind, folder, "--config", str(path), "--out", str(folder / "sub" / "table.nc"))
-    assert not (folder / "sub").exists()
-    assert "own.toml" in message
-    return message
-
-
+LOW = "low = -2.0\nhigh = 6.0"
 UNIVERSAL = [
-    ("zzz = 1", "unknown key 'zzz'"),
+    ("zzz = 1", "own.toml: top level: unknown key 'zzz'"),
     ("[axes.Y]\nlow = 1", "[axes]: unknown key 'Y'"),
     ("[axes.X]\nlwo = 1e-3", "[axes.X]: unknown key 'lwo'; did you mean 'low'"),
     ("[axes]\nX = [1, 2]", "axes.X: [1, 2] is not of type 'object'"),
     ("kind = 'island4d'", "kind: 'universal' was expected"),
     ("target = 1e-12", "target: 1e-12 is less than the minimum of 1e-11"),
-    ("target = 1e-3", "target: 0.001 is greater than the maximum of 0.0003"),
     ("target = nan", "not JSON compliant"),
     ("max_nodes = 1.5", "max_nodes: 1.5 is not of type 'integer'"),
-    ("certificate_points = 99", "certificate_points: 99 is less than the minimum of 100"),
     ("variant = 'rubbed'", "variant: 'rubbed' is not known"),
     ("[axes.mu]\nhigh = 1e11", "axes.mu.high: 100000000000.0 is greater than the maximum of 10000000000.0"),
     ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X: its nodes must increase from low to high"),
-    (b"variant = '\xff'", "is not a TOML file"),
+    ("variant = [", "is not a TOML file"),
+    (SMALL["universal"].replace("max_nodes = 5000", "max_nodes = 100"), "more than the 100 allowed; raise max_nodes"),
+    (SMALL["universal"].replace(LOW, "low = 90.0\nhigh = 100.0"), "hardly a surface visits these axes"),
 ]
 ISLAND4D = [
     ("[axes.hurst]\nhigh = 1.1", "axes.hurst.high: 1.1 is greater than the maximum of 1"),
     ("[axes.hurst]\noffset = 1.0", "[axes.hurst]: unknown key 'offset'"),
     ("[axes.X]\noffset = -0.5", "axes.X: its nodes must increase from low to high, and low + offset be above 0"),
-    ("[axes.X]\noffset = 1e19", "axes.X: its nodes must increase from low to high"),
-    ("[axes.X]\nnodes = 7", "axes.X.nodes: 7 is less than the minimum of 8"),
     ("[axes.X]\nnodes = 50000", "nodes, max_nodes allows"),
 ]
 
@@ -68,20 +54,11 @@ ISLAND4D = [
     [("universal", *row) for row in UNIVERSAL] + [("island4d", *row) for row in ISLAND4D],
 )
 def test_a_bad_configuration_is_refused(kind, text, message, tmp_path):
-    assert message in refused_file(kind, tmp_path, text)
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "message"),
-    [
-        ("max_nodes = 5000", "max_nodes = 100", "more than the 100 allowed; raise max_nodes or the target"),
-        ("low = -2.0\nhigh = 6.0", "low = 90.0\nhigh = 100.0", "hardly a surface visits these axes"),
-    ],
-)
-def test_what_makes_no_table_is_refused(before, after, message, tmp_path):
     path = tmp_path / "own.toml"
-    path.write_text(SMALL["universal"].replace(before, after))
-    assert message in refused("universal", tmp_path, "--config", str(path), "--out", str(tmp_path / "table.nc"))
+    path.write_text(text)
+    said = refused(kind, tmp_path, "--config", str(path), "--out", str(tmp_path / "sub" / "table.nc"))
+    assert message in said
+    assert not (tmp_path / "sub").exists()
 
 
 def test_misuse_of_the_command_line_is_refused(tmp_path):
@@ -120,28 +97,3 @@ def test_a_file_changes_what_it_names(tmp_path):
     found, shipped = load("island4d", path), load("island4d")
     assert found.axes["spread"] == dataclasses.replace(shipped.axes["spread"], high=10.0, nodes=17)
     assert found.axes["X"] == shipped.axes["X"]
-
-
-def limits(kind, name):
-    """Least and largest coordinate that the schema allows on an axis."""
-    ends = SCHEMAS[kind]["properties"]["axes"]["properties"][name]["properties"]
-    return ends.get("low", ends["high"])["minimum"], ends["high"]["maximum"]
-
-
-def test_the_solver_works_on_every_corner_that_the_limits_allow():
-    X, mu = np.array(limits("universal", "X"), dtype=float), np.array([1e-30, limits("universal", "mu")[1]])
-    pairs = np.stack(np.meshgrid(X, mu), axis=-1).reshape(-1, 2)
-    for rtol in (greenwood_tripp.MIN_SOLVER_RTOL, 1e-6, 1e-3):
-        solved = greenwood_tripp.solve(*pairs.T, rtol=rtol)
-        ratio = np.stack([solved.phi_F, solved.phi_A]) / greenwood_tripp.rigid_sphere(*pairs.T)
-        assert (solved.error <= rtol).all()
-        assert np.isfinite(np.log(ratio)).all()
-
-
-def test_the_limits_of_island4d_stay_within_those_of_mu():
-    corners = np.meshgrid(*(limits("island4d", name) for name in ("spread", "sphere", "hurst")))
-    flat = [corner.ravel().astype(float) for corner in corners]
-    for variant in VARIANTS.values():
-        mu = band_fields(*flat, variant)[0]
-        assert (mu >= 1e-30).all()
-        assert (mu <= limits("universal", "mu")[1]).all()

@@ -1,7 +1,5 @@
 """The study of costs on few islands and surfaces, its clock replaced: errors, counts, and what goes into the files."""
 
-import itertools
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -14,7 +12,7 @@ from generate.pages import cost as pages_cost
 from generate.pages.cost import pareto_front
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.scenes.costs import read_costs, shipped_costs, shipped_distances
+from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.theories import THEORIES
 
 COST, SECONDS = 2.0, 1e-3
@@ -31,14 +29,11 @@ def by_variant(rows):
 
 
 def test_references_agree_with_the_solver():
-    found = cost.reference()
-    assert len(found) == len(cost.SURFACES)
-    surface, truth = cost.SURFACES[3], found[3]
-    gap = cost.gaps_of(surface)[:: cost.EVERY]
-    answer = contact(surface, separation=gap, island_model="exact", rtol=1e-10)
-    assert answer.pressure == pytest.approx(truth["pressure"], rel=1e-10, abs=0)
-    assert answer.area == pytest.approx(truth["area"], rel=1e-10, abs=0)
-    answers = list(found)
+    surface, truth = cost.SURFACES[3], cost.reference()[3]
+    answer = contact(surface, separation=cost.gaps_of(surface)[:: cost.EVERY], island_model="exact", rtol=1e-10)
+    for name in ("pressure", "area"):
+        assert getattr(answer, name) == pytest.approx(truth[name], rel=1e-10, abs=0)
+    answers = list(cost.reference())
     assert cost.largest_error(answers) == 0
     answers[2] = {"area": answers[2]["area"] * 1.001}
     assert cost.largest_error(answers) == pytest.approx(1e-3, rel=1e-9, abs=0)
@@ -48,23 +43,15 @@ def test_references_agree_with_the_solver():
     assert cost.island_error(1.01 * solved.phi_F, solved.phi_A, phi) == pytest.approx(0.01, rel=1e-6, abs=0)
 
 
-@pytest.fixture
-def few_totals(monkeypatch):
-    small = {
-        "ISLAND_MODELS": ("universal", "rigid"),
-        "RTOLS": (1e-1, 1e-2, 1e-4),
-        "LAW_RTOLS": (1e-2,),
-        "SLOW_LAW_RTOLS": (1e-1,),
-        "measure": once,
-    }
-    for name, value in small.items():
+def test_totals_laws_and_theories(monkeypatch):
+    few = {"ISLAND_MODELS": ("universal", "rigid"), "RTOLS": (1e-1, 1e-2, 1e-4), "LAW_RTOLS": (1e-2,)}
+    few |= {"SLOW_LAW_RTOLS": (1e-1,), "THEORY_GAPS": dict.fromkeys(THEORIES, 5), "measure": once}
+    for name, value in few.items():
         monkeypatch.setattr(cost, name, value)
-
-
-def test_totals(few_totals):
-    rows = by_variant(cost.gap_rows())
-    asked = {float(name.split("=")[1]) for _, name, what in rows if "rtol" in name and what == "both"}
-    assert asked == {1e-1, 1e-2, 1e-4}
+    rows = by_variant([*cost.gap_rows(), *cost.law_rows()])
+    assert {name for model, name, _ in rows if model == "rigid" and "gap" in name} == {
+        f"gap rtol=1e-0{k}" for k in (1, 2, 4)
+    }
     row = rows["universal", "gap rtol=1e-02", "both"]
     assert row.error < 1e-2
     # a call's cost is taken off, down to next to nothing, and the rest is shared by the gaps
@@ -73,24 +60,12 @@ def test_totals(few_totals):
     assert rows["universal", "call", "both"].cost == pytest.approx(COST / 6, rel=1e-12, abs=0)
     # spheres that do not deform are not the model
     assert rows["rigid", "gap rtol=1e-02", "both"].error > 1
-
-
-def test_laws_theories_and_scenes(few_totals, monkeypatch):
-    rows = by_variant(cost.law_rows())
-    assert [island_model for island_model, name, _ in rows if name.startswith("law rtol")] == ["universal", "rigid"]
     assert rows["universal", "law rtol=1e-02", "both"].error < 1e-2
     assert rows["law", "lookup", "both"].cost == COST / 10_000
-    assert {name for island_model, name, _ in rows if island_model == "law"} == {"lookup", "invert"}
-    monkeypatch.setattr(cost, "THEORY_GAPS", dict.fromkeys(THEORIES, 5))
     rows = by_variant(cost.theory_rows())
-    assert {island_model for island_model, _, _ in rows} == {"calibrated", "persson", "greenwood_williamson"}
-    whats = {"call", "gap", "invert", "energy", "law"}
-    assert {row.what for row in rows.values()} == whats
+    assert {model for model, _, _ in rows} == {"calibrated", "persson", "greenwood_williamson"}
+    assert {row.what for row in rows.values()} == {"call", "gap", "invert", "energy", "law"}
     assert rows["persson", "law rtol=1e-05", "both"].cost == COST
-    costs = itertools.count(5.0, -3.0)
-    monkeypatch.setattr(cost, "measure", lambda run: (run(), (next(costs), SECONDS))[1])
-    # 5 for the run, 2 for its step
-    assert [row.cost for row in cost.scene_rows()] == [3.0]
 
 
 def test_a_study_becomes_data(tmp_path, monkeypatch):
@@ -129,21 +104,16 @@ def test_the_gauge_names_every_theory_and_way_at_its_measured_place():
     assert 1e5 < simulated["us"] < 1e7
     assert simulated["force_light"] < 1 < simulated["area_light"] < 3
     for panel, name in zip(pages_cost.draw_gauge(rows).axes, pages_cost.GAUGES, strict=True):
-        drawn = {line.get_label(): line.get_xydata() for line in panel.lines}
-        assert {theory for theory, points in drawn.items() if len(points)} == set(rows["theory"][rows[name].notna()])
-        assert sum(map(len, drawn.values())) == rows[name].notna().sum()
+        drawn = {line.get_label(): len(line.get_xydata()) for line in panel.lines}
+        assert drawn == dict.fromkeys(drawn, 0) | rows[rows[name].notna()].groupby("theory").size().to_dict()
 
 
 @pytest.mark.slow
 def test_points_of_theories_are_priced(monkeypatch):
     monkeypatch.setattr(cost_distances, "measure", once)
     monkeypatch.setattr(cost_distances, "SLOW_POINTS", 2)
-    found = list(cost_distances.ways())
-    known = {*distances.THEORIES, *distances.ISLAND_MODELS, "area alone"}
-    assert {name for _, _, name, _, _ in found} <= known
-    assert {label for label, *_ in found} == set(distances.THEORIES)
-    prices = {(label, way): (cost, made) for label, way, _, cost, made in found}
-    assert prices["calibrated", "table"] == (COST / (3 * cost_distances.POINTS), 0)
+    prices = {(label, way): (cost, made) for label, way, _, cost, made in cost_distances.ways()}
+    assert {label for label, _ in prices} == set(distances.THEORIES)
     assert prices["calibrated", "law"] == (COST / (3 * cost_distances.POINTS), COST / 3)
     assert prices["MBMA reported", "exact"] == (COST / 6, 0)
 

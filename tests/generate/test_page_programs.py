@@ -1,5 +1,6 @@
-"""The programs that write pages: what they draw is what the library computes, and nothing else of a page changes."""
+"""The programs that write pages: what they draw is what the library computes; corners of parameters of its atlas."""
 
+import math
 import re
 
 import numpy as np
@@ -8,12 +9,22 @@ from click.testing import CliRunner
 
 from generate.__main__ import COMMANDS, main
 from generate.files import ROOT
-from generate.page import MARKED, fill
-from generate.pages import library, maps
+from generate.page import MARKED, fill, svg
+from generate.pages import library, maps, stability
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
 
 SVG = b"<?xml"
+# corners of parameters
+FEW = {
+    "X_CORNERS": np.array([-40.0, -5.0, 0.0, 2.0, 30.0, 1e4]),
+    "MU_CORNERS": np.array([0.0, 1e-300, 1e-16, 1e-6, 1.0, 1e5]),
+    "APPROACHES": np.geomspace(1e-12, 30, 6),
+    "BANDS": np.array([3.0000001, 30.0, 1e8]),
+    "DEPTHS": (1e-12, 1e-3, 6.0),
+    "TOTAL_BANDS": (3.0000001, 216.0, 1e6),
+    "TOTAL_HURSTS": (0.1, 0.8, 1.0),
+}
 
 
 def run(command, *arguments):
@@ -41,17 +52,6 @@ def test_ratios_of_a_theory_to_itself_are_one():
     np.testing.assert_allclose(area, 0.5, rtol=1e-3)
     np.testing.assert_allclose(force, 1.0, rtol=1e-9)
     assert np.isnan(maps.ratios(theories.Persson(), surface, np.array([1e3]), np.array([1.0]), u[:1])[0])
-
-
-def test_shapes_are_told_with_extremes_and_validity():
-    surface = Surface.from_map(np.random.default_rng(1).normal(size=(32, 32)), 1e3, periodic=True)
-    u = 0.5 * surface.h_max * np.ones(2)
-    found = contact(surface, mean_separation=u, theory="calibrated")
-    rows = np.stack([found.pressure, np.full(2, 0.05), u])
-    area, force, valid = maps.summary([("one", surface, rows)])[3:]
-    assert force == pytest.approx((1.0, 1.0, 1.0), rel=1e-6)
-    assert area[0] == pytest.approx(found.area[0] / 0.05, rel=5e-3)
-    assert valid in ("0%", "100%")
 
 
 def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):
@@ -112,3 +112,28 @@ def test_coefficients_of_the_height_integrals_are_the_shipped_ones(monkeypatch, 
     monkeypatch.setattr(height_coefficients, "TARGET", tmp_path / "again.h")
     height_coefficients.main()
     assert (tmp_path / "again.h").read_bytes() == shipped
+
+
+@pytest.mark.slow
+def test_corners_have_numbers_within_their_bounds_and_no_warning(monkeypatch):
+    for name, value in FEW.items():
+        monkeypatch.setattr(stability, name, value)
+    found = stability.islands() | stability.island_geometry() | stability.totals()
+    rows = {name: stability.row(name, outcomes)[1:] for name, outcomes in found.items()}
+    # the comparison would show it if the formulas as printed were fine
+    assert rows.pop("geometry, the paper's formulas as printed")[2] > 0
+    for name, (tried, refused, not_finite, warned, _, beyond) in rows.items():
+        assert not_finite == warned == beyond == 0, name
+        assert refused < tried
+    assert rows["geometry, library"][4] < 1e-13
+    assert svg(stability.draw(found)).startswith(SVG)
+
+
+def test_what_goes_wrong_is_counted():
+    def refuse():
+        raise InputError("no")
+
+    answers = [lambda: ([1.0], 0.1), lambda: ([1.5], 0.1), lambda: ([math.nan], 0.1), lambda: ([1 / 0], 0.1), refuse]
+    found = [stability.outcome(answer, [1.0]) for answer in answers]
+    assert [one.error for one in found] == pytest.approx([0.0, 0.5, math.nan, math.nan, math.nan], nan_ok=True)
+    assert stability.row("some", found) == ["some", 5, 1, 2, 0, 0.5, 1]

@@ -9,7 +9,7 @@ import pytest
 from mbma_tables import Scene
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
+from mbma_tables.scenes.plan import Row, read_costs, shipped_costs
 from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
 from mbma_tables.scenes.specimen import schema
 from mbma_tables.theories import THEORIES
@@ -60,7 +60,6 @@ MISTAKES = [
     (scene('theory = "persson"\nvariant = "printed"'), "variant: of theory 'mbma', not of 'persson'"),
     (scene(at="separations = [0.5]\npressures = [0.1]"), "prescribe one of"),
     (scene(at="separations = [-2.0]"), "at least -h_max"),
-    (scene(at="pressures = [0.01]\nover_h_rms = true"), "leave it out"),
     (
         scene(effects='on = ["pressure"]\noff = ["finite_height"]', at="pressures = [0.01]"),
         "leave finite_height on, or give separations",

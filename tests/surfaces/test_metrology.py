@@ -5,15 +5,15 @@ import json
 
 import numpy as np
 import pytest
-from helpers import random_map, refused, run
+from helpers import random_map, run
 from scipy.integrate import quad
 from scipy.special import ndtri
 from scipy.stats import norm
 
 from generate.machined.makers import Part, heights, rough
 from mbma_tables import InputError, Surface, contact
-from mbma_tables.surfaces.areal import areal_parameters, core
 from mbma_tables.surfaces.averages import average
+from mbma_tables.surfaces.roughness import areal_parameters, core
 
 
 def told(surface, step):
@@ -142,35 +142,6 @@ class TestScans:
         values = np.load(tmp_path / "1.npy")
         assert one["areal"]["Sq"] == pytest.approx(values.std(), rel=1e-6)
         assert "core [um]: Sk" in run("fit", tmp_path / "1.npy", "--dx", "1um", "--periodic")
-
-
-class TestBatchOfMaps:
-    @pytest.fixture
-    def folder(self, tmp_path):
-        for seed in (1, 2):
-            np.save(tmp_path / f"{seed}.npy", 0.02 * random_map(64, 0.05, 0.25, seed=seed))
-        return tmp_path
-
-    def test_each_line_is_its_map(self, folder):
-        (folder / "all.csv").write_text(
-            "map,dx,s_filter,surface,E_star\n1.npy,1um,,,2GPa\n2.npy,1um,5um,,1GPa\n,,,challenge,1GPa\n"
-        )
-        words = ("--pressure", "5MPa", "--length-unit", "um", "--stress-unit", "MPa", "--json")
-        found = json.loads(run("batch", folder / "all.csv", *words))
-        assert found["columns"]["name"] == ["1.npy", "2.npy", "challenge"]
-        own = Surface.from_map(folder / "2.npy", dx="1 um", s_filter="5 um")
-        known = contact(own, pressure="5 MPa", E_star="1 GPa")
-        assert found["columns"]["area"][1] == pytest.approx(known.area)
-        assert found["columns"]["theory"] == ["calibrated", known.theory, "mbma"]
-
-    def test_mistakes(self, folder):
-        for text, message in (
-            ("map,surface\n1.npy,challenge\n", "name and map are given: one of"),
-            ("map,dx\nabsent.npy,1um\n", "is not a file"),
-            ("surface,dx\nchallenge,1um\n", "for a measured map, which is missing"),
-        ):
-            (folder / "all.csv").write_text(text)
-            assert message in refused("batch", folder / "all.csv", "--area", "0.1")
 
 
 SHARES = (np.arange(200_000) + 0.5) / 200_000

@@ -14,7 +14,6 @@ from helpers import refusals
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
-from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.theories import THEORIES, Mbma, get_theory
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -46,45 +45,6 @@ def test_other_island_models_have_stiffness_and_validity_too(island_model):
     assert set(other.reasons) == set(table.reasons)
     rigid = contact(SURFACE, mean_separation=[1.0, 2.0], island_model="rigid")
     assert rigid.stiffness == pytest.approx(contact_law(SURFACE, island_model="rigid").stiffness([1.0, 2.0]), rel=1e-6)
-
-
-@pytest.mark.parametrize("held", ["pressure", "area"])
-def test_derivatives_at_a_held_quantity(held):
-    asked = {held: 10.0 if held == "pressure" else 0.004}
-    found = contact(SURFACE, **asked, E_star=MODULUS, derivatives=True)
-    free = "area" if held == "pressure" else "pressure"
-    step = 1e-5
-    for name in (*PARAMETERS, held, *(("E_star",) if held == "pressure" else ())):
-        sides, scale = [], 1.0
-        for sign in (1, -1):
-            numbers = {p: float(getattr(SURFACE, p)) for p in PARAMETERS} | asked | {"E_star": MODULUS}
-            scale = numbers[name]
-            numbers[name] *= 1 + sign * step
-            given = {key: numbers[key] for key in (held, "E_star")}
-            sides.append(contact(Surface(*(numbers[p] for p in PARAMETERS)), **given, rtol=1e-10))
-        for kind in ("separation", free):
-            slope = (getattr(sides[0], kind) - getattr(sides[1], kind)) / (2 * step * scale)
-            own = getattr(found, f"{kind}_by")[name]
-            # h_max hardly moves anything here: what it moves is compared with the quantity itself
-            assert own == pytest.approx(slope, rel=1e-6, abs=1e-6 * abs(getattr(found, kind)) / scale), (kind, name)
-    assert getattr(found, "pressure_by" if held == "pressure" else "area_by") is None
-
-
-def test_derivatives_at_first_contact_and_of_other_theories_are_refused():
-    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are requested") as caught:
-        contact(SURFACE, pressure=[0.0, 0.001], derivatives=True)
-    assert caught.value.mask.tolist() == [True, False]
-    for more in ({"theory": "calibrated"}, {"hardness": 0.1}):
-        with pytest.raises(InputError, match=r"derivatives are of theory 'mbma' without a hardness; sensitivity\(\)"):
-            contact(SURFACE, pressure=0.001, derivatives=True, **more)
-
-
-def test_a_surface_that_is_its_own_spectrum_has_derivatives_by_what_is_known():
-    q = np.geomspace(0.2, 50, 200)
-    surface = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1)
-    found = contact(surface, pressure=[0.01, 0.03], theory="mbma", derivatives=True)
-    assert set(found.area_by) == {"pressure", "E_star"}
-    assert found.separation_by["pressure"] == pytest.approx(-2 / found.stiffness, rel=1e-5)
 
 
 def test_scatter_of_stiffness_and_separation():

@@ -7,8 +7,8 @@ from generate.boundary_elements.tamaas_contact import Contact
 from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law
 from mbma_tables.theories import theory_name
-from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.own_map import law_loads
+from mbma_tables.theories.saturated import of_map
 
 
 def surface_of(family, number):

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import Surface, contact, contact_law
-from mbma_tables.answers.leakage import flow
-from mbma_tables.answers.leakage_table import flow_of_spectrum, shipped_flow
+from mbma_tables.answers.leakage import flow, flow_of_spectrum, shipped_flow
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.laws import effective_medium as leakage
 from mbma_tables.laws.calibrated import Spectrum

@@ -17,7 +17,7 @@ from mbma_tables.common.errors import ConvergenceError, InputError, TableFileErr
 from mbma_tables.laws import boundary_elements, pressing
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.theories import BoundaryElements, own_map
-from mbma_tables.theories.corrected import of_map
+from mbma_tables.theories.saturated import of_map
 
 pytest.importorskip("tamaas")
 
@@ -143,7 +143,7 @@ def test_on_the_command_line(tmp_path):
     own = BoundaryElements.from_netcdf(table).surface
     assert found["columns"]["area"] == pytest.approx(contact(own, pressure="5 MPa", E_star="1 GPa").area)
     assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
-    assert "leave --dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
+    assert "leave dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
     assert "not the map" in refused("fit", table)
 
 

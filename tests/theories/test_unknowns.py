@@ -30,23 +30,6 @@ def test_answers_scale_as_they_must(theory, by):
         assert all(abs(row[answer]) < 1e-5 for row in found.errors.values())
 
 
-@pytest.mark.parametrize("given", [{"separation": 0.8}, {"pressure": 0.03}], ids=["separation", "pressure"])
-def test_derivatives_of_the_model(given):
-    found = sensitivity(SURFACE, **given, E_star=10.0)
-    exact = contact(SURFACE, **given, E_star=10.0, derivatives=True)
-    for name in ("hurst", "q0", "q1", "h_rms", "h_max"):
-        number = getattr(SURFACE, name)
-        expected = {"area": exact.area_by[name] * number / exact.area}
-        if "separation" in given:
-            expected["pressure"] = exact.pressure_by[name] * number / exact.pressure
-        else:
-            # u = (h_max + d)/2
-            moved = (exact.separation_by[name] + (name == "h_max")) / 2
-            expected["mean_separation"] = moved * number / exact.mean_separation
-        for quantity, slope in expected.items():
-            assert found.slopes[name][quantity] == pytest.approx(slope, abs=1e-5)
-
-
 def test_numbers_of_a_drawing_are_the_unknowns():
     drawing = {"hurst": 0.8, "Ra": 0.4, "Rdq": 0.1, "longest": 100.0, "h_max": 1.8}
     surface = Surface.from_roughness(**drawing, unit="um")

@@ -26,7 +26,6 @@ def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
     for cap in (np.inf, [np.inf, np.inf, HARDNESS]):
         found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
         for name in ("pressure", "area", "stiffness", "error", "unloading_stiffness"):
-            # MBMA's sums with derivatives, which yielding needs, add in another order than those without
             rel = (1e-8 if name == "error" else 1e-14) if theory == "mbma" and np.ndim(cap) else 0
             assert getattr(found, name)[:2] == pytest.approx(getattr(elastic, name)[:2], rel=rel, abs=0), name
         assert (found.yielded[:2] == 0).all()

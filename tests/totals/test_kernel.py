@@ -34,24 +34,23 @@ def test_islands_are_those_of_geometry(variant):
         assert np.isnan(nodes[0]).all()
 
 
-def totals(hurst, zeta_1, compression, peak, rtol=1e-9, slopes=0):
+def totals(hurst, zeta_1, compression, peak, rtol=1e-9):
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak)))
     numbers, count = [np.ascontiguousarray(array) for array in arrays], arrays[0].size
-    out, error, status = np.empty((count, 2, 5 if slopes else 1)), np.empty(count), np.empty(count, np.uint8)
-    own = REPORTED.numbers, *universal_model().cells, slopes
+    out, error, status = np.empty((count, 2, 2)), np.empty(count), np.empty(count, np.uint8)
+    own = REPORTED.numbers, *universal_model().cells
     bad = core.totals(*numbers, rtol, *own, out, error, status, np.empty(1, np.int64))
     assert bad == (status != OK).sum()
     return out, error, status
 
 
-@pytest.mark.parametrize("slopes", [0, 1])
-def test_no_number_crashes_and_none_that_is_wrong_is_answered(slopes):
+def test_no_number_crashes_and_none_that_is_wrong_is_answered():
     awful = np.array([math.nan, math.inf, -math.inf, 5e-324, -5e-324, 1e300, -1.0, 0.0, 1.0, 1e-160])
     good = (0.8, 216.0, 2.0, 3.0)
     for place in range(4):
         given = list(good)
         given[place] = awful
-        out, error, status = totals(*given, slopes=slopes)
+        out, error, status = totals(*given)
         answered = status == OK
         assert np.isfinite(out[answered]).all()
         assert np.isnan(out[~answered]).all()
@@ -80,13 +79,12 @@ def test_what_cannot_be_resolved_is_said(monkeypatch):
     assert np.argwhere(caught.value.mask).tolist() == [[1, 1]]
 
 
-@pytest.mark.parametrize("slopes", [0, 1])
-def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generations):
+def test_bits_depend_neither_on_the_batch_nor_on_the_generation(generations):
     rng = np.random.default_rng(8)
     given = rng.uniform(0.2, 1, 300), 10 ** rng.uniform(0.7, 4, 300), rng.uniform(0, 6, 300), rng.uniform(3, 5, 300)
-    whole = totals(*given, slopes=slopes)[0]
+    whole = totals(*given)[0]
     for k in range(0, 300, 37):
-        assert totals(*(x[k] for x in given), slopes=slopes)[0].tobytes() == whole[k].tobytes()
+        assert totals(*(x[k] for x in given))[0].tobytes() == whole[k].tobytes()
     X, mu = rng.uniform(-6, 40, 500), 10 ** rng.uniform(-10, 6, 500)
     phi = []
     for one in generations:

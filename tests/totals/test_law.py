@@ -15,11 +15,12 @@ import xarray as xr
 from helpers import difference_weights, refusals, with_slopes
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.law import pieces as law_pieces
+from mbma_tables.law import block as law_block
 from mbma_tables.law.block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import NAMED
-from mbma_tables.totals.contact import Pairs, Sums, sums_by_table
+from mbma_tables.theories import Mbma
+from mbma_tables.totals.contact import Sums, by_table
 from mbma_tables.totals.profile import profile
 
 # hurst, zeta_1, h_max/h_rms, variant
@@ -185,8 +186,9 @@ def test_a_function_of_c_keeps_its_law():
 
 def gap_by_gap(model, surface, c, variant):
     """Rows of force and area by the core's quadrature."""
-    how = Sums(model, variant, 1e-11)
-    return sums_by_table(model, Pairs.of(surface, c), how, "raise", slopes=False)[0][:, :, 0].T
+    rows = np.empty((3, c.size))
+    by_table(surface, c, np.arange(c.size), model, Sums(model, variant, 1e-11), rows)
+    return rows[:2]
 
 
 @pytest.mark.parametrize(
@@ -268,7 +270,7 @@ def test_laws_that_end_early_and_of_too_many_pieces(monkeypatch):
     surface = surface_of(*CASES[0][:3])
     labelled = Surface(xr.DataArray(0.8), surface.q0, surface.q1, surface.h_rms, surface.h_max)
     assert contact_law(labelled).pressure(separation=1.0) == law_of(CASES[0]).pressure(separation=1.0)
-    monkeypatch.setattr(law_pieces, "MAX_RECORDS", 3)
+    monkeypatch.setattr(law_block, "MAX_RECORDS", 3)
     with pytest.raises(ConvergenceError, match="more than 3 pieces") as caught:
         contact_law(surface)
     assert caught.value.mask
@@ -310,22 +312,22 @@ def test_a_narrow_dip_is_a_turning_point(at, width, sign):
     t = np.polynomial.Polynomial([-at, 1.0])
     dip = (t**2 - width**2) * (1 + 0.3 * t**4)
     assert dip.degree() < DEGREE
-    x, _ = law_pieces.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
+    x, _ = law_block.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
     # compression goes from t = s to t = -s
     expected = max(at - width, -1.0) if sign < 0 else min(at + width, 1.0)
     assert 4 * (x - 0.75) == pytest.approx(expected, abs=1e-9)
     above = rising_but_for(-sign * (dip + 2 * width**2))
-    assert law_pieces.first_falls(above, np.array([float(sign)]))[0][0] is None
+    assert law_block.first_falls(above, np.array([float(sign)]))[0][0] is None
 
 
 def slope_misses(surface, law, gap, variant="reported"):
     """Errors of the law's slopes over F/l and A/l, against derivatives of totals."""
-    truth = contact(surface, separation=gap, rtol=1e-11, derivatives=True, variant=variant)
-    for slope, by, value in (
-        (law.stiffness(separation=gap) / 2, truth.pressure_by, truth.pressure),
-        (law.area_slope(separation=gap), truth.area_by, truth.area),
+    truth = Mbma(variant=variant, rtol=1e-11).totals(surface, gap, slopes=True)
+    for slope, true, value in (
+        (law.stiffness(separation=gap) / 2, truth.pressure_slope, truth.pressure),
+        (law.area_slope(separation=gap), truth.area_slope, truth.area),
     ):
-        yield np.abs(slope + by["separation"]) / (value / (law.h_max - gap))
+        yield np.abs(slope + true) / (value / (law.h_max - gap))
 
 
 def test_inverses_stay_within_the_law():

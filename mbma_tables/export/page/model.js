@@ -14,26 +14,17 @@ function bytesOf(text) {
   return bytes;
 }
 
-// Undoes `packed` of export/explorer.py.
-async function unpacked({ count, differences, bits, text }) {
+// Undoes `packed` of export/explorer.py: the bytes of a table.
+async function unpacked({ count, bytes: size, differences, text }) {
   const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
   const planes = new Uint8Array(await new Response(stream).arrayBuffer());
-  const values = new Float64Array(count);
-  if (differences === 0) {
-    const bytes = new Uint8Array(values.buffer);
-    for (let k = 0; k < bytes.length; ++k) bytes[k] = planes[(k % 8) * count + Math.floor(k / 8)];
-    return values;
-  }
-  for (let plane = planes.length / count - 1; plane >= 0; --plane) {
-    for (let k = 0, at = plane * count; k < count; ++k, ++at) values[k] = 256 * values[k] + planes[at];
-  }
-  for (let k = 0; k < count; ++k) values[k] = values[k] % 2 ? -(values[k] + 1) / 2 : values[k] / 2;
+  const bytes = new Uint8Array(count * size),
+    words = new Int32Array(bytes.buffer);
+  for (let k = 0; k < bytes.length; ++k) bytes[k] = planes[(k % size) * count + Math.floor(k / size)];
   for (let n = 0; n < differences; ++n) {
-    for (let k = 1; k < count; ++k) values[k] += values[k - 1];
+    for (let k = 1; k < count; ++k) words[k] += words[k - 1];
   }
-  const unit = 2 ** -bits;
-  for (let k = 0; k < count; ++k) values[k] *= unit;
-  return values;
+  return bytes;
 }
 
 const tables = await Promise.all(
@@ -48,10 +39,7 @@ const ARGUMENTS = OWN + 2 * LAW_BYTES,
   ANSWER = ARGUMENTS + 1024,
   SAMPLES = ANSWER + 1024;
 const numbersAt = (place, count) => new Float64Array(C.memory.buffer, place, count);
-for (const [name, values] of tables) {
-  const kind = { Float32Array, Float64Array, Int32Array }[DATA.model.tables[name].kind];
-  new kind(C.memory.buffer, C[name].value, values.length).set(values);
-}
+for (const [name, bytes] of tables) new Uint8Array(C.memory.buffer, C[name].value, bytes.length).set(bytes);
 
 // One surface, variant and modulus as functions of the mean separation, by theory.
 function prepare(state) {

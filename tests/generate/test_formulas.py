@@ -1,19 +1,21 @@
-"""The fits of the closed forms: least largest errors, coefficients that made samples are found, certificates hold."""
+"""The closed forms: fits find the coefficients that made samples, certificates hold, C and sympy agree."""
 
 from functools import partial
 
-import mpmath
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
 from generate import formulas as fit
-from generate.formulas import HEADER, Function, evaluate, read_functions
+from generate.formulas import HEADER, MODULE, evaluate, header_text, module_text, read_functions
+from generate.pages.library import expressions
+from generate.pages.stability import rigid_truth
 from mbma_tables import Surface, contact, greenwood_tripp
-from mbma_tables.models.closed_form_certificates import CERTIFICATES
+from mbma_tables.models.closed_forms import CERTIFICATES, FUNCTIONS, RANGES
 
 PRINTED = {"rel": 0.011, "abs": 0}  # three digits are stated, the largest error rounded up
-SHIPPED = read_functions(HEADER.read_text(encoding="utf-8"))
+TEXT = HEADER.read_text(encoding="utf-8")
+SHIPPED = read_functions(TEXT)
 
 
 @pytest.fixture
@@ -105,20 +107,34 @@ def test_a_form_that_falls_is_refused(few, monkeypatch):
         fit.certified(SHIPPED["pocket_phi_F"])
 
 
-def exact_rigid(result, x):
-    """The rigid sphere by quadrature in 25 digits."""
-    order, factor = {"phi_F": (2.5, mpmath.pi / 5), "phi_A": (2.0, mpmath.pi / 2)}[result]
-    with mpmath.workdps(25):
-        cuts = [-x, max(-x, -8), max(-x, 0), max(-x, 0) + 4, max(-x, 0) + 14]
-        return float(factor * mpmath.quad(lambda z: (z + x) ** mpmath.mpf(order) * mpmath.npdf(z), cuts))
-
-
 @pytest.mark.parametrize(("form", "accuracy"), [("pocket", 3e-3), ("standard", 1e-3), ("long", 1e-4)])
 @pytest.mark.parametrize("result", ["phi_F", "phi_A"])
 def test_the_rigid_sphere_of_a_form(form, accuracy, result):
-    function: Function = SHIPPED[f"{form}_{result}"]
-    steps = {name: function.steps[name] for name in ("w", "p", "rigid")}
+    steps = {name: SHIPPED[f"{form}_{result}"].steps[name] for name in ("w", "p", "rigid")}
     X = np.array([-0.5, -0.37, 0.0, 0.61, 1.3, 2.9, 6.7, 15.3, 33.1, 60.0])
-    found = evaluate(steps, {"X": X})["rigid"]
-    assert np.abs(found / [exact_rigid(result, x) for x in X] - 1).max() <= np.expm1(accuracy)
+    exact = [float(rigid_truth(x)[result == "phi_A"]) for x in X]
+    assert np.abs(evaluate(steps, {"X": X})["rigid"] / exact - 1).max() <= np.expm1(accuracy)
     assert (np.diff(evaluate(steps, {"X": np.linspace(-0.5, 60, 2001)})["rigid"]) > 0).all()
+
+
+def test_the_shipped_text_is_what_the_generator_prints():
+    assert header_text(TEXT, SHIPPED) == TEXT
+    assert module_text(CERTIFICATES) == MODULE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_core_agrees_with_sympy_in_30_digits(name):
+    function, steps, rng = SHIPPED[name], expressions(SHIPPED[name]), np.random.default_rng(5)
+    ranges = RANGES[function.form]
+    given = {argument: rng.uniform(*ranges[argument], 2) for argument in ranges if argument != "area"}
+    if function.form == "totals":
+        given["d_over_h_rms"] = given["h_max_over_h_rms"] - rng.uniform(0.1, 6, 2)
+    else:
+        given["mu"] = np.array([0.0, 10 ** rng.uniform(-9, np.log10(2e3))])
+    given = {argument: given[argument] for argument in function.arguments}
+    found = FUNCTIONS[function.form][function.result](*given.values())
+    for number in range(2):
+        values = {argument: float(both[number]) for argument, both in given.items()}
+        for step, expression in steps.items():
+            values[step] = expression.evalf(30, subs=values)
+        assert found[number] == pytest.approx(float(values[function.result]), rel=1e-12, abs=0)
