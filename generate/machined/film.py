@@ -1,7 +1,7 @@
 """Flow factors against Reynolds' equation on simulated gaps: ``python -m generate.machined.film``.
 
 Gaussian surfaces with lays up to 8:1; five mean gaps above contact, and five loads on which Tamaas deforms the faces.
-No constant of `mbma_tables.laws.film` was fitted to them; six minutes on one core.
+No constant of `mbma_tables.laws.lay` was fitted to them; six minutes on one core.
 """
 
 import click
@@ -13,7 +13,7 @@ from mbma_tables import Surface, flow_factors
 from mbma_tables.answers.leakage import shipped_flow
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.effective_medium import wide_gap
-from mbma_tables.laws.film import factors
+from mbma_tables.laws.lay import factors
 from mbma_tables.laws.reynolds import flow_and_couette
 
 POINTS, SHORTEST, LONGEST = 256, 8.0, 64.0

@@ -26,8 +26,7 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
 from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import QUANTITIES, AnyModel
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.labels import apply_to_surface
+from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import OPTIONS, THEORIES, default_theory, get_theory, theory_name
 from mbma_tables.theories.mbma import Mbma

@@ -16,7 +16,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import unit_of
 from mbma_tables.laws.calibrated import TESTED_AREA
-from mbma_tables.laws.film import LAY, OPEN, SHEAR, WIDEST_LAY, factors
+from mbma_tables.laws.lay import LAY, OPEN, SHEAR, WIDEST_LAY, factors
 from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.materials import Metal, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -91,7 +91,7 @@ def flow_factors(
     """Pressure and shear flow factors and asperity pressure at mean gaps, for average Reynolds equations.
 
     Before contact the factors are those of an effective medium of Gaussian gaps, in contact of that of the leakage law
-    (`mbma_tables.laws.film`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
+    (`mbma_tables.laws.lay`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
 
     With ``theory="simulated"`` they are those of the surface's own map: Reynolds' equation on its gaps, which boundary
     elements deform in contact, at knots of u (half a minute for 256 x 256 points).

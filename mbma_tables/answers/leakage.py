@@ -21,7 +21,7 @@ from mbma_tables.common.units import unit_of
 from mbma_tables.core import core, in_blocks
 from mbma_tables.laws.calibrated import Spectrum, self_affine_law, spectrum_of
 from mbma_tables.laws.effective_medium import LARGEST_AREA, FlowConstants, contact_factor, wide_gap
-from mbma_tables.surfaces.labels import agree
+from mbma_tables.surfaces.any_surface import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, known_at, nodes_of, shipped_part
 from mbma_tables.theories.mbma import Mbma

@@ -24,7 +24,7 @@ from mbma_tables.law import block as at
 from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.law.derived import Derived
 from mbma_tables.materials import Pair
-from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 if TYPE_CHECKING:
     from scipy import LowLevelCallable
@@ -125,8 +125,6 @@ class ContactLaw(Law, Derived, Displayed):
     def _ask(self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]) -> Any:
         """Result of `fill`, in blocks, if it reports that all is in range; else `check` raises."""
         if is_labelled(given):
-            from mbma_tables.surfaces.labels import apply
-
             return apply(lambda block: self._ask(block, count, check, fill), (given,), count)
         # entries of plain arrays are checked during evaluation
         plain = type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0

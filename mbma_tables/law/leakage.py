@@ -14,8 +14,7 @@ from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
 from mbma_tables.law import block as fit
 from mbma_tables.laws.effective_medium import wide_gap
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.labels import apply
+from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 RTOL, SHARE = 1e-4, 0.1  # tolerance of the polynomials, or this share of the law's own error
 MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow is a power

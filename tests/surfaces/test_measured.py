@@ -13,8 +13,8 @@ from mbma_tables import InputError, Surface, contact, contact_law
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.surfaces.heights import SHARES, Heights
 from mbma_tables.surfaces.maps import extrapolated
-from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.spectral import resolution
+from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.surface import MeasuredSurface
 
 FIVE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0)

@@ -12,8 +12,8 @@ from scipy.stats import norm
 
 from generate.machined.makers import Part, heights, rough
 from mbma_tables import InputError, Surface, contact
-from mbma_tables.surfaces.areal import areal_parameters, core
 from mbma_tables.surfaces.averages import average
+from mbma_tables.surfaces.roughness import areal_parameters, core
 
 
 def told(surface, step):

@@ -12,7 +12,7 @@ from helpers import refusals, refused, run
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
 from mbma_tables.scenes.specimen import from_numbers
-from mbma_tables.surfaces.extremes import highest_point
+from mbma_tables.surfaces.heights import highest_point
 
 SURFACE = Surface(0.75, 0.02, 5.0, 0.6, 2.1, unit="um")
 

@@ -6,7 +6,7 @@ import pytest
 from generate.pages.bodies import PATIR_CHENG, published
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, flow_factors
 from mbma_tables.laws.effective_medium import FlowConstants
-from mbma_tables.laws.film import factors
+from mbma_tables.laws.lay import factors
 from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.theories import BoundaryElements
 
