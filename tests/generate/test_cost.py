@@ -1,7 +1,6 @@
 """The study of costs on few islands and surfaces, its clock replaced: errors, counts, and what goes into the files."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from click.testing import CliRunner
 
@@ -9,7 +8,6 @@ from generate import cost, cost_distances, distances
 from generate.boundary_elements import studies
 from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
-from generate.pages.cost import pareto_front
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
@@ -79,17 +77,6 @@ def test_a_study_becomes_data(tmp_path, monkeypatch):
     assert CliRunner().invoke(cost.cost, catch_exceptions=False).exit_code == 0
     # the fastest fixed work seen is the unit
     assert read_costs(tmp_path / "tables" / "cost.csv") == shipped
-
-
-def test_the_pareto_front_is_what_nothing_dominates():
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        rows = pd.DataFrame(rng.integers(1, 6, (12, 2)).astype(float), columns=["cost", "error"])
-        front = pareto_front(rows).to_numpy()
-        at_least = (front[None] <= rows.to_numpy()[:, None]).all(axis=2)
-        assert at_least.any(axis=1).all()
-        # none of the front is better than another
-        assert (at_least[pareto_front(rows).index].sum(axis=1) == 1).all()
 
 
 def test_the_gauge_names_every_theory_and_way_at_its_measured_place():

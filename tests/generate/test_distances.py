@@ -71,16 +71,6 @@ def test_held_out_distances_are_those_of_the_shipped_file():
             assert rms == pytest.approx(np.hypot(row[k, 0], row[k, 1]), rel=0.02), (quantity, k)
 
 
-def test_theories_that_do_not_take_a_surface_are_left_out():
-    # a band below the floors of `fitted`
-    narrow = distances._simulated(
-        "self_affine", ([0.01, 0.02, 0.05], [0.02, 0.04, 0.1], [1.5, 1.2, 0.8]), 3.0, zeta_1=4.0
-    )
-    found = distances.distances([narrow], distances.THEORIES["MBMA fitted"])
-    assert all(np.isnan(values).all() for values in found.values())
-    assert distances.summed_up([narrow], found["area"])[1] == 0
-
-
 def test_a_file_of_heights_becomes_a_case(tmp_path):
     pytest.importorskip("tamaas")
     pytest.importorskip("SurfaceTopography")
