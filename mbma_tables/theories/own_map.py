@@ -18,7 +18,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.tablefiles.own import ADVICE, read_own, write_own
+from mbma_tables.tablefiles.netcdf import OWN_REMEDY, read_own, write_own
 from mbma_tables.theories.calibrated_curves import own_law
 
 # A/A0 by the law of the map, at which it is simulated
@@ -156,7 +156,7 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
             provenance=tuple(json.loads(own["provenance"])),
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
-        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {ADVICE}") from None
+        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {OWN_REMEDY}") from None
 
 
 def _plain(value: Any) -> Any:
