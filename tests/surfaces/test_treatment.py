@@ -136,14 +136,16 @@ class TestCutoff:
 
 
 class TestReading:
-    def test_arrays_in_files(self, tmp_path):
-        np.save(tmp_path / "a.npy", MAP)
-        np.savetxt(tmp_path / "a.txt", MAP)
-        np.savetxt(tmp_path / "a.csv", MAP, delimiter=",")
-        plain = Surface.from_map(MAP, STEP, model="measured")
+    def test_rows_of_arrays_in_files_are_x(self, tmp_path):
+        values = waves(shape=(64, 48))
+        np.save(tmp_path / "a.npy", values)
+        np.savetxt(tmp_path / "a.txt", values)
+        np.savetxt(tmp_path / "a.csv", values, delimiter=",")
+        plain = Surface.from_map(values, 0.5, 0.8)
         for name in ("a.npy", "a.txt", "a.csv"):
-            found = Surface.from_map(tmp_path / name, STEP, unit="um", model="measured")
-            assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-9)
+            found = Surface.from_map(tmp_path / name, dx=0.5, dy=0.8, unit="um")
+            np.testing.assert_allclose(found.map.heights, plain.map.heights, atol=1e-12)
+            assert found.map.steps == pytest.approx((0.5, 0.8))
             assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
             assert found.unit == "um"
             with pytest.raises(InputError, match="has no lengths: give the sampling step dx"):
