@@ -16,8 +16,8 @@ from mbma_tables.answers.contact import contact
 from mbma_tables.answers.interface import ratio_of
 from mbma_tables.answers.result import Contact
 from mbma_tables.answers.sensitivity import Sensitivity, sensitivity
-from mbma_tables.common.arguments import hinted, nearest, needed
-from mbma_tables.common.display import Displayed, Variable
+from mbma_tables.common.arguments import hinted, nearest
+from mbma_tables.common.display import Displayed, Variable, dataset_of
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import Units
@@ -248,15 +248,8 @@ class Joint(Displayed):
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""
-        needed("xarray")
-        import xarray as xr
-
         held = self.quantities(self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist()))
-        data = {
-            name: xr.Variable("pressure", np.atleast_1d(kept.values), {"units": kept.unit, "long_name": kept.meaning})
-            for name, kept in held.items()
-        }
-        return xr.Dataset(data, coords={"pressure": data.pop("pressure")}, attrs=dict(self.facts()))
+        return dataset_of({name: each._replace(dims=("pressure",)) for name, each in held.items()}, self.facts())
 
     def quantities(self, found: Contact) -> dict[str, Variable]:
         """Values, units, meanings and model uncertainties of a contact of this joint, by name."""
@@ -297,8 +290,7 @@ class Joint(Displayed):
         facts = {"metals": f"{a.name} on {b.name}", "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa"}
         return facts | {"hardness": str(hardness), "theory": theory, "gas": self.gas, "surface": repr(self.surface)}
 
-    def _facts(self) -> dict[str, str]:
-        return self.facts()
+    _facts = facts
 
     def _variables(self) -> dict[str, Variable]:
         return self.quantities(self._range())

@@ -126,16 +126,19 @@ class Displayed:
 
     def to_dataset(self) -> xr.Dataset:
         """Its quantities as an xarray Dataset, each with unit and description."""
-        needed("xarray")
-        import xarray as xr
+        return dataset_of(self._variables(), {**self._facts(), **self._origin()})
 
-        variables = {}
-        for name, (values, unit, meaning, dims) in self._variables().items():
-            described = {"units": unit} | ({"long_name": meaning} if meaning else {})
-            if is_labelled(values):
-                variables[name] = values.assign_attrs(described)
-                continue
-            rank = np.ndim(values)
-            own = dims if dims is not None else ("point",) if rank == 1 else tuple(f"dim_{k}" for k in range(rank))
-            variables[name] = xr.Variable(own, values, described)
-        return xr.Dataset(variables, attrs={**self._facts(), **self._origin()})
+
+def dataset_of(variables: Mapping[str, Variable], facts: Mapping[str, str]) -> xr.Dataset:
+    """An xarray Dataset of variables, with facts as its attributes."""
+    xarray, made = needed("xarray"), {}
+    for name, (values, unit, meaning, dims) in variables.items():
+        described = {"units": unit} | ({"long_name": meaning} if meaning else {})
+        if is_labelled(values):
+            made[name] = values.assign_attrs(described)
+            continue
+        rank = np.ndim(values)
+        own = dims if dims is not None else ("point",) if rank == 1 else tuple(f"dim_{k}" for k in range(rank))
+        made[name] = xarray.Variable(own, values, described)
+    dataset: xr.Dataset = xarray.Dataset(made, attrs=dict(facts))
+    return dataset

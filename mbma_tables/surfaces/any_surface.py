@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import broadcast_shape, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_lines
+from mbma_tables.common.plots import draw_line
 from mbma_tables.common.units import Units, factor, unit_of
 from mbma_tables.surfaces import spectrum
 
@@ -160,8 +160,7 @@ class AnySurface(Displayed, abc.ABC):
             raise InputError("a batch has no single spectrum to draw: take one surface")
         q = np.geomspace(self.q0, self.q1, 200)[1:-1]
         length = self.unit or "length"
-        labels = f"wavenumber q [1/{length}]", f"spectrum C(q) [{length}^4]"
-        return draw_lines({"spectrum": (q, self.power_spectrum(q))}, *labels)
+        return draw_line(q, self.power_spectrum(q), f"wavenumber q [1/{length}]", f"spectrum C(q) [{length}^4]")
 
     def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
         """The equivalent rough surface of two in contact: spectra add, heights convolve.

@@ -10,7 +10,7 @@ from mbma_tables import Scene
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.scenes.plan import Row, read_costs, shipped_costs
-from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
+from mbma_tables.scenes.problem import OUTPUTS, REFINEMENTS
 from mbma_tables.scenes.specimen import schema
 from mbma_tables.theories import THEORIES
 
@@ -36,15 +36,12 @@ MISTAKES = [
     (scene('[comparison]\ntheories = ["person"]', effects='on = ["comparison"]'), "did you mean 'persson'"),
     (scene(surface=None), "'surface' is a required property"),
     (scene(surface="hurst = 0.8\nq0 = 1.0"), "a surface needs hurst, q0, q1"),
-    (scene(surface='name = "concrete"\nhurst = 0.8'), "leave one of them out"),
-    (scene(surface='name = "concrete"\nmap = "a.nc"'), "one of name, map, psd or numbers"),
+    (scene(surface='name = "concrete"\nhurst = 0.8'), r"name and numbers \(hurst\) are given"),
+    (scene(surface='name = "concrete"\nmap = "a.nc"'), "one of name, map or numbers"),
     (scene(surface='map = "none.nc"'), "is not a file; paths are relative"),
-    (scene(surface='name = "concrete"\nconvention = "paper"'), "give psd"),
     (scene(surface='name = "concrete"\nlength_unit = "MPa"'), "no known unit of length"),
     (scene(effects=None), "'effects' is a required property"),
     (scene(effects="on = []"), "effects.on: .* should be non-empty"),
-    (scene(effects='on = ["finite_height"]'), "needs at least one of pressure"),
-    (scene(effects='on = ["area", "subscale_area"]\noff = ["subscale_area"]'), "leave it in one of the two lists"),
     (scene(effects='on = ["pressure"]\noff = ["area"]'), "did you mean|known are"),
     (scene(effects='on = ["energy"]\noff = ["finite_height"]'), "leave finite_height on"),
     (
@@ -118,20 +115,9 @@ def test_examples_are_scenes(path):
 
 def test_the_schema_names_what_the_code_knows():
     tables = schema()["properties"]
-    assert set(tables["effects"]["properties"]["on"]["items"]["enum"]) == set(EFFECTS)
+    assert set(tables["effects"]["properties"]["on"]["items"]["enum"]) == set(OUTPUTS)
     assert tuple(tables["effects"]["properties"]["off"]["items"]["enum"]) == REFINEMENTS
     json.dumps(schema(), allow_nan=False)
-
-
-def test_a_psd_file(tmp_path):
-    q = [1.05**k for k in range(100)]
-    lines = "\n".join(f"{a} {1e-3 * a**-3.6}" for a in q)
-    (tmp_path / "psd.txt").write_text(lines, encoding="utf-8")
-    path = write(tmp_path, scene(surface='psd = "psd.txt"\nh_max = 0.3', at="separations = [0.1]"))
-    assert float(Scene.from_toml(path).surface.hurst) == pytest.approx(0.8, rel=0.02, abs=0)
-    (tmp_path / "psd.txt").write_text("# q C\n")
-    with pytest.raises(InputError, match="must hold two columns"):
-        Scene.from_toml(path)
 
 
 HEADER = ",".join(Row._fields)

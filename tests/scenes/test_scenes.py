@@ -277,8 +277,9 @@ def test_beyond_a_table_totals_are_solved(island_model):
 
 test_contradictions = refusals(
     lambda given: scene_with(**given),
-    ({"without": ("pressure",)}, "is both on and off"),
-    ({"without": ("energy",)}, "'energy' is off unless it is asked for"),
+    ({"effects": ("finite_height",)}, "no effect is named 'finite_height'"),
+    ({"without": ("energy",)}, "no refinement is named 'energy'; known are subscale_area, sphere_deformation"),
+    ({"effects": ()}, "on needs at least one of"),
     (
         {"effects": ("pressure", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
         "pressure_profile is that of the deformed sphere",
