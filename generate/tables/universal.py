@@ -8,9 +8,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
-from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance
-from generate.tables.chunks import ChunkedSolver, phi
+from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance, phi
 from generate.tables.writing import about, label
+from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
@@ -123,15 +123,12 @@ def cells_of(low: float, high: float, mu_high: float, aim: float, rtol: float) -
 class Universal(Kind):
     def strips(self) -> list[Strip]:
         """Ranges of X, each as wide as polynomials allow."""
-        X, mu_high, aim = (
-            self.configuration.axes["X"],
-            self.configuration.axes["mu"].high,
-            AIM * self.configuration.target,
-        )
+        X, mu = (self.configuration.axes[name] for name in ("X", "mu"))
         strips, low, width = list[Strip](), X.low, 1
 
         def strip(steps: int) -> Strip:
-            return Strip(low, min(low + steps / X_STEPS, X.high), mu_high, aim, self.rtol)
+            high = min(low + steps / X_STEPS, X.high)
+            return Strip(low, high, mu.high, AIM * self.configuration.target, self.rtol)
 
         while low < X.high:
             widest = math.ceil((X.high - low) * X_STEPS)
@@ -147,9 +144,9 @@ class Universal(Kind):
             low = strips[-1].high
         return strips
 
-    def build(self, solver: ChunkedSolver) -> TableContent:
-        own = self.configuration
-        rows = np.concatenate(solver.map("cells", cells_of, [dataclasses.astuple(strip) for strip in self.strips()]))
+    def build(self) -> TableContent:
+        own, jobs = self.configuration, [dataclasses.astuple(strip) for strip in self.strips()]
+        rows = np.concatenate([*results("cells", cells_of, jobs, self.workers)])
         if len(rows) * TERMS**2 > own.max_nodes:
             raise UncertifiedError(
                 f"universal: an error of {own.target:.1e} needs {len(rows) * TERMS**2} coefficients, more than the "
@@ -169,7 +166,7 @@ class Universal(Kind):
         table = np.stack(UniversalModel(content).answer(X, mu)[:2])
         points = conformance({"X": X, "mu": mu}, X, mu, table, 1.0, 0.0)
         known = about(UNIVERSAL) | {"variant": "any", "variant_numbers": "[]"} | own.attributes()
-        attributes = known | self.certify(content, solver)
+        attributes = known | self.certify(content)
         return self.checked(dataclasses.replace(content, conformance=points, attributes=attributes))
 
     def held_out(self, content: TableContent, count: int, seed: int) -> list[FloatArray]:
@@ -180,10 +177,10 @@ class Universal(Kind):
         box = [X_at(2 * x - 1, X_low, X_high), mu_at(2 * y - 1, mu_low, mu_high)]
         return [np.concatenate(pair) for pair in zip(box, self.manifold(count - count // 2), strict=True)]
 
-    def certify(self, content: TableContent, solver: ChunkedSolver) -> dict[str, Any]:
+    def certify(self, content: TableContent) -> dict[str, Any]:
         """Errors on held-out points, solved on twice the nodes that made the table."""
         X, mu = self.held_out(content, self.configuration.certificate_points, self.configuration.seed + 101)
-        truth = solver.phi("certificate", X, mu, rtol=self.rtol, refinement=2)
+        truth = self.phi("certificate", X, mu, rtol=self.rtol, refinement=2)
         errors = np.abs(np.stack(UniversalModel(content).answer(X, mu)[:2], axis=-1) / truth - 1)
         return self.certificate(errors, {"X": X, "mu": mu})
 

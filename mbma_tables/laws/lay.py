@@ -11,7 +11,7 @@ from mbma_tables.laws.effective_medium import NEAREST, FlowConstants
 from mbma_tables.laws.gas import open_gaps
 
 ROUNDS, RESOLVED = 200, 1e-11
-# root mean square of ln(medium/simulation) at 16 surfaces with gamma from 1 to 8, `generate.machined.film`:
+# root mean square of ln(medium/simulation) at 16 surfaces with gamma from 1 to 8, `python -m generate film`:
 # phi without contact; addition by a lay per e-fold of gamma and A/A0 to the power 1.2; phi_s
 OPEN, LAY, SHEAR = 0.022, (12.0, 1.2), 0.15
 WIDEST_LAY = 8.5  # gamma, or its inverse, up to which flow, and anisotropy up to which stiffness was simulated

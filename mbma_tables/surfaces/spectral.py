@@ -79,7 +79,7 @@ class SpectralSurface(AnySurface):
     anisotropy : float, optional
         Root of the ratio of the gradient tensor's eigenvalues, 1 if isotropic; None where not measured.
     unit : str, optional
-        The unit of length, such as "um"; None where it is not known. Results carry it.
+        Unit of length, such as "um", of the numbers and the results; None if it is not known.
     provenance : sequence of mapping, optional
         The treatment of the measurement, a plain record for each step: {"step": "detrend", "kind": "plane"}, ...
     nominal_area : float or str, optional

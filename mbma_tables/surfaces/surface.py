@@ -33,9 +33,9 @@ class Surface(SelfAffine):
     h_rms : array_like
         Root-mean-square height, length.
     h_max, nominal_area : array_like, one of them
-        Highest point above the mid-plane, length; or A0, length^2, from which `surfaces.heights` takes its median.
+        Highest point above the mid-plane, length; or A0, length^2: h_max is its median over Gaussian surfaces of A0.
     unit : str, optional
-        The unit of length, such as "um"; None where it is not known. Results carry it.
+        Unit of length, such as "um", of the numbers and the results; None if it is not known.
     fit : SpectrumFit, optional
         Quality of the fit, in the measurement's unit, if the surface was fitted to a measurement.
     provenance : sequence of mapping, optional

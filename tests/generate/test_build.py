@@ -1,6 +1,5 @@
 """Tables: certificates against fresh exact solutions, targets, physical checks, and the same bytes again."""
 
-import concurrent.futures
 import dataclasses
 import json
 import os
@@ -13,9 +12,8 @@ from small_tables import small, small_build
 
 from generate.files import ROOT
 from generate.provenance import versions
-from generate.tables import chunks
-from generate.tables.certificate import UncertifiedError
-from generate.tables.chunks import ChunkedSolver, phi
+from generate.tables import certificate
+from generate.tables.certificate import Kind, UncertifiedError, phi
 from generate.tables.commands import KINDS
 from generate.tables.configuration import load
 from generate.tables.island4d import evaluate
@@ -76,33 +74,20 @@ def test_fresh_points_confirm_the_certificate_and_the_local_bound(kind, tmp_path
     kind.check(read_table(write_table(tmp_path / "table.nc", content)))
 
 
-def test_certificate_points_stand_off_the_nodes_and_half_of_them_where_surfaces_go(nodes):
-    kind, content = nodes
-    count = 300
-    places = kind.held_out(content.axes, count, 11)
-    assert all(place.size == count for place in places)
-    for axis, place in zip(content.axes, places, strict=True):
-        assert ((axis.low <= place) & (place <= axis.high)).all()
-        assert (axis.position(place) != np.round(axis.position(place))).all()
-    visited = kind.manifold(count // 2)
-    for place, own in zip(places, visited, strict=True):
-        np.testing.assert_array_equal(place[count // 2 :], own)
-
-
 def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
     kind, content = nodes
     places = kind.held_out(content.axes, 100, 11)
     places[0][3] = content.axes[0].low
     monkeypatch.setattr(kind, "held_out", lambda *_: places)
     with pytest.raises(UncertifiedError, match="a held-out point lies on a node"):
-        kind.certify(content.axes, content.coefficients, ChunkedSolver())
+        kind.certify(content.axes, content.coefficients)
 
 
 @pytest.mark.parametrize(("kind", "targets"), [("universal", (1e-4, 1e-6, 1e-8)), ("island4d", (1e-1, 2e-2))])
 def test_a_tighter_target_takes_more_coefficients_and_is_met(kind, targets, tmp_path):
     sizes, largest = [], []
     for target in targets:
-        content = KINDS[kind](load(kind, small(tmp_path, kind), target)).build(ChunkedSolver())
+        content = KINDS[kind](load(kind, small(tmp_path, kind), target)).build()
         largest.append(max(content.attributes[f"largest_error_{f}"] for f in "FA"))
         assert largest[-1] <= target
         sizes.append(content.coefficients.size)
@@ -116,34 +101,27 @@ def test_a_target_that_is_missed_is_refused(nodes):
     kind, content = nodes
     tight = dataclasses.replace(kind.configuration, target=1e-6)
     with pytest.raises(UncertifiedError, match=r"the largest held-out error is .*, the target 1\.00e-06"):
-        type(kind)(tight).certify(content.axes, content.coefficients, ChunkedSolver())
-
-
-def bump(content, place, height):
-    """A wave between the nodes: coefficients of alternating sign add nothing that the nodes would show at once."""
-    spoiled = content.coefficients.copy()
-    spoiled[place] += height
-    return dataclasses.replace(content, coefficients=spoiled)
-
-
-def middle(content, function, spread=0):
-    return (*(slice(n // 2 - spread, n // 2 + 1 + spread) for n in content.coefficients.shape[:-1]), function)
+        type(kind)(tight).certify(content.axes, content.coefficients)
 
 
 def test_what_no_islands_can_do_breaks_a_rule(nodes):
     kind, content = nodes
-    first, second, *others = content.coefficients.shape[:-1]
-    rest = (slice(None),) * len(others)
-    dips = (first // 2, slice(None), *rest), (slice(None), second // 2, *rest)
-    spoilt = [("force increasing in X", (*dips[0], 0), -12.0), ("area increasing in X", (*dips[0], 1), -12.0)]
-    # at the smallest spread mu is about 0.01
-    spoilt += [("force increasing with the spread", (*dips[1], 0), -12.0), ("rigid limit", (Ellipsis, 1), -5.0)]
-    for number in (0, 1):
-        spoilt.append(("force and area finite", middle(content, number), np.nan))
-        spoilt.append(("no larger than a rigid sphere's", middle(content, number, 1), 20.0))
-    for rule, place, height in spoilt:
+    X, spread, *_ = (n // 2 for n in content.coefficients.shape)
+    near = slice(X - 1, X + 2), slice(spread - 1, spread + 2)
+    for rule, place, height in (
+        ("force increasing in X", (X, ..., 0), -12.0),
+        ("area increasing in X", (X, ..., 1), -12.0),
+        ("force increasing with the spread", (slice(None), spread, ..., 0), -12.0),
+        # at the smallest spread mu is about 0.01
+        ("rigid limit", (..., 1), -5.0),
+        ("force and area finite", (X, spread, ..., 0), np.nan),
+        ("no larger than a rigid sphere's", (*near, ..., 0), 20.0),
+        ("no larger than a rigid sphere's", (*near, ..., 1), 20.0),
+    ):
+        spoilt = content.coefficients.copy()
+        spoilt[place] += height
         with pytest.raises(UncertifiedError, match=rule):
-            kind.check(bump(content, place, height))
+            kind.check(dataclasses.replace(content, coefficients=spoilt))
 
 
 def test_what_no_islands_can_do_breaks_a_rule_in_a_cell():
@@ -169,15 +147,13 @@ def test_what_no_islands_can_do_breaks_a_rule_in_a_cell():
             kind.check(dataclasses.replace(content, coefficients=series))
 
 
-def test_any_executor_gives_the_same_bits(monkeypatch):
-    monkeypatch.setattr(chunks, "CHUNK", 10)
+def test_any_workers_give_the_same_bits(monkeypatch):
+    monkeypatch.setattr(certificate, "CHUNK", 10)
     X, mu = np.linspace(0.0, 5.0, 40), np.geomspace(1e-3, 10.0, 40)
     expected = phi(X, mu, 1e-6)
-    np.testing.assert_array_equal(ChunkedSolver().phi("test", X, mu, 1e-6), expected)
-    square = ChunkedSolver().phi("test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6)
-    np.testing.assert_array_equal(square, expected.reshape(8, 5, 2))
-    with concurrent.futures.ThreadPoolExecutor(3) as threads:
-        np.testing.assert_array_equal(ChunkedSolver(threads).phi("test", X, mu, 1e-6), expected)
+    for workers in (1, 2):
+        found = Kind(load("universal"), workers).phi("test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6)
+        np.testing.assert_array_equal(found, expected.reshape(8, 5, 2))
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from scipy.special import erf
 from generate import distances
 from generate.boundary_elements.studies import measured_maps
 from generate.files import ROOT
-from generate.pages import fidelity
+from generate.pages import simulations
 from mbma_tables import Surface, contact
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -71,16 +71,6 @@ def test_held_out_distances_are_those_of_the_shipped_file():
             assert rms == pytest.approx(np.hypot(row[k, 0], row[k, 1]), rel=0.02), (quantity, k)
 
 
-def test_theories_that_do_not_take_a_surface_are_left_out():
-    # a band below the floors of `fitted`
-    narrow = distances._simulated(
-        "self_affine", ([0.01, 0.02, 0.05], [0.02, 0.04, 0.1], [1.5, 1.2, 0.8]), 3.0, zeta_1=4.0
-    )
-    found = distances.distances([narrow], distances.THEORIES["MBMA fitted"])
-    assert all(np.isnan(values).all() for values in found.values())
-    assert distances.summed_up([narrow], found["area"])[1] == 0
-
-
 def test_a_file_of_heights_becomes_a_case(tmp_path):
     pytest.importorskip("tamaas")
     pytest.importorskip("SurfaceTopography")
@@ -101,13 +91,8 @@ def test_a_file_of_heights_becomes_a_case(tmp_path):
 def test_committed_page_is_what_the_code_computes():
     sets = distances.data_sets()
     committed = {line.split(" | ")[0]: line for line in reversed(PAGE.splitlines())}  # the first table
-    for line in fidelity.summary_table(sets[name] for name in PICKED).splitlines():
+    for line in simulations.summary_table(sets[name] for name in PICKED).splitlines():
         before = committed[line.split(" | ")[0]]
         assert re.sub(NUMBER, "", before) == re.sub(NUMBER, "", line)
         found, expected = (list(map(float, re.findall(NUMBER, one))) for one in (before, line))
         assert found == pytest.approx(expected, rel=0.06), line  # two digits are printed
-
-
-@pytest.mark.slow
-def test_every_figure_of_the_page_is_drawn():
-    assert set(fidelity.drawn()) == set(re.findall(r"figures/(\w+)\.svg", PAGE))

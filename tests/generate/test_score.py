@@ -8,8 +8,7 @@ from click.testing import CliRunner
 from scipy.special import erf
 
 from generate.__main__ import main
-from generate.distances import RANGES, held_out
-from generate.pages.score import OTHERS, theories_of
+from generate.distances import OTHERS, RANGES, held_out, theories_of
 from generate.theories_of_others import FORCES, Corrected
 from mbma_tables import InputError, Surface
 from mbma_tables.laws.calibrated import PERSSON, Law, Spectrum

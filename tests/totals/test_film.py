@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from generate.pages.bodies import PATIR_CHENG, published
+from generate.pages.simulations import PATIR_CHENG, published
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, flow_factors
 from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.laws.lay import factors
