@@ -224,44 +224,26 @@ test_bad_input_of_one_command = told(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("[surface\n", "is not a TOML file"),
-        ("[surface]\nhrust = 0.7\n", "unknown key 'hrust'; did you mean 'hurst'?"),
-        ("[surface]\nname = 'concrete'\nxyz = 1\n", "unknown key 'xyz'; known are name, map"),
-        (toml(CONCRETE).replace("0.7", "'0.7'"), "surface.hurst: '0.7' is not of type 'number'"),
-        ("[surface]\nmap = 'missing.nc'\n", "missing.nc"),
+        ("[surface]\nname = 'concrete'\nxyz = 1\n", "s.toml: [surface]: unknown key 'xyz'; known are name, map"),
+        (toml(CONCRETE).replace("0.7", "'0.7'"), "s.toml: surface.hurst: '0.7' is not of type 'number'"),
     ],
 )
 def test_bad_files(folder, content, message):
     (folder / "s.toml").write_text(content)
-    found = refused("contact", "--file", "s.toml", "-d", "0.1")
-    assert message in found
-    assert "s.toml" in found or "missing.nc" in found
+    assert message in refused("contact", "--file", "s.toml", "-d", "0.1")
 
 
-@pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        (
-            FileNotFoundError(2, "No such file or directory", "a.txt"),
-            "mbma: [Errno 2] No such file or directory: 'a.txt'\n",
-        ),
-        (OSError("odd\nfault"), "mbma: odd fault\n"),
-    ],
-)
-def test_faults_of_the_system_are_one_line(folder, fault, said, monkeypatch):
+def test_faults_of_the_system_are_one_line(folder, monkeypatch):
     def fail(*_, **__):
-        raise fault
+        raise OSError("odd\nfault")
 
     monkeypatch.setattr("mbma_tables.answers.contact.contact", fail)
-    assert refused("contact", "--surface", "concrete", "-d", "0.1") == said
+    assert refused("contact", "--surface", "concrete", "-d", "0.1") == "mbma: odd fault\n"
 
 
-def test_without_a_command_it_shows_its_help():
+def test_help_has_many_options_in_sections():
     assert run() == run("--help")
     assert run().startswith("Usage: mbma [OPTIONS] [COMMAND]")
-
-
-def test_many_options_are_in_sections():
     headings = re.findall(r"^(\w.*):$", run("contact", "--help"), re.MULTILINE)
     assert headings == [
         "What is known", "Surface", "Measured map", "Surface in numbers", "Surface by roughness parameters", "Bodies",
