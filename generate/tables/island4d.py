@@ -26,7 +26,7 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.island4d import at_places
+from mbma_tables.models.island4d import spline_of
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell
@@ -47,7 +47,7 @@ def from_axes(sphere: Any, hurst: Any) -> Any:
 
 def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
     """The table's spline at positions in node units, shape (entries, 2)."""
-    return at_places(coefs, np.stack(positions)).T
+    return np.asarray(spline_of(coefs)(np.stack(positions, axis=-1)))
 
 
 def error_cells(axis: Axis) -> int:

@@ -118,12 +118,6 @@ void mbma_profile_series(const mbma_panel_rule *rules, size_t panels, const int6
 void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
                          int rows, int slopes, double *out);
 
-/* ---- spline4.c: islands by the four-number table ----------------------------------------------------------------- */
-
-/* Two functions f and g of four axes by their cubic tensor spline over equally spaced nodes. `places` is (4, n), from 0
- * to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2); `out` is (2, n). */
-size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, double *out);
-
 /* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 
 /* F_n(x) = integral_x^inf (z - x)^n phi(z) dz, phi the standard normal density, of twice_n = 1, 2, 3, 4 or 5. */

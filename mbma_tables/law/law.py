@@ -1,7 +1,4 @@
-"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses, from one record each.
-
-A record has the polynomials of a stretch of gaps and is found from the bits of the gap (`core/law.c`).
-"""
+"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses, by `core/law.c`."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import scipy.signal
-from helpers import refusals, topographies
+from helpers import random_map, refusals, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
@@ -39,7 +39,7 @@ def treated(heights=MAP, periodic=False, steps=(STEP, STEP), **options):
 
 
 def told(result, step):
-    return next(entry["told"] for entry in result.provenance if entry["step"] == step)
+    return " ".join(entry["told"] for entry in result.provenance if entry["step"] == step)
 
 
 @pytest.mark.parametrize(
@@ -135,15 +135,71 @@ class TestCutoff:
     )
 
 
+class TestFilters:
+    @pytest.mark.parametrize(("name", "short"), [("s_filter", True), ("l_filter", False)])
+    def test_a_wave_of_the_nesting_index_is_halved(self, name, short):
+        x = np.arange(128.0)
+        q = 2 * np.pi * np.array([2, 8, 22]) / 128
+        values = sum(np.sin(one * x)[:, None] + 0 * x for one in q)
+        own = Surface.from_map(values, 0.5, periodic=True, unit="um", **{name: 0.5 * 16.0})
+        left = 2 * np.abs(np.fft.fft(own.map.heights[:, 5]))[[2, 8, 22]] / 128
+        # ISO 16610-61, alpha = sqrt(ln 2/pi)
+        passed = np.exp(-np.pi * (np.sqrt(np.log(2) / np.pi) * 16 / (2 * np.pi / q)) ** 2)
+        expected = passed if short else 1 - passed
+        # shorter than 0.39 times the nesting index: none is left
+        expected = np.where(short & (expected < 0.01), 0.0, expected)
+        np.testing.assert_allclose(left, expected, atol=1e-9)
+        assert left[1] == pytest.approx(0.5)
+
+    def test_they_are_told_and_limit_the_spectrum(self):
+        noise = 0.1 * np.random.default_rng(1).standard_normal((64, 64))
+        own = Surface.from_map(noise, 1.0, periodic=True, unit="um", s_filter="10 um")
+        assert "an S-filter at 10 um removes" in told(own, "s_filter")
+        assert "times larger than without" in told(own, "s_filter")
+        assert 2 * np.pi / float(own.q1) == pytest.approx(0.388 * 10, rel=0.1)
+        with pytest.raises(InputError, match="leaves no wave"):
+            Surface.from_map(MAP, STEP, periodic=True, l_filter=1e-9)
+
+
+class TestWhatIsTold:
+    x = np.arange(64.0)
+
+    def map_with(self, form, **options):
+        return Surface.from_map(0.02 * random_map(64, 0.1, 0.3) + form, 1.0, **options)
+
+    def test_a_bow_and_a_tilt(self):
+        bowed = self.map_with((self.x[:, None] - 32) ** 2 / 100)
+        assert "a bow has" in told(bowed, "detrend")
+        assert "detrend='quadratic' removes it" in told(bowed, "detrend")
+        tilted = self.map_with(self.x / 10, periodic=True)
+        assert "detrend='plane' removes it" in told(tilted, "detrend")
+        for flat in (
+            self.map_with((self.x[:, None] - 32) ** 2 / 100, detrend="quadratic"),
+            self.map_with(self.x / 10, detrend="plane"),
+            self.map_with(0.0),
+        ):
+            assert "removes it" not in told(flat, "detrend")
+
+    def test_a_spike(self):
+        spikes = np.zeros((64, 64))
+        spikes[10, 20] = 50.0
+        assert "1 of 4096 points" in told(self.map_with(spikes), "outliers seen")
+        assert "outliers=10 removes them" in told(self.map_with(spikes), "outliers seen")
+        assert not told(self.map_with(0.0), "outliers seen")
+        assert not told(self.map_with(spikes, outliers=10), "outliers seen")
+
+
 class TestReading:
-    def test_arrays_in_files(self, tmp_path):
-        np.save(tmp_path / "a.npy", MAP)
-        np.savetxt(tmp_path / "a.txt", MAP)
-        np.savetxt(tmp_path / "a.csv", MAP, delimiter=",")
-        plain = Surface.from_map(MAP, STEP, model="measured")
+    def test_rows_of_arrays_in_files_are_x(self, tmp_path):
+        values = waves(shape=(64, 48))
+        np.save(tmp_path / "a.npy", values)
+        np.savetxt(tmp_path / "a.txt", values)
+        np.savetxt(tmp_path / "a.csv", values, delimiter=",")
+        plain = Surface.from_map(values, 0.5, 0.8)
         for name in ("a.npy", "a.txt", "a.csv"):
-            found = Surface.from_map(tmp_path / name, STEP, unit="um", model="measured")
-            assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-9)
+            found = Surface.from_map(tmp_path / name, dx=0.5, dy=0.8, unit="um")
+            np.testing.assert_allclose(found.map.heights, plain.map.heights, atol=1e-12)
+            assert found.map.steps == pytest.approx((0.5, 0.8))
             assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
             assert found.unit == "um"
             with pytest.raises(InputError, match="has no lengths: give the sampling step dx"):

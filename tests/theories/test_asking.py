@@ -60,11 +60,6 @@ def test_scatter_of_stiffness_and_separation():
     for theory in ("calibrated", "mbma", "persson"):
         stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
         assert stated == pytest.approx(row[theories.index(theory)], rel=1e-6)
-    heights = np.minimum(np.random.default_rng(1).normal(size=(64, 64)), 0)
-    worn = Surface.from_spectrum(*(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=heights)
-    for given in ({}, {"hardness": 0.1 * float(worn.rms_gradient)}):
-        off = contact(worn, mean_separation=0.5 * worn.h_max, theory="calibrated", **given)
-        assert np.isnan([off.scatter, off.area_scatter, off.stiffness_scatter, off.separation_scatter]).all()
 
 
 def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
@@ -96,9 +91,12 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
 @each
 def test_labelled_arrays_keep_their_names(theory):
     pressure = xr.DataArray([1.0, 10.0], dims="load", coords={"load": [1.0, 10.0]})
-    surface = Surface(hurst=xr.DataArray([0.7, 0.8], dims="hurst"), q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+    hurst = xr.DataArray([0.7, 0.8], dims="hurst")
+    surface, lazy = (Surface(each, 0.01, 2.0, 1.0, 3.0) for each in (hurst, hurst.chunk(hurst=1)))
     asked = {"E_star": MODULUS, "theory": theory}
-    found = contact(surface, pressure=pressure, **asked)
+    found, later = contact(surface, pressure=pressure, **asked), contact(lazy, pressure=pressure, **asked).area
+    assert later.chunks is not None
+    np.testing.assert_array_equal(later.compute(), found.area)
     plain = contact(Surface([[0.7], [0.8]], 0.01, 2.0, 1.0, 3.0), pressure=[1.0, 10.0], **asked)
     names = ("separation", "mean_separation", "area", "stiffness", "mean_pressure", "valid")
     for labelled, expected in [(getattr(found, name), getattr(plain, name)) for name in names]:
