@@ -161,11 +161,7 @@ class TestFilters:
         assert 2 * np.pi / float(own.q1) == pytest.approx(0.388 * 10, rel=0.1)
 
 
-BOW, TILT, SPIKE = (
-    np.add.outer((np.arange(64.0) - 32) ** 2 / 100, np.zeros(64)),
-    np.arange(64.0) / 10,
-    np.zeros((64, 64)),
-)
+BOW, TILT, SPIKE = (np.arange(64.0)[:, None] - 32) ** 2 / 100, np.arange(64.0) / 10, np.zeros((64, 64))
 SPIKE[10, 20] = 50.0
 
 
