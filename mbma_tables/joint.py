@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import os
 import pathlib
 from collections.abc import Mapping, Sequence
@@ -167,10 +166,6 @@ class Joint(Displayed):
 
     def law(self) -> ContactLaw:
         """The joint's contact law, for many gaps or pressures, as of `contact_law`."""
-        return self._law
-
-    @functools.cached_property
-    def _law(self) -> ContactLaw:
         return contact_law(self.surface, **self._asked)
 
     def sensitivity(self, pressure: float | str) -> Sensitivity:
