@@ -215,7 +215,8 @@ class Universal(Kind):
         rules = {
             "force and area finite and positive": (np.isfinite(found) & (found > 0)).all(),
             "force and area no larger than a rigid sphere's": (found <= (1 + target) * rigid).all(),
-            "force and area increasing in X": (more_X > found).all(),
+            "force increasing in X": (more_X > found)[0].all(),
+            "area increasing in X": (more_X > found)[1].all(),
             "force increasing in mu": (more_mu > found)[0].all(),
             "rigid limit at mu = 0": (np.abs(limit) <= target).all(),
         }
