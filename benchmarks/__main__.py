@@ -25,7 +25,6 @@ from typing import Any
 import click
 import numpy as np
 from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_spline
-from scipy.special import erf
 
 from benchmarks.exports import exported
 from benchmarks.kernels import BEFORE, held_out, measured
@@ -37,10 +36,7 @@ from generate.files import ROOT
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.calibrated import Law, Spectrum
-from mbma_tables.models.island4d import at_places
-from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated
-from mbma_tables.theories.calibrated_table import shipped
 
 POINTS = 20_000
 HELD_OUT = 500
@@ -51,11 +47,6 @@ CALLS = 10_000  # of one number: a loop of them, not its first ones
 DESIGNS = 20  # surfaces of a design loop, likewise
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
 SEED = 7
-
-
-def random_places(content: TableContent, rng: np.random.Generator) -> np.ndarray:
-    """Random points in node units, (points, axes)."""
-    return rng.uniform(size=(POINTS, len(content.axes))) * [axis.nodes - 1 for axis in content.axes]
 
 
 def peers(X: np.ndarray, mu: np.ndarray) -> dict[str, Callable[[], Any]]:
@@ -87,8 +78,8 @@ def _knots(nodes: list[np.ndarray], values: np.ndarray) -> tuple[tuple[np.ndarra
 
 
 def tables(rng: np.random.Generator) -> None:
-    """The universal table against its past and others' interpolators, the four-number table against scipy's."""
-    universal, four = open_table("universal"), open_table("island4d").content
+    """The universal table against its past and others' interpolators."""
+    universal = open_table("universal")
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
     click.echo("\nUniversal table: Phi_F, Phi_A and the bound on their error at once")
     some = slice(HELD_OUT)
@@ -103,19 +94,6 @@ def tables(rng: np.random.Generator) -> None:
     beside = rounds(own | others, 3)
     for name in others:
         report(f"faster than {name}, {GRID} x {GRID} nodes, one function", times_faster(beside, name, "own"), "x")
-
-    nodes = [np.arange(axis.nodes, dtype=float) for axis in four.axes]
-    cubic = RegularGridInterpolator(nodes, four.auxiliary["log_ratio_F"][1], method="cubic")
-    at_four = random_places(four, rng)
-    columns = np.ascontiguousarray(at_four.T)
-    value = {"value": lambda: at_places(four.coefficients, columns)}
-    taken = rounds({"scipy": lambda: cubic(at_four)} | value, 3)
-    click.echo("\nFour-number table: both functions at once")
-    report("value, a lookup", 1e3 * microseconds(taken["value"], POINTS), "ns")
-    report("  faster than scipy RGI, cubic, one function", times_faster(taken, "scipy", "value"), "x")
-    report(
-        "largest |log_ratio_F - scipy's|", np.abs(at_places(four.coefficients, columns)[0] - cubic(at_four)).max(), ""
-    )
 
 
 def one_step() -> dict[str, Callable[[], Any]]:
@@ -167,9 +145,7 @@ def totals(rng: np.random.Generator) -> None:
 def laws(rng: np.random.Generator) -> None:
     """A frozen surface against numpy and scipy."""
     surface = Surface.named("asphalt")
-    start = time.perf_counter()
     law = contact_law(surface)
-    spent = time.perf_counter() - start
     gaps = rng.uniform(0, 0.99995 * surface.h_max, MANY_GAPS)
     nodes = np.linspace(0, surface.h_max, 1000)
     values = law.pressure(nodes)
@@ -191,7 +167,6 @@ def laws(rng: np.random.Generator) -> None:
     some = gaps[:2000]
     truth = contact(surface, mean_separation=some, rtol=1e-10).pressure
     click.echo("\ncontact_law of one surface, asphalt")
-    report("making the first law", spent, "s")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
     report("law.pressure, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns")
     for what, key, most in (
@@ -202,7 +177,6 @@ def laws(rng: np.random.Generator) -> None:
     ):
         name = f"{what} against numpy.interp on 1000 nodes, same points"
         report(name, times_faster(taken, key, "numpy"), "x", at_most=most)
-    report("scalar call", microseconds(taken["scalar law"], CALLS), "us", at_most=0.3)
     report("scalar call against RegularGridInterpolator's", times_faster(taken, "scalar scipy", "scalar law"), "x", 25)
     report("largest error of the law", np.abs(law.pressure(some) / truth - 1).max(), "")
     report("largest error of numpy.interp", np.abs(np.interp(some, nodes, values) / truth - 1).max(), "")
@@ -218,20 +192,12 @@ def calibrated(rng: np.random.Generator) -> None:
     taken = rounds(
         {
             "table": lambda: theory.answer(surface, u),
-            "erf": lambda: erf(u),
             "law": lambda: law.contact(some)[::2],
         }
     )
     spent = microseconds(taken["table"], GAPS)
     report("force, area and stiffness of a random separation", 1e3 * spent, "ns", at_most=100)
-    report("the same in evaluations of scipy.special.erf", spent / microseconds(taken["erf"], GAPS), "")
     surfaces, gaps = held_out(SURFACES, rng)
-    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), surfaces.h_max])
-    table, at = shipped(), np.arange(SURFACES)
-    alone = rounds({"fill": lambda: table.prepared(columns, gaps.size)[0]((at, (gaps + columns[2]) / 2))})
-    report(
-        "the same with a new surface each, table alone", 1e3 * microseconds(alone["fill"], SURFACES), "ns", at_most=100
-    )
     asked_of = {"one surface": (surface, u), "one gap a surface": (surfaces, (gaps + surfaces.h_max) / 2)}
     for what, (batch, mean) in asked_of.items():
         asked = functools.partial(contact, batch, mean_separation=mean, theory="calibrated")

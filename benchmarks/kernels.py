@@ -1,4 +1,4 @@
-"""Every kernel of docs/lookup.md through the public interface, beside its time in the last version that used numba.
+"""Kernels through the public interface, beside their times in the last version that used numba.
 
 `BEFORE` was measured by ``python -m benchmarks.kernels`` with this file in a checkout of that version (33125d6, numba
 0.68.1, everything compiled), in turns with the present one. Times are in evaluations of `scipy.special.erf` of the same
@@ -28,21 +28,12 @@ SEED, ROUNDS = 7, 9
 BEFORE: dict[str, float] = {
     "universal table, random": 2.498,
     "universal table, path": 1.73,
-    "universal table with slopes, random": 5.013,
-    "universal table with slopes, path": 2.758,
-    "four-number table": 35.86,
     "totals, a new surface each": 311.4,
     "1,000 gaps on a new surface": 34.41,
     "1,000 gaps on a known surface": 11.53,
     "100,000 gaps on a new surface": 4.454,
     "one gap on a new surface": 1.036e05,
-    "a law": 8.074e04,
-    "law: pressure": 0.4774,
-    "law: pressure and stiffness": 0.6982,
-    "law: energy": 0.6291,
     "law: pressure, area, stiffness, energy": 1.371,
-    "law: gap, area and stiffness at a pressure": 1.731,
-    "law: pressure of one number": 21.55,
     "calibrated law, one surface": 3.809,
     "calibrated law, at a pressure": 14.11,
     "calibrated law, a new surface each": 30.37,
@@ -64,17 +55,10 @@ def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]
 def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     """Calls by name, with the number of answers of each."""
     rng = np.random.default_rng(SEED)
-    universal, four = open_table("universal"), open_table("island4d")
+    universal = open_table("universal")
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
     fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_variant("reported"))
     path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
-    raw = (
-        10 ** rng.uniform(-2, 0.5, MANY),
-        rng.uniform(1.5, 30, MANY),
-        rng.uniform(1.5, 60, MANY),
-        rng.uniform(0.3, 1, MANY),
-    )
-    raw = raw[0], raw[1], raw[1] * (1 + raw[2]), raw[3]
     surfaces, gaps = held_out(SURFACES, rng)
     one, fresh = Surface.named("asphalt"), itertools.count(1)
     some, many = (rng.uniform(-one.h_max, 0.9999 * one.h_max, count) for count in (SOME, MANY))
@@ -84,7 +68,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         return dataclasses.replace(one, h_max=one.h_max * (1 + 1e-9 * next(fresh)))
 
     law = contact_law(one)
-    forces, place = law.pressure(separation=many), float((one.h_max + many[0]) / 2)
+    place = float((one.h_max + many[0]) / 2)
     flat, u = Surface(0.8, 1.0, 64.0, 1.0, 3.3), rng.uniform(0.01, 3.3, MANY)
     mean = (gaps + surfaces.h_max) / 2
     calibrated, loads = contact(flat, mean_separation=u, theory="calibrated").pressure, {}
@@ -94,9 +78,6 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     return {
         "universal table, random": (lambda: universal.answer(X, mu, outside="nan"), MANY),
         "universal table, path": (lambda: universal.answer(*path, outside="nan"), MANY),
-        "universal table with slopes, random": (lambda: universal.slopes(X, mu), MANY),
-        "universal table with slopes, path": (lambda: universal.slopes(*path), MANY),
-        "four-number table": (lambda: four.lookup(*raw, outside="nan"), MANY),
         "totals, a new surface each": (lambda: contact(surfaces, separation=gaps), SURFACES),
         "1,000 gaps on a new surface": (
             lambda: [contact(another(), separation=some) for _ in range(DESIGNS)],
@@ -108,13 +89,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         ),
         "100,000 gaps on a new surface": (lambda: contact(another(), separation=many), MANY),
         "one gap on a new surface": (lambda: [contact(another(), mean_separation=place) for _ in range(50)], 50),
-        "a law": (lambda: [contact_law(another()) for _ in range(5)], 5),
-        "law: pressure": (lambda: law.pressure(separation=many), MANY),
-        "law: pressure and stiffness": (lambda: law.pressure_and_stiffness(separation=many), MANY),
-        "law: energy": (lambda: law.energy(separation=many), MANY),
         "law: pressure, area, stiffness, energy": (lambda: law.values(separation=many), MANY),
-        "law: gap, area and stiffness at a pressure": (lambda: law.at_pressure(forces), MANY),
-        "law: pressure of one number": (lambda: [law.pressure(place) for _ in range(CALLS)], CALLS),
         "calibrated law, one surface": (lambda: contact(flat, mean_separation=u, theory="calibrated"), MANY),
         "calibrated law, at a pressure": (lambda: contact(flat, pressure=calibrated, theory="calibrated"), MANY),
         "calibrated law, a new surface each": (

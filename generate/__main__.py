@@ -15,10 +15,12 @@ from mbma_tables.common.errors import MbmaError
 COMMANDS = {
     **{name: f"generate.{name}" for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")},
     **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
+    **dict.fromkeys(("edges", "film", "tangential"), "generate.machined.studies"),
     "boundary_elements": "generate.boundary_elements.run",
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
-    "score": "generate.pages.score",
+    "rough_spheres": "generate.rough_spheres",
+    "score": "generate.distances",
     "tables": "generate.tables.commands",
 }
 

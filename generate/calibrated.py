@@ -228,7 +228,7 @@ def others(found: Sequence[Case]) -> dict[str, FloatArray]:
     for theory in (*variants, Persson(), Persson("simplified"), GreenwoodWilliamson()):
         reached, curves = [], dict[int, TheoryCurve]()
         for one in plain:
-            curve = TheoryCurve(theory, one)
+            curve = TheoryCurve(theory, one.surface)
             kept = np.isfinite(curve.separation(one.force))
             if kept.sum() > 3:
                 reached.append(one.at(kept))

@@ -2,14 +2,12 @@
 
 import dataclasses
 import datetime
-import functools
 import hashlib
 import itertools
 import json
 import os
 import pathlib
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,6 +17,7 @@ from scipy.optimize import least_squares
 
 from generate.provenance import source_digest, versions
 from generate.splines import coefficients
+from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.data import read_groups
@@ -192,8 +191,7 @@ def write(
     facts: dict[str, Any],
 ) -> dict[str, float]:
     """Write the root of the file, with statistics of errors by theory and by set; the table's certificate."""
-    with ProcessPoolExecutor(PROCESSES) as pool:
-        values = np.array(list(pool.map(functools.partial(_row, constants), HURST)))
+    values = np.array([*results("table", _row, [(constants, hurst) for hurst in HURST], PROCESSES)])
     bias, deviation, _, number = np.moveaxis(np.array(list(stated.values())), -1, 0)
     scatter = np.where(number >= MIN_ERRORS, np.hypot(bias, deviation), np.nan)
     spline = "ln F_G, F/(A0 E* g) of a surface without end: cardinal quintic B-splines"

@@ -17,7 +17,7 @@ from scipy.stats import qmc
 from generate import cost_distances
 from generate.classical import iterated, ring_matrix
 from generate.files import ROOT, to_csv
-from generate.tables import chunks
+from generate.tables.certificate import phi
 from generate.timing import measure
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.common.arguments import FloatArray
@@ -75,7 +75,7 @@ def held_out(count: int = ISLANDS) -> tuple[dict[str, FloatArray], FloatArray]:
     """Islands of random surfaces that made no table, and their Phi_F and Phi_A (2, islands) on twice the nodes."""
     hurst, log_zeta, log_approach = qmc.scale(qmc.Halton(3, seed=SEED).random(count), *RANGES).T
     fields = geometry(10**log_approach, hurst, 10**log_zeta, get_variant("reported"))
-    return fields | {"hurst": hurst}, chunks.phi(fields["X"], fields["mu"], REFERENCE_ISLANDS, 2).T
+    return fields | {"hurst": hurst}, phi(fields["X"], fields["mu"], REFERENCE_ISLANDS, 2).T
 
 
 def island_error(phi_F: FloatArray, phi_A: FloatArray, truth: FloatArray) -> float:

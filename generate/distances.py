@@ -1,4 +1,4 @@
-"""Deviations of theories from simulated contacts: every theory on every data set.
+"""Deviations of theories from simulated contacts: every theory on every data set, and `python -m generate score`.
 
 Deviations are ln(theory/simulation) of three quantities: area at equal force, force at equal mean separation, stiffness
 at equal force. They are model errors: the theories are solved to 1e-6 or better, except for the map's law.
@@ -6,19 +6,24 @@ at equal force. They are model errors: the theories are solved to 1e-6 or better
 
 import dataclasses
 import pathlib
+import runpy
+import types
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import click
 import numpy as np
+from scipy.special import erf
 
 from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve, curves_of
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.calibrated import errors
 from generate.calibrated_file import QUANTITIES, rms
-from generate.files import DATA, dataset, evidence, read_csv
+from generate.files import DATA, ROOT, dataset, evidence, read_csv
+from generate.page import percent, table
 from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.data import FILE
 from mbma_tables.laws.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
 from mbma_tables.laws.map_curves import MAP_CONSTANTS
@@ -26,6 +31,9 @@ from mbma_tables.surfaces.variants import REPORTED, Variant
 
 LOW, DEEP, HIGH = 0.01, 0.1, 0.97  # A/A0 of the simulations between which distances are summed up
 RANGES = ((LOW, DEEP), (DEEP, HIGH))
+OTHERS = ROOT / "generate" / "theories_of_others.py"
+HEADER = "theory | area at given pressure | pressure at given gap | stiffness at given pressure | loads reached"
+FUNCTIONS = ("answer", "at_pressure")
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
 MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
 ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps
@@ -41,8 +49,8 @@ def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[
     return _theory(theories.Mbma(island_model, variant, 1e-6, "nan" if island_model == "universal" else "raise"))
 
 
-def _theory(theory: theories.Theory) -> Callable[[Case], Any]:
-    return lambda one: TheoryCurve(theory, one)
+def _theory(theory: Any) -> Callable[[Case], Any]:
+    return lambda one: TheoryCurve(theory, one.surface)
 
 
 def _map(one: Case) -> Any:
@@ -62,7 +70,7 @@ THEORIES: dict[str, Callable[[Case], Any]] = {
     "Persson simplified": _theory(theories.Persson("simplified")),
     "G-W": _theory(theories.GreenwoodWilliamson()),
 }
-HUES = dict(zip(THEORIES, ("C0", "C1", "C9", "C4", "k", "0.5", "C3", "C6", "C2"), strict=True))
+HUES = ("C0", "C1", "C9", "C4", "k", "0.5", "C3", "C6", "C2")  # of figures
 ISLAND_MODELS = {name: _mbma("reported", name) for name in ("formula", "rigid")}
 
 
@@ -180,3 +188,73 @@ def summed_up(seen: Sequence[Case], found: FloatArray, low: float = LOW, high: f
     values = found[(area >= low) & (area <= high)]
     known = values[np.isfinite(values)]
     return (rms(known), known.size / values.size) if known.size else (np.nan, 0.0)
+
+
+def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
+    """A/A0 at p/(E* g): the area law of docs/formula.md."""
+    t = pressure / 0.33
+    s = (0.51 + 0.033 * np.log(alpha / 10) + t) / (1 + t)
+    return np.asarray(erf(pressure * np.sqrt(2 / s)))
+
+
+def pocket_pressure(u: FloatArray, nu: float) -> FloatArray:
+    """p/(E* q0 h_rms) at u/h_rms: the law of separation of docs/formula.md, by the spectrum's narrowness."""
+    return np.asarray(u**-0.26 * np.exp(-1.91 * u - 2.8 * (nu - 0.63)))
+
+
+def pocket_errors() -> list[list[Any]]:
+    """Of both laws: name, median, 90% quantile and largest error [%] on held-out surfaces, number of surfaces."""
+    seen = held_out()
+    found: dict[str, list[FloatArray]] = {"area at given pressure": [], "pressure at given separation": []}
+    for one in seen:
+        inside, spectrum = (one.area >= LOW) & (one.area <= HIGH), one.spectrum
+        force, g = one.force[inside], float(spectrum.gradient)
+        pressure = pocket_pressure(one.u[inside], float(spectrum.narrowness)) / g
+        laws = pocket_area(force, float(spectrum.alpha)) / one.area[inside], pressure / force
+        for misses, law in zip(found.values(), laws, strict=True):
+            misses.append(100 * np.abs(law - 1))
+    return [[what, *np.quantile(np.concatenate(e), (0.5, 0.9, 1.0)), len(seen)] for what, e in found.items()]
+
+
+def theories_of(path: pathlib.Path) -> dict[str, Any]:
+    """Theories of a Python file by name: objects that have a name, or the file's own function, named as the file.
+
+    A theory has ``answer(surface, mean_separation)``, which returns F/(A0 E*) and A/A0, or
+    ``at_pressure(surface, pressure)``, which returns A/A0 and the mean separation.
+    """
+    content = runpy.run_path(str(path))
+    found = {
+        one.name: one
+        for one in content.values()
+        if any(hasattr(one, function) for function in FUNCTIONS) and not isinstance(one, type | types.ModuleType)
+    }
+    if own := {name: content[name] for name in FUNCTIONS if callable(content.get(name))}:
+        found[content.get("name", path.stem)] = types.SimpleNamespace(**own)
+    if not found:
+        raise InputError(
+            f"{path} must have a function answer(surface, mean_separation) or at_pressure(surface, pressure), "
+            f"or objects with a name and one of these; it has {sorted(name for name in content if name[0] != '_')}"
+        )
+    return found
+
+
+def scores(theories: dict[str, Any]) -> str:
+    """A table of theories, as objects or as functions of a `Case`, on all held-out self-affine surfaces."""
+    seen, rows = held_out(), []
+    for name, one in theories.items():
+        found = distances(seen, one if isinstance(one, types.FunctionType) else _theory(one))
+        sums = [[summed_up(seen, values, *ends) for ends in RANGES] for values in found.values()]
+        cells = [[rms for rms, _ in own] for own in sums] + [[reached for _, reached in sums[0]]]
+        rows.append([name, *(" / ".join(map(percent, values)) for values in cells)])
+    return table(HEADER, rows)
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
+def score(path: pathlib.Path) -> None:
+    """Print how far the theories of the Python file PATH are from boundary elements.
+
+    Root mean squares of ln(theory/simulation) in percent, at 1-10% / 10-97% contact, on the surfaces of which none was
+    used in a fit; docs/data.md describes PATH.
+    """
+    click.echo(scores(theories_of(path)))

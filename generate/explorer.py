@@ -1,18 +1,24 @@
-"""``python -m generate explorer``: compile the C of the page of `mbma explore` to WebAssembly."""
+"""``python -m generate explorer``: the WebAssembly of the page of `mbma explore`; its size and speed in a browser."""
 
+import contextlib
 import hashlib
 import json
 import pathlib
+import shutil
+import statistics
 import sys
-from collections.abc import Iterable
+import tempfile
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import click
 
 from generate.files import ROOT
+from generate.page import Measured, table
+from mbma_tables import Surface
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
-from mbma_tables.export.explorer import MODULE
+from mbma_tables.export.explorer import MODULE, explorer_page
 from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import core_file
 from mbma_tables.models.tables import universal_model
@@ -27,6 +33,16 @@ FUNCTIONS = (
 LAW_FUNCTIONS = (
     *("mbma_law_open", "mbma_law_at_overclosure", "mbma_law_and_slope", "mbma_law_overclosure", "mbma_law_flow"),
 )
+
+OPENINGS, STEPS = 5, 40
+# moves a slider; milliseconds to the end of the drawing that follows
+STEP = """async (place) => {
+  const slider = document.getElementById("slide-hurst"), start = performance.now();
+  slider.value = place;
+  slider.dispatchEvent(new Event("input"));
+  await new Promise((done) => setTimeout(done));
+  return performance.now() - start;
+}"""
 
 
 def c_sources() -> tuple[dict[str, str], dict[str, Any]]:
@@ -62,3 +78,51 @@ def explorer() -> None:
     write_file(folder / MODULE, compiled(texts, [*FUNCTIONS, "MBMA_VARIANT", *values]))
     write_file(folder / LAW_MODULE, compiled(law_sources(), LAW_FUNCTIONS))
     click.echo(f"{folder / MODULE}\n{folder / LAW_MODULE}")
+
+
+def program() -> str | None:
+    """A Chromium on this machine."""
+    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@contextlib.contextmanager
+def browser() -> Iterator[Any]:
+    """A headless Chromium."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        # as root, as often in CI, it only runs without a sandbox
+        opened = playwright.chromium.launch(executable_path=program(), args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+def visit(opened: Any, address: str, **options: Any) -> Any:
+    """A tab with the page, once it has drawn; in a context of its own."""
+    tab = opened.new_context(**{"viewport": {"width": 1280, "height": 800}, **options}).new_page()
+    tab.goto(address)
+    tab.wait_for_selector("html[data-ready]", state="attached")
+    return tab
+
+
+def measure() -> Measured:
+    """docs/explorer.md: size and speed of the page, and its picture."""
+    text = explorer_page(Surface.named("concrete"), 13.3, "MPa", "calibrated", title="concrete road of Lorenz")
+    clocks, ready = dict[str, list[float]](), "document.documentElement.dataset.ready"
+    with tempfile.TemporaryDirectory() as folder, browser() as opened:
+        path = pathlib.Path(folder, "explorer.html")
+        path.write_text(text, encoding="utf-8")
+        openings = (visit(opened, path.as_uri()) for _ in range(OPENINGS))
+        clocks["opening to the first curves"] = [float(tab.evaluate(ready)) for tab in openings]
+        for against in ("gap", "pressure"):
+            tab = visit(opened, f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson")
+            tab.wait_for_timeout(1000)
+            clock = [tab.evaluate(STEP, 400 + 10 * k) for k in range(STEPS)]
+            clocks[f"a slider's step, three theories against {against}"] = clock
+        tab = visit(opened, path.as_uri())
+        tab.locator(".chart").first.hover(position={"x": 200, "y": 100})
+        picture = tab.screenshot()
+    rows = [[name, statistics.median(clock), max(clock)] for name, clock in clocks.items()]
+    size = ["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", ""]
+    parts = {"numbers": table("quantity | median | largest", [size, *rows], "{} | {:.0f} ms")}
+    return parts, {"docs/figures/explorer.png": picture}

@@ -4,7 +4,6 @@ import dataclasses
 import functools
 import pathlib
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import click
@@ -17,6 +16,7 @@ from generate.boundary_elements.evidence import Simulated, TheoryCurve, simulate
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.calibrated_file import FOLDS, by_bin, coordinates, fitted, made_by, rms, variable, within, write_part
 from generate.splines import coefficients
+from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 from mbma_tables.laws import effective_medium as leakage
@@ -85,7 +85,7 @@ class Case(Simulated):
         """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and a hardness, the last of `node`."""
         if self.kind == "yielded":
             gradient = self.spectrum.gradient
-            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), self)
+            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), self.surface)
             return curve.area(self.force), curve.separation(self.force)
         law = Law(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)
@@ -242,7 +242,7 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
     for theory in (Mbma(outside="nan"), Persson(), GreenwoodWilliamson()):
         parts = []
         for flow in seen:
-            curve = TheoryCurve(theory, flow.one)
+            curve = TheoryCurve(theory, flow.one.surface)
             area, u = curve.area(flow.one.force), curve.separation(flow.one.force)
             kept = np.isfinite(u)
             log_k = np.full(u.shape, -np.inf)
@@ -263,8 +263,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     """The group `leakage` of the calibrated law's file, with that law's constants."""
     flows = [Flow(one, contact) for one in found]
     constants = fit([flow for flow in flows if flow.one.split == TRAINING])
-    with ProcessPoolExecutor(PROCESSES) as pool:
-        values = np.array(list(pool.map(functools.partial(_row, constants, contact), map(float, HURST))))
+    values = np.array([*results("table", _row, [(constants, contact, hurst) for hurst in HURST], PROCESSES)])
     misses = {label: [errors(f, law(f, constants)) for f in flows] for label, law in LAWS.items()}
     sets = {name: [k for k, f in enumerate(flows) if member(f.one)] for name, member in SETS.items()}
     sets = {name: own for name, own in sets.items() if own}

@@ -22,20 +22,21 @@ from mbma_tables.common.files import write_file
 from mbma_tables.common.plots import new_figure, to_picture
 
 PAGES = {
-    **{name: f"library:{name}" for name in ("architecture", "formula", "readme", "tables", "theories")},
-    "data": "fidelity:data",
-    **{name: f"bodies:{name}" for name in ("joints", "lubrication", "rough_bodies")},
-    **{name: f"{name}:measure" for name in ("cost", "explorer", "fidelity", "machined", "stability")},
-    **{"calibrated": "laws:calibrated", "leakage": "laws:leakage", "yield": "laws:yielding"},
-    **{"gallery": "maps:gallery", "maps": "maps:measure"},
+    **{name: f"pages.library:{name}" for name in ("architecture", "formula", "readme", "tables", "theories")},
+    **{name: f"pages.laws:{name}" for name in ("calibrated", "leakage", "yielding")},
+    **{name: f"pages.maps:{name}" for name in ("gallery", "machined", "maps")},
+    **{name: f"pages.simulations:{name}" for name in ("data", "fidelity", "joints", "lubrication", "rough_bodies")},
+    **{name: f"pages.{name}:measure" for name in ("cost", "stability")},
+    "explorer": "explorer:measure",
 }
+PAGES["yield"] = PAGES.pop("yielding")
 Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def measured(name: str) -> Measured:
     module, _, function = PAGES[name].partition(":")
-    found: Measured = getattr(importlib.import_module(f"generate.pages.{module}"), function)()
+    found: Measured = getattr(importlib.import_module(f"generate.{module}"), function)()
     return found
 
 

@@ -1,4 +1,4 @@
-"""Boundary elements of rough spheres on a flat: ``python -m generate.rough_spheres``, two minutes on one core.
+"""``python -m generate rough_spheres``: boundary elements of rough spheres on a flat.
 
 Gaussian roughness on spheres of radius `RADIUS` against a rigid flat, on a half-space that is not periodic (Tamaas with
 the convolution of DC-FFT), E* = 1, lengths in sampling steps. Their rows are a group of docs/data/boundary_elements.nc.
@@ -55,7 +55,9 @@ def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
         yield force, float(approach), float(area), float(np.mean(pressure * r) / pressure.mean())
 
 
-if __name__ == "__main__":
+@click.command()
+def rough_spheres() -> None:
+    """Press rough spheres on a flat, for docs/rough_bodies.md: two minutes."""
     rows = []
     for seed, design in enumerate(itertools.product(HURSTS, LONGEST, HEIGHTS, range(EACH)), FIRST_SEED):
         rows += [[*design[:-1], seed, *row] for row in simulated(heights(*design[:-1], seed))]

@@ -1,55 +1,18 @@
-"""Where jobs run: here, or in processes of this machine."""
+"""Jobs, here or in processes of this machine."""
 
 import concurrent.futures
-import contextlib
-import functools
+import itertools
 import multiprocessing
-import os
-import threading
-import time
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
-Pool = concurrent.futures.Executor | None
-Key = TypeVar("Key")
+from tqdm import tqdm
 
 
-@contextlib.contextmanager
-def executor(workers: int) -> Iterator[Pool]:
-    """Processes, or None for one worker: here."""
-    if workers == 1:
-        yield None
-        return
+def results(label: str, work: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], workers: int = 1) -> Iterator[Any]:
+    """``work(*job)`` of each job, in order, with a progress bar of that name where stderr is a terminal."""
     # started afresh: threads and forks do not mix
     start = multiprocessing.get_context("spawn")
-    ends = functools.partial(_end_with, os.getpid())
-    with concurrent.futures.ProcessPoolExecutor(workers, start, initializer=ends) as pool:
-        yield pool
-
-
-def _end_with(parent: int) -> None:
-    """End this worker when its parent is gone, even if that was killed."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def attempts(
-    pool: Pool, work: Callable[..., Any], jobs: Mapping[Key, tuple[Any, ...]]
-) -> Iterator[tuple[Key, Callable[[], Any]]]:
-    """Keys of jobs, as they finish, and a function that returns the job's result or raises its error."""
-    if pool is None:
-        yield from ((key, functools.partial(work, *job)) for key, job in jobs.items())
-        return
-    waiting = {pool.submit(work, *job): key for key, job in jobs.items()}
-    try:
-        for future in concurrent.futures.as_completed(waiting):
-            yield waiting[future], future.result
-    finally:
-        # else leaving the pool waits for all of them
-        for future in waiting:
-            future.cancel()
+    with concurrent.futures.ProcessPoolExecutor(workers, start) as pool:
+        found = itertools.starmap(work, jobs) if workers == 1 else pool.map(work, *zip(*jobs, strict=True))
+        yield from tqdm(found, label, len(jobs), disable=None)

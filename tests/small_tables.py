@@ -8,7 +8,6 @@ import tempfile
 import netCDF4
 import numpy as np
 
-from generate.tables.chunks import ChunkedSolver
 from generate.tables.commands import KINDS
 from generate.tables.configuration import load
 from mbma_tables.tablefiles.netcdf import SEAL, SEAL_LENGTH
@@ -50,7 +49,7 @@ def small_build(kind):
     with tempfile.TemporaryDirectory() as folder:
         configuration = load(kind, small(pathlib.Path(folder), kind))
     made = KINDS[kind](configuration)
-    return made, made.build(ChunkedSolver())
+    return made, made.build()
 
 
 def small_table(kind):

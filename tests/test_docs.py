@@ -13,6 +13,7 @@ import pytest
 from helpers import assert_same_output
 
 import mbma_tables
+from generate import distances
 from generate.files import ROOT
 from generate.page import MARKED, fill, printed, svg
 from generate.pages import library
@@ -107,7 +108,7 @@ def test_every_module_of_the_architecture_exists():
     assert 1000 < sum(lines) < 1300
 
 
-def test_layers_of_the_picture_are_those_of_the_import_contract():
+def test_layers_of_the_table_are_those_of_the_import_contract():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     layers = {name for layer in settings["contracts"][0]["layers"] for name in layer.split(" : ")}
     assert {*library.rooms()[0], "__main__"} == layers
@@ -182,5 +183,5 @@ def test_pocket_laws_are_printed_as_they_are_computed():
         text = re.sub(r"([\d.]) (log|x|\()", r"\1*\2", text).replace("p/1 sqrt", "p*sqrt")
         names[name] = eval(text, {}, names)
         if name == "A/A0":
-            assert abs(names[name] / float(library.pocket_area(0.04, 30.0)) - 1) < 1e-12
-    assert abs(names["p"] / float(library.pocket_pressure(1.3, 0.6)) - 1) < 1e-12
+            assert abs(names[name] / float(distances.pocket_area(0.04, 30.0)) - 1) < 1e-12
+    assert abs(names["p"] / float(distances.pocket_pressure(1.3, 0.6)) - 1) < 1e-12

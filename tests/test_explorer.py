@@ -45,7 +45,7 @@ CSV = """() => {
 def opened():
     if importlib.util.find_spec("playwright") is None:
         pytest.skip("not installed: playwright")
-    from generate.pages.explorer import browser, program
+    from generate.explorer import browser, program
 
     if program() is None:
         pytest.skip("not installed: chromium")
@@ -63,7 +63,7 @@ def address(tmp_path_factory):
 @pytest.fixture
 def visit(opened, address):
     """Opens the page in a state; nothing may fail or be fetched meanwhile."""
-    from generate.pages.explorer import visit
+    from generate.explorer import visit
 
     tabs, faults = [], []
 
@@ -287,7 +287,7 @@ def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
 
 
 def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
-    from generate.pages.explorer import visit
+    from generate.explorer import visit
 
     path = tmp_path / "map.html"
     surface = Surface.from_map((0.04 * random_map(64, 0.024, 0.239, seed=8)) ** 3, 1.0, periodic=True)

@@ -67,7 +67,7 @@ class Simulated:
 
 
 class TheoryCurve:
-    """A theory on a simulated surface: forces over A0 E* g, lengths over h_rms; NaN where the theory does not reach.
+    """A theory on a surface: forces over A0 E* g, lengths over h_rms; NaN where the theory does not reach.
 
     A theory has an ``answer`` at mean separations, or an ``at_pressure``, which returns A/A0 and the mean separation.
 
@@ -77,9 +77,9 @@ class TheoryCurve:
         Where the theory does not take the surface.
     """
 
-    def __init__(self, theory: Any, one: Simulated) -> None:
-        self._theory, self._surface = theory, one.surface
-        self._g, self._h_rms = float(self._surface.rms_gradient), float(self._surface.h_rms)
+    def __init__(self, theory: Any, surface: AnySurface) -> None:
+        self._theory, self._surface = theory, surface
+        self._g, self._h_rms = float(surface.rms_gradient), float(surface.h_rms)
         u, pressure = DEPTHS * float(self._surface.h_max), PRESSURES * self._g
         with np.errstate(all="ignore"):
             if hasattr(theory, "answer"):

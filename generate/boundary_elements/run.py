@@ -7,7 +7,6 @@ import datetime
 import functools
 import json
 import pathlib
-import shutil
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -16,13 +15,12 @@ import click
 import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
-from tqdm import tqdm
 
 from generate.boundary_elements.solve import HARDNESSES, simulate, simulate_capped, simulate_to, solve_flow
 from generate.boundary_elements.surfaces import SPLITS, Recipe, Task, campaign
 from generate.calibrated_file import Variable, variable, write_part
 from generate.provenance import source_digest, versions
-from generate.workers import Pool, attempts, executor
+from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws import bearing_curve as bearing
@@ -36,24 +34,13 @@ LOADED = {"band_energy", "flow"}
 
 
 def run(
-    tasks: Sequence[Task], folder: pathlib.Path, pool: Pool = None, solve: Callable[[Recipe, str], str] = simulate_to
+    tasks: Sequence[Task], folder: pathlib.Path, workers: int = 1, solve: Callable[[Any], dict[str, Any]] = simulate
 ) -> None:
-    """Solve what `folder` does not hold yet, one file a surface; no pool: here, one after the other.
-
-    Surfaces that fail are left out until the end, then named.
-    """
+    """Solve what `folder` does not hold yet, one file a surface; those that fail are named at the end."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
-    # a terminal may have no columns
-    width, done, failures = shutil.get_terminal_size().columns, len(tasks) - len(missing), list[str]()
-    with tqdm(total=len(tasks), initial=done, desc="surfaces", unit="surface", ncols=width, disable=None) as bar:
-        for _, finish in attempts(pool, solve, {recipe.name: (recipe, str(folder)) for recipe in missing}):
-            try:
-                finish()
-            except RuntimeError as fault:
-                failures.append(str(fault))
-            bar.update()
-    if failures:
+    work = functools.partial(simulate_to, solve=solve, folder=folder)
+    if failures := [*filter(None, results("surfaces", work, [(recipe,) for recipe in missing], workers))]:
         raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
 
 
@@ -185,5 +172,4 @@ def boundary_elements(
         write_part(target, data, kind)
         click.echo(f"{target}: {data.sizes['surface']} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
-    with executor(workers) as pool:
-        run(tasks, folder, pool, functools.partial(simulate_to, solve=SOLVERS[kind]))
+    run(tasks, folder, workers, SOLVERS[kind])

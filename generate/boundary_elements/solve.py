@@ -4,7 +4,7 @@ Tamaas has pressures capped at a hardness too (KatoSaturated), but its iteration
 """
 
 import importlib.metadata
-import os
+import io
 import pathlib
 from collections.abc import Callable
 from typing import Any
@@ -15,6 +15,7 @@ from scipy.special import erfinv
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.boundary_elements.tamaas_contact import Contact as Contact
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.files import write_file
 from mbma_tables.laws import bearing_curve, boundary_elements
 from mbma_tables.laws.bearing_curve import band_sums, bearing, radial_bands
 from mbma_tables.laws.boundary_elements import LOADS as LOADS
@@ -146,16 +147,13 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     )
 
 
-def simulate_to(recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str, Any]] = simulate) -> str:
-    """Simulate one surface into a file of its own, which stands only when it is whole."""
-    target = pathlib.Path(folder) / f"{recipe.name}.npz"
-    if not target.exists():
-        partial = target.with_suffix(f".{os.getpid()}.partial")
-        try:
-            found = solve(recipe)
-        except (ArithmeticError, RuntimeError) as fault:
-            raise RuntimeError(f"{recipe.name}: {fault}") from None
-        with open(partial, "wb") as stream:
-            np.savez_compressed(stream, **found)
-        partial.replace(target)
-    return recipe.name
+def simulate_to(recipe: Recipe, solve: Callable[[Recipe], dict[str, Any]], folder: pathlib.Path) -> str | None:
+    """Simulate one surface into a file of its own, which stands only when it is whole; what failed, or None."""
+    try:
+        found = solve(recipe)
+    except (ArithmeticError, RuntimeError) as fault:
+        return f"{recipe.name}: {fault}"
+    content = io.BytesIO()
+    np.savez_compressed(content, **found)
+    write_file(folder / f"{recipe.name}.npz", content.getvalue())
+    return None

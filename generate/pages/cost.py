@@ -6,12 +6,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.ticker import FixedLocator
 
-from generate.boundary_elements.studies import GRIDS
 from generate.calibrated_file import rms
-from generate.cost_distances import SIMULATED
-from generate.distances import DEEP, LOW
+from generate.distances import DEEP, HUES, LOW, THEORIES
 from generate.files import ROOT, dataset, read_csv
 from generate.page import Measured, panels, printed
 from mbma_tables.scenes.plan import shipped_costs
@@ -19,28 +16,7 @@ from mbma_tables.scenes.plan import shipped_costs
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
 GAUGES = {"area_light": "contact area at a given pressure", "force_light": "pressure at a given gap"}
 OWN = ("corrected", "simulated")  # theories of a map, timed in docs/lookup.md
-# in the gauge: a theory's label, its colour, and the label's place beside the slowest way [points], in both panels
-LABELS: dict[str, tuple[Any, ...]] = {
-    "calibrated": ("calibrated", "k", (10, 0), (24, -4)),
-    "calibrated, map": ("calibrated, of a map", "0.5", (10, 0), (10, 0)),
-    "MBMA reported": ("MBMA", "C0", (10, 0), (10, 0)),
-    "MBMA, rigid islands": ("MBMA, rigid islands", "C0", (10, -7), (10, -6)),
-    "MBMA printed": ("MBMA, printed", "C1", (10, 0), (12, -9)),
-    "MBMA fitted": ("MBMA, fitted", "C9", (8, 8), (8, 7)),
-    "MBMA cover": ("MBMA, cover", "C4", (8, 7), (8, 8)),
-    "Persson": ("Persson", "C3", (-45, 10), (-45, 10)),
-    "Persson simplified": ("Persson, simplified", "C6", (-100, -9), (-116, 0)),
-    "G-W": ("Greenwood-Williamson", "C2", (10, 2), (-58, -9)),
-    SIMULATED: ("boundary elements", "C5", (-108, -9), (-108, -9)),
-    "corrected": ("own simulation, corrected", "C8", (8, 5), (-146, -10)),
-    "simulated": ("own simulation, simulated", "C8", (8, 2), (8, 6)),
-}
-ABOVE = ("G-W", SIMULATED)  # the names of ways are above their points
-SHORT = {"closed form, area of a force": "formula", "law": "law", "table": "table", "quadrature": "quadrature"}
-SHORT |= {"inverse of (19)": "quadrature", "universal": "table", "island4d": "4-D", "formula": "formula"}
-SHORT |= {"exact": "exact"} | {f"{points} x {points}, cold": f"{points}²" for points in GRIDS}
-TIMES = {10.0**k: f"{10.0**k:g}" for k in range(-2, 3)} | {10.0**k: f"10$^{k}$" for k in range(3, 9)}
-TIMES |= {1e3: "1000\n= 1 ms", 1e6: "10$^6$\n= 1 s"}
+COLOURS = dict(zip(THEORIES, HUES, strict=True)) | {"boundary elements": "C5"} | dict.fromkeys(OWN, "C8")
 
 
 def pareto_front(rows: pd.DataFrame) -> pd.DataFrame:
@@ -84,14 +60,14 @@ def draw(costs: pd.DataFrame) -> Any:
 
 def gauge_rows(distances: pd.DataFrame) -> pd.DataFrame:
     """Microseconds a point, and percent of deviation at 1-10% contact, of theories and of the library's simulations."""
-    cold = distances[~distances["way"].str.endswith("continued")].reset_index(drop=True)
+    # rigid islands are not the model
+    cold = distances[~distances["way"].str.contains("continued|rigid")].reset_index(drop=True)
     rows = cold.assign(us=1e6 * cold["cost"] * shipped_costs().seconds)
-    rows.loc[rows["way"] == "rigid", "theory"] = "MBMA, rigid islands"
     data, benchmarks = dataset("machined"), (ROOT / "docs" / "lookup.md").read_text(encoding="utf-8")
     for theory in OWN:
         timed = re.search(rf"256 x 256, periodic: {theory}.* \| ([\d.]+) s \|", benchmarks)
         assert timed is not None
-        seen = (data.area.values >= LOW) & (data.area.values <= DEEP) & (data[f"{theory}_valid"].values > 0)
+        seen = ((data.area >= LOW) & (data.area <= DEEP) & (data[f"{theory}_valid"] > 0)).values
         off = (data[f"{theory}_mean_separation"] - data.mean_separation) * data.stiffness / data.pressure
         errors = np.log(data[f"{theory}_area"] / data.area).values[seen], off.values[seen]
         rows.loc[len(rows), ["theory", "us", *GAUGES]] = [theory, 1e6 * float(timed[1]), *map(rms, errors)]
@@ -100,25 +76,16 @@ def gauge_rows(distances: pd.DataFrame) -> pd.DataFrame:
 
 def draw_gauge(rows: pd.DataFrame) -> Any:
     """Deviation from boundary elements against time: a line joins the ways to evaluate a theory."""
-    figure, axes = panels(2, 1, (9, 9.2))
+    figure, axes = panels(2, 1, (9, 9.2), sharex=True)
     for panel, (name, title) in zip(axes, GAUGES.items(), strict=True):
-        for theory, (label, colour, *places) in LABELS.items():
+        for (theory, colour), mark in zip(COLOURS.items(), "osD^vP*Xh<>d", strict=True):
             own = rows[(rows["theory"] == theory) & rows[name].notna()].sort_values("us")
-            panel.loglog(own["us"], own[name], "o-", color=colour, lw=2, ms=5)
-            place = own[["us", name]].to_numpy(float)[-1]
-            options: dict[str, Any] = {"textcoords": "offset points", "color": colour}
-            panel.annotate(label, place, places[panel is axes[1]], weight="bold", va="center", fontsize=9, **options)
-            for way, at, value in own[["way", "us", name]].itertuples(index=False) if len(own) > 1 else ():
-                shift, side = (8, "left") if theory == SIMULATED else (0, "right" if way[:6] == "closed" else "center")
-                where = shift, 7 if theory in ABOVE else -9
-                panel.annotate(SHORT[way], (at, value), where, ha=side, va="center", fontsize=7, **options)
-        panel.set(title=f"error of the {title}", xlim=(6e-3, 1e9), ymargin=0.1)
+            panel.loglog(own["us"], own[name], f"{mark}-", color=colour, ms=6, label=theory)
+        panel.set_title(f"error of the {title}")
         panel.grid(alpha=0.25)
         panel.yaxis.set_major_formatter("{x:g}%")
-        panel.xaxis.set_major_locator(FixedLocator([*TIMES]))
-        panel.xaxis.set_major_formatter(lambda x, _: TIMES[x])
-        panel.minorticks_off()
     axes[1].set_xlabel("processor time per point [µs]")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
     return figure
 
 

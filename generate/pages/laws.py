@@ -14,7 +14,7 @@ from generate.boundary_elements.surfaces import REFINEMENT, SPLITS, TRAINING
 from generate.calibrated_file import binned
 from generate.calibrated_hardness import BARS, blind
 from generate.files import dataset
-from generate.leakage_law import EDGES, LARGE, Flow, cases, errors, noise_floor, summary
+from generate.leakage_law import EDGES, LAWS, Flow, cases, errors, noise_floor, summary
 from generate.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact, materials
 from mbma_tables.answers.leakage import GROUP, shipped_flow
@@ -35,15 +35,10 @@ WORDS = {"held_out_": "new ", "4 wave": "4-8 wave", "wave": "wavelength", "stret
 GRIDS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9)  # contacts at which grids are compared
 
 BINS, HEADER = (0.004, 0.05, 0.15, 0.3, 0.4), "A {:.3g}-{:.3g}%"  # of leakage
-LEAKAGE_SETS = ("training", "plateaus", "stretched", "yielded", "zeta_1 32, two waves", "zeta_1 64 and 128")
-MANY_WAVES = 8  # longest wavelengths a side
-DRAWN = (0.4, 0.8)  # Hurst exponents
 
 YIELD_BINS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # A/A0 by which stiffness is compared, at these hardnesses
 HARDNESSES = (0.05, 0.2, 0.8)
-CONTACT = (0.01, 0.1)  # A/A0 at which elastic answers are compared
 GRADIENT = 0.1  # rms gradient of a ground face
-METALS = ("steel 1020", "steel 4140", "steel 52100", "stainless steel 304", "aluminium 6061", "copper C11000", "gold")
 SURFACE = Surface(hurst=0.8, q0=1.0, q1=32.0, h_rms=1e-3, h_max=3.5e-3)
 INDICES = np.geomspace(0.4, 40, 60)
 HELD_OUT = {
@@ -126,7 +121,7 @@ def leakage_accuracy() -> str:
     values, facts = shipped_part(GROUP)
     sets, laws = facts["sets"].split("; "), facts["laws"].split("; ")
     shown, lines = [(law, "held out") for law in laws], []
-    for name in LEAKAGE_SETS:
+    for name in (name for name in sets if not name.startswith("held")):
         shown += [(law, name) for law in ("calibrated", "closed form")[: 2 if "zeta_1" in name else 1]]
     for law, name in shown:
         cells: list[Any] = []
@@ -162,15 +157,14 @@ def of_cells(seen: Sequence[Any]) -> str:
     """Held-out errors, and the spread of cells of one spectrum, with many and with few longest wavelengths a side."""
     constants, lines = shipped_flow().constants, list[list[Any]]()
     for name, many in (("eight", True), ("four or five", False)):
-        own = [one for one in seen if one.isotropic and one.zeta_1 < LARGE and (one.waves >= MANY_WAVES) == many]
+        own = [one for one in seen if one.plain and (one.waves >= 8) == many]
         flows = [Flow(one, shipped().constants) for one in own if one.split != TRAINING]
-        laws = {
-            "calibrated": [errors(f, f.medium(constants)) for f in flows],
-            "medium, simulated area and gap": [errors(f, f.medium(constants, f.one.area, f.one.u)) for f in flows],
-        }
-        cells = {law: [f"{rms:.2f} ({n:.0f})" for _, rms, n in summary(misses, BINS)] for law, misses in laws.items()}
-        cells["cells of one spectrum"] = [f"{value:.2f}" for value in noise_floor(own, BINS)]
-        lines += [[f"{law}, {name} wavelengths a side", *row] for law, row in cells.items()]
+        for law in ("calibrated", "medium, simulated area and gap"):
+            misses = [errors(flow, LAWS[law](flow, constants)) for flow in flows]
+            cells = [f"{rms:.2f} ({n:.0f})" for _, rms, n in summary(misses, BINS)]
+            lines.append([f"{law}, {name} wavelengths a side", *cells])
+        of_one = [f"{value:.2f}" for value in noise_floor(own, BINS)]
+        lines.append([f"cells of one spectrum, {name} wavelengths a side", *of_one])
     return table(f"rms of ln k | {spans(BINS, HEADER)}", lines)
 
 
@@ -178,11 +172,12 @@ def draw_leakage(seen: Sequence[Any]) -> Any:
     """k against contact of simulated surfaces, and the laws."""
     figure, axes_of = panels(1, 2, (10, 4.5), sharey=True)
     area, flow = np.linspace(0.004, 0.405, 200), shipped_flow().constants
-    for axes, hurst in zip(axes_of, DRAWN, strict=True):
-        for one in seen:
-            if one.kind == "self_affine" and one.node[1] == hurst and (one.isotropic or one.zeta_1 >= 64):
-                colour, label = ("k", "simulated, zeta_1 < 64") if one.zeta_1 < 64 else ("r", "simulated, zeta_1 >= 64")
-                axes.plot(one.area, np.exp(one.log_k), ".", color=colour, ms=4, alpha=0.6, label=label)
+    for axes, hurst in zip(axes_of, (0.4, 0.8), strict=True):
+        alike = [one for one in seen if one.node[:2] == ("self_affine", hurst) and (one.plain or one.zeta_1 >= 64)]
+        for colour, sign, large in (("k", "<", False), ("r", ">=", True)):
+            own = [(one.area, np.exp(one.log_k)) for one in alike if (one.zeta_1 >= 64) == large]
+            dots: dict[str, Any] = {"ms": 4, "alpha": 0.6, "label": f"simulated, zeta_1 {sign} 64"}
+            axes.plot(*np.concatenate([*own, np.empty((2, 0))], axis=1), f"{colour}.", **dots)
         for zeta, style in ((64.0, "--"), (1024.0, ":"), (16.0, "-")):
             answer = contact(Surface(hurst, 1.0, zeta, 1.0, 4.0), area=area, theory="calibrated")
             k = np.where(answer.leakage.blocked, np.nan, answer.leakage.K)
@@ -196,9 +191,7 @@ def draw_leakage(seen: Sequence[Any]) -> Any:
         axes.set(xlabel="real contact area  A/A0", yscale="log", ylim=(1e-7, 20), title=f"H = {hurst:g}")
         axes.grid(alpha=0.3)
     axes_of[0].set_ylabel("flow coefficient over h_rms^3,  k")
-    # one entry for all simulations of a colour
-    entries = {text: handle for handle, text in zip(*axes_of[0].get_legend_handles_labels(), strict=True)}
-    axes_of[0].legend(entries.values(), entries.keys(), fontsize="small")
+    axes_of[0].legend(fontsize="small")
     return figure
 
 
@@ -221,14 +214,12 @@ def yielding() -> Measured:
 
 
 def simulated(seen: list[Capped]) -> FloatArray:
-    """psi of every simulation, and means over contacts of A_el/A at equal force, F_el/F at equal gap, yielded share."""
+    """By simulation psi, means from 1% to 10% contact of A_el/A at equal force and F_el/F at equal u, yielded share."""
     rows = []
     for one in seen:
-        bare = one.bare
+        bare, light = one.bare, (one.area > 0.01) & (one.area < 0.1)
         # where the elastic contact was pressed as lightly
-        kept = (
-            (one.area > CONTACT[0]) & (one.area < CONTACT[1]) & (one.u < bare["u"][0]) & (one.force > bare["force"][0])
-        )
+        kept = light & (one.u < bare["u"][0]) & (one.force > bare["force"][0])
         if one.kind != "stretched" and kept.any():
             elastic = np.exp(np.interp(np.log(one.force), np.log(bare["force"]), np.log(bare["area"])))
             load = np.exp(np.interp(-one.u, -bare["u"], np.log(bare["force"])))
@@ -276,17 +267,12 @@ def frozen(seen: list[Capped]) -> str:
     return table(header, rows, "{} | {} | {:+.0f} ± {:.0f}")
 
 
-def psi_of(metal: Any) -> list[float]:
-    """psi of a metal pressed on itself at `GRADIENT`, from its softest state."""
-    modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
-    return [modulus * GRADIENT / hardness for hardness in metal.hardness]
-
-
 def metals() -> str:
-    """psi of metals pressed on themselves, and the gradient up to which they stay elastic."""
+    """psi of metals pressed on themselves at `GRADIENT`, and the gradient up to which they stay elastic."""
     rows = []
     for metal in map(materials.get, materials.METALS):
-        psi = psi_of(metal)
+        modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
+        psi = [modulus * GRADIENT / hardness for hardness in metal.hardness]
         limit = [materials.ELASTIC_PSI * GRADIENT / p for p in psi]
         ends = (metal.hardness, "g"), (metal.conductivity, "g"), (psi[::-1], ".1f"), (limit, ".3f")
         cells = (" to ".join(dict.fromkeys(format(number, form) for number in pair)) for pair, form in ends)
@@ -296,26 +282,20 @@ def metals() -> str:
 
 
 def draw_yield(ratios: FloatArray) -> Any:
-    """Area and force of elastic answers over the simulated ones against psi, with metals below."""
+    """Area and force of elastic answers over the simulated ones against psi."""
     found = contact(SURFACE, area=0.03, theory="calibrated", hardness=float(SURFACE.rms_gradient) / INDICES)
     elastic = contact(SURFACE, pressure=found.pressure, theory="calibrated")
     closer = contact(SURFACE, mean_separation=found.mean_separation, theory="calibrated")
     by_law = elastic.area / found.area, closer.pressure / found.pressure
-    psi, *points, _ = ratios
-    figure, axes = panels(3, 1, (7, 8), sharex=True, height_ratios=(3, 3, 2))
+    figure, axes = panels(2, 1, (7, 6), sharex=True)
     labels = (f"{RATIOS[0]},\nequal force", f"{RATIOS[1]},\nequal mean gap")
-    for axis, dots, line, label in zip(axes, points, by_law, labels, strict=False):
+    for axis, dots, line, label in zip(axes, ratios[1:3], by_law, labels, strict=True):
         axis.axhspan(0.95, 1.05, color="tab:green", alpha=0.2, label="within 5%")
-        axis.semilogx(psi, dots, ".", color="grey", alpha=0.6, label="boundary elements, 1% to 10% contact")
+        axis.semilogx(ratios[0], dots, ".", color="grey", alpha=0.6, label="boundary elements, 1% to 10% contact")
         axis.semilogx(INDICES, line, label="law at 3% contact")
+        axis.axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
         axis.set_ylabel(label)
         axis.grid(True, alpha=0.3)
-    axes[1].set_yscale("log")
+    axes[1].set(yscale="log", xlabel="psi = E* g/p_m")
     axes[0].legend(fontsize=8, loc="lower left")
-    for place, metal in enumerate(map(materials.get, METALS)):
-        axes[2].plot(psi_of(metal), [place, place], linewidth=6)
-    for axis in axes:
-        axis.axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
-    axes[2].set_yticks(range(len(METALS)), [f"{name} on itself" for name in METALS], fontsize=8)
-    axes[2].set_xlabel(f"psi = E* g/p_m; metals at rms gradient {GRADIENT:g}, hard to soft")
     return figure

@@ -3,25 +3,23 @@
 import ast
 import collections
 import dataclasses
+import graphlib
 import itertools
 import math
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import sympy
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import LogNorm
-from scipy.special import erf
 
 from benchmarks.import_circles import import_graph
-from generate.boundary_elements.evidence import MIN_WAVES
-from generate.boundary_elements.surfaces import TRAINING
+from generate.distances import pocket_errors
 from generate.files import ROOT, evidence
 from generate.formulas import HEADER, Function, read_functions
 from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact
-from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.tables import shipped
@@ -30,12 +28,6 @@ from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.theories import THEORIES
 
-BOX = {"boxstyle": "square,pad=0.4", "facecolor": "#e8eef7", "edgecolor": "#4a6fa5"}
-RIGHT = 0.83  # edge of the boxes
-SHARED = ("common", "core")  # every room uses them: no arrows
-LEAST_DRAWN = 1e-3  # mu
-
-POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are compared with simulations
 SHOWN = ("self_affine", 0.7, 24.0, 5, 0.0)  # a held-out spectrum: kind, H, zeta_1, wavelengths a side, shape
 LOADS = np.geomspace(1e-4, 0.6, 60)  # F/(A0 E* g), g the rms gradient
 ROWS = {
@@ -57,8 +49,8 @@ LATEX = {
 }
 
 
-def rooms() -> tuple[dict[str, set[str]], dict[str, str]]:
-    """What each folder, or module at the top, imports of the others, and what is written in its box."""
+def rooms() -> tuple[dict[str, set[str]], dict[str, list[Any]]]:
+    """What each folder, or module at the top, imports of the others; and its title and lines."""
     graph: dict[str, set[str]] = collections.defaultdict(set)
     lines, titles = collections.Counter[str](), {}
     imports, files = import_graph(ROOT / "mbma_tables")
@@ -68,32 +60,23 @@ def rooms() -> tuple[dict[str, set[str]], dict[str, str]]:
         lines[room] += len(text.splitlines())
         graph[room] |= {other.split(".")[1] for other in others} - {room}
         if name.count(".") == 1:
-            titles[room] = (ast.get_docstring(ast.parse(text)) or "").split("\n")[0].rstrip(".").replace("`", "")
+            titles[room] = (ast.get_docstring(ast.parse(text)) or "").split("\n")[0].rstrip(".")
     del graph["__main__"]
     lines["core"] += sum(len(path.read_text().splitlines()) for path in (ROOT / "mbma_tables/core").glob("*.[ch]"))
-    return graph, {room: f"{room:<11}{titles[room]:<72}{lines[room]:>6,}" for room in graph}
+    return graph, {room: [titles[room], lines[room]] for room in graph}
 
 
 def architecture() -> Measured:
-    """The rooms as boxes, with arrows to those that are imported, less those that follow from others."""
+    """The layers, from above, with what each imports but for what follows from others."""
     graph, texts = rooms()
-    below = {room: set(others) for room, others in graph.items()}
-    for middle, room in itertools.product(graph, graph):
-        if middle in below[room]:
-            below[room] |= below[middle]
-    order = sorted(graph, key=lambda room: (len(below[room]), room))
-    figure, axes = panels(1, 1, (7.4, 7.2))
-    axes.set_position((0, 0, 1, 1))
-    axes.set(xlim=(0, 1), ylim=(-0.6, len(order) - 0.4))
-    axes.axis("off")
-    for y, room in enumerate(order):
-        axes.text(0.01, y, texts[room], va="center", family="monospace", fontsize=8, bbox=BOX)
-    for y, room in enumerate(order):
-        direct = graph[room] - set().union(*(below[other] for other in graph[room])) - set(SHARED)
-        for down in map(order.index, sorted(direct)):
-            style = {"arrowstyle": "-|>", "color": "#555555", "connectionstyle": f"arc3,rad={-0.15 - 0.4 / (y - down)}"}
-            axes.annotate("", (RIGHT, down + 0.12), (RIGHT, y - 0.12), arrowprops=style)
-    return {}, {"docs/figures/architecture.svg": figure}
+    order, rows = list(graphlib.TopologicalSorter(graph).static_order()), []
+    below: dict[str, set[str]] = {}
+    for room in order:
+        implied = set[str]().union(*(below[other] for other in graph[room]))
+        below[room] = implied | graph[room]
+        direct = (other for other in reversed(order) if other in graph[room] - implied - {"common", "core"})
+        rows.append([f"`{room}`", *texts[room], ", ".join(f"`{other}`" for other in direct)])
+    return {"layers": table("layer | subject | lines | imports", reversed(rows), "{} | {} | {:,} | {}")}, {}
 
 
 def tables() -> Measured:
@@ -113,47 +96,17 @@ def tables() -> Measured:
 
 
 def drawn_errors(content: TableContent) -> Any:
-    """Bound on the relative error of the universal table over X and mu."""
+    """Bound on the relative error of the universal table over X and mu, at the middles of its cells."""
     X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
-    bottom = np.maximum(mu_low, LEAST_DRAWN)
-    corners = np.stack([X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high], axis=-1).reshape(-1, 4, 2)
     figure, plots = panels(1, 2, (9, 3.6), sharey=True)
     norm = LogNorm(content.local_error.min(), content.local_error.max())
     for plot, errors, name in zip(plots, content.local_error.T, (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
-        image = PolyCollection(list(corners), array=errors)
-        image.set(norm=norm, edgecolor="white", linewidth=0.2, rasterized=True)
-        plot.add_collection(image)
-        title = f"bound on the relative error of {name}"
-        plot.set(yscale="log", xlim=(X_low[0], 12), ylim=(LEAST_DRAWN, mu_high[-1]), xlabel="X", title=title)
-    plots[0].set_ylabel(r"$\mu$")
-    figure.colorbar(image, ax=plots)
+        middle = (X_low + X_high) / 2, (mu_low + mu_high) / 2
+        dots = plot.scatter(*middle, c=errors, s=5, norm=norm, rasterized=True)
+        plot.set(yscale="log", xlim=(X_low[0], 12), xlabel="X", title=f"bound on the relative error of {name}")
+    plots[0].set(ylabel=r"$\mu$", ylim=(1e-3, mu_high[-1]))
+    figure.colorbar(dots, ax=plots)
     return figure
-
-
-def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
-    """A/A0 at p/(E* g): the area law of docs/formula.md."""
-    t = pressure / 0.33
-    s = (0.51 + 0.033 * math.log(alpha / 10) + t) / (1 + t)
-    return np.asarray(erf(pressure * np.sqrt(2 / s)))
-
-
-def pocket_pressure(u: FloatArray, nu: float) -> FloatArray:
-    """p/(E* q0 h_rms) at u/h_rms: the law of separation of docs/formula.md, by the spectrum's narrowness."""
-    return np.asarray(u**-0.26 * np.exp(-1.91 * u - 2.8 * (nu - 0.63)))
-
-
-def pocket_errors() -> list[list[Any]]:
-    """Of both laws: name, median, 90% quantile and largest error [%] on held-out surfaces, number of surfaces."""
-    seen = [o for o in evidence() if o.split != TRAINING and o.kind == "self_affine" and o.waves >= MIN_WAVES]
-    found: dict[str, list[FloatArray]] = {"area at given pressure": [], "pressure at given separation": []}
-    for one in seen:
-        inside, spectrum = (one.area >= POCKET_AREAS[0]) & (one.area <= POCKET_AREAS[1]), one.spectrum
-        force, g = one.force[inside], float(spectrum.gradient)
-        pressure = pocket_pressure(one.u[inside], float(spectrum.narrowness)) / g
-        laws = pocket_area(force, float(spectrum.alpha)) / one.area[inside], pressure / force
-        for errors, law in zip(found.values(), laws, strict=True):
-            errors.append(100 * np.abs(law - 1))
-    return [[what, *np.quantile(np.concatenate(e), (0.5, 0.9, 1.0)), len(seen)] for what, e in found.items()]
 
 
 def expressions(function: Function) -> dict[str, sympy.Expr]:
@@ -164,25 +117,23 @@ def expressions(function: Function) -> dict[str, sympy.Expr]:
     return {name: sympy.sympify(re.sub(r"\b(\d+)\.0\b", r"\1", text), locals=known) for name, text in exact}
 
 
-def latex_steps(function: Function) -> list[str]:
+def latex_steps(function: Function) -> Iterator[str]:
     """One equation a step, in the order in which they are evaluated; polynomials without Horner's brackets."""
     _, is_island, letter = function.result.partition("phi_")
     own = {"log_Q": rf"\ln Q_{letter}", "rigid": f"R_{letter}"} | {name: f"{name}_{{{letter}}}" for name in "pytzuv"}
     names = {sympy.Symbol(name): text for name, text in (LATEX | (own if is_island else {})).items()}
-    style = {"symbol_names": names, "ln_notation": True, "fold_frac_powers": True}
-    lines = []
     for name, value in expressions(function).items():
         shown = value.expand() if len(value.free_symbols) == 1 and value.is_polynomial() else value
-        lines.append(f"{sympy.latex(sympy.Symbol(name), **style)} = {sympy.latex(shown, **style)}")
-    return lines
+        equation = sympy.Eq(sympy.Symbol(name), shown, evaluate=False)
+        yield sympy.latex(equation, symbol_names=names, ln_notation=True, fold_frac_powers=True)
 
 
 def formula() -> Measured:
     rows = []
-    for form, result in ((form, result) for form, results in CERTIFICATES.items() for result in results):
-        found = CERTIFICATES[form][result]
-        worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
-        rows.append([form, result, found.coefficients, found.largest, found.median, worst])
+    for form, results in CERTIFICATES.items():
+        for result, found in results.items():
+            worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
+            rows.append([form, result, found.coefficients, found.largest, found.median, worst])
     header = "form | function | coefficients | largest error | median | worst at"
     parts = {"certificates": table(header, rows, "{} | {} | {} | {:g} | {:.2g}")}
     header = "pocket law | median error | 90% of errors below | largest | surfaces"
@@ -201,10 +152,10 @@ def formula() -> Measured:
 
 def picture() -> Any:
     """Force against separation and area against force by three theories, and simulated surfaces as dots."""
-    seen = [one for one in evidence() if one.node == SHOWN]
-    _, hurst, zeta_1, *_ = SHOWN
+    seen, (_, hurst, zeta_1, *_) = [one for one in evidence() if one.node == SHOWN], SHOWN
     surface = Surface(float(hurst), 1.0, float(zeta_1), 1.0, float(np.mean([one.h_max for one in seen])))
-    u, curves = contact(surface, pressure=LOADS * surface.rms_gradient, theory="calibrated").mean_separation, []
+    loads, curves = LOADS * surface.rms_gradient, []
+    u = contact(surface, pressure=loads, theory="calibrated").mean_separation
     for theory in ("calibrated", "mbma", "persson"):
         # three bands would hide one another
         bands: dict[str, Any] = {} if theory == "calibrated" else {"scatter": None, "area_scatter": None}
@@ -214,10 +165,9 @@ def picture() -> Any:
     by_gap, by_force = figure.axes
     for line in (*by_gap.lines, *by_force.lines):
         line.set_marker("")
-    for number, one in enumerate(seen):
-        force = one.force * float(surface.rms_gradient)
-        by_gap.plot(one.u, force, "k.", label="_" if number else "boundary elements")
-        by_force.plot(force, one.area, "k.")
+    u, force, area = (np.concatenate([getattr(one, name) for one in seen]) for name in ("u", "force", "area"))
+    by_gap.plot(u, force * surface.rms_gradient, "k.", label="boundary elements")
+    by_force.plot(force * surface.rms_gradient, area, "k.")
     by_gap.legend()
     return figure
 

@@ -1,5 +1,6 @@
-"""docs/gallery.md, measured maps from file to contact, and docs/maps.md, theories on maps beside boundary elements."""
+"""Theories on maps beside boundary elements: docs/gallery.md, docs/maps.md and docs/machined.md."""
 
+import itertools
 import os
 import pathlib
 from collections.abc import Iterator
@@ -11,7 +12,10 @@ from scipy.signal import resample
 
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, Recipe, heights
 from generate.files import ROOT, dataset, read_csv, to_csv
-from generate.page import Measured, printed, table
+from generate.machined import makers
+from generate.machined.campaign import FORMS
+from generate.machined.evaluation import by_family, covered, families_left_out, yielding
+from generate.page import Measured, panels, printed, table
 from mbma_tables import Surface, contact
 from mbma_tables.answers.measurement import curves, draw
 from mbma_tables.common.arguments import FloatArray
@@ -29,7 +33,6 @@ from mbma_tables.theories.protocol import Theory
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"
-VARIABLE = "MBMA_REFERENCE_MAPS"
 COLUMNS = ["force", "area", "mean_separation", "energy"]
 HEAD = """\
 # boundary elements on measured maps (Tamaas), plane removed, continued by mirror images, waves below
@@ -37,7 +40,7 @@ HEAD = """\
 """
 GAPS = np.append(np.geomspace(1e-6, 0.1, 90)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
 KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")
-GRADIENT = 0.1  # that surfaces are given: theories are for small ones
+GRADIENT = 0.1  # of surfaces: theories are for small ones
 # contacts that are summed up: as far as islands do not lie on one another, and all
 RANGES = {"mbma": (0.01, 0.1), "calibrated": (0.01, 0.97)}
 EXTRAPOLATION = (
@@ -58,13 +61,12 @@ BARS: dict[str, dict[str, Any]] = {
     "al3d-1.al3d": {"short_cutoff": f"{4 * 4.38027e-07 * (1 - 1e-9)}m"},
     "di-1.di": {"short_cutoff": f"{4 * 500 / 512 * (1 - 1e-9)}nm"},
 }
-FINER = "di-1.di"  # whose light contacts are solved on a finer grid too
 
 
 def path_of(name: str) -> pathlib.Path | None:
     """The file, in the repository or in the folder that MBMA_REFERENCE_MAPS names; None if in neither."""
-    places = [ROOT / FOLDER, *([pathlib.Path(os.environ[VARIABLE])] if VARIABLE in os.environ else [])]
-    return next((place / name for place in places if (place / name).is_file()), None)
+    places = (ROOT / FOLDER / name, pathlib.Path(os.environ.get("MBMA_REFERENCE_MAPS", ""), name))
+    return next(filter(pathlib.Path.is_file, places), None)
 
 
 def read_rows() -> dict[str, FloatArray]:
@@ -75,10 +77,10 @@ def read_rows() -> dict[str, FloatArray]:
 def refined(treated: Treated, surface: MeasuredSurface) -> FloatArray:
     """Light loads of a map on twice as many points along each side, by Fourier interpolation: ten minutes."""
     values = mirrored(treated.heights - treated.heights.mean())
+    sizes = values.shape[0] * treated.steps[0], values.shape[1] * treated.steps[1]
     for axis, count in enumerate(values.shape):
         values = resample(values, 2 * count, axis=axis)
-    steps = [step / 2 for step in treated.steps]
-    press = Press(values, (values.shape[0] * steps[0], values.shape[1] * steps[1]), own_law(surface).gradient)
+    press = Press(values, sizes, own_law(surface).gradient)
     force, rows = press.loads(press.gradient * np.array(LOADS[:4]), False)
     return np.array([force, *rows])
 
@@ -86,7 +88,9 @@ def refined(treated: Treated, surface: MeasuredSurface) -> FloatArray:
 def gallery() -> Measured:
     """What `mbma fit` prints of each example, and its picture with boundary elements, solved where none are known."""
     rows, parts, files = read_rows(), {}, dict[str, Any]()
-    for name, label in (*((name, name) for name in EXAMPLES | BARS), (FINER, f"{FINER} refined")):
+    # light contacts of one map are solved on a finer grid too
+    for label in (*EXAMPLES, *BARS, "di-1.di refined"):
+        name = label.split()[0]
         path, options = path_of(name), (EXAMPLES | BARS)[name]
         if path is None:
             continue
@@ -111,7 +115,7 @@ def ratios(
     """A theory's area at a force and force at a separation over simulated ones; NaN where it does not reach them."""
     fine = answer_where_finite(theory, surface, np.append(u, GAPS * float(surface.h_max)))
     loads, areas = fine.pressure[u.size :], fine.area[u.size :]
-    order = np.argsort(np.where(np.isfinite(loads), loads, np.inf))[: np.isfinite(loads).sum()]
+    order = np.argsort(loads)[: np.isfinite(loads).sum()]
     loads, areas = loads[order], np.maximum.accumulate(areas[order])
     # between gaps, a force that vanishes cannot be interpolated
     held = loads > 0
@@ -139,12 +143,12 @@ def simulated() -> Iterator[Seen]:
         yield name, surface, rows[:, np.isfinite(rows).all(axis=0) & (one.area.values > 0)]
 
 
-def summary(seen: list[Seen]) -> list[Any]:
+def summary(simulations: list[Seen]) -> list[Any]:
     """Cells of one row: area and force of both theories over simulation, and how many answers are valid."""
     cells: list[Any] = []
     for name, (low, high) in RANGES.items():
         theory, found = get_theory(name), []
-        for _, surface, rows in seen:
+        for _, surface, rows in simulations:
             force, area, u = rows[:, (rows[1] >= low) & (rows[1] <= high)]
             valid = np.full(u.size, np.nan)
             try:
@@ -163,7 +167,7 @@ def summary(seen: list[Seen]) -> list[Any]:
     return cells
 
 
-def measure() -> Measured:
+def maps() -> Measured:
     groups, known = dict[str, list[Seen]](), read_rows()
     for one in simulated():
         groups.setdefault(one[0], []).append(one)
@@ -173,13 +177,32 @@ def measure() -> Measured:
             label = f"measured: {name}"
             groups[label] = [(label, measured(path, options)[1], known[name][:3])]
     rows = []
-    for name, seen in groups.items():
+    for name, own in groups.items():
         stretch, kurtosis, skewness = (
-            np.mean([getattr(s.bearing, key, getattr(s, key, 0.0)) for _, s, _ in seen])
+            np.mean([getattr(s.bearing, key, getattr(s, key, 0.0)) for _, s, _ in own])
             for key in ("anisotropy", "slope_kurtosis", "skewness")
         )
-        rows.append([f"{name} ({len(seen)})", stretch, kurtosis, skewness, *summary(seen)])
+        rows.append([f"{name} ({len(own)})", stretch, kurtosis, skewness, *summary(own)])
     columns = (f"{name}: {what}" for name in ("MBMA", "calibrated") for what in ("area", "force", "valid"))
     header = f"surfaces (number) | anisotropy | kurtosis of slopes | skewness | {' | '.join(columns)}"
     shapes = table(header, rows, "{} | {:.1f} | {:.1f} | {:.1f} | {:.2f} ({:.2f} to {:.2f})")
     return {"shapes": shapes, "extrapolation": printed(EXTRAPOLATION)}, {}
+
+
+def draw_families() -> Any:
+    """One map of each family."""
+    figure, axes = panels(2, 7, (14, 4.4))
+    for axis, family in itertools.zip_longest(axes.ravel(), makers.FAMILIES):
+        axis.set_axis_off()
+        if family:
+            axis.imshow(makers.heights(makers.Part(family, 1))[::4, ::4].T, origin="lower", interpolation="none")
+            axis.set_title(family)
+    return figure
+
+
+def machined() -> Measured:
+    """Errors of answers on maps of machined surfaces by family, and how many their scatter covers."""
+    data = dataset("machined")
+    parts = {form: by_family(data, form) for form in FORMS} | {"yielding": yielding(data), "coverage": covered(data)}
+    parts |= {f"left_out_{form}": families_left_out(data, form) for form in FORMS}
+    return parts, {"docs/figures/machined.svg": draw_families()}

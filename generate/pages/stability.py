@@ -12,22 +12,19 @@ from typing import Any, NamedTuple
 
 import mpmath as mp
 import numpy as np
-from matplotlib import colormaps, colors
+from matplotlib.colors import LogNorm
 
 from generate.page import Measured, panels, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
-from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands.geometry import geometry, kinks
 from mbma_tables.models import answer_islands
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import get_variant
 
-DIGITS = 40
 ULP = np.finfo(float).eps
-MIN_ERROR, MAX_ERROR = 1e-16, 1e0  # of the colour scale
 ISLAND_MODELS, VARIANTS = ("exact", "universal", "formula", "rigid"), ("reported", "printed")
 
 # islands
@@ -36,11 +33,10 @@ MU_CORNERS = np.concatenate([[0.0], 10.0 ** np.array([-300, -200, -100, -30, -16
 RIGID_MU = 1e-13  # below it mu Q is less than 1e-9 up to X = 1e4
 SOLVED, ISLAND_TRUTH = 1e-9, 1e-11
 
-# geometry
+# geometry; corners of the maps first
 APPROACHES = np.geomspace(1e-12, 30, 44)
 BANDS = np.concatenate([[3.0000001, 3.001], np.geomspace(3.1, 1e8, 30)])
-HURSTS = (0.05, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
-MAP_HURST = 0.8
+HURSTS, MAPPED = (0.05, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0), (0.8, "reported")
 FIELDS = ("X", "mu", "eta", "D_d", "sigma_d", "R_u")
 
 # totals
@@ -49,8 +45,7 @@ TOTAL_BANDS = (3.0000001, 3.1, 10.0, 216.0, 1e4, 1e6, 1e8)
 TOTAL_HURSTS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
 TOP, TOTAL_TRUTH = 3.0, 1e-10
 
-Answer = tuple[Sequence[Any], float]  # values, and a bound on their relative error
-Ways = Mapping[str, Callable[..., Answer]]
+Way = Callable[..., tuple[Sequence[Any], float]]  # values, and a bound on their relative error
 
 
 class Outcome(NamedTuple):
@@ -63,7 +58,14 @@ class Outcome(NamedTuple):
     beyond: bool = False
 
 
-def outcome(answer: Callable[[], Answer], truth: Sequence[Any] | None) -> Outcome:
+def relative_error(found: float, truth: Any) -> float:
+    """Zero where both underflow."""
+    if abs(float(truth)) < 1e-300:
+        return 0.0 if abs(found) < 1e-290 else math.inf
+    return abs(float(found / truth - 1))
+
+
+def outcome(answer: Callable[[], tuple[Sequence[Any], float]], truth: Sequence[Any] | None) -> Outcome:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -72,21 +74,15 @@ def outcome(answer: Callable[[], Answer], truth: Sequence[Any] | None) -> Outcom
             return Outcome(refused=True)
         except (ArithmeticError, ValueError):
             values, bound = [math.nan], math.inf
-    if truth is None or not all(math.isfinite(value) for value in values):
-        return Outcome(not_finite=not all(math.isfinite(value) for value in values), warned=len(caught))
+    finite = bool(np.isfinite(np.array(values, float)).all())
+    if truth is None or not finite:
+        return Outcome(not_finite=not finite, warned=len(caught))
     error = max(map(relative_error, values, truth))
     return Outcome(warned=len(caught), error=error, beyond=error > bound)
 
 
-def relative_error(found: float, truth: Any) -> float:
-    """Relative error; zero where both underflow."""
-    if abs(float(truth)) < 1e-300:
-        return 0.0 if abs(found) < 1e-290 else math.inf
-    return abs(float(found / truth - 1))
-
-
 def counted(
-    ways: Ways, corners: Iterable[tuple[Any, ...]], truth: Callable[..., Sequence[Any]]
+    ways: Mapping[str, Way], corners: Iterable[tuple[Any, ...]], truth: Callable[..., Sequence[Any]]
 ) -> dict[str, list[Outcome]]:
     """Every way at every corner; rigid spheres do not claim to be elastic ones, and have no truth."""
     found: dict[str, list[Outcome]] = {name: [] for name in ways}
@@ -103,7 +99,7 @@ def counted(
 
 def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
     """(pi/5) F_{5/2}(-X) and (pi/2) F_2(-X) by mpmath: parabolic cylinder functions."""
-    with mp.workdps(DIGITS):
+    with mp.workdps(40):
         force, area = (height_integral(mp.mpf(n), -mp.mpf(float(X))) for n in (2.5, 2))
         return mp.pi / 5 * force, mp.pi / 2 * area
 
@@ -111,7 +107,7 @@ def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
 def islands() -> dict[str, list[Outcome]]:
     """Every island model at every corner of (X, mu)."""
 
-    def ask(name: str, X: float, mu: float) -> Answer:
+    def ask(name: str, X: float, mu: float) -> tuple[Sequence[Any], float]:
         model = get_model(name, 10 * SOLVED, get_variant("reported"))
         found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
         return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
@@ -128,68 +124,54 @@ def islands() -> dict[str, list[Outcome]]:
 
 
 def island_geometry() -> dict[str, list[Outcome]]:
-    """Geometry by the library and by the paper's formulas as printed, against 60 digits; corners of the maps first."""
+    """Geometry by the library and by the paper's formulas as printed, against 60 digits."""
 
-    def library(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
+    def library(approach: float, zeta_1: float, hurst: float, variant: str) -> tuple[Sequence[Any], float]:
         found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), get_variant(variant))
         return [float(found[name][0]) for name in FIELDS], math.inf
 
-    def printed(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
-        found = exact_island(approach, hurst, zeta_1, float(divisor(variant)), DOUBLES)
-        return [found[name] for name in FIELDS], math.inf
-
-    def truth(approach: float, hurst: float, zeta_1: float, variant: str) -> Sequence[Any]:
-        found = exact_island(approach, hurst, zeta_1, divisor(variant))
+    def exact(approach: float, zeta_1: float, hurst: float, variant: str, *arithmetic: Any) -> Sequence[Any]:
+        density = float(divisor(variant)) if arithmetic else divisor(variant)
+        found = exact_island(approach, hurst, zeta_1, density, *arithmetic)
         return [found[name] for name in FIELDS]
 
-    corners = list(itertools.product(APPROACHES, (MAP_HURST,), BANDS, ("reported",)))
-    for hurst, variant, zeta_1 in itertools.product(HURSTS, VARIANTS, map(float, BANDS)):
-        if (hurst, variant) != (MAP_HURST, "reported"):
-            corners += [(approach, hurst, zeta_1, variant) for approach in APPROACHES]
+    others = [own for own in itertools.product(HURSTS, VARIANTS) if own != MAPPED]
+    corners = [(*place, *own) for own in (MAPPED, *others) for place in itertools.product(APPROACHES, BANDS)]
+    for zeta_1, (hurst, variant) in itertools.product(map(float, BANDS), (MAPPED, *others)):
         # one ulp around the floors of zeta_d and zeta_u
-        floors = [float(kink) for kink in kinks(hurst, zeta_1, get_variant(variant))]
-        corners += [(kink * (1 + side * ULP), hurst, zeta_1, variant) for kink in floors for side in (-1, 0, 1)]
-    ways = {"geometry, library": library, "geometry, the paper's formulas as printed": printed}
-    return counted(ways, corners, truth)
+        floors = itertools.product(map(float, kinks(hurst, zeta_1, get_variant(variant))), (-1, 0, 1))
+        corners += [(kink * (1 + side * ULP), zeta_1, hurst, variant) for kink, side in floors]
+    ways: dict[str, Way] = {"geometry, library": library}
+    ways["geometry, the paper's formulas as printed"] = lambda *corner: (exact(*corner, DOUBLES), math.inf)
+    return counted(ways, corners, exact)
 
 
 def totals() -> dict[str, list[Outcome]]:
     """Totals of every island model at corners of surfaces and gaps, both variants, against the exact one at 1e-10."""
 
-    def ask(name: str, variant: str, hurst: float, zeta_1: float, depth: float, rtol: float = 1e-8) -> Answer:
+    def ask(name: str, variant: str, hurst: float, zeta_1: float, depth: float, rtol: float = 1e-8) -> Any:
         surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
         found = contact(surface, separation=TOP - depth, island_model=name, variant=variant, rtol=rtol)
         return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
 
-    def truth(variant: str, hurst: float, zeta_1: float, depth: float) -> Sequence[Any]:
-        return ask("exact", variant, hurst, zeta_1, depth, TOTAL_TRUTH)[0]
-
-    def of(names: Sequence[str], variants: Sequence[str]) -> dict[str, list[Outcome]]:
-        ways = {f"totals by {name}": functools.partial(ask, name) for name in names}
-        return counted(ways, itertools.product(variants, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS), truth)
-
+    exact, found = functools.partial(ask, "exact", rtol=TOTAL_TRUTH), dict[str, list[Outcome]]()
     # the four-number table is of one variant
-    return of(ISLAND_MODELS, VARIANTS) | of(["island4d"], VARIANTS[:1])
+    for names, variants in ((ISLAND_MODELS, VARIANTS), (["island4d"], VARIANTS[:1])):
+        ways = {f"totals by {name}": functools.partial(ask, name) for name in names}
+        corners = itertools.product(variants, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS)
+        found |= counted(ways, corners, lambda *corner: exact(*corner)[0])
+    return found
 
 
 def draw(found: Mapping[str, Sequence[Outcome]]) -> Any:
-    """Maps of error: geometry by the paper's formulas as printed and by the library, and islands."""
-    figure, axes = panels(2, 2, (10, 8))
-    colormap = colormaps["viridis"].with_extremes(bad="white")
-    style = {"norm": colors.LogNorm(MIN_ERROR, MAX_ERROR), "cmap": colormap, "shading": "nearest", "rasterized": True}
-
-    def errors(name: str, *shape: int) -> FloatArray:
-        return np.maximum([one.error for one in found[name][: math.prod(shape)]], MIN_ERROR).reshape(shape)
-
-    for panel, name in zip(axes[0], ("geometry, the paper's formulas as printed", "geometry, library"), strict=True):
-        panel.pcolormesh(BANDS, APPROACHES, errors(name, APPROACHES.size, BANDS.size), **style)
-        panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=name)
-    places = np.arange(MU_CORNERS.size), np.arange(X_CORNERS.size)
-    for panel, name in zip(axes[1], ("islands by exact", "islands by universal"), strict=True):
-        mesh = panel.pcolormesh(*places, errors(name, X_CORNERS.size, MU_CORNERS.size), **style)
-        panel.set(xlabel="mu", ylabel="X", title=f"{name} (white: refused)")
-        panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in MU_CORNERS[::4]], rotation=45)
-        panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in X_CORNERS[::4]])
+    """Maps of error: geometry by the paper's formulas as printed and by the library."""
+    figure, axes = panels(1, 2, (10, 4.2), sharey=True)
+    for panel, name in zip(axes, ("geometry, the paper's formulas as printed", "geometry, library"), strict=True):
+        errors = np.array([one.error for one in found[name][: APPROACHES.size * BANDS.size]])
+        errors = np.maximum(errors, 1e-16).reshape(APPROACHES.size, BANDS.size)
+        mesh = panel.pcolormesh(BANDS, APPROACHES, errors, norm=LogNorm(1e-16, 1.0), shading="nearest", rasterized=True)
+        panel.set(xscale="log", yscale="log", xlabel="zeta_1", title=name)
+    axes[0].set_ylabel("delta/h_rms")
     figure.colorbar(mesh, ax=axes, label="largest relative error")
     return figure
 

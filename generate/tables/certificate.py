@@ -1,4 +1,4 @@
-"""What both tables are held to: held-out errors, points to replay, physical rules."""
+"""What both tables share: exact islands, solved in chunks, held-out errors, points to replay, physical rules."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,6 +7,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from generate.tables.configuration import Configuration
+from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
@@ -16,17 +17,44 @@ CONFORMANCE_POINTS = 64
 CONFORMANCE_TOLERANCE = 1e-11
 SOLVER_SHARE = 0.01
 MAX_DRAWS = 400  # islands drawn for each that a narrow table covers
+CHUNK = 2000
 
 
 class UncertifiedError(MbmaError):
     """A table that broke a physical check or missed its target; it is not written."""
 
 
+def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+    """Phi_F and Phi_A at flat (X, mu), shape (entries, 2), on `refinement` times the nodes that `rtol` asks."""
+    solved = greenwood_tripp.solve(X, mu, rtol=rtol)
+    found = np.stack([solved.phi_F, solved.phi_A], axis=-1)
+    if refinement > 1:
+        for nodes in np.unique(solved.nodes):
+            same = solved.nodes == nodes
+            finer = greenwood_tripp.solve(X[same], mu[same], rtol=rtol, nodes=refinement * int(nodes))
+            found[same] = np.stack([finer.phi_F, finer.phi_A], axis=-1)
+    return found
+
+
 class Kind:
-    def __init__(self, configuration: Configuration) -> None:
-        self.configuration = configuration
+    """A kind of table, computed by worker processes; the values are the same to the last bit."""
+
+    def __init__(self, configuration: Configuration, workers: int = 1) -> None:
+        self.configuration, self.workers = configuration, workers
         # accuracy of the islands that the table is made of: far below its target
         self.rtol = max(SOLVER_SHARE * configuration.target, greenwood_tripp.MIN_SOLVER_RTOL)
+
+    def phi(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+        """`phi` of arrays of any one shape, shape (..., 2)."""
+        flat = [np.ascontiguousarray(array, dtype=float).ravel() for array in (X, mu)]
+        parts = (slice(k, k + CHUNK) for k in range(0, flat[0].size, CHUNK))
+        jobs = [(flat[0][part], flat[1][part], rtol, refinement) for part in parts]
+        return np.concatenate([*results(label, phi, jobs, self.workers)]).reshape((*np.shape(X), 2))
+
+    def log_ratio(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+        """log(Phi/Phi_rigid) of arrays of any one shape, shape (..., 2)."""
+        rigid = np.moveaxis(greenwood_tripp.rigid_sphere(X, mu), 0, -1)
+        return np.asarray(np.log(self.phi(label, X, mu, rtol, refinement) / rigid))
 
     def visited_surfaces(self, count: int, ranges: dict[str, tuple[float, float]]) -> list[FloatArray]:
         """delta/h_rms, H and zeta_1 of `count` islands, low-discrepancy over the ranges."""

@@ -7,12 +7,10 @@ import click
 
 from generate.files import ROOT
 from generate.tables import height_coefficients
-from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
 from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
 from generate.tables.writing import write_table
-from generate.workers import executor
 from mbma_tables.common.errors import InputError
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
@@ -56,10 +54,9 @@ def tables(
     paths = [destination(what, configuration, out) for configuration in configurations]
     if what in ("all", "heights"):
         height_coefficients.main()
-    with executor(workers) as pool:
-        for configuration, path in zip(configurations, paths, strict=True):
-            content = KINDS[configuration.kind](configuration).build(ChunkedSolver(pool))
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_table(path, content)
-            errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
-            click.echo(f"{path}: {content.size}; largest held-out error {errors}; {path.stat().st_size} bytes")
+    for configuration, path in zip(configurations, paths, strict=True):
+        content = KINDS[configuration.kind](configuration, workers).build()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_table(path, content)
+        errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
+        click.echo(f"{path}: {content.size}; largest held-out error {errors}; {path.stat().st_size} bytes")

@@ -20,14 +20,13 @@ from threadpoolctl import threadpool_limits
 
 from generate.splines import coefficients, padding
 from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance
-from generate.tables.chunks import ChunkedSolver
 from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.island4d import at_places
+from mbma_tables.models.island4d import spline_of
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell
@@ -35,6 +34,7 @@ from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, Tab
 VISITED = {"hurst": (0.3, 1.0), "log10_zeta_1": (math.log10(3.001), 4.0), "log10_approach": (-8.0, 1.0)}
 COVER_TRIALS = 4096
 BLAS_THREADS = 2  # as when the shipped table was made
+ERROR_CELLS = 32  # of the error field along an axis; as many as the table's where those are fewer
 LOCAL_FLOOR = 0.8  # smallest bound, in units of the islands' tolerance
 LOCAL_FACTOR = 2.5  # bound over the largest error at the middles of the cells nearby
 
@@ -47,12 +47,11 @@ def from_axes(sphere: Any, hurst: Any) -> Any:
 
 def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
     """The table's spline at positions in node units, shape (entries, 2)."""
-    return at_places(coefs, np.stack(positions)).T
+    return np.asarray(spline_of(coefs)(np.stack(positions, axis=-1)))
 
 
-def error_cells(axis: Axis, largest: int = 32) -> int:
-    """Cells of the error field along an axis: as the nodes where those are few."""
-    return min(axis.nodes - 1, largest)
+def error_cells(axis: Axis) -> int:
+    return min(axis.nodes - 1, ERROR_CELLS)
 
 
 class Island4d(Kind):
@@ -62,18 +61,18 @@ class Island4d(Kind):
 
     # the spline's factors are rounded differently on another number of BLAS threads
     @threadpool_limits.wrap(limits=BLAS_THREADS)
-    def build(self, solver: ChunkedSolver) -> TableContent:
+    def build(self) -> TableContent:
         own = self.configuration
         axes = tuple(own.axis(name) for name in own.axes)
         grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
-        values = solver.log_ratio("island4d table", *self.arguments(*grid), rtol=self.rtol)
+        values = self.log_ratio("island4d table", *self.arguments(*grid), rtol=self.rtol)
         coefs = coefficients(values, DEGREE, len(axes))
-        certified = self.certify(axes, coefs, solver)
+        certified = self.certify(axes, coefs)
         content = TableContent(
             kind=ISLAND4D,
             axes=axes,
             coefficients=coefs,
-            local_error=self.local_errors(axes, coefs, solver),
+            local_error=self.local_errors(axes, coefs),
             auxiliary=self.auxiliary(axes, values),
             conformance=self.conformance(axes, coefs, self.held_out(axes, CONFORMANCE_POINTS, own.seed + 303)),
             attributes=self.attributes() | certified | own.attributes(),
@@ -86,24 +85,24 @@ class Island4d(Kind):
         spread = [axis.coordinate(d * (axis.nodes - 1)) for axis, d in zip(axes, box.T, strict=True)]
         return [np.concatenate(pair) for pair in zip(spread, self.manifold(count - count // 2), strict=True)]
 
-    def certify(self, axes: tuple[Axis, ...], coefs: FloatArray, solver: ChunkedSolver) -> dict[str, Any]:
+    def certify(self, axes: tuple[Axis, ...], coefs: FloatArray) -> dict[str, Any]:
         """Errors on held-out points, solved on twice the nodes that made the table."""
         places = self.held_out(axes, self.configuration.certificate_points, self.configuration.seed + 101)
         positions = [axis.position(x) for axis, x in zip(axes, places, strict=True)]
         if any((p == np.round(p)).any() for p in positions):
             raise UncertifiedError("island4d: a held-out point lies on a node")
-        truth = solver.log_ratio("certificate", *self.arguments(*places), rtol=self.rtol, refinement=2)
+        truth = self.log_ratio("certificate", *self.arguments(*places), rtol=self.rtol, refinement=2)
         errors = np.abs(np.expm1(evaluate(coefs, positions) - truth))
         return self.certificate(errors, {axis.name: x for axis, x in zip(axes, places, strict=True)})
 
-    def local_errors(self, axes: tuple[Axis, ...], coefs: FloatArray, solver: ChunkedSolver) -> FloatArray:
+    def local_errors(self, axes: tuple[Axis, ...], coefs: FloatArray) -> FloatArray:
         """Bounds on the error over a coarser grid, from the middle of every cell of the table."""
         cells = tuple(error_cells(axis) for axis in axes)
         middles = np.meshgrid(*(np.arange(axis.nodes - 1) + 0.5 for axis in axes), indexing="ij")
         positions = [middle.ravel() for middle in middles]
         places = [axis.coordinate(p) for axis, p in zip(axes, positions, strict=True)]
         rtol = max(0.1 * self.rtol, greenwood_tripp.MIN_SOLVER_RTOL)
-        truth = solver.log_ratio("local error", *self.arguments(*places), rtol=rtol)
+        truth = self.log_ratio("local error", *self.arguments(*places), rtol=rtol)
         where = tuple(error_cell(a, c, p) for a, c, p in zip(axes, cells, positions, strict=True))
         field = np.zeros((*cells, 2))
         np.maximum.at(field, where, np.abs(np.expm1(evaluate(coefs, positions) - truth)))

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
-from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance
-from generate.tables.chunks import ChunkedSolver, phi
+from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance, phi
 from generate.tables.writing import about, label
+from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
@@ -123,15 +123,12 @@ def cells_of(low: float, high: float, mu_high: float, aim: float, rtol: float) -
 class Universal(Kind):
     def strips(self) -> list[Strip]:
         """Ranges of X, each as wide as polynomials allow."""
-        X, mu_high, aim = (
-            self.configuration.axes["X"],
-            self.configuration.axes["mu"].high,
-            AIM * self.configuration.target,
-        )
+        X, mu = (self.configuration.axes[name] for name in ("X", "mu"))
         strips, low, width = list[Strip](), X.low, 1
 
         def strip(steps: int) -> Strip:
-            return Strip(low, min(low + steps / X_STEPS, X.high), mu_high, aim, self.rtol)
+            high = min(low + steps / X_STEPS, X.high)
+            return Strip(low, high, mu.high, AIM * self.configuration.target, self.rtol)
 
         while low < X.high:
             widest = math.ceil((X.high - low) * X_STEPS)
@@ -147,9 +144,9 @@ class Universal(Kind):
             low = strips[-1].high
         return strips
 
-    def build(self, solver: ChunkedSolver) -> TableContent:
-        own = self.configuration
-        rows = np.concatenate(solver.map("cells", cells_of, [dataclasses.astuple(strip) for strip in self.strips()]))
+    def build(self) -> TableContent:
+        own, jobs = self.configuration, [dataclasses.astuple(strip) for strip in self.strips()]
+        rows = np.concatenate([*results("cells", cells_of, jobs, self.workers)])
         if len(rows) * TERMS**2 > own.max_nodes:
             raise UncertifiedError(
                 f"universal: an error of {own.target:.1e} needs {len(rows) * TERMS**2} coefficients, more than the "
@@ -169,7 +166,7 @@ class Universal(Kind):
         table = np.stack(UniversalModel(content).answer(X, mu)[:2])
         points = conformance({"X": X, "mu": mu}, X, mu, table, 1.0, 0.0)
         known = about(UNIVERSAL) | {"variant": "any", "variant_numbers": "[]"} | own.attributes()
-        attributes = known | self.certify(content, solver)
+        attributes = known | self.certify(content)
         return self.checked(dataclasses.replace(content, conformance=points, attributes=attributes))
 
     def held_out(self, content: TableContent, count: int, seed: int) -> list[FloatArray]:
@@ -180,10 +177,10 @@ class Universal(Kind):
         box = [X_at(2 * x - 1, X_low, X_high), mu_at(2 * y - 1, mu_low, mu_high)]
         return [np.concatenate(pair) for pair in zip(box, self.manifold(count - count // 2), strict=True)]
 
-    def certify(self, content: TableContent, solver: ChunkedSolver) -> dict[str, Any]:
+    def certify(self, content: TableContent) -> dict[str, Any]:
         """Errors on held-out points, solved on twice the nodes that made the table."""
         X, mu = self.held_out(content, self.configuration.certificate_points, self.configuration.seed + 101)
-        truth = solver.phi("certificate", X, mu, rtol=self.rtol, refinement=2)
+        truth = self.phi("certificate", X, mu, rtol=self.rtol, refinement=2)
         errors = np.abs(np.stack(UniversalModel(content).answer(X, mu)[:2], axis=-1) / truth - 1)
         return self.certificate(errors, {"X": X, "mu": mu})
 
@@ -207,19 +204,20 @@ class Universal(Kind):
         X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1][:, None] for name in CELL_EDGES)
         x, y = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(-0.99, 0.99, 5)]))
         X, mu = X_at(x, X_low, X_high).ravel(), mu_at(y, mu_low, mu_high).ravel()
-        value, by_X, by_mu = UniversalModel(content).slopes(X, mu)
-        found = np.stack([value.phi_F, value.phi_A])
+        answer = UniversalModel(content).answer
+        found = np.stack(answer(X, mu)[:2])
+        beside = X_at(x + 1e-3, X_low, X_high).ravel(), mu_at(y + 1e-3, mu_low, mu_high).ravel()
+        more_X, more_mu = (np.stack(answer(*place)[:2]) for place in ((beside[0], mu), (X, beside[1])))
         rigid = greenwood_tripp.rigid_sphere(X, mu)
-        still = greenwood_tripp.rigid_sphere(X, np.ones(X.size))
-        at_zero = UniversalModel(content).slopes(X, np.zeros(X.size))
-        limit = np.stack([at_zero[2].phi_F, at_zero[0].phi_A]) / still - 1
+        rigid_limit = X, np.full(X.size, SMALLEST_MU)
+        limit = np.stack(answer(*rigid_limit)[:2]) / greenwood_tripp.rigid_sphere(*rigid_limit) - 1
         target = self.configuration.target
         rules = {
             "force and area finite and positive": (np.isfinite(found) & (found > 0)).all(),
             "force and area no larger than a rigid sphere's": (found <= (1 + target) * rigid).all(),
-            "force increasing in X": (by_X.phi_F > 0).all(),
-            "area increasing in X": (by_X.phi_A > 0).all(),
-            "force increasing in mu": (by_mu.phi_F > 0).all(),
+            "force increasing in X": (more_X > found)[0].all(),
+            "area increasing in X": (more_X > found)[1].all(),
+            "force increasing in mu": (more_mu > found)[0].all(),
             "rigid limit at mu = 0": (np.abs(limit) <= target).all(),
         }
         self.require(rules)

@@ -26,8 +26,7 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
 from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import QUANTITIES, AnyModel
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.labels import apply_to_surface
+from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import OPTIONS, THEORIES, default_theory, get_theory, theory_name
 from mbma_tables.theories.mbma import Mbma
@@ -66,20 +65,20 @@ def contact(
     mean_separation : array_like
         u = (h_max + d)/2 (50) [length].
     pressure : array_like
-        F/A0 in the unit of `E_star`, or with its own; the solution is on the branch of first contact.
+        F/A0 in the unit of `E_star`, or as text with its own; on the branch that begins at first contact.
     area : array_like
-        A/A0, likewise.
+        A/A0, on the same branch.
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
         `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or
         where an option of MBMA is given; "corrected" for one given by a map of at most
         2^18 points whose wavelengths are resolved, and "calibrated" otherwise.
     hardness : array_like or str, optional
-        Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1), or a
-        text that `mbma_tables.materials.hardness` reads: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
+        Largest pressure p_m that the softer body supports, in the unit of `E_star` (over E* if that is 1), or a text
+        that `mbma_tables.materials.hardness` accepts: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
         theory's elastic result is corrected by `mbma_tables.laws.hardness`; u is then the mean gap with yielded points
-        flattened. By default that of the softer of `materials`; infinite, or without either: nothing yields, and the
-        result is not `valid` where the metals named, or any, would.
+        flattened. Default: that of the softer of `materials`, or infinite. If it is infinite, nothing yields, and
+        results at which the named metals (without names: all metals) would yield are not `valid`.
     materials : str, pair of str, optional
         Metals in contact, one of `mbma_tables.materials.METALS` each, or `Metal` objects; in place of `E_star`.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
@@ -88,11 +87,11 @@ def contact(
     variant : {"reported", "printed", "fitted"} or Variant
         Variant of the paper's equations in MBMA.
     E_star : array_like or str
-        Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit, which "100 GPa" names.
+        Effective modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, or text with its unit, "100 GPa"; pressure is in it.
     rtol : float
-        Requested relative error of MBMA's sums, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
+        Requested relative error of MBMA's sums, in [1e-11, 0.1]; `error` includes that of a table.
     outside : {"raise", "exact", "nan"}
-        For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
+        For islands outside MBMA's table: raise an error, use the exact solver, or return NaN.
 
     Returns
     -------
@@ -250,22 +249,15 @@ def _of_labelled(
     surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source
 ) -> dict[str, Any]:
     """Fields of `contact` of DataArrays, lazily where they are."""
-    units = source.units
-    names = (*(("separation", "mean_separation") if by in QUANTITIES else ()), *QUANTITIES, "error")
+    names = ("separation", "mean_separation", *QUANTITIES, "error")
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
         _, found = _contact(block, asked, modulus, cap, by, source)
         return tuple(found[name] for name in names)
 
     outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star, "hardness": hardness}, len(names))
-    fields: dict[str, Any] = {name: named(found, name, units) for found, name in zip(outputs, names, strict=True)}
-    fields["islands"] = None
-    # the given quantity keeps its name and attributes
-    lowest, highest = (value, value) if source.theory.ends_at_h_max else (-np.inf, np.inf)
-    if by == "separation":
-        average = np.maximum((surface.h_max + value) / 2, lowest)
-        fields |= {by: value, "mean_separation": named(average, "mean_separation", units)}
-    elif by == "mean_separation":
-        gap = np.minimum(2 * value - surface.h_max, highest)
-        fields |= {by: value, "separation": named(gap, "separation", units)}
-    return fields
+    fields: dict[str, Any] = {
+        name: named(found, name, source.units) for found, name in zip(outputs, names, strict=True)
+    }
+    # a separation keeps its name and attributes
+    return fields | {"islands": None} | ({} if by in QUANTITIES else {by: value})

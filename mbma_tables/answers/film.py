@@ -16,7 +16,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import unit_of
 from mbma_tables.laws.calibrated import TESTED_AREA
-from mbma_tables.laws.film import LAY, OPEN, SHEAR, WIDEST_LAY, factors
+from mbma_tables.laws.lay import LAY, OPEN, SHEAR, WIDEST_LAY, factors
 from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.materials import Metal, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -43,7 +43,7 @@ class FlowFactors(Displayed):
     phi_x: FloatArray = quantity("pressure flow factor along x; flow is -phi u^3/(12 viscosity) dp/dx")
     phi_y: FloatArray = quantity("pressure flow factor along y")
     # of two rough faces they add, weighted by their shares of h_rms^2 and signed (Patir and Cheng 1979)
-    shear_x: FloatArray = quantity("shear flow factor phi_s along x; that of the sliding face's roughness")
+    shear_x: FloatArray = quantity("shear flow factor phi_s along x; due to the roughness of the sliding face")
     shear_y: FloatArray = quantity("shear flow factor phi_s along y")
     pressure: FloatArray = quantity("asperity pressure F/A0 [stress]")
     area: FloatArray = quantity("real over nominal contact area")
@@ -90,11 +90,11 @@ def flow_factors(
 ) -> FlowFactors:
     """Pressure and shear flow factors and asperity pressure at mean gaps, for average Reynolds equations.
 
-    Before contact the factors are those of an effective medium of Gaussian gaps, in contact of that of the leakage law
-    (`mbma_tables.laws.film`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
+    Before contact the factors are those of an effective medium of Gaussian gaps, in contact those of the leakage law
+    (`mbma_tables.laws.lay`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
 
-    With ``theory="simulated"`` they are those of the surface's own map: Reynolds' equation on its gaps, which boundary
-    elements deform in contact, at knots of u (half a minute for 256 x 256 points).
+    With ``theory="simulated"`` they are those of the surface's own map: Reynolds' equation is solved on its gaps, in
+    contact those of a BEM simulation, at several mean gaps (half a minute for 256 x 256 points).
 
     Parameters
     ----------
@@ -103,8 +103,8 @@ def flow_factors(
     mean_separation : array_like or str
         u [length], from 0.2 to 50 h_rms; above h_max there is no contact.
     peklenik : float, optional
-        Length of the roughness along x over that along y, from 1/8.5 to 8.5. By default that of the map, x its first
-        axis; of a spectrum with an anisotropy that, x along the lay; else 1, isotropic. Not of a simulated map.
+        Length of the roughness along x over that along y, from 1/8.5 to 8.5. Default: that of the map, x being its
+        first axis, or of the spectrum, x being along the lay, else 1 (isotropic). Not accepted for a simulated map.
     theory, E_star, hardness, materials : optional
         As for `contact`; the theory is "calibrated" by default.
 

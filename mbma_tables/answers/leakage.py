@@ -1,9 +1,4 @@
-"""Leakage of a contact: its flow coefficient with uncertainty, and leakage rates of liquids.
-
-The contact factor R of self-affine surfaces is from a table of ln R of `laws.effective_medium` over Hurst exponent,
-ln zeta_1 and ln A/(Ac - A). Below the smallest tabulated contact ln R is proportional to A^m, as the obstruction is;
-above the largest R is a power of Ac - A.
-"""
+"""Leakage of a contact: flow coefficient with uncertainty, by a table of `laws.effective_medium`, and leakage rates."""
 
 import dataclasses
 import functools
@@ -21,7 +16,7 @@ from mbma_tables.common.units import unit_of
 from mbma_tables.core import core, in_blocks
 from mbma_tables.laws.calibrated import Spectrum, self_affine_law, spectrum_of
 from mbma_tables.laws.effective_medium import LARGEST_AREA, FlowConstants, contact_factor, wide_gap
-from mbma_tables.surfaces.labels import agree
+from mbma_tables.surfaces.any_surface import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, known_at, nodes_of, shipped_part
 from mbma_tables.theories.mbma import Mbma
@@ -285,6 +280,7 @@ def shipped_flow() -> FlowTable:
 @np.errstate(all="ignore")
 def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
     """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
+    # below the table ln R is in proportion to A^obstruction, above it R is a power of threshold - A/A0
     numbers, found = given[1], np.empty(u.shape)
     threshold, obstruction, first = numbers[10], numbers[11], numbers[2]
     last = first + given[2][2] / numbers[5]

@@ -8,7 +8,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.common.plots import new_figure, theory_label
-from mbma_tables.surfaces.areal import areal_parameters
+from mbma_tables.surfaces.roughness import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory

@@ -79,7 +79,7 @@ def sensitivity(
     surface : Surface
         One surface. Its parameters are its five numbers, or those of the drawing that it was made from
         (`Surface.from_roughness`). Those of one given by a spectrum are "heights" and "lengths", factors of all
-        heights and of all lengths along the plane, as calibrations of an instrument are; h_max alone; the
+        heights and of all lengths along the plane, like an instrument's calibration factors; h_max alone; the
         "shortest" and "longest" wavelengths, cut-offs that only remove wavelengths, and with an extrapolated spectrum
         its exponent "extrapolate_hurst". Where the calibrated law uses a map's own heights and curves, h_max and
         cut-offs are left out: they follow from the map.
@@ -88,8 +88,8 @@ def sensitivity(
     E_star : float or str
         Effective modulus, as for `contact`.
     theory, island_model, variant, rtol, hardness, materials : optional
-        As for `contact`, but for maps "calibrated" by default, as a simulation is of one surface only; a hardness is
-        one of the parameters.
+        As for `contact`, but for maps "calibrated" by default, since a simulation applies to one surface only; a
+        hardness is one of the parameters.
 
     Returns
     -------

@@ -20,8 +20,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import shown
 from mbma_tables.common.units import Units, factor, unit_of
 from mbma_tables.materials import ELASTIC_PSI, HARDEST, Pair
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.labels import apply_to_surface
+from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 if TYPE_CHECKING:

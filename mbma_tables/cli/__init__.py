@@ -42,7 +42,7 @@ class Program(click.Group):
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run, and exit with 0, with 2 for bad input, or with 130 where it was interrupted."""
         words = list(sys.argv[1:] if args is None else args)
-        extra["standalone_mode"] = False
+        extra |= {"standalone_mode": False, "obj": words}
         warnings.showwarning = _show_warning
         try:
             with progress.shown("starting"):

@@ -83,7 +83,6 @@ def _leakage(answer: Contact) -> dict[str, Any]:
 
 @click.command("curve", short_help="Pressure and area from first contact to full compression.")
 @click.option("--points", type=click.IntRange(min=MIN_POINTS), default=41, show_default=True, help="How many gaps.")
-@click.option("--compare", is_flag=True, help="Add all other theories, and Persson's simplified form.")
 @options.leakage_option
 @options.plot_option
 @options.specimen_options
@@ -91,7 +90,6 @@ def _leakage(answer: Contact) -> dict[str, Any]:
 @options.output_options
 def curve_command(
     points: int,
-    compare: bool,
     leakage: bool,
     plot: Path | None,
     specimen: Specimen,
@@ -110,7 +108,6 @@ def curve_command(
     options.check_plot(plot, output.out)
     from mbma_tables.answers.contact import contact
     from mbma_tables.common import plots
-    from mbma_tables.scenes.problem import COMPARED
     from mbma_tables.scenes.run import other_theory
 
     model, surface = model.of(specimen.surface), specimen.surface
@@ -125,28 +122,19 @@ def curve_command(
     gap = np.concatenate([[surface.h_max], inner, gap[-1:]])
     answer = contact(surface, separation=gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
-    units = {}
-    others = {
-        name: other_theory(name, surface, gap, modulus, asked.get("hardness", math.inf))
-        for name in COMPARED
-        if name != model.theory and (compare or (plot is not None and name in DRAWN))
-    }
-    for theory, line in others.items() if compare else ():
-        for quantity in ("pressure", "area"):
-            values[f"{theory}_{quantity}"] = getattr(line, quantity)
-            units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
     picture = b""
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
         own = np.asarray(answer.mean_separation / surface.h_rms)
         curves = [answer.curve(leakage)]
-        for name, line in others.items():
+        for name in (name for name in DRAWN if name != model.theory):
+            line = other_theory(name, surface, gap, modulus, asked.get("hardness", math.inf))
             known = np.isfinite(line.pressure)
             curves.append(plots.Curve(plots.theory_label(name), own[known], *(field[known] for field in line)))
         labels = plots.pressure_label(unit_of("pressure", specimen.units))
         flow = plots.leakage_label(unit_of("leakage", specimen.units))
         picture = plots.to_picture(plots.draw_compression(curves, title, labels, leakage_label=flow), plot.suffix[1:])
-    report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
+    report_answer("curve", specimen, model, answer, values).write(output, plot, picture)
 
 
 @click.command("sensitivity", short_help="Sensitivity of results to each parameter.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbma_tables.cli import options
-from mbma_tables.common.arguments import nearest
+from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file, write_file
 from mbma_tables.common.progress import echo
@@ -26,23 +26,8 @@ MAX_BYTES = 1 << 30  # of an input file
 DEFAULTS = {"variant": "reported", "leakage": False, "check": False}
 
 
-class _Target(click.ParamType[str]):
-    """One of the targets; for an unknown name the error suggests the nearest."""
-
-    name = "target"
-
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        if value not in names():
-            self.fail(f"no target is called {value!r}: {nearest(value, names())}", param, ctx)
-        return value
-
-
 class _Export(click.Command):
     """The command, whose help lists the targets."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        ctx.meta["words"] = tuple(args)
-        return super().parse_args(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         formatter.write_paragraph()
@@ -50,7 +35,7 @@ class _Export(click.Command):
 
 
 @click.command("export", cls=_Export, short_help="A contact law, or the whole model, for other codes.")
-@click.argument("target", metavar="TARGET", type=_Target())
+@click.argument("target", metavar="TARGET")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @options.optional_specimen_options
 @click.option("--rows", type=int, help="Number of rows of a table; else as few as --rtol needs.")
@@ -92,6 +77,7 @@ def export_command(target: str, out: Path, **values: Any) -> None:
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
+    require_name("target", target, names())
     given = {name: value for name, value in values.items() if value is not None and value != DEFAULTS.get(name)}
     kind, code = targets()[target], target in group("CODE")
     words = {"specimen": "the surface", "kappa": "--nu"}
@@ -117,9 +103,9 @@ def export_command(target: str, out: Path, **values: Any) -> None:
     inputs = [ctx.params[key] for key in ("file", "map") if ctx.params[key]]
     for path in [path for path in inputs if path.suffix == ".toml"]:
         table = tomllib.loads(read_file(path, MAX_BYTES).decode()).get("surface", {})
-        inputs += [path.parent / table[name] for name in ("map", "psd") if name in table]
+        inputs += [path.parent / table["map"]] if "map" in table else []
     digests = (f"input {path}: sha256 {hashlib.sha256(read_file(path, MAX_BYTES)).hexdigest()}" for path in inputs)
-    joint["made_by"] = *digests, written_by(ctx.meta["words"])
+    joint["made_by"] = *digests, written_by(ctx.obj[1:])
     if kind.rows:
         name = {"name": out.stem} if kind.end else {"name": given.pop("name")} if "name" in given else {}
         files = kind.files(_rows(kind, joint | given), **name)

@@ -18,8 +18,8 @@ from mbma_tables.models import ISLAND_MODELS
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.roughness import ROUGHNESS
+from mbma_tables.surfaces.self_affine import CASES
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import OF_MAPS, THEORIES
 

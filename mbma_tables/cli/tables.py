@@ -1,4 +1,4 @@
-"""`mbma tables`: list tables, show their contents, verify their files; and `mbma cache`, stored simulations."""
+"""`mbma tables`: show the contents of tables and verify their files; and `mbma cache`, stored simulations."""
 
 import json
 from collections.abc import Iterable
@@ -11,9 +11,8 @@ from mbma_tables.cli.options import json_option
 from mbma_tables.common import cache
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.progress import echo
-from mbma_tables.tablefiles.own import ADVICE, holds_own, read_own
-from mbma_tables.tablefiles.own import KIND as OWN
-from mbma_tables.tablefiles.schema import FUNCTIONS, KINDS, UNIVERSAL, TableContent
+from mbma_tables.tablefiles.netcdf import OWN, OWN_REMEDY, holds_own, read_own, read_table
+from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 
 FAITHFUL = 1e-6  # relative, of an own table's curves at the loads they go through
 
@@ -27,38 +26,13 @@ def _place(name: str) -> tuple[Path, str | None]:
     return (shipped(name), name) if name in KINDS else (Path(name), None)
 
 
-def _read(name: str) -> TableContent:
-    from mbma_tables.tablefiles.netcdf import read_table
-
-    return read_table(*_place(name))
-
-
 def _show(content: Any, lines: Iterable[str], as_json: bool) -> None:
     echo(json.dumps(content, indent=2) if as_json else "\n".join(lines))
 
 
 @click.group("tables", no_args_is_help=False)
 def tables_group() -> None:
-    """List, describe and check tables."""
-
-
-@tables_group.command("list")
-@json_option("lines")
-def list_command(as_json: bool) -> None:
-    """Kind, size, nodes and largest held-out error of the shipped tables."""
-    rows, lines = [], []
-    for kind in KINDS:
-        (path, _), content = _place(kind), _read(kind)
-        errors = {f: content.attributes[f"largest_error_{f}"] for f in FUNCTIONS}
-        row = {"kind": kind, "path": str(path), "bytes": path.stat().st_size, "size": content.size}
-        row |= {name: content.attributes[name] for name in ("variant", "data_version")}
-        rows.append(row | {"largest_error": errors})
-        largest = ", ".join(f"{f} {error:.2g}" for f, error in errors.items())
-        text = (
-            "{kind}: {size}; variant {variant}; largest held-out error {largest}; {bytes} bytes; data {data_version}; "
-        )
-        lines.append(f"{text.format(**row, largest=largest)}{path}")
-    _show({"tables": rows}, lines, as_json)
+    """Describe and check tables."""
 
 
 def _verified(table: str) -> tuple[dict[str, Any], str]:
@@ -74,7 +48,7 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
         answer = theory.answer(theory.surface, theory.rows[2])
         error, loads = float(np.abs(np.array(answer[:2]) / theory.rows[:2] - 1).max()), theory.rows.shape[1]
         if not error <= FAITHFUL:
-            raise TableFileError(f"{table}: its curves miss its simulated loads by {error:.1e}; {ADVICE}")
+            raise TableFileError(f"{table}: its curves miss its simulated loads by {error:.1e}; {OWN_REMEDY}")
         found: dict[str, Any] = {"path": table, "kind": OWN, "points": loads, "table_error": error}
         return found, f"{table}: hashes match; {loads} simulated loads: curves within {error:.1e}"
     v = verify(*_place(table))
@@ -94,7 +68,7 @@ def info_command(table: str, as_json: bool) -> None:
         kind, entries = "variables", {name: [float(v.min()), float(v.max())] for name, v in values.items()}
         lines = [f"variable {name}: {values[name].size} numbers, {a:g} to {b:g}" for name, (a, b) in entries.items()]
     else:
-        content = _read(table)
+        content = read_table(*_place(table))
         kind, attributes = "axes", content.attributes
         entries = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
         # the universal table has cells, not nodes

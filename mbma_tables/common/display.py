@@ -107,14 +107,14 @@ class Displayed:
         return f"{table}<img src='data:image/png;base64,{picture}'></div>"
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """A picture of it, kept under `path` where that is given ("name.svg", .pdf, .png); notebooks show the figure.
+        """Plot the quantities and return the figure; with `path` ("name.svg", .pdf, .png) it is also saved.
 
         Raises
         ------
         InputError
-            Where there is no curve to draw, as of a single contact, or no such kind of picture.
+            If there is no curve to draw, as for a single contact, or the kind of file is unknown.
         MbmaError
-            Where matplotlib is missing.
+            If matplotlib is not installed.
         """
         figure = self._figure()
         if path is not None:
@@ -125,17 +125,20 @@ class Displayed:
         return figure
 
     def to_dataset(self) -> xr.Dataset:
-        """Its quantities as an xarray Dataset, each with unit and description."""
-        needed("xarray")
-        import xarray as xr
+        """The quantities as an xarray Dataset, with units and descriptions."""
+        return dataset_of(self._variables(), {**self._facts(), **self._origin()})
 
-        variables = {}
-        for name, (values, unit, meaning, dims) in self._variables().items():
-            described = {"units": unit} | ({"long_name": meaning} if meaning else {})
-            if is_labelled(values):
-                variables[name] = values.assign_attrs(described)
-                continue
-            rank = np.ndim(values)
-            own = dims if dims is not None else ("point",) if rank == 1 else tuple(f"dim_{k}" for k in range(rank))
-            variables[name] = xr.Variable(own, values, described)
-        return xr.Dataset(variables, attrs={**self._facts(), **self._origin()})
+
+def dataset_of(variables: Mapping[str, Variable], facts: Mapping[str, str]) -> xr.Dataset:
+    """An xarray Dataset of variables, with facts as its attributes."""
+    xarray, made = needed("xarray"), {}
+    for name, (values, unit, meaning, dims) in variables.items():
+        described = {"units": unit} | ({"long_name": meaning} if meaning else {})
+        if is_labelled(values):
+            made[name] = values.assign_attrs(described)
+            continue
+        rank = np.ndim(values)
+        own = dims if dims is not None else ("point",) if rank == 1 else tuple(f"dim_{k}" for k in range(rank))
+        made[name] = xarray.Variable(own, values, described)
+    dataset: xr.Dataset = xarray.Dataset(made, attrs=dict(facts))
+    return dataset

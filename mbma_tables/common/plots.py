@@ -65,16 +65,13 @@ def new_figure(width: float, height: float) -> Figure:
     return made
 
 
-def draw_lines(lines: Mapping[str, tuple[Any, Any]], x_label: str, y_label: str, scale: str = "log") -> Figure:
-    """Lines (x, y) by their names, on axes of one scale; names are left out where there is one line."""
+def draw_line(x: Any, y: Any, x_label: str, y_label: str) -> Figure:
+    """One line on logarithmic axes."""
     figure = new_figure(5.5, 4)
     axes = figure.subplots()
-    for name, (x, y) in lines.items():
-        axes.plot(x, y, label=name)
-    axes.set(xlabel=x_label, ylabel=y_label, xscale=scale, yscale=scale)
+    axes.loglog(x, y)
+    axes.set(xlabel=x_label, ylabel=y_label)
     axes.grid(True, which="major", alpha=0.3)
-    if len(lines) > 1:
-        axes.legend()
     return figure
 
 

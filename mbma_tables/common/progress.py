@@ -11,13 +11,13 @@ import click
 PATIENCE = 2.0  # seconds before the first display
 WIPE = "\r\x1b[K"
 
-_ended = threading.Event()
-_state = {"doing": "working"}
+_doing = ["working"]  # the innermost task last
+_ended, _visible = threading.Event(), threading.Event()
 
 
 def doing(what: str) -> None:
     """Set the text of the progress line, which is shown if the task takes long."""
-    _state["doing"] = what
+    _doing[-1] = what
 
 
 def echo(text: object, nl: bool = True, err: bool = False) -> None:
@@ -32,20 +32,17 @@ def shown(what: str) -> Iterator[None]:
 
     Within another such call, only the text changes until its end.
     """
-    before, thread = _state["doing"], None
-    doing(what)
-    if "running" not in _state and sys.stderr.isatty():
+    _doing.append(what)
+    thread = threading.Thread(target=_beat, args=(time.monotonic(),), daemon=True)
+    outermost = len(_doing) == 2 and sys.stderr.isatty()
+    if outermost:
         _ended.clear()
-        _state.pop("shown", None)
-        _state["running"] = "yes"
-        thread = threading.Thread(target=_beat, args=(time.monotonic(),), daemon=True)
         thread.start()
     try:
         yield
     finally:
-        doing(before)
-        if thread is not None:
-            _state.pop("running", None)
+        _doing.pop()
+        if outermost:
             _end()
             thread.join()
 
@@ -54,12 +51,13 @@ def _beat(start: float) -> None:
     wait = PATIENCE
     while not _ended.wait(wait):
         wait = 0.5
-        _state["shown"] = "yes"
-        text = f"{WIPE}mbma: {_state['doing']}, {time.monotonic() - start:.0f} s (Ctrl-C ends it)"
+        _visible.set()
+        text = f"{WIPE}mbma: {_doing[-1]}, {time.monotonic() - start:.0f} s (Ctrl-C ends it)"
         click.echo(text, err=True, nl=False)
 
 
 def _end() -> None:
     _ended.set()
-    if _state.pop("shown", None):
+    if _visible.is_set():
+        _visible.clear()
         click.echo(WIPE, err=True, nl=False)

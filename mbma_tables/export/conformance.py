@@ -27,7 +27,6 @@ FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
-    "slopes": "X, mu; the same, phi_F by X, phi_F by mu, phi_A by X, phi_A by mu",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness, error",
     "status": "X, mu; the status",
@@ -60,14 +59,8 @@ def rows(kind: str, arguments: Iterable[Any], answers: Any, scales: Any = None, 
         yield ",".join((kind, *map(repr, (most, len(own), *own, *numbers))))
 
 
-def island_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Rows:
-    """Slopes at flat (X, mu) by the compiled runtime, and the closed form where they lie in its range."""
-    values, by_X, by_mu = model.slopes(X, mu)
-    slopes = np.stack([by_X.phi_F, by_mu.phi_F, by_X.phi_A, by_mu.phi_A])
-    # where a derivative changes sign, its error is taken relative to value/argument
-    places, numbers = np.array([X, mu, X, mu]), np.array([values.phi_F, values.phi_F, values.phi_A, values.phi_A])
-    scales = np.maximum(np.abs(slopes), np.where(places > 0, np.abs(numbers / np.maximum(places, 1e-300)), 0.0))
-    yield from rows("slopes", (X, mu), (*values, *slopes), (*values, *scales))
+def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
+    """The closed form at flat (X, mu) that lie in its range."""
     functions, form = FUNCTIONS[FORM], RANGES[FORM]
     (X_low, X_high), (_, mu_high) = form["X"], form["mu"]
     place = np.array([X, mu])[:, (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)]
@@ -101,7 +94,7 @@ def surface_rows(
 
 
 def points_text(model: UniversalModel, variant: Variant) -> str:
-    """The points' file: the table's own, and the runtime's slopes, islands, totals, refusals and calibrated law."""
+    """The points' file: the table's own, and the runtime's islands, totals, refusals and calibrated law."""
     points, (X, mu) = model.content.conformance, model.content.axes
     places = points["X"], points["mu"]
     head = [
@@ -112,7 +105,7 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
     ]
     # with the results and tolerances that are stored in the table
     known = points["table_F"], points["table_A"], model.answer(*places).error
-    lines = [*rows("phi", places, known, None, points["tolerance"]), *island_rows(model, *places)]
+    lines = [*rows("phi", places, known, None, points["tolerance"]), *formula_rows(*places)]
     middle = 0.5 * (X.low + X.high)
     statuses = {(X.low, 1.0): OK, (X.high, 1.0): OK, (middle, mu.high): OK, (middle, 0.0): OK}
     statuses |= {(np.nextafter(X.low, -np.inf), 1.0): X_BELOW, (np.nextafter(X.high, np.inf), 1.0): X_ABOVE}

@@ -198,7 +198,7 @@ def text_of(target: str, asked: AskedLaw, template: str = "") -> str:
 def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[str, str]:
     """Numbers of a law by their placeholders."""
     write: dict[type, Any] = {int: str, float: language.number, np.ndarray: language.array}
-    texts = {what: write[type(value)](value) for what, value in numbers.items()}
+    texts = {what: write[float if isinstance(value, float) else type(value)](value) for what, value in numbers.items()}
     return {
         f"{prefix}{what}".upper(): text for what, text in (texts | {"records": str(len(numbers["centre"]))}).items()
     }

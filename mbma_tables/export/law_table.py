@@ -18,7 +18,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, number_in, whole_number_in
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_lines
+from mbma_tables.common.plots import draw_line
 from mbma_tables.export.text import DIGITS, number
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class LawTable(Displayed):
 
     def _figure(self) -> Figure:
         labels = (f"{name} [{unit}]" for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit)))
-        return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
+        return draw_line(self.x[1:], self.y[1:], *labels)
 
 
 def chosen_rows(

@@ -22,8 +22,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.surfaces.power_laws import Place
-from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, moment_of, summit_rate
+from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, Place, alpha_of, moment_of, summit_rate
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import Variant
 

@@ -1,7 +1,4 @@
-"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses, from one record each.
-
-A record has the polynomials of a stretch of gaps and is found from the bits of the gap (`core/law.c`).
-"""
+"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses, by `core/law.c`."""
 
 from __future__ import annotations
 
@@ -24,7 +21,7 @@ from mbma_tables.law import block as at
 from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.law.derived import Derived
 from mbma_tables.materials import Pair
-from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 if TYPE_CHECKING:
     from scipy import LowLevelCallable
@@ -99,7 +96,7 @@ class ContactLaw(Law, Derived, Displayed):
         return self.block[self.block.view(np.int64)[at.RECORDS] :].reshape(-1, at.RECORD)
 
     def separations(self, mean_separation: Any = None, separation: Any = None) -> FloatArray:
-        """Separations d, checked, of mean separations or of separations, one of them."""
+        """Separations d, checked, from either mean separations or separations."""
         return self._in_range(*self._known(mean_separation, separation))[1]
 
     def _known(self, mean_separation: Any, separation: Any) -> tuple[str, Any]:
@@ -125,8 +122,6 @@ class ContactLaw(Law, Derived, Displayed):
     def _ask(self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]) -> Any:
         """Result of `fill`, in blocks, if it reports that all is in range; else `check` raises."""
         if is_labelled(given):
-            from mbma_tables.surfaces.labels import apply
-
             return apply(lambda block: self._ask(block, count, check, fill), (given,), count)
         # entries of plain arrays are checked during evaluation
         plain = type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
@@ -168,7 +163,7 @@ class ContactLaw(Law, Derived, Displayed):
         return LawValues(*self._values(("pressure", "area", "stiffness", "energy"), mean_separation, separation))
 
     def separation(self, *, pressure: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
-        """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero.
+        """Separation d at a pressure or area, on the branch of first contact; h_max at zero, if contact ends there.
 
         Raises
         ------
@@ -262,7 +257,7 @@ class ContactLaw(Law, Derived, Displayed):
         return {name: Variable(value, unit_of(name, self.units), MEANINGS[name]) for name, value in values.items()}
 
     def compiled(self, quantity: str = "pressure") -> LowLevelCallable:
-        """A quantity at a separation as a function of C, ``double (double, void *)``, which scipy calls without Python.
+        """A quantity as a C function of the separation, ``double (double, void *)``, which scipy calls without Python.
 
         Parameters
         ----------
@@ -271,7 +266,7 @@ class ContactLaw(Law, Derived, Displayed):
         Returns
         -------
         scipy.LowLevelCallable
-            NaN outside the law. For other callers of C, `function` is a ctypes function and `user_data` its last
+            NaN outside the range. For other C callers, `function` is a ctypes function and `user_data` its last
             argument, which keeps the law alive.
 
         Examples

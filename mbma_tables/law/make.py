@@ -60,8 +60,8 @@ def contact_law(
         As for `contact`.
     rtol : float
         Requested relative error of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; for
-        other theories at least a tenth of their own error, the median over gaps, or all of it where their answers are
-        not smooth below it.
+        other theories not below a tenth of their own error (its median over gaps), or not below that error where their
+        results are not smooth within it.
     island_model, variant, E_star : optional
         As for `contact`.
     hardness, materials : optional

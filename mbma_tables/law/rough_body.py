@@ -30,7 +30,7 @@ MOMENTS = 128  # nodes of the effective radius
 POINTS = 101  # points of a profile
 COUNTED = 0.1  # share of the force above which a reason against the layer's law applies
 # c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the width of the contact over the
-# mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate.rough_spheres`
+# mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate rough_spheres`
 CELLS, NARROWEST = (0.62, 0.8), 1.5
 WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 
@@ -57,14 +57,14 @@ class RoughContact(Displayed):
     position: FloatArray = quantity("distance from the middle [length]; up to the last contact")
     pressure: FloatArray = quantity("mean pressure [stress]")
     mean_separation: FloatArray = quantity("mean separation of the deformed faces [length]")
-    error: Numbers = quantity("estimate of the relative numerical error of force; with that of the layer's law")
+    error: Numbers = quantity("estimate of the relative numerical error of force; including that of the layer's law")
     scatter: Numbers = quantity(
-        "standard deviation of ln F at the approach; of the layer's model uncertainty, and from place to place on the "
-        "faces, whose mean plane below a narrow contact is uncertain"
+        "standard deviation of ln F at the approach; from the model uncertainty of the layer's law, and from the mean "
+        "plane below the contact, which depends on the place on the faces"
     )
     valid: Any = quantity(
-        "whether the law was tested for such contacts; where nine tenths of the force are, and the contact is wider "
-        "than 1.5 mean wavelengths, and narrower than a tenth of R"
+        "whether the law was tested for such contacts; at the places that carry nine tenths of the force, for contacts "
+        "wider than 1.5 mean wavelengths and narrower than R/10"
     )
 
     def law(self, rtol: float = 1e-5) -> ForceLaw:
@@ -73,7 +73,7 @@ class RoughContact(Displayed):
         Parameters
         ----------
         rtol : float
-            Of the polynomials, in [1e-6, 0.1]: at 1e-5 some 400 contacts are solved.
+            Relative error of the polynomials, in [1e-6, 0.1]; at 1e-5 about 400 contacts are solved.
 
         Examples
         --------
@@ -133,7 +133,7 @@ def rough_contact(
     """Press a rough sphere or cylinder on a flat: an elastic half-space behind the layer of a contact law.
 
     Roughness is a layer whose mean pressure is that of the law at the local mean separation (Greenwood and Tripp 1967),
-    so contacts must be wide against its longest wavelength. As roughness vanishes, the contact is Hertz's.
+    so contacts must be wide compared with its longest wavelength. Without roughness the contact is Hertz's.
 
     Parameters
     ----------
@@ -146,10 +146,10 @@ def rough_contact(
     approach, force : array_like or str
         One of them, in one dimension at most: the approach [length], or F: numbers, "10 N", or "5 N/mm" of a cylinder.
     reference : float or str, optional
-        Of a cylinder the distance along the face [length] at which it does not move; by default 2 R/e, so that Hertz's
+        For a cylinder, the distance along the face [length] with zero displacement; by default 2 R/e, so that Hertz's
         approach is that of a cylinder's axis (K. L. Johnson, Contact Mechanics, 1985, Eq. 5.57).
     theory, E_star, hardness, materials : optional
-        As for `contact`. With a hardness roughness yields and the bodies do not: of loading alone.
+        As for `contact`. With a hardness, the roughness yields and the bodies do not; results are for loading only.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def rough_contact(
     InputError, OutOfRangeError
         For numbers that are not positive and finite, and loads beyond the layer's law.
     ConvergenceError
-        Where the half-space's equation is not solved.
+        If the equation of the half-space is not solved.
 
     Examples
     --------

@@ -71,10 +71,8 @@ class Contact:
 
     Parameters
     ----------
-    surface : ndarray, shape (n, m)
-        Heights [length].
-    sizes : pair of float
-        Sides of the map.
+    surface, sizes : ndarray of shape (n, m), pair of float
+        Heights and sides of the map [length].
     tolerance : float
         Mean complementarity error over mean pressure times h_rms, at which iterations end.
     hardness : float
@@ -84,13 +82,9 @@ class Contact:
     """
 
     def __init__(
-        self,
-        surface: FloatArray,
-        sizes: tuple[float, float],
-        tolerance: float = TOLERANCE,
-        hardness: float = np.inf,
+        self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE, hardness: float = np.inf,
         mirrored: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.surface = np.asarray(surface, float) - np.mean(surface)
         self.sizes, self.tolerance, self.cap, self.mirrored = sizes, tolerance, hardness, mirrored
         self.h_rms = float(self.surface.std())
@@ -99,12 +93,10 @@ class Contact:
         self._stiffness = q / 2
         self.pressure: FloatArray | None = None
 
-    def _filtered(self, field: FloatArray, filter_: FloatArray) -> FloatArray:
-        return composed(waves(field, self.mirrored) * filter_, field.shape, self.mirrored)
-
-    def deflect(self, pressure: FloatArray) -> FloatArray:
-        """Displacement of mean zero."""
-        return self._filtered(pressure, self._compliance)
+    def deflect(self, pressure: FloatArray, filter_: FloatArray | None = None) -> FloatArray:
+        """Displacement of mean zero, or the field after another filter."""
+        own = self._compliance if filter_ is None else filter_
+        return composed(waves(pressure, self.mirrored) * own, pressure.shape, self.mirrored)
 
     def press(self, force: float) -> dict[str, float]:
         """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map.
@@ -153,20 +145,18 @@ class Contact:
         self.pressure, self._rest = p, rest
         return self._found(force, residual, iteration) | {"seconds": time.process_time() - started}
 
-    def _beside(self, field: Any) -> list[Any]:
+    def _beside(self, field: Any) -> Any:
         """The field at the four neighbours of each point."""
         wide = np.pad(field, 1, "symmetric" if self.mirrored else "wrap")
-        return [wide[2:, 1:-1], wide[:-2, 1:-1], wide[1:-1, 2:], wide[1:-1, :-2]]
+        return np.stack([wide[2:, 1:-1], wide[:-2, 1:-1], wide[1:-1, 2:], wide[1:-1, :-2]])
 
     def _found(self, force: float, residual: float, iterations: int) -> dict[str, float]:
         p, rest = self.traction, self._rest
         touching, yielded = p > 0, p >= self.cap * (1 - 1e-9)
         elastic = touching & ~yielded
-        beside, held = np.any(self._beside(yielded), axis=0), self._beside(touching)
-        open_edges, mixed_edges = (
-            sum(int(np.count_nonzero(points & ~other)) for other in held) for points in (elastic, elastic & beside)
-        )
-        own_edges = sum(int(np.count_nonzero(yielded & ~other)) for other in self._beside(yielded))
+        held, hard = self._beside(touching), self._beside(yielded)
+        open_edges = np.count_nonzero(elastic & ~held)
+        mixed_edges, own_edges = np.count_nonzero(elastic & hard.any(axis=0) & ~held), np.count_nonzero(yielded & ~hard)
         raw, raw_yielded, full = float(touching.mean()), float(yielded.mean()), force / self.cap
         area = raw - CORRECTION * (open_edges + MIXED * mixed_edges) / p.size
         return {
@@ -205,7 +195,7 @@ class Contact:
             """Filters fields on the area, whose mean there is taken off."""
 
             def filtered(field: FloatArray) -> FloatArray:
-                found = self._filtered(field.reshape(shape), filter_)
+                found = self.deflect(field.reshape(shape), filter_)
                 return np.where(touching, found - found[touching].mean(), 0.0).ravel()
 
             return LinearOperator((touching.size, touching.size), filtered, dtype=float)

@@ -11,7 +11,7 @@ import functools
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, answered, require
 from mbma_tables.common.errors import ConvergenceError, InputError
@@ -215,5 +215,4 @@ def mean_top_height(share: ArrayLike) -> FloatArray:
 
     a = np.asarray(share, float)
     z = ndtri(a)
-    result: NDArray[np.float64] = np.exp(-z * z / 2) / np.sqrt(2 * np.pi) / a
-    return result
+    return np.asarray(np.exp(-z * z / 2) / np.sqrt(2 * np.pi) / a)

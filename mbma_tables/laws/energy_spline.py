@@ -15,47 +15,41 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.optimize.elementwise import find_root
 from scipy.special import erf, erfinv
 
 from mbma_tables.common.arguments import FloatArray
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
-FINE = 64  # parts of an interval between loads: for inverses, and to see whether a spline is monotone
-HALVINGS = 60
+FINE = 64  # parts of an interval between loads, to see whether a spline is monotone
 LARGEST_AREA = 1 - 1e-12
 
 
 class LoadCurve:
     """Mean separation, area and energy by ln F, from first contact to full compression; arguments are not checked.
 
-    Parameters
-    ----------
-    rows : ndarray, shape (4, n)
-        F/(A0 E*), rising, A/A0, rising, u [length], falling, and U/(A0 E*) [length].
-    top : float
-        u of first contact [length], above the first load's.
+    `rows`, shape (4, n), are F/(A0 E*), rising, A/A0, rising, u [length], falling, and U/(A0 E*) [length]; `top` is u
+    of first contact [length], above the first load's.
     """
 
     def __init__(self, rows: FloatArray, top: float) -> None:
         force, area, u, energy = rows
         self.x, self.top = np.log(force), top
         self._work = energy + force * u
-        fine = self.x[:-1, None] + np.diff(self.x)[:, None] * np.arange(FINE) / FINE
-        self._fine = np.append(fine, self.x[-1])
+        fine = np.append(self.x[:-1, None] + np.diff(self.x)[:, None] * np.arange(FINE) / FINE, self.x[-1])
         self._spline: Any = _constrained(self.x, u, np.diff(self._work))
         self._slope = self._spline.derivative()
-        if not (self._slope(self._fine) < 0).all():
+        if not (self._slope(fine) < 0).all():
             self._spline = PchipInterpolator(self.x, u)
             self._slope = self._spline.derivative()
-        self._fine_u = np.minimum.accumulate(self._spline(self._fine))
         root = np.log(erfinv(np.minimum(area, LARGEST_AREA)))
         self._root: Any = CubicSpline(self.x, root - self.x, bc_type="natural")
         self._line = 1.0  # spline of the remainder beside ln F
-        if not (self._root(self._fine, 1) > -1).all():
+        if not (self._root(fine, 1) > -1).all():
             self._root, self._line = PchipInterpolator(self.x, root), 0.0
         # ln F, u and ln erfinv(A) of the first and the last load
-        self._ends, self._gaps = self.x[[0, -1]], u[[0, -1]]
-        self._roots = self._root(self._ends) + self._line * self._ends
+        self._ends = self.x[[0, -1]]
+        self._gaps, self._roots = self._spline(self._ends), self._log_root(self._ends)
         with np.errstate(divide="ignore"):
             first, last = force[[0, -1]] / -self._slope(self._ends)
         self._power = max(float(first * (top - u[0]) / force[0]), 1.0)
@@ -86,39 +80,30 @@ class LoadCurve:
     def area(self, x: FloatArray) -> FloatArray:
         """A/A0 at ln F."""
         inside, light, heavy = self._split(x)
-        return np.asarray(erf(np.exp(self._root(inside) + self._line * inside + light + heavy)))
+        return np.asarray(erf(np.exp(self._log_root(inside) + light + heavy)))
 
     def log_force(self, u: FloatArray) -> FloatArray:
         """ln F at mean separations from 0 to `top`: infinite at either."""
-        inside = np.clip(u, *self._gaps[::-1])
-        place = np.clip(np.searchsorted(-self._fine_u, -inside) - 1, 0, self._fine.size - 2)
-        low, high = self._fine[place], self._fine[place + 1]
-        x = (low + high) / 2
-        for _ in range(HALVINGS):
-            over = self._spline(x) - inside
-            low, high = np.where(over > 0, x, low), np.where(over > 0, high, x)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = x - over / self._slope(x)
-            step = np.where((step >= low) & (step <= high), step, (low + high) / 2)
-            if np.allclose(step, x, rtol=0, atol=1e-14 * np.abs(self.x).max()):
-                break
-            x = step
+        inside = self._inverse(self._spline, np.clip(u, *self._gaps[::-1]))
         with np.errstate(divide="ignore"):
             lighter = self._ends[0] + self._power * np.log(np.maximum(self.top - u, 0) / (self.top - self._gaps[0]))
             heavier = self._ends[1] + np.log1p(-2 * self._rate * np.log(np.minimum(u / self._gaps[1], 1))) / 2
-        return np.asarray(np.where(u > self._gaps[0], lighter, np.where(u < self._gaps[1], heavier, x)))
+        return np.asarray(np.where(u > self._gaps[0], lighter, np.where(u < self._gaps[1], heavier, inside)))
 
     def log_force_at(self, area: FloatArray) -> FloatArray:
         """ln F at A/A0 from 0 to below 1."""
         with np.errstate(divide="ignore"):
             root = np.log(erfinv(area))
         known = np.clip(root, *self._roots)
-        low, high = (np.full(np.shape(area), end) for end in self._ends)
-        for _ in range(HALVINGS):
-            middle = (low + high) / 2
-            more = self._root(middle) + self._line * middle > known
-            low, high = np.where(more, low, middle), np.where(more, middle, high)
-        return np.asarray((low + high) / 2 + (root - known))
+        return np.asarray(self._inverse(self._log_root, known) + (root - known))
+
+    def _log_root(self, x: FloatArray) -> Any:
+        """ln erfinv(A) within the loads."""
+        return self._root(x) + self._line * x
+
+    def _inverse(self, curve: Any, wanted: FloatArray) -> FloatArray:
+        """ln F within the loads at which a monotone curve has these values."""
+        return np.asarray(find_root(lambda x, value: curve(x) - value, tuple(self._ends), args=(wanted,)).x)
 
     @np.errstate(all="ignore")
     def energy(self, x: FloatArray) -> FloatArray:

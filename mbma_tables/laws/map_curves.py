@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import operator
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,18 +16,9 @@ from scipy.optimize import brentq, isotonic_regression
 from scipy.special import ellipe, ellipkm1, erf, expit, ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws import calibrated
 from mbma_tables.laws.bearing_curve import FRACTIONS, Bearing, RadialSpectrum
-from mbma_tables.laws.calibrated import (
-    CONSTANTS,
-    Constants,
-    Law,
-    Spectrum,
-    area,
-    area_of,
-    force_of,
-    light_factor,
-    mean_top_height,
-)
+from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, light_factor
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
 NODES = 500
@@ -52,15 +44,12 @@ class MapConstants:
     valley_area: float = 0.6527  # and then the valleys
     tension_area: float = 0.6  # contact above which the tensile area in full contact replaces that of the highest parts
     merging_area: float = 0.00761  # contact over which c grows from a single contact's
-    elliptic: float = (
-        0.7245  # further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces
-    )
+    # further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces
+    elliptic: float = 0.7245
     curvature: float = 0.09953
 
 
 MAP_CONSTANTS = MapConstants()
-
-
 # of maps whose light- and full-contact curves disagree at 30% contact, fitted to machined surfaces: valleys take over
 # at a contact larger by shift (1 - exp(-(D/onset)^4)), D the difference of their pressure-weighted heights there
 # [h_rms], which is below 0.1 on Gaussian maps, larger on plateaus and with pits
@@ -76,14 +65,10 @@ def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
     def curvatures(b: float) -> tuple[float, float]:
         m = 1 - b * b
         K, E = float(ellipkm1(b * b)), float(ellipe(m))
-        return 2 * b / m * (K - E), 2 * b / m * (E / (b * b) - K)
+        return 2 * b / m * (E / (b * b) - K), 2 * b / m * (K - E)
 
-    def mismatch(b: float) -> float:
-        ka, kb = curvatures(b)
-        return kb / ka - anisotropy**2
-
-    b = brentq(mismatch, 1e-9, 1 - 1e-7, xtol=1e-14)
-    ka, kb = curvatures(b)
+    b = brentq(lambda b: operator.truediv(*curvatures(b)) - anisotropy**2, 1e-9, 1 - 1e-7, xtol=1e-14)
+    kb, ka = curvatures(b)
     product = np.sqrt(ka * kb)
     # the circle has curvatures pi/2 at semi-axis 1
     factor = np.sqrt(b * product * (ka + kb)) / (np.pi / np.sqrt(2))
@@ -154,7 +139,7 @@ class MapLaw:
         contact = erf(e)
         light = 1 + self.map_constants.elliptic * np.exp(-contact / ELLIPTIC_AREA)
         s0 = light_factor(self.spectrum.alpha, c) / self._ellipse[0] ** (2 * light)
-        y = force_of(e, s0, c)
+        y = calibrated.force_of(e, s0, c)
         top = -np.expm1(2 * np.log1p(-np.minimum(contact, 1 - 1e-12)))
         gradient = np.interp(np.log(top), np.log(FRACTIONS), self.top_gradient)
         log_force = np.maximum.accumulate(np.log(y * gradient) + 1e-12 * np.arange(NODES))
@@ -165,9 +150,9 @@ class MapLaw:
         pulled = np.exp(np.interp(np.exp(LOG_FORCE), self.tension_force[::-1], np.log(FRACTIONS[::-1])))
         beyond = np.maximum(np.exp(LOG_FORCE) / self.tension_force[0], 1.0)
         force = np.maximum(-ndtri(np.minimum(pulled, 0.5)) / 2, 0.0) * beyond
-        alpha = self.spectrum.alpha
-        # Hertz's elliptic factor, in the place of alpha's: s0/k^2
-        return area_of(force, light_factor(alpha, self.constants) / self._ellipse[0] ** 2, self.constants.area_t0)
+        # Hertz's elliptic factor, in the place of alpha's
+        s0 = light_factor(self.spectrum.alpha, self.constants) / self._ellipse[0] ** 2
+        return calibrated.area_of(force, s0, self.constants.area_t0)
 
     @functools.cached_property
     def _ellipse(self) -> tuple[float, float]:
@@ -182,11 +167,8 @@ class MapLaw:
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
-        known = self._contact
-        found = np.interp(
-            np.log(np.asarray(force, float)), LOG_FORCE, np.log(known / (1 - np.minimum(known, 1 - 1e-15)))
-        )
-        return np.asarray(expit(found))
+        logit = np.log(self._contact / (1 - np.minimum(self._contact, 1 - 1e-15)))
+        return np.asarray(expit(np.interp(np.log(np.asarray(force, float)), LOG_FORCE, logit)))
 
     def gaussian_force(self, force: ArrayLike) -> FloatArray:
         """F_D: force at which Gaussian pressures of full contact have the same mean tension as the map's at F."""
@@ -215,10 +197,10 @@ class MapLaw:
         valleys = u + 2 * energy / force
         # the curve of the highest parts, with the deviation of a Gaussian surface from M(c A) at the same contact
         grid = np.linspace(LIGHTEST - 2, HEAVIEST + 1, 2000)
-        same = np.exp(np.interp(contact, area(np.exp(grid), self.spectrum.alpha, self.constants), grid))
+        same = np.exp(np.interp(contact, law.area(np.exp(grid)), grid))
         height = law.separation_persson(same)[0] + 2 * law.energy(same) / same
         shares = np.linspace(np.log(FRACTIONS[0]), 0, 2000)
-        own = np.interp(-height, -mean_top_height(np.exp(shares)), shares)
+        own = np.interp(-height, -calibrated.mean_top_height(np.exp(shares)), shares)
         near = np.exp(-((contact / m.gaussian_area) ** 2))
         single = 0.8 * self._ellipse[1]
         factor = single + (self.height_factor - single) * -np.expm1(-contact / m.merging_area)

@@ -52,28 +52,14 @@ def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> 
 class Press:
     """A map that is pressed when it is first called with a load over A0 E*; lengths of the map.
 
-    Parameters
-    ----------
-    gradient : float
-        About its rms gradient.
-    mirrored : bool
-        Whether its mirror images continue it; else it is periodic.
-    hardness : float
-        Over E*.
-    left_out : float
-        Wavelength [length] below which a large map was cut off; 0 if it was not.
+    `gradient` is about its rms gradient, `hardness` is over E*, and `left_out` the wavelength [length] below which a
+    large map was cut off, 0 if it was not; `mirrored` as for `Contact`.
     """
 
     def __init__(
-        self,
-        heights: FloatArray,
-        sizes: tuple[float, float],
-        gradient: float,
-        tolerance: float = TOLERANCE,
-        mirrored: bool = False,
-        hardness: float = np.inf,
-        left_out: float = 0.0,
-    ) -> None:
+        self, heights: FloatArray, sizes: tuple[float, float], gradient: float, tolerance: float = TOLERANCE,
+        mirrored: bool = False, hardness: float = np.inf, left_out: float = 0.0,
+    ) -> None:  # fmt: skip
         self.left_out = left_out
         self.heights, self.sizes, self.gradient, self.mirrored = heights, sizes, gradient, mirrored
         self._tolerance, self._cap = tolerance, hardness / gradient

@@ -4,7 +4,6 @@ Finite volumes with the harmonic mean of h^3 at faces; mean pressure gradients a
 factorisation. Closed gaps are found by labelling connected gaps, not by a small conductance.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,11 +23,11 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
     """
     labels, number = label(gap > 0)
     joins: list[list[tuple[int, int, int]]] = [[] for _ in range(number + 1)]
-    for axis in (0, 1):
-        last, first = labels.take(-1, axis), labels.take(0, axis)
-        for a, b in {(int(a), int(b)) for a, b in zip(last, first, strict=True) if a and b}:
-            joins[a].append((b, *((1, 0) if axis == 0 else (0, 1))))
-            joins[b].append((a, *((-1, 0) if axis == 0 else (0, -1))))
+    for axis, (dx, dy) in enumerate(((1, 0), (0, 1))):
+        last, first = labels.take(-1, axis).tolist(), labels.take(0, axis).tolist()
+        for a, b in {(a, b) for a, b in zip(last, first, strict=True) if a and b}:
+            joins[a].append((b, dx, dy))
+            joins[b].append((a, -dx, -dy))
     component = np.zeros(number + 1, int)
     winds = np.zeros((number + 1, 2), bool)
     place: dict[int, tuple[int, int]] = {}
@@ -47,8 +46,7 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
                 # the same gap reached in two cells: a closed path around the periodic cell
                 winds[start] |= np.not_equal(met, place[there])
     component[~winds[component].any(axis=1)] = 0
-    along: Any = winds.any(axis=0)
-    return component[labels], (bool(along[0]), bool(along[1]))
+    return component[labels], (bool(winds[:, 0].any()), bool(winds[:, 1].any()))
 
 
 def flow_conductance(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) -> FloatArray:
@@ -115,22 +113,27 @@ def _checked(gap: ArrayLike) -> FloatArray:
 
 
 def _faces(
-    number: np.ndarray, cubes: FloatArray, axis: int, steps: list[float], mirrored: bool = False
-) -> tuple[Any, Any, Any, FloatArray]:
-    """Points whose next neighbour along an axis is open, too, numbers of both, and the conductance of their faces."""
-    beside = np.roll(number, -1, axis)
-    joined = (number >= 0) & (beside >= 0)
-    if mirrored:
-        joined[(-1, slice(None)) if axis == 0 else (slice(None), -1)] = False
-    # a b/(a + b) would underflow where both are tiny
-    face = 2 / (1 / cubes[joined] + 1 / np.roll(cubes, -1, axis)[joined]) * steps[1 - axis] / steps[axis]
-    return joined, number[joined], beside[joined], face
+    gap: FloatArray, open_: Any, sizes: tuple[float, float], mirrored: bool = False
+) -> tuple[np.ndarray, list[float], list[tuple[Any, Any, Any, FloatArray]]]:
+    """Numbers of open points, steps, and for each axis: points with an open neighbour, both numbers, conductance."""
+    steps = [side / points for side, points in zip(sizes, gap.shape, strict=True)]
+    number, cubes, faces = np.full(gap.shape, -1), gap**3, []
+    number[open_] = np.arange(np.count_nonzero(open_))
+    for axis in (0, 1):
+        beside = np.roll(number, -1, axis)
+        joined = (number >= 0) & (beside >= 0)
+        if mirrored:
+            joined[(-1, slice(None)) if axis == 0 else (slice(None), -1)] = False
+        # a b/(a + b) would underflow where both are tiny
+        face = 2 / (1 / cubes[joined] + 1 / np.roll(cubes, -1, axis)[joined]) * steps[1 - axis] / steps[axis]
+        faces.append((joined, number[joined], beside[joined], face))
+    return number, steps, faces
 
 
-def _factors(rows: Sequence[Any], columns: Sequence[Any], values: Sequence[Any], more: Any, free: Any) -> Any:
+def _factors(faces: list[tuple[Any, Any, Any, FloatArray]], more: Any, free: Any) -> Any:
     """Factors of the matrix of faces, `more` on its diagonal, without the rows that are not `free`."""
-    entries = np.concatenate([*values, *values])
-    matrix = coo_array((-entries, (np.concatenate([*rows, *columns]), np.concatenate([*columns, *rows]))))
+    i, j, face = (np.concatenate([own[k] for own in faces]) for k in (1, 2, 3))
+    matrix = coo_array((-np.append(face, face), (np.append(i, j), np.append(j, i))))
     matrix = matrix - diags_array(matrix.sum(axis=1) - more)
     kept = matrix.tocsc() if free is None else matrix.tocsc()[free][:, free]
     return splu(kept, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -141,30 +144,21 @@ def _solved(gap: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, Fl
     owner, along = open_ways(gap)
     if not any(along):
         return np.zeros((2, 2)), np.zeros(2)
-    steps = [side / points for side, points in zip(sizes, gap.shape, strict=True)]
-    number = np.full(gap.shape, -1)
-    number[owner > 0] = np.arange(np.count_nonzero(owner))
-    cubes = gap**3
-    rows, columns, values = [], [], []
-    forces, uniform = np.zeros((np.count_nonzero(owner), 2)), np.zeros(2)
-    carried, mean = np.zeros_like(forces), np.zeros(2)
-    for axis in (0, 1):
-        joined, i, j, face = _faces(number, cubes, axis, steps)
+    _, steps, faces = _faces(gap, owner > 0, sizes)
+    count = np.count_nonzero(owner)
+    forces, carried = np.zeros((2, count, 2))
+    uniform, mean = np.zeros((2, 2))
+    for axis, (joined, i, j, face) in enumerate(faces):
         one, other = gap[joined], np.roll(gap, -1, axis)[joined]
         wider, ratio = np.maximum(one, other), np.minimum(one, other) / np.maximum(one, other)
         couette = wider * ratio * (1 + ratio**2) / (1 + ratio**3) * steps[1 - axis]
-        carried[:, axis] = np.bincount(i, couette, len(forces)) - np.bincount(j, couette, len(forces))
+        carried[:, axis] = np.bincount(i, couette, count) - np.bincount(j, couette, count)
         mean[axis] = couette.sum() * steps[axis]
-        rows.append(i)
-        columns.append(j)
-        values.append(face)
-        forces[:, axis] = np.bincount(i, face, len(forces)) - np.bincount(j, face, len(forces))
-        forces[:, axis] *= steps[axis]
+        forces[:, axis] = (np.bincount(i, face, count) - np.bincount(j, face, count)) * steps[axis]
         uniform[axis] = face.sum() * steps[axis] ** 2
     # pressure is free by a constant in each connected gap
-    fixed = np.unique(owner[owner > 0], return_index=True)[1]
-    free = np.delete(np.arange(len(forces)), fixed)
-    pressure = _factors(rows, columns, values, 0.0, free).solve(forces[free])
+    free = np.delete(np.arange(count), np.unique(owner[owner > 0], return_index=True)[1])
+    pressure = _factors(faces, 0.0, free).solve(forces[free])
     area = sizes[0] * sizes[1]
     found = (np.diag(uniform) - forces[free].T @ pressure) / area
     couette = (mean - np.sum(carried[free] * pressure, axis=0)) / area
@@ -177,18 +171,12 @@ def _between_mirrors(gap: FloatArray, sizes: tuple[float, float], axis: int) -> 
     open_ = np.isin(labels, np.setdiff1d(np.intersect1d(labels.take(0, axis), labels.take(-1, axis)), 0))
     if not open_.any():
         return 0.0
-    steps = [side / points for side, points in zip(sizes, gap.shape, strict=True)]
-    number = np.full(gap.shape, -1)
-    number[open_] = np.arange(np.count_nonzero(open_))
-    cubes = gap**3
-    faces = [_faces(number, cubes, way, steps, True)[1:] for way in (0, 1)]
-    count = int(np.count_nonzero(open_))
+    number, steps, faces = _faces(gap, open_, sizes, True)
     ends: list[Any] = []
     for side in (0, -1):
         # half a step from a mirror, where pressure is that of the end
-        there = number.take(side, axis) >= 0
-        half: Any = 2 * np.take(cubes, side, axis)[there] * steps[1 - axis] / steps[axis]
-        ends.append(np.bincount(number.take(side, axis)[there], half, count))
-    i, j, face = ([own[k] for own in faces] for k in range(3))
-    pressure = _factors(i, j, face, ends[0] + ends[1], None).solve(ends[1])
+        own = number.take(side, axis)
+        half = 2 * np.take(gap, side, axis)[own >= 0] ** 3 * steps[1 - axis] / steps[axis]
+        ends.append(np.bincount(own[own >= 0], half, np.count_nonzero(open_)))
+    pressure = _factors(faces, ends[0] + ends[1], None).solve(ends[1])
     return float(ends[0] @ pressure * sizes[axis] / sizes[1 - axis])

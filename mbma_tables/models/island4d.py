@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import in_blocks
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, to_axes
 from mbma_tables.models import SOLVER, IslandAnswer, check_outside
@@ -18,12 +18,12 @@ from mbma_tables.tablefiles.schema import TableContent, error_cell
 BLOCK = 1 << 15  # islands between two checks for Ctrl-C
 
 
-def at_places(coefs: FloatArray, places: FloatArray) -> FloatArray:
-    """Two cubic functions of four axes, (2, entries), at positions in node units, (4, entries); NaN beyond the axes."""
-    nodes, given = np.array(coefs.shape[:4]) - 2, np.ascontiguousarray(places, dtype=float)
-    out = np.empty((2, given.shape[1]))
-    core.spline4(given, np.ascontiguousarray(coefs), nodes, out)
-    return out
+def spline_of(coefficients: FloatArray) -> Any:
+    """Cubic functions of four axes, of positions in units of nodes, (entries, 4); NaN beyond the axes."""
+    from scipy.interpolate import NdBSpline
+
+    knots = tuple(np.arange(count + 4) - 3.0 for count in coefficients.shape[:4])
+    return NdBSpline(knots, coefficients, 3, extrapolate=False)
 
 
 class Lookup(NamedTuple):
@@ -56,6 +56,7 @@ class Island4dModel:
         self.content = content
         self.variant = get_variant(content.attributes["variant"])
         self._X, self._spread, _, self._hurst = content.axes
+        self._spline = spline_of(content.coefficients)
         self._error: FloatArray = content.local_error.max(axis=-1)
 
     def __repr__(self) -> str:
@@ -144,13 +145,11 @@ class Island4dModel:
         low = self._spread.low
         held = place.X, np.maximum(place.spread, low), place.sphere, place.hurst
         places = np.stack([axis.position(x) for axis, x in zip(self.content.axes, held, strict=True)])
+        # an end may be missed by rounding
+        places = np.clip(places, 0, [[axis.nodes - 1] for axis in self.content.axes])
         cells = [error_cell(*every) for every in zip(self.content.axes, self._error.shape, places, strict=True)]
-        log_ratio = np.empty((2, place.X.size))
-
-        def fill(block: slice) -> None:
-            log_ratio[:, block] = at_places(self.content.coefficients, places[:, block])
-
-        in_blocks(fill, place.X.size, BLOCK)
+        blocks = in_blocks(lambda block: self._spline(places[:, block].T).T, place.X.size, BLOCK)
+        log_ratio = np.concatenate(blocks, axis=1)
         edge = band_fields(held[1], place.sphere, place.hurst, self.variant)[0]
         log_ratio *= np.where(place.spread < low, place.mu / edge, 1.0)
         rigid = greenwood_tripp.rigid_sphere(place.X, place.mu)

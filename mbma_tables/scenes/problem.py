@@ -21,7 +21,6 @@ OF_ISLANDS = ("island_statistics", "pressure_profile")  # available for MBMA onl
 OUTPUTS = (*OF_CONTACT[:6], *OF_ISLANDS, "comparison", *OF_CONTACT[6:])
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
-EFFECTS = (*OUTPUTS, *REFINEMENTS)
 ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
 COMPARED = (*THEORIES, "persson_simplified")
 PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
@@ -101,17 +100,11 @@ class Problem:
 
     def _choose_effects(self) -> None:
         """Set the requested outputs and the refinements switched off, checked against each other."""
-        wanted, without = list(self.effects), list(self.without)
-        for name in (*wanted, *without):
-            require_name("effect", name, EFFECTS)
-        both = sorted(set(wanted) & set(without))
-        if both:
-            raise InputError(f"effect {both[0]!r} is both on and off: leave it in one of the two lists")
-        outputs, dropped = frozenset(wanted) & frozenset(OUTPUTS), frozenset(without)
-        for name in sorted(dropped & set(OUTPUTS)):
-            raise InputError(
-                f"{name!r} is off unless it is asked for: leave it out; off takes {', '.join(REFINEMENTS)}"
-            )
+        outputs, dropped = frozenset(self.effects), frozenset(self.without)
+        for name in outputs:
+            require_name("effect", name, OUTPUTS)
+        for name in dropped:
+            require_name("refinement", name, REFINEMENTS)
         if not outputs:
             raise InputError(f"no effect is requested: on needs at least one of {', '.join(OUTPUTS)}")
         for name in sorted(dropped | outputs & set(ELASTIC)) if "yield" in outputs else ():

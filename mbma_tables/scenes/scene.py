@@ -34,16 +34,16 @@ class Scene(Problem):
         d [length], u [length], F/A0 in the unit of `E_star`, or A/A0; one number or a list. Texts such as "0.8 um" are
         converted to the units of the surface and the modulus.
     E_star : float or str
-        Effective modulus; stresses come out in its unit. 1 gives them over E*. A text has its unit: "100 GPa".
+        Effective modulus, as a number or as text with a unit ("100 GPa"); stresses are in its unit, over E* if it is 1.
     hardness : float or str, optional
-        Largest pressure that the softer body bears, in the unit of `E_star`, for "yield": the theory's elastic result
-        is corrected by `mbma_tables.laws.hardness`, and conductance is that of the frozen contact.
+        Largest pressure that the softer body supports, in the unit of `E_star`, for "yield": the theory's elastic
+        result is corrected by `mbma_tables.laws.hardness`, and conductance is that at constant contact area.
     rtol : float, optional
-        Requested relative error, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
+        Requested relative error, in [1e-10, 0.1]; without `seconds` by default 1e-6, or 1e-4 for other theories.
     seconds : float, optional
-        Instead of `rtol`: a time budget, spent on as much accuracy as the measured costs allow.
+        Time budget instead of `rtol`; the measured costs determine the accuracy that it allows.
     variant : str or Variant
-        Which variant of the paper's equations.
+        Variant of the paper's equations.
     island_model : str or IslandModel, optional
         Island model, as for `contact`; without it the plan chooses between "universal" and "exact".
     theory : str or theory, optional

@@ -13,24 +13,23 @@ from typing import Any
 
 from mbma_tables.common.arguments import nearest, one_number, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import numbers_of, read_file
+from mbma_tables.common.files import read_file
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import ROUGHNESS
-from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
-from mbma_tables.tablefiles.own import is_own
+from mbma_tables.tablefiles.netcdf import is_own
 
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
 NUMBERS = tuple(dict.fromkeys(PARAMETERS + MAGNIFICATION + MOMENTS + ROUGHNESS))
 MATERIAL = ("E_star", "E1", "nu1", "E2", "nu2")
 MAP_OPTIONS = (*OPTIONS[1:], "extrapolate_to", "extrapolate_hurst")  # for a measured map; its unit is separate
-MAX_TOML_BYTES, MAX_SPECTRUM_BYTES = 2**20, 16 * 2**20
+MAX_TOML_BYTES = 2**20
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,47 +165,23 @@ def from_tables(entries: Mapping[str, Any], folder: pathlib.Path, title: str) ->
 def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
     """The surface of a table [surface]."""
     numbers = dict(surface)
-    convention, unit = (numbers.pop(name, None) for name in ("convention", "length_unit"))
-    sources = {name: numbers.pop(name) for name in ("name", "map", "psd") if name in numbers}
-    treatment = {name: numbers.pop(name) for name in (*MAP_OPTIONS, "model") if name in numbers}
-    (kind, source), *more = sources.items() or [("numbers", "")]
-    if more:
-        raise InputError(f"[surface]: {' and '.join(sources)} are given: one of name, map, psd or numbers")
-    if treatment and kind != "map":
+    name, source, unit = (numbers.pop(key, None) for key in ("name", "map", "length_unit"))
+    treatment = {key: numbers.pop(key) for key in (*MAP_OPTIONS, "model") if key in numbers}
+    given = ["name"] * (name is not None) + ["map"] * (source is not None) + ["numbers"] * bool(numbers)
+    if len(given) > 1:
+        listed = f" ({', '.join(numbers)})" if numbers else ""
+        raise InputError(f"[surface]: {' and '.join(given)}{listed} are given: one of name, map or numbers")
+    if treatment and source is None:
         raise InputError(f"[surface]: {', '.join(treatment)}: for a measured map, which is missing: give map = ...")
-    if convention is not None and kind != "psd":
-        raise InputError("[surface]: convention belongs to a psd: give psd = ..., or leave it out")
-    if kind == "numbers":
+    if name is not None:
+        return Specimen(Surface.named(name), CASES[name].title).in_units(unit, None)
+    if source is None:
         return from_numbers(numbers, unit, title)
-    if kind != "psd" and numbers:
-        raise InputError(f"[surface]: {kind} and numbers ({', '.join(numbers)}) are given: leave one of them out")
-    if kind == "name":
-        return Specimen(Surface.named(source), get_case(source).title).in_units(unit, None)
     path = folder / source
     if not path.is_file():
-        raise InputError(
-            f"[surface]: {kind} = {source!r} is not a file; paths are relative to the file that names them"
-        )
-    return _from_map(path, treatment, unit) if kind == "map" else _from_psd(path, numbers, convention or "paper", unit)
-
-
-def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, unit: str | None) -> Specimen:
-    """The surface of two columns of text, q and C, in a unit of length."""
-    if set(numbers) != {"h_max"}:
-        raise InputError(f"[surface]: a psd needs h_max = ... and no other number, got {', '.join(numbers) or 'none'}")
-    # not by its name: numpy would unpack .gz, .bz2 and .xz files of any size
-    content = read_file(path, MAX_SPECTRUM_BYTES)
-    try:
-        columns = numbers_of(content.decode("utf-8").splitlines(), "," if path.suffix == ".csv" else None)
-    except (UnicodeDecodeError, InputError) as fault:
-        why = fault if isinstance(fault, InputError) else "it is no text"
-        raise InputError(f"[surface]: {path.name} must hold two columns of numbers, q and C: {why}") from None
-    if columns.shape[1] != 2:
-        raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")
-    h_max = Units(unit).number("h_max", numbers["h_max"])
-    q, C = columns.T
-    surface = Surface.from_spectrum(q, C, h_max=h_max, convention=convention, unit=unit)
-    return Specimen(surface, f"spectrum {path.name}")
+        where = "paths are relative to the file that names them"
+        raise InputError(f"[surface]: map = {str(source)!r} is not a file; {where}")
+    return _from_map(path, treatment, unit)
 
 
 def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:

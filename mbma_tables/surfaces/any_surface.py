@@ -1,4 +1,4 @@
-"""Base class of surfaces, given by five numbers or a spectrum: moments, summits, and the sum of two surfaces."""
+"""Base class of surfaces: moments, summits, the sum of two surfaces, functions of surfaces that are DataArrays."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.common.arguments import broadcast_shape, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_lines
+from mbma_tables.common.plots import draw_line
 from mbma_tables.common.units import Units, factor, unit_of
 from mbma_tables.surfaces import spectrum
 
@@ -144,11 +145,10 @@ class AnySurface(Displayed, abc.ABC):
         return np.sqrt((1 - spectrum.BROADENING / self.alpha) * self.m0)
 
     def _facts(self) -> dict[str, str]:
-        units = Units(self.unit)
-        named = {"Hurst exponent": ("hurst", "1"), "q0": ("q0", ""), "q1": ("q1", ""), "zeta_1": ("zeta_1", "1")}
-        named |= {"h_rms": ("h_rms", ""), "h_max": ("h_max", ""), "rms gradient": ("rms_gradient", "1")}
-        known = {fact: (getattr(self, name), unit or unit_of(name, units)) for fact, (name, unit) in named.items()}
-        return {fact: shown(*value) for fact, value in known.items() if value[0] is not None}
+        titles = {"hurst": "Hurst exponent", "rms_gradient": "rms gradient"}
+        names = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "rms_gradient")
+        known = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return {titles.get(name, name): shown(value, unit_of(name, Units(self.unit))) for name, value in known.items()}
 
     def _variables(self) -> dict[str, Variable]:
         units = Units(self.unit)
@@ -160,8 +160,7 @@ class AnySurface(Displayed, abc.ABC):
             raise InputError("a batch has no single spectrum to draw: take one surface")
         q = np.geomspace(self.q0, self.q1, 200)[1:-1]
         length = self.unit or "length"
-        label = f"wavenumber q [1/{length}]"
-        return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
+        return draw_line(q, self.power_spectrum(q), f"wavenumber q [1/{length}]", f"spectrum C(q) [{length}^4]")
 
     def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
         """The equivalent rough surface of two in contact: spectra add, heights convolve.
@@ -195,3 +194,58 @@ class AnySurface(Displayed, abc.ABC):
         """
         both = self.sampled().added(other.sampled())
         return both if nominal_area is None else dataclasses.replace(both, h_max=None, nominal_area=nominal_area)
+
+
+def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
+    """The tuple of results of `function` for broadcast arguments, block by block for dask arrays."""
+    # xarray is imported already if its objects are passed
+    import xarray as xr
+
+    whole = all(np.size(argument) for argument in arguments)
+
+    def block(*fields: Any) -> Any:
+        if whole and not all(np.size(field) for field in fields):
+            # a chunk of a dask array may be empty, an array may not
+            found = (np.empty(np.broadcast_shapes(*map(np.shape, fields))),) * outputs
+        else:
+            found = function(*fields)
+        return found[0] if outputs == 1 else found
+
+    found = xr.apply_ufunc(
+        block,
+        *arguments,
+        input_core_dims=[[]] * len(arguments),
+        output_core_dims=[[]] * outputs,
+        dask="parallelized",
+        output_dtypes=[float] * outputs,
+        join="exact",
+        keep_attrs=False,
+    )
+    return (found,) if outputs == 1 else found
+
+
+def refuse_plain(arguments: Mapping[str, Any]) -> None:
+    """Reject arrays without names beside DataArrays."""
+    for name, given in arguments.items():
+        if not is_labelled(given) and np.ndim(given):
+            raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
+
+
+def agree(**arguments: Any) -> None:
+    """Reject plain arrays that do not broadcast, or that are combined with DataArrays."""
+    if any(map(is_labelled, arguments.values())):
+        refuse_plain(arguments)
+    else:
+        broadcast_shape(**arguments)
+
+
+def apply_to_surface(answer: Any, surface: AnySurface, arrays: Mapping[str, Any], outputs: int) -> Any:
+    """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are errors."""
+    count = len(surface.parameters)
+    arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(arrays)
+    refuse_plain(arguments)
+
+    def block(*numbers: Any) -> Any:
+        return answer(surface.with_numbers(*numbers[:count]), *numbers[count:])
+
+    return apply(block, tuple(arguments.values()), outputs)

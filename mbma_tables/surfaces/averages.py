@@ -9,7 +9,6 @@ import numpy as np
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.spectral import resolution
 from mbma_tables.surfaces.surface import MeasuredSurface
 
 SQUARES = ("h_rms", "gradient")  # fields averaged as squares
@@ -18,8 +17,7 @@ SQUARES = ("h_rms", "gradient")  # fields averaged as squares
 def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
     """The surface from several measured maps of it, each a `Surface.from_map` of similar size and treatment.
 
-    Spectra, quantiles of heights and the curves of highest parts are averaged. h_max is the mean of that of the scans,
-    for the area of one scan.
+    Spectra, quantiles of heights and the curves of highest parts are averaged; h_max is that for the area of one scan.
 
     Parameters
     ----------
@@ -60,16 +58,15 @@ def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
     q = np.unique(np.concatenate([scan.q for scan in known]))
     spectra = np.array([scan.power_spectrum(q) for scan in known])
     covered = np.array([(q >= scan.q0) & (q <= scan.q1) for scan in known]).sum(axis=0)
-    bearing = Bearing(
-        **{field.name: _mean([s.bearing for s in known], field.name) for field in dataclasses.fields(Bearing)}
-    )
+    bearings = [scan.bearing for scan in known]
+    bearing = Bearing(**{field.name: _mean(bearings, field.name) for field in dataclasses.fields(Bearing)})
     spread = "; ".join(
         f"{name} {np.mean(values):.4g} ({min(values):.4g} to {max(values):.4g})"
         for name in ("h_rms", "h_max", "rms_gradient")
         for values in [[float(getattr(scan, name)) for scan in known]]
     )
-    record = {"step": "average", "of": [list(scan.provenance) for scan in known]}
-    whole = MeasuredSurface(
+    told = f"average of {len(known)} scans: {spread}"
+    return MeasuredSurface(
         q,
         spectra.sum(axis=0) / np.maximum(covered, 1),
         heights=_heights([scan.heights for scan in known]),
@@ -78,9 +75,8 @@ def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
         anisotropy=bearing.anisotropy,
         unit=first.unit,
         scans=tuple(known),
-        provenance=(record | {"told": f"average of {len(known)} scans: {spread}"},),
-    )
-    return dataclasses.replace(whole, provenance=(*whole.provenance, resolution(whole)))
+        provenance=({"step": "average", "of": [list(scan.provenance) for scan in known], "told": told},),
+    ).resolved()
 
 
 def _mean(parts: Sequence[Any], name: str) -> Any:
@@ -92,18 +88,15 @@ def _mean(parts: Sequence[Any], name: str) -> Any:
 def _heights(parts: Sequence[Heights]) -> Heights:
     """The distribution of all scans; moments about their means add."""
     h_rms = _mean(parts, "h_rms")
-    skewness = np.mean([part.skewness * part.h_rms**3 for part in parts]) / h_rms**3
-    kurtosis = np.mean([part.kurtosis * part.h_rms**4 for part in parts]) / h_rms**4
-    quantiles, h_max = _mean(parts, "quantiles"), _mean(parts, "h_max")
-    return Heights(quantiles, h_rms, h_max, float(skewness), float(kurtosis), _mean(parts, "top"))
+    skewness, kurtosis = (
+        float(np.mean([getattr(part, name) * part.h_rms**power for part in parts]) / h_rms**power)
+        for name, power in (("skewness", 3), ("kurtosis", 4))
+    )
+    return Heights(_mean(parts, "quantiles"), h_rms, _mean(parts, "h_max"), skewness, kurtosis, _mean(parts, "top"))
 
 
 def _bands(parts: Sequence[Any]) -> RadialSpectrum:
     """The bands of all scans, each with its share of the variance."""
-    held = [part.variance > 0 for part in parts]
-    q, variance = (
-        np.concatenate([getattr(part, name)[own] for part, own in zip(parts, held, strict=True)])
-        for name in ("q", "variance")
-    )
+    q, variance = (np.concatenate([getattr(p, name)[p.variance > 0] for p in parts]) for name in ("q", "variance"))
     order = np.argsort(q)
     return RadialSpectrum(q[order], variance[order] / len(parts))

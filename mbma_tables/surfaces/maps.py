@@ -12,29 +12,18 @@ from mbma_tables.common.arguments import FloatArray, nearest, number_in, require
 from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
-from mbma_tables.surfaces.heights import Heights, one_height
+from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
-from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import SCATTER, log_bins
-from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface, resolution
-from mbma_tables.surfaces.treatment import (
-    LENGTHS,
-    MIN_POWER,
-    OPTIONS,
-    OVERLAP,
-    Treated,
-    Treatment,
-    mirrored,
-    squares,
-    treat,
-)
+from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface
+from mbma_tables.surfaces.spectrum import PowerLaws
+from mbma_tables.surfaces.treatment import CALLED, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
 
+S = TypeVar("S", bound=SpectralSurface)
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
-WINDOW_OVERLAP = OVERLAP**2  # along both axes
 MAX_KURTOSIS = 50.0  # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
-S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
 
 
@@ -82,7 +71,7 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
         # given steps are in the given unit
         grid, steps = grid * by, steps if lengths else tuple(step * by for step in steps)
     units = Units(own)
-    given |= {name: units.number(name, given[name]) for name in given.keys() & {*LENGTHS, "outliers"}}
+    given |= {name: units.number(name, given[name]) for name in given.keys() & {*CALLED, "outliers"}}
     return treat(grid, steps, whole, Treatment(**given), own)
 
 
@@ -102,20 +91,21 @@ def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:
         return {name: values[C > 0] for name, values in given.items()} | {"low": float(q[0])}
     # heights of order one, so that their squares neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
-    q, C, waves = _within_band(treated, 1.0, radial_spectrum(treated.windowed() / scale, *treated.steps))
-    C, steps = C * scale**2, _grid(treated)
-    return {
-        "q": q,
-        "C": C,
-        "counts": waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP),
-        "variances": C * waves * (steps[0] * steps[1]),
-        "low": float(q[0]) if treated.periodic else max(WINDOW_LOBE * max(steps), float(q[0])),
-    }
+    q, C, waves, grid = _rings(treated, scale, 1.0)
+    C = C * scale**2
+    given = {"q": q, "C": C, "counts": waves / (2 * treated.overlap), "variances": C * waves * (grid[0] * grid[1])}
+    return given | {"low": float(q[0]) if treated.periodic else max(WINDOW_LOBE * max(grid), float(q[0]))}
 
 
-def _grid(treated: Treated, scale: float = 1.0) -> list[float]:
-    """Steps of wavenumber along both axes, lengths over `scale`."""
-    return [2 * math.pi * scale / (n * d) for n, d in zip(treated.heights.shape, treated.steps, strict=True)]
+def _rings(treated: Treated, up: float, along: float) -> tuple[FloatArray, FloatArray, FloatArray, list[float]]:
+    """The radial spectrum within the band kept, heights over `up`, steps over `along`; the grid's steps in q."""
+    q, C, waves = radial_spectrum(treated.windowed() / up, *(step / along for step in treated.steps))
+    # a window smears some beyond the band
+    held = (q / along >= treated.waves[0] * (1 - 1e-9)) & (q / along <= treated.waves[1] * (1 + 1e-9))
+    if not held.any():
+        raise InputError("no wavelength of the map lies between its cut-offs")
+    grid = [2 * math.pi * along / (n * d) for n, d in zip(treated.heights.shape, treated.steps, strict=True)]
+    return q[held], C[held], waves[held], grid
 
 
 # grid steps in wavenumber; a window weights the few wavelengths below at random; none lies on this limit
@@ -153,10 +143,9 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
         return np.log([laws.moment(0) / variance, 2 * laws.moment(2) / slopes])
 
     with np.errstate(all="ignore"):
-        known = np.isfinite(misses(np.zeros(2))).all()
-    if not known:
-        # one wavelength, or moments that overflow
-        return C
+        if not np.isfinite(misses(np.zeros(2))).all():
+            # one wavelength, or moments that overflow
+            return C
     found = least_squares(misses, np.zeros(2), bounds=(-RAISED, RAISED), xtol=1e-12)
     # not for heights with a trend, which has no wavelength under the window
     changed = C * np.exp(found.x @ ways)
@@ -198,27 +187,17 @@ def _disagreement(q: FloatArray, C: FloatArray, variance: float, slopes: float) 
     ]
 
 
-def _within_band(treated: Treated, scale: float, spectrum: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Entries of a radial spectrum, lengths over `scale`, within the band kept; a window smears some beyond it."""
-    q = spectrum[0] / scale
-    held = (q >= treated.waves[0] * (1 - 1e-9)) & (q <= treated.waves[1] * (1 + 1e-9))
-    if not held.any():
-        raise InputError("no wavelength of the map lies between its cut-offs")
-    return tuple(part[..., held] for part in spectrum)
-
-
-def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
+def measured_map(treated: Treated) -> SpectralSurface:
     """A height map as its own radial spectrum, heights and curves; see `Surface.from_map`."""
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
-    q, C, waves = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
-    bins = log_bins(q, C, waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP))
+    q, C, waves, grid = _rings(treated, scale, scale)
+    bins = log_bins(q, C, waves / (2 * treated.overlap))
     # for ridges, or a few cosines, some bins have no wavelength
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
     values = values if treated.periodic else mirrored(values)
-    grid = _grid(treated, scale)
 
     def slopes(low: float) -> float:
         """Mean squared gradient of the map itself from a wavenumber to the spectrum's last ring."""
@@ -230,7 +209,7 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
         changed = raised(bins.q, C_bins, variance, whole)
         # a tilt if there are many long wavelengths, as for a step
         C_bins = matched(bins.q, C_bins, variance, whole / variance) if changed is C_bins else changed
-        few = _disagreement(bins.q, C_bins, variance, whole) if bins.q.size > 1 else []
+        few = _disagreement(bins.q, C_bins, variance, whole)
         notes += [{"step": "few wavelengths", "told": line} for line in few]
     else:
         seen, floor = C * waves * q**2 * grid[0] * grid[1], LONG * max(grid)
@@ -249,10 +228,9 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     known = SpectralSurface(
         bins.q,
         C_bins,
-        None if h_max is None else one_height(h_max) / scale,
-        own,
-        curves,
-        bearing.radial_spectrum(values, sizes),
+        heights=own,
+        bearing=curves,
+        bands=bearing.radial_spectrum(values, sizes),
         samples=1 / (1 / bins.weight - SCATTER**2),
         anisotropy=curves.anisotropy,
     ).scaled(scale, treated.unit)
@@ -267,17 +245,15 @@ def measured_surface(
     """The surface of a treated map or line scan, extrapolated to a shorter wavelength if requested."""
     if (shortest is None) != (hurst is None):
         raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
-    surface = (measured_profile if treated.heights.ndim == 1 else measured_map)(treated, h_max)
-    known = dataclasses.replace(surface, provenance=(*surface.provenance, resolution(surface)))
+    found = (measured_profile if treated.heights.ndim == 1 else measured_map)(treated)
+    known = (found if h_max is None else dataclasses.replace(found, h_max=h_max)).resolved()
     return known if shortest is None else extrapolated(known, shortest, hurst)
 
 
 def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     """A measured spectrum continued to a shorter wavelength [length] by a given power law."""
-    wave, exponent = (
-        number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30),
-        number_in("extrapolate_hurst", hurst, 0.0, 1.0),
-    )
+    wave = number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30)
+    exponent = number_in("extrapolate_hurst", hurst, 0.0, 1.0)
     last, end = float(surface.q1), 2 * math.pi / wave
     if not end > last:
         raise InputError(

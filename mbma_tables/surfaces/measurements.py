@@ -38,9 +38,8 @@ def read_measurement(
 ) -> Any:
     """The topography or line scan in a file: any format of SurfaceTopography, and text with commas; "-" is stdin.
 
-    Sampling steps [length], in `unit`, are of files that have none, and so is the unit; without a channel it is the
-    file's own default. A list of points may name units in the header of its columns, like "x [um]". Rows of a matrix
-    without lengths are x, as those of an array.
+    Sampling steps, in `unit`, are of files that have none, and so is the unit. A list of points may name units in the
+    header of its columns, like "x [um]". Rows of a matrix without lengths are x, as those of an array.
     """
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"
@@ -132,12 +131,10 @@ def _channel_of(
             )
         if dx is None:
             raise InputError(f"{path.name} has no lengths: give the sampling step dx")
-        steps = (dx, dx if dy is None else dy)[:: -1 if turned else 1]
         scale = 1.0 if own is None or unit is None else factor(unit, own)
-        given["physical_sizes"] = tuple(
-            count * scale * sampling_step(name, step)
-            for name, count, step in zip(("dx", "dy")[:: -1 if turned else 1], chosen.nb_grid_pts, steps, strict=False)
-        )
+        steps = [("dx", dx), ("dy", dx if dy is None else dy)][:: -1 if turned else 1]
+        sides = zip(chosen.nb_grid_pts, steps, strict=False)
+        given["physical_sizes"] = tuple(count * scale * sampling_step(*step) for count, step in sides)
     elif dx is not None or dy is not None:
         raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit=... sets their unit)")
     found = reader.topography(**given)
@@ -147,8 +144,7 @@ def _channel_of(
 def sampling_step(name: str, value: Any) -> float:
     """A sampling step [length] as a number."""
     step = one_number(name, value)
-    require(name, step, step > 0, "positive")
-    require(name, step, (step >= MIN_LENGTH) & (step <= MAX_LENGTH), "in [1e-30, 1e30]")
+    require(name, step, (step >= MIN_LENGTH) & (step <= MAX_LENGTH), "positive, in [1e-30, 1e30]")
     return float(step)
 
 
@@ -159,8 +155,7 @@ def grid_of(
     if not callable(getattr(source, "heights", None)):
         if dx is None:
             raise InputError("dx is missing: the sampling step of a plain array of heights")
-        given = {"dx": dx, "dy": dx if dy is None else dy} if dimensions == 2 else {"dx": dx}
-        steps = tuple(sampling_step(name, value) for name, value in given.items())
+        steps = tuple(sampling_step(*step) for step in (("dx", dx), ("dy", dx if dy is None else dy))[:dimensions])
         # of a DataArray
         stated = getattr(source, "attrs", {}).get("units")
         return source, steps, bool(periodic), None if stated in ("", "1") else stated
@@ -183,10 +178,9 @@ def grid_of(
     extent = finite_array("physical_sizes", sizes)
     allowed = "in [1e-30, 1e30], x and y rising"
     require("physical_sizes", extent, (extent >= MIN_LENGTH) & (extent <= MAX_LENGTH), allowed)
-    if periodic is None:
-        periodic = getattr(source, "is_periodic", False)
+    whole = getattr(source, "is_periodic", False) if periodic is None else periodic
     found = tuple(float(size) / max(count, 1) for size, count in zip(extent, np.shape(grid), strict=True))
-    return grid, found, bool(periodic), getattr(source, "unit", None)
+    return grid, found, bool(whole), getattr(source, "unit", None)
 
 
 def heights_of(grid: Any, dimensions: int = 2) -> Any:
@@ -199,8 +193,6 @@ def heights_of(grid: Any, dimensions: int = 2) -> Any:
         raise InputError(f"heights must be {('one', 'two')[dimensions - 1]}-dimensional, got shape {values.shape}")
     if values.dtype.kind not in "fiu":
         raise InputError(f"heights must be real numbers: entries of type {values.dtype}")
-    if values.size == 0:
-        raise InputError("heights is empty: at least one number is needed")
     numbers = np.ma.getdata(values).astype(float)
     holes = np.ma.getmaskarray(values) | np.isnan(numbers)
     if holes.all():

@@ -14,10 +14,10 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.surfaces.heights import Heights, one_height
-from mbma_tables.surfaces.power_laws import PowerLaws
+from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.spectral import SpectralSurface
-from mbma_tables.surfaces.treatment import MIN_POWER, OVERLAP, Treated
+from mbma_tables.surfaces.spectrum import PowerLaws
+from mbma_tables.surfaces.treatment import MIN_POWER, Treated
 
 PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # panels between two nodes
@@ -28,7 +28,7 @@ LONGEST, ROLLED_OFF = 4, 0.5  # longest wavelengths of a trace: with half of the
 MIN_NODES = 5
 
 
-def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
+def measured_profile(treated: Treated) -> SpectralSurface:
     """The isotropic surface of a treated line scan; see `Surface.from_profile`."""
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
@@ -36,16 +36,18 @@ def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
     # oblique wavelengths appear longer along the line: the cut-off applies to the spectrum, not to the trace
     trace = dataclasses.replace(treated, heights=(treated.heights if treated.uncut is None else treated.uncut) / scale)
     heights, length = Heights.of(treated.heights / scale), treated.heights.size * step
-    unit, overlap = 2 * math.pi / length, 1.0 if treated.periodic else OVERLAP
+    unit, overlap = 2 * math.pi / length, treated.overlap
     q, C = _components(trace, step, low)
     edges, number = _bins(q, unit)
     count, slopes = np.bincount(number).astype(float), C * q**2
     h_rms, gradient = float(trace.heights.std()), math.sqrt(2 * slopes.sum() * unit / np.pi)
-    sides = 4 * np.pi * np.sqrt(np.maximum(_panels(edges) ** 2 - q[:, None] ** 2, 0))
+    # panels between nodes, evenly spaced in ln q
+    place = np.arange(PANELS * (edges.size - 1) + 1) / PANELS
+    fine = np.exp(np.interp(place, np.arange(edges.size), np.log(edges)))
+    sides = 4 * np.pi * np.sqrt(np.maximum(fine**2 - q[:, None] ** 2, 0))
     kernel = np.add.reduceat(np.diff(sides, axis=1), np.searchsorted(number, np.arange(count.size)), axis=0)
-    nodes = _isotropic(
-        edges, np.bincount(number, C) / count, count / overlap, kernel / count[:, None], (h_rms**2, gradient**2)
-    )
+    mean, squares = np.bincount(number, C) / count, (h_rms**2, gradient**2)
+    nodes = _isotropic(edges, fine, mean, count / overlap, kernel / count[:, None], squares)
     longest, notes = float(C[:LONGEST].sum() / C.sum()), _limits(length * gradient / h_rms)
     # powers are exponentially distributed: the mean of squares is twice the square of the mean
     kept = q <= high * (1 + 1e-9)
@@ -65,13 +67,8 @@ def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
         notes += ({"step": "no roll-off", "share": longest, "told": told},)
     end = min(high, float(edges[-1]))
     q = np.append(edges[edges < end], end)
-    surface = SpectralSurface(
-        q,
-        PowerLaws(edges, nodes).at(q),
-        None if h_max is None else one_height(h_max) / scale,
-        heights,
-        samples=np.interp(np.log(q), np.log(edges[:-1]), count / overlap),
-    ).scaled(scale, treated.unit)
+    own, samples = PowerLaws(edges, nodes).at(q), np.interp(np.log(q), np.log(edges[:-1]), count / overlap)
+    surface = SpectralSurface(q, own, heights=heights, samples=samples).scaled(scale, treated.unit)
     return dataclasses.replace(surface, provenance=treated.history(found, *notes))
 
 
@@ -100,24 +97,19 @@ def _bins(q: FloatArray, unit: float) -> tuple[FloatArray, Any]:
     return edges, np.searchsorted(edges, q, side="right") - 1
 
 
-def _panels(edges: FloatArray) -> FloatArray:
-    """Ends of the panels between nodes, evenly spaced in ln q."""
-    place = np.arange(PANELS * (edges.size - 1) + 1) / PANELS
-    return np.asarray(np.exp(np.interp(place, np.arange(edges.size), np.log(edges))))
-
-
 def _isotropic(
-    edges: FloatArray, mean: FloatArray, count: FloatArray, kernel: FloatArray, squares: tuple[float, float]
-) -> FloatArray:
+    edges: FloatArray, fine: FloatArray, mean: FloatArray, count: FloatArray, kernel: FloatArray,
+    squares: tuple[float, float],
+) -> FloatArray:  # fmt: skip
     """C at the edges of bins [length^4], h_rms^2 = 2 pi integral C q dq.
 
-    `mean` is C_1D of each bin, `count` its independent components, `kernel` its C_1D for C = 1 on each panel, `squares`
-    are the mean squares of height and gradient.
+    `fine` are the ends of panels, `mean` is C_1D of each bin, `count` its independent components, `kernel` its C_1D for
+    C = 1 on each panel, `squares` are the mean squares of height and gradient.
     """
     from scipy.optimize import least_squares
     from scipy.special import digamma
 
-    log_q, fine = np.log(edges), _panels(edges)
+    log_q = np.log(edges)
     middle = np.log(fine[1:] * fine[:-1]) / 2
     between = np.stack([np.interp(middle, log_q, row) for row in np.eye(log_q.size)], axis=1)
     independent = np.maximum(count, 1.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from typing import Any
 
@@ -125,9 +124,7 @@ def find_law(bins: Bins, unit: float, breaks: bool) -> PowerLaw:
     roll_offs = {start: _roll_off(x, bins, start) for start in starts}
     departures = {stop: _straight(x, bins, stop, count)[2] if stop < count else 0.0 for stop in stops}
     laws = []
-    for start, stop in itertools.product(starts, stops):
-        if stop - start < MIN_POINTS:
-            continue
+    for start, stop in ((i, j) for i in starts for j in stops if j - i >= MIN_POINTS):
         log_k, slope, chi2, spread = _straight(x, bins, start, stop)
         before, more, level = roll_offs[start]
         # each piece by its own scatter, or a tail that no line fits would hide the misfit of the law; the scatter
@@ -139,11 +136,8 @@ def find_law(bins: Bins, unit: float, breaks: bool) -> PowerLaw:
         laws.append(PowerLaw(start, stop, log_k, -slope, error, level, information))
     best = min(laws, key=lambda law: law.criterion)
     # a roll-off and its law can also be described as a law and its departure: only one of them is self-affine
-    likely = [
-        law
-        for law in laws
-        if 0 < law.slope / 2 - 1 <= 1 + HURST_TOLERANCE and bins.q[law.stop - 1] > MIN_ZETA_1 * bins.q[law.start]
-    ]
+    wide = [law for law in laws if bins.q[law.stop - 1] > MIN_ZETA_1 * bins.q[law.start]]
+    likely = [law for law in wide if 0 < law.slope / 2 - 1 <= 1 + HURST_TOLERANCE]
     chosen = min(likely, key=lambda law: law.criterion, default=best)
     return chosen if chosen.criterion <= best.criterion + MARGIN else best
 
@@ -159,10 +153,8 @@ def _band_of(bins: Bins, law: PowerLaw, unit: float, ends: tuple[float, float]) 
     return q0, q1 if law.stop == len(q) else math.sqrt(q[law.stop - 1] * q[law.stop])
 
 
-def _checked(band: Any, low: float, high: float) -> tuple[float, float] | None:
+def _checked(band: Any, low: float, high: float) -> tuple[float, float]:
     """A forced band as two numbers inside [low, high], the range that the measurement holds."""
-    if band is None:
-        return None
     pair = finite_array("band", band)
     if pair.shape != (2,) or not pair[0] < pair[1]:
         raise InputError(f"band must be two wavenumbers (q_low, q_high) with q_low < q_high, got {band!r}")
@@ -186,7 +178,7 @@ def fit_spectrum(
     not fitted.
     """
     unit, last = float(q.min()), float(q.max())
-    band = _checked(band, unit, last)
+    band = None if band is None else _checked(band, unit, last)
     least, most = band or (low, last)
     every = log_bins(q, C, counts)
     bins = every[(every.q >= least * (1 - 1e-9)) & (every.q <= most * (1 + 1e-9))]
@@ -195,9 +187,8 @@ def fit_spectrum(
             f"only {len(bins.q)} spectral points between q = {least:.6g} and {most:.6g}; "
             f"a power law needs at least {MIN_POINTS}"
         )
-    y, side = bins.log_c, MIN_PIECE
-    rise = y[side:-side] - np.maximum(y[: -2 * side], y[2 * side :])
-    _refuse_peak(bins.q[side:-side], rise, MAX_PEAK, "what it is on either side")
+    rise = bins.log_c[MIN_PIECE:-MIN_PIECE] - np.maximum(bins.log_c[: -2 * MIN_PIECE], bins.log_c[2 * MIN_PIECE :])
+    _refuse_peak(bins.q[MIN_PIECE:-MIN_PIECE], rise, MAX_PEAK, "what it is on either side")
     law = find_law(bins, unit, breaks=band is None)
     hurst, error, used = law.slope / 2 - 1, law.slope_error / 2, bins[law.start : law.stop]
     if not 0 < hurst <= 1 + max(HURST_TOLERANCE, 2 * error):
@@ -213,7 +204,7 @@ def fit_spectrum(
     def beyond(points: Bins) -> FloatArray:
         return np.asarray(points.log_c - log_k + (2 + 2 * exponent) * np.log(points.q / unit))
 
-    # without roll-off the band extends to the map's size, though the longest wavelengths are too few to be fitted
+    # without roll-off the band extends to the map's size, though its longest wavelengths are not fitted
     q0, q1 = band or _band_of(bins, law, unit, (unit, last))
     fit = SpectrumFit(
         hurst=hurst,

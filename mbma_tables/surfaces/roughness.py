@@ -1,7 +1,7 @@
-"""A self-affine surface from the numbers of a drawing or of a profilometer, with each assumption stated.
+"""Roughness parameters: the surface with those of a drawing, each assumption stated; those of a height map.
 
 A profile along any line of an isotropic surface has its variance of height m0 and, for the variance of slope, m2, while
-the gradient of the surface has 2 m2. Everything else here follows from Gaussian heights.
+the gradient of the surface has 2 m2. Everything else that is assumed follows from Gaussian heights.
 """
 
 import math
@@ -9,8 +9,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, describe_entries, finite_array, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    describe_entries,
+    finite_array,
+    positive_array,
+    require,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import resolve
 from mbma_tables.surfaces import spectrum
@@ -39,14 +47,15 @@ SAID = {
     "Sp": "h_max = Sp: contact begins at the highest point of the map; a larger map has a higher one",
 }
 TYPICAL = "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) times it of N independent points"
+CORE = 0.4  # share of the material ratio curve that the straight line is fitted to
 
 
-def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str | None:
-    """The one of the names that is given; an error for several."""
+def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str:
+    """The one of the names that is given, "" for none; an error for several."""
     found = [name for name in names if name in given]
     if len(found) > 1 or (needed and not found):
         raise InputError(f"{what}: give one of {', '.join(names)}; got {' and '.join(found) or 'none'}")
-    return found[0] if found else None
+    return found[0] if found else ""
 
 
 def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[str, Any]:
@@ -65,36 +74,27 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
             "the band of wavelengths needs two of longest, shortest and Rdq (or Sdq, Rsm); "
             f"got {' and '.join(band) or 'none'}"
         )
-    if "rolloff" in given and slope is not None:
+    if "rolloff" in given and slope:
         raise InputError("rolloff needs longest and shortest: from a slope no band follows")
-    arrays = {name: finite_array(name, value) for name, value in given.items()}
-    for name, array in arrays.items():
-        require(name, array, array > 0, "positive")
+    arrays = {name: positive_array(name, value) for name, value in given.items()}
     require("hurst", arrays["hurst"], arrays["hurst"] <= 1, "in (0, 1]")
     shape = broadcast_shape(**arrays)
     at = {name: np.broadcast_to(array, shape) for name, array in arrays.items()}
-    assert height is not None
-    assert top is not None
     h_rms = at[height] * (math.sqrt(math.pi / 2) if height in ("Ra", "Sa") else 1.0)
     said = f" [{unit}]" if unit else ""
     if top != "nominal_area":
         require(f"{top}{said}", at[top], at[top] > h_rms, f"above the rms height; {TYPICAL}")
-    if slope is None:
+    if not slope:
         long, short = at["longest"], at["shortest"]
         few = long <= spectrum.MIN_ZETA_1 * short
         require(f"longest{said}", long, ~few, f"more than 3 times shortest, {describe_entries(short, few)}")
     q0, q1 = _band(at, h_rms, slope)
     used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
-    record = {
-        "step": "from_roughness",
-        "given": shown,
-        "unit": unit,
-        "assumed": [ASSUMED, *(SAID[name] for name in used)],
-    }
-    surface: dict[str, Any] = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms}
-    surface[top if top == "nominal_area" else "h_max"] = at[top]
-    surface |= {"unit": unit, "provenance": (record,)}
+    record = {"given": shown, "unit": unit, "assumed": [ASSUMED, *(SAID[name] for name in used)]}
+    surface: dict[str, Any] = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms, "unit": unit}
+    surface |= {"provenance": ({"step": "from_roughness", **record},)}
+    surface["nominal_area" if top == "nominal_area" else "h_max"] = at[top]
     return surface if "rolloff" not in given else _rolled_off(surface, at["rolloff"])
 
 
@@ -113,36 +113,106 @@ def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
     return surface | {"q": np.array([q0, start, q1]), "C": C}
 
 
-def _band(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str | None) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest wavenumber."""
-    ends = [2 * math.pi / at[wave] for wave in WAVES if wave in at]
-    if slope is None:
-        return ends[0], ends[1]
-    m2 = {
-        "Rdq": lambda: at["Rdq"] ** 2,
-        "Sdq": lambda: at["Sdq"] ** 2 / 2,
-        "Rsm": lambda: (2 * math.pi * h_rms / at["Rsm"]) ** 2,
-    }[slope]()
-    from_longest = "longest" in at
-    zeta = _ratio(at["hurst"], m2 / (h_rms * ends[0]) ** 2, at[slope], slope, 0 if from_longest else 2)
-    return (ends[0], ends[0] * zeta) if from_longest else (ends[0] / zeta, ends[0])
-
-
-def _ratio(hurst: FloatArray, wanted: FloatArray, slope: FloatArray, name: str, power: int) -> FloatArray:
-    """zeta_1 at which m2/m0 over q0^2, or over q1^2 where power is 2, has the wanted value."""
+def _band(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest wavenumber: q1/q0 is where m2/m0 over q0^2, or over q1^2, has the wanted value."""
+    end, *other = (2 * math.pi / at[wave] for wave in WAVES if wave in at)
+    if not slope:
+        return end, other[0]
     from scipy.optimize.elementwise import find_root
+
+    power = 0 if "longest" in at else 2
+    gradient = 2 * math.pi * h_rms / at["Rsm"] if slope == "Rsm" else at[slope]
+    wanted = gradient**2 / (2 if slope == "Sdq" else 1) / (h_rms * end) ** 2
 
     def ratio(x: Any, h: Any) -> Any:
         zeta = np.exp(x)
         return spectrum.band_moment(2, h, 1.0, zeta) / spectrum.band_moment(0, h, 1.0, zeta) / zeta**power
 
     ends = math.log(spectrum.MIN_ZETA_1), math.log(spectrum.MAX_ZETA_1)
-    least, most = np.sort(np.stack([ratio(end, hurst) for end in ends]), axis=0)
-    bounds = [slope * (end / wanted) ** (-0.5 if name == "Rsm" else 0.5) for end in (least, most)]
-    low, high = (float(f(np.stack(bounds))) for f in (np.min, np.max))
-    good = (wanted > least) & (wanted < most)
-    require(name, slope, good, f"between {low:.4g} and {high:.4g}, for a band of 3 < q1/q0 < 1e8 at these wavelengths")
-    found = find_root(
-        lambda x, h, goal: np.log(ratio(x, h) / goal), ends, args=(hurst, wanted), tolerances={"xrtol": 1e-15}
-    )
-    return np.asarray(np.exp(found.x))
+    least, most = np.sort(np.stack([ratio(x, at["hurst"]) for x in ends]), axis=0)
+    bounds = np.stack([at[slope] * (each / wanted) ** (-0.5 if slope == "Rsm" else 0.5) for each in (least, most)])
+    allowed = f"between {bounds.min():.4g} and {bounds.max():.4g}, for a band of 3 < q1/q0 < 1e8 at these wavelengths"
+    require(slope, at[slope], (wanted > least) & (wanted < most), allowed)
+    args = (at["hurst"], wanted)
+    found = find_root(lambda x, h, goal: np.log(ratio(x, h) / goal), ends, args=args, tolerances={"xrtol": 1e-15})
+    zeta = np.asarray(np.exp(found.x))
+    return (end, end * zeta) if power == 0 else (end / zeta, end)
+
+
+def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str, float]:
+    """Sq, Sa, Ssk, Sku, Sp, Sv, Sz, Sdq, Sk, Spk, Svk, Smr1, Smr2 and the direction of the lay.
+
+    Parameters
+    ----------
+    heights : array_like, shape (nx, ny)
+        Height map [length]; its mean is subtracted. The first axis is x.
+    steps : pair of float
+        Sampling steps along x and y [length].
+
+    Returns
+    -------
+    dict of float
+        Lengths in the unit of the map; `Smr1` and `Smr2` as shares; `Sdq` by central differences; `lay` in degrees from
+        the x axis towards y, in [0, 180): the direction along which the mean squared gradient is least.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables.surfaces.roughness import areal_parameters
+    >>> x = np.arange(200.0)
+    >>> ridges = np.repeat(np.sin(2 * np.pi * x / 40)[:, None], 100, axis=1)  # along y
+    >>> found = areal_parameters(ridges, (1.0, 1.0))
+    >>> f"Sq = {found['Sq']:.3f}, Sku = {found['Sku']:.2f}, lay at {found['lay']:.0f} degrees"
+    'Sq = 0.707, Sku = 1.50, lay at 90 degrees'
+    """
+    values = finite_array("heights", heights)
+    if values.ndim != 2 or min(values.shape) < 2:
+        raise InputError(f"heights must be a map, got shape {values.shape}")
+    values = values - values.mean()
+    Sq = float(np.sqrt(np.mean(values**2)))
+    if not Sq > 0:
+        raise InputError("heights are all the same")
+    slopes = np.stack(np.gradient(values, *steps)).reshape(2, -1)
+    tensor = slopes @ slopes.T / values.size
+    along = np.linalg.eigh(tensor)[1][:, 0]
+    top, bottom = float(values.max()), float(values.min())
+    return {
+        "Sq": Sq,
+        "Sa": float(np.mean(np.abs(values))),
+        "Ssk": float(np.mean((values / Sq) ** 3)),
+        "Sku": float(np.mean((values / Sq) ** 4)),
+        "Sp": top,
+        "Sv": -bottom,
+        "Sz": top - bottom,
+        "Sdq": float(np.sqrt(np.trace(tensor))),
+        **core(values),
+        "lay": float(np.degrees(np.arctan2(along[1], along[0])) % 180),
+    }
+
+
+def core(heights: FloatArray) -> dict[str, float]:
+    """Sk, Spk, Svk, Smr1 and Smr2 of heights of any shape.
+
+    A line is fitted to the 40% of the material ratio curve where its secant is least steep. Sk is the line's height
+    difference between ratios 0 and 1, and Smr1 and Smr2 are the ratios at which the curve has these heights. Spk and
+    Svk are the heights of triangles over Smr1 and 1 - Smr2 of the area of the curve beyond.
+    """
+    curve = np.sort(heights, axis=None)[::-1]
+    count = curve.size
+    ratio, width = (np.arange(count) + 0.5) / count, max(round(CORE * count), 2)
+    secants = curve[: count - width + 1] - curve[width - 1 :]
+    # the middle one if several are least, as for uniform heights
+    least = np.flatnonzero(secants <= secants.min() * (1 + 1e-12))
+    part = slice(first := int(least[least.size // 2]), first + width)
+    centre, level = ratio[part].mean(), curve[part].mean()
+    slope = ((ratio[part] - centre) @ (curve[part] - level)) / np.sum((ratio[part] - centre) ** 2)
+    upper, lower = level - slope * centre, level + slope * (1 - centre)
+    peaks, valleys = np.maximum(curve - upper, 0.0), np.maximum(lower - curve, 0.0)
+    above, below = np.count_nonzero(peaks) / count, np.count_nonzero(valleys) / count
+    return {
+        "Sk": float(upper - lower),
+        "Spk": float(2 * peaks.mean() / above) if above else 0.0,
+        "Svk": float(2 * valleys.mean() / below) if below else 0.0,
+        "Smr1": above,
+        "Smr2": 1 - below,
+    }

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,8 +25,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface, frozen
-from mbma_tables.surfaces.cases import get_case
-from mbma_tables.surfaces.extremes import of_area
+from mbma_tables.surfaces.heights import of_area
 from mbma_tables.surfaces.roughness import surface_of_roughness
 
 if TYPE_CHECKING:
@@ -35,6 +34,40 @@ if TYPE_CHECKING:
 LARGEST = 1e50  # limit of lengths and wavenumbers, so that their powers stay finite
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
+
+
+class Case(NamedTuple):
+    """A named surface of the paper (Section 4), with the numbers that it reports."""
+
+    title: str
+    unit: str | None  # of length; None if lengths are over h_rms
+    numbers: Mapping[str, Any]  # arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments
+
+
+def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, top: float) -> dict[str, float]:
+    return {"hurst": hurst, "q0": q0, "q1": q0 * zeta_1, "h_rms": h_rms, "h_max": top * h_rms}
+
+
+def _moments(hurst: float, m0: float, m2: float, m4: float, h_max: float) -> dict[str, float]:
+    return {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4, "h_max": h_max}
+
+
+CASES = {
+    "yang-persson": Case(
+        "Yang-Persson molecular dynamics (Fig. 11)", "nm", _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0)
+    ),
+    "papangelo": Case(
+        "Papangelo Green's function simulation (Fig. 12)", "um", _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0)
+    ),
+    "concrete": Case("concrete road of Lorenz (Figs. 13a, 14a)", "mm", _moments(0.7, 0.071, 0.27, 62.0, 1.1)),
+    "asphalt": Case("asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _moments(0.85, 0.091, 2.67, 21000.0, 1.37)),
+    "challenge": Case("contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7)),
+} | {
+    f"resolution-{z}": Case(
+        f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)", None, _band(0.7, 0.1, z, 1.0, 3.0)
+    )
+    for z in (125, 250, 500, 1000)
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -47,6 +80,7 @@ class SelfAffine(AnySurface):
     h_rms: Any
     h_max: Any = None
     parameters = PARAMETERS
+    spectral: ClassVar[Any]  # `MeasuredSurface`
     unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
     provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
@@ -56,7 +90,11 @@ class SelfAffine(AnySurface):
         units = Units(self.unit)
         vars(self).update(unit=units.length)
         if nominal_area is not None:
-            self._reach(nominal_area)
+            # derived from the other numbers, which are checked for that
+            numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
+            like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
+            h_max, provenance = of_area(like, nominal_area, self.h_max)
+            vars(self).update(h_max=h_max, provenance=provenance)
         elif self.h_max is None:
             raise InputError("h_max is missing: the highest point above the mid-plane, or give the nominal_area")
         if self.labelled:
@@ -75,15 +113,6 @@ class SelfAffine(AnySurface):
         zeta_1 = np.asarray(self.zeta_1)
         require("q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3: q1 is the largest wavenumber")
         require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
-
-    def _reach(self, nominal_area: Any) -> None:
-        """Set the highest point of a Gaussian surface of that area."""
-        units = Units(self.unit)
-        numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
-        # derived from the other numbers; checked like them
-        like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
-        h_max, provenance = of_area(like, nominal_area, self.h_max)
-        vars(self).update(h_max=h_max, provenance=provenance)
 
     def __repr__(self) -> str:
         numbers = [f"{name}={_shown(getattr(self, name))}" for name in PARAMETERS]
@@ -112,14 +141,9 @@ class SelfAffine(AnySurface):
 
         Parameters
         ----------
-        hurst : array_like
-            Hurst exponent, in (0, 1].
+        hurst, h_max, nominal_area, unit : as for `Surface`
         m0, m2, m4 : array_like
             Variance of height [length^2], of a profile's slope, of its second derivative [1/length^2].
-        h_max, nominal_area : array_like, one of them
-            Height of the highest point above the mid-plane [length]; or A0 [length^2], as for `Surface`.
-        unit : str, optional
-            The unit of length.
 
         Returns
         -------
@@ -162,18 +186,16 @@ class SelfAffine(AnySurface):
         nominal_area: Any = None,
         unit: str | None = None,
     ) -> Any:
-        """The surface that numbers of a drawing or a profilometer describe.
+        """A surface from the roughness parameters of a drawing or a profilometer.
 
-        One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength; nothing is
-        filled in. `provenance` holds the meaning assumed for each number;
-        docs/surfaces.md has typical values. Lengths are numbers in one unit, or texts with their unit.
+        Required are one height, one highest point, the Hurst exponent, and two of slope, longest and shortest
+        wavelength. `provenance` contains the assumed meaning of each number; docs/surfaces.md has typical values.
 
         Parameters
         ----------
-        hurst : array_like
-            Hurst exponent, in (0, 1].
+        hurst, unit : as for `Surface`
         h_max, Sp, nominal_area : array_like, one of them
-            Height of the highest point above the mid-plane [length], or A0 [length^2], as for `Surface`.
+            Highest point above the mid-plane [length], or A0 [length^2], as for `Surface`.
         Rq, Ra, Sq, Sa : array_like, one of them
             Root-mean-square or mean absolute height of a profile or of a map [length].
         Rdq, Sdq, Rsm : array_like, one of them, optional
@@ -181,10 +203,8 @@ class SelfAffine(AnySurface):
         longest, shortest : array_like, optional
             Wavelengths at which the roughness ends [length].
         rolloff : float or str, optional
-            Wavelength down from which the spectrum follows its power law [length]; between `longest` and it the
-            spectrum is flat, as of most machined faces. Without, the law holds from `longest` on.
-        unit : str, optional
-            The unit of length.
+            Longest wavelength of the power law [length]; between `longest` and it the spectrum is flat, as for most
+            machined faces. Default: `longest`.
 
         Returns
         -------
@@ -206,12 +226,8 @@ class SelfAffine(AnySurface):
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
         given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
-        return cls._made(surface_of_roughness(unit, given))
-
-    @classmethod
-    def _made(cls, numbers: dict[str, Any]) -> Any:
-        """Of numbers, which may be those of a spectrum."""
-        return cls(**numbers)
+        numbers = surface_of_roughness(unit, given)
+        return cls.spectral(**numbers) if "C" in numbers else cls(**numbers)
 
     @classmethod
     def named(cls, name: str) -> Self:
@@ -229,10 +245,10 @@ class SelfAffine(AnySurface):
         >>> float(challenge.h_rms), challenge.unit
         (0.762, 'um')
         """
-        case = get_case(name)
-        if "m0" in case.numbers:
-            return cls.from_moments(**case.numbers, unit=case.length_unit)
-        return cls(**case.numbers, unit=case.length_unit)
+        if not isinstance(name, str) or name not in CASES:
+            raise InputError(f"no surface is named {name!r}; there are {', '.join(CASES)}")
+        _, unit, numbers = CASES[name]
+        return (cls.from_moments if "m0" in numbers else cls)(**numbers, unit=unit)
 
     @functools.cached_property
     def labelled(self) -> bool:

@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import positive_array, require
+from mbma_tables.common.arguments import finite_array, one_number, positive_array, require
 from mbma_tables.common.display import Variable
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.any_surface import AnySurface, frozen
-from mbma_tables.surfaces.extremes import of_area
-from mbma_tables.surfaces.heights import Heights, one_height
-from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
-from mbma_tables.surfaces.spectrum import MIN_ZETA_1
+from mbma_tables.surfaces.heights import Heights, of_area
+from mbma_tables.surfaces.spectrum import MIN_ZETA_1, PowerLaws
 from mbma_tables.surfaces.treatment import Treated
 
 if TYPE_CHECKING:
@@ -58,7 +56,7 @@ class SpectralSurface(AnySurface):
     Parameters
     ----------
     q : array_like, shape (n,)
-        Wavenumber [1/length], positive, rising; a repeated one is a jump of the spectrum.
+        Wavenumber [1/length], positive, in any order; a repeated one is a jump of the spectrum.
     C : array_like, shape (n,)
         Spectrum [length^4] as h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), not negative: a power law between
         neighbours, nothing beyond the ends or beside a zero.
@@ -81,7 +79,7 @@ class SpectralSurface(AnySurface):
     anisotropy : float, optional
         Root of the ratio of the gradient tensor's eigenvalues, 1 if isotropic; None where not measured.
     unit : str, optional
-        The unit of length, such as "um"; None where it is not known. Results carry it.
+        Unit of length, such as "um", of the numbers and the results; None if it is not known.
     provenance : sequence of mapping, optional
         The treatment of the measurement, a plain record for each step: {"step": "detrend", "kind": "plane"}, ...
     nominal_area : float or str, optional
@@ -118,16 +116,18 @@ class SpectralSurface(AnySurface):
     nominal_area: dataclasses.InitVar[Any] = None
 
     def __post_init__(self, nominal_area: Any) -> None:
-        q, C = two_columns(self.q, self.C)
+        q, C = finite_array("q", self.q), finite_array("C", self.C)
+        if q.ndim != 1 or q.shape != C.shape:
+            raise InputError(f"q and C must be two columns of one length, got shapes {q.shape} and {C.shape}")
         require("q", q, q > 0, "positive (leave q = 0 out)")
-        require("q", q, np.diff(q, prepend=q[0]) >= 0, "rising")
         require("C", C, C >= 0, "zero or positive")
-        held = np.flatnonzero(C > 0)
-        inside = slice(held[0], held[-1] + 1) if held.size else slice(0)
         keep = {"q": q, "C": C}
         if self.samples is not None:
             keep["samples"] = np.broadcast_to(positive_array("samples", self.samples), q.shape)
-        vars(self).update({name: frozen(array[inside].copy()) for name, array in keep.items()})
+        order = np.argsort(q, kind="stable")
+        held = np.flatnonzero(C[order] > 0)
+        inside = order[held[0] : held[-1] + 1] if held.size else order[:0]
+        vars(self).update({name: frozen(array[inside]) for name, array in keep.items()})
         if held.size < 2 or not self.laws.width.size:
             raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
         numbers = {"q0": self.q[0], "q1": self.q[-1], "h_rms": math.sqrt(self.laws.moment(0))}
@@ -145,7 +145,7 @@ class SpectralSurface(AnySurface):
             raise InputError(
                 "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
             )
-        top = heights.h_max if top is None else one_height(top)
+        top = heights.h_max if top is None else float(positive_array("h_max", one_number("h_max", top)))
         heights = Heights.gaussian(self.h_rms, top) if heights is None else heights
         vars(self).update(heights=heights, h_max=top, provenance=provenance)
 
@@ -235,28 +235,21 @@ class SpectralSurface(AnySurface):
 
     def resized(self, up: float, along: float) -> Self:
         """The surface with its heights `up` times as large, and its lengths along the plane `along` times."""
-        known, bands, whole, slope = self.bearing, self.bands, self.map, up / along
+        known, bands, whole = self.bearing, self.bands, self.map
         if known is not None:
             moved = dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), up)
-            moved |= dict.fromkeys(("gradient", "tension_force", "tension"), slope)
+            moved |= dict.fromkeys(("gradient", "tension_force", "tension"), up / along)
             known = dataclasses.replace(known, **{name: by * getattr(known, name) for name, by in moved.items()})
         if bands is not None:
             bands = dataclasses.replace(bands, q=bands.q / along, variance=bands.variance * up**2)
         if whole is not None:
             steps = tuple(along * step for step in whole.steps)
             whole = dataclasses.replace(whole, heights=up * whole.heights, steps=steps)
-        return dataclasses.replace(
-            self,
-            q=self.q / along,
-            C=self.C * (up * along) ** 2,
-            h_max=self.h_max * up,
-            heights=self.heights.scaled(up),
-            bearing=known,
-            bands=bands,
-            map=whole,
-            table=None if self.table is None else self.table.resized(up, along),
-            scans=tuple(scan.resized(up, along) for scan in self.scans),
-        )
+        table = None if self.table is None else self.table.resized(up, along)
+        scans = tuple(scan.resized(up, along) for scan in self.scans)
+        parts: dict[str, Any] = {"bearing": known, "bands": bands, "map": whole, "table": table, "scans": scans}
+        parts |= {"q": self.q / along, "C": self.C * (up * along) ** 2}
+        return dataclasses.replace(self, **parts, h_max=self.h_max * up, heights=self.heights.scaled(up))
 
     def between(self, low: float, high: float) -> Self:
         """The wavelengths from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
@@ -279,17 +272,18 @@ class SpectralSurface(AnySurface):
         fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
         grid = np.unique(np.clip(np.concatenate([fine, self.q, other.q]), low, high))
         # both sides of every wavenumber, since the sum jumps at the ends of bands
-        above, below = (
-            self.laws.at(side) + other.laws.at(side) for side in (grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE))
-        )
-        q, C = np.repeat(grid, 2)[1:-1], np.stack([above, below], axis=1).ravel()
+        sides = np.stack([grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)], axis=1).ravel()
+        q, C = np.repeat(grid, 2)[1:-1], self.laws.at(sides) + other.laws.at(sides)
         kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
-        told = []
+        told, stretch = [], None
         if self.bearing is not None or other.bearing is not None:
             told.append(
                 "curves of the maps' summits and valleys are not used: the relative position of the maps is not known"
             )
-        if (stretch := _anisotropy(self, other)) is not None:
+        if self.anisotropy is not None or other.anisotropy is not None:
+            # the largest of a sum: parallel, their tensors of mean gradients have the same axes
+            parts = [(float(one.m2), (one.anisotropy or 1.0) ** 2) for one in (self, other)]
+            stretch = math.sqrt(sum(m2 * a / (1 + a) for m2, a in parts) / sum(m2 / (1 + a) for m2, a in parts))
             told.append(f"lays are assumed to be parallel: anisotropy {stretch:.3g} at most")
         record = {"step": "combined", "of": [list(self.provenance), list(other.provenance)]}
         both = type(self)(
@@ -300,35 +294,21 @@ class SpectralSurface(AnySurface):
             unit=self.unit,
             provenance=(record | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),),
         )
-        if not self.resolution and not other.resolution:
-            return both
-        return dataclasses.replace(both, provenance=(*both.provenance, resolution(both)))
+        return both.resolved() if self.resolution or other.resolution else both
 
-
-def resolution(surface: SpectralSurface) -> dict[str, Any]:
-    """A record of the influence of the shortest octave of a measured spectrum."""
-    laws, q = surface.laws, surface.q
-    below = laws.below(2, laws.place(q))
-    # the map may be sampled more finely than its shortest wavelength
-    end = float(q[np.argmax(below >= (1 - NO_POWER) * below[-1])])
-    before = float(laws.below(2, laws.place(np.asarray(end / 2))))
-    factor = math.sqrt(laws.moment(2) / before) if before > 0 else math.inf
-    shortest, unit = 2 * math.pi / end, f" {surface.unit}" if surface.unit else ""
-    finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
-    told = (
-        f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the last "
-        f"octave of them area at light load would be {factor:.2f} times larger"
-    )
-    return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
-
-
-def _anisotropy(one: SpectralSurface, other: SpectralSurface) -> float | None:
-    """The largest anisotropy of a sum: parallel, their tensors of mean gradients have the same axes."""
-    if one.anisotropy is None and other.anisotropy is None:
-        return None
-    along = across = 0.0
-    for surface in (one, other):
-        square = (surface.anisotropy or 1.0) ** 2
-        along += float(surface.m2) * square / (1 + square)
-        across += float(surface.m2) / (1 + square)
-    return math.sqrt(along / across)
+    def resolved(self) -> Self:
+        """The same measured surface, with a record of the influence of its shortest octave of wavelengths."""
+        laws, q = self.laws, self.q
+        below = laws.below(2, laws.place(q))
+        # the map may be sampled more finely than its shortest wavelength
+        end = float(q[np.argmax(below >= (1 - NO_POWER) * below[-1])])
+        before = float(laws.below(2, laws.place(np.asarray(end / 2))))
+        factor = math.sqrt(laws.moment(2) / before) if before > 0 else math.inf
+        shortest, unit = 2 * math.pi / end, f" {self.unit}" if self.unit else ""
+        finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
+        told = (
+            f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the "
+            f"last octave of them area at light load would be {factor:.2f} times larger"
+        )
+        record = {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
+        return dataclasses.replace(self, provenance=(*self.provenance, record))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import hinted
+from mbma_tables.common.arguments import finite_array, hinted
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.power_laws import sorted_spectrum
 from mbma_tables.surfaces.self_affine import SelfAffine
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
@@ -33,9 +33,9 @@ class Surface(SelfAffine):
     h_rms : array_like
         Root-mean-square height, length.
     h_max, nominal_area : array_like, one of them
-        Highest point above the mid-plane, length; or A0, length^2, from which `surfaces.extremes` takes its median.
+        Highest point above the mid-plane, length; or A0, length^2: h_max is its median over Gaussian surfaces of A0.
     unit : str, optional
-        The unit of length, such as "um"; None where it is not known. Results carry it.
+        Unit of length, such as "um", of the numbers and the results; None if it is not known.
     fit : SpectrumFit, optional
         Quality of the fit, in the measurement's unit, if the surface was fitted to a measurement.
     provenance : sequence of mapping, optional
@@ -59,10 +59,6 @@ class Surface(SelfAffine):
     """
 
     @classmethod
-    def _made(cls, numbers: dict[str, Any]) -> Surface | MeasuredSurface:
-        return MeasuredSurface(**numbers) if "C" in numbers else cls(**numbers)
-
-    @classmethod
     @hinted
     def from_spectrum(
         cls,
@@ -84,16 +80,14 @@ class Surface(SelfAffine):
         q : array_like, shape (n,)
             Wavenumber, 1/length, positive, in any order and spacing.
         C : array_like, shape (n,)
-            Spectrum [length^4], not negative; a power law is taken between neighbours. Masked entries are left out.
-        h_max, nominal_area : float, optional
-            As for `Surface`; h_max is that of `heights` if neither is given.
+            Spectrum [length^4], not negative, interpolated by power laws. Masked entries are left out.
+        h_max, nominal_area, unit : as for `Surface`
+            The highest point is that of `heights` if none is given.
         heights : array_like, optional
-            Heights measured anywhere on the surface [length], of any shape; their mean is taken off. A Gaussian that
-            ends at h_max if not given.
+            Heights measured anywhere on the surface [length], of any shape; their mean is subtracted. Default: a
+            Gaussian distribution that ends at h_max.
         convention : {"paper", "isotropic"}, optional
             h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi).
-        unit : str, optional
-            The unit of length.
         model : {"measured", "self-affine"}, optional
             The spectrum itself, or the five numbers of its `MeasuredSurface.fit(band)`.
         band : tuple of float, optional
@@ -105,10 +99,8 @@ class Surface(SelfAffine):
 
         Raises
         ------
-        InputError, OutOfRangeError
-            For input that is no spectrum.
-        NotSelfAffineError
-            As `MeasuredSurface.fit`.
+        InputError, OutOfRangeError, NotSelfAffineError
+            For input that is no spectrum; as `MeasuredSurface.fit`.
 
         Examples
         --------
@@ -119,9 +111,14 @@ class Surface(SelfAffine):
         >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}, alpha = {surface.alpha:.1f}")
         h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
         """
+        if convention not in ("paper", "isotropic"):
+            raise InputError(f"convention must be 'paper' or 'isotropic', got {convention!r}")
+        if np.ma.is_masked(C) and np.shape(q) == np.shape(C):
+            shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
+            q, C = np.asarray(q)[shown], np.asarray(C)[shown]
         known = None if heights is None else Heights.of(heights)
-        found = MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit, nominal_area=nominal_area)
-        return _modelled(found, model, band)
+        own = finite_array("C", C) * (1.0 if convention == "paper" else 1 / (4 * math.pi**2))
+        return _modelled(MeasuredSurface(q, own, h_max, known, unit=unit, nominal_area=nominal_area), model, band)
 
     @classmethod
     @hinted
@@ -156,8 +153,8 @@ class Surface(SelfAffine):
             SurfaceTopography reads (the extra `maps`); or an object with that library's `heights()`,
             `physical_sizes` and `is_periodic`.
         dx, dy : float, optional
-            Sampling steps along the first and the second axis [length]; dy is dx if not given. A topography has its
-            own, most files too.
+            Sampling steps along the first and the second axis [length]; dy is dx if not given. Topographies
+            and most files contain them.
         periodic : bool, optional
             Whether the map continues periodically; else a Hann window is applied. A topography's own flag, False for
             an array.
@@ -166,10 +163,7 @@ class Surface(SelfAffine):
             mean of a periodic map, the plane of any other.
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; by default the map's, after detrending.
-        model : {"measured", "self-affine"}, optional
-            The map's own spectrum, heights and curves, or the five numbers of its `MeasuredSurface.fit(band)`.
-        band : tuple of float, optional
-            (q0, q1) of that fit.
+        model, band : as for `from_spectrum`
         extrapolate_to, extrapolate_hurst : float, optional
             Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; its
             influence is recorded.
@@ -179,7 +173,7 @@ class Surface(SelfAffine):
             Unit of the result and of plain lengths; lengths of a file are converted to it, or taken to be in it if the
             file names none. dx may have its own, such as "195 nm", which is then that of heights if `unit` is missing.
         channel : int, optional
-            Of a file with several maps.
+            Index of the map in a file with several maps.
 
         Returns
         -------
@@ -188,10 +182,8 @@ class Surface(SelfAffine):
 
         Raises
         ------
-        InputError, OutOfRangeError
-            For an invalid map: holes, a missing or negative step, an unknown trend, nothing but a plane.
-        NotSelfAffineError
-            As `MeasuredSurface.fit`.
+        InputError, OutOfRangeError, NotSelfAffineError
+            For holes, a missing or negative step, an unknown trend, nothing but a plane; as `MeasuredSurface.fit`.
 
         Examples
         --------
@@ -233,10 +225,9 @@ class Surface(SelfAffine):
             instance; or such a line scan.
         dx : float, optional
             Sampling step [length], of an array.
-        extrapolate_to, extrapolate_hurst, **treatment : optional
-            As for `from_map`: periodic, detrend, outliers, ... channel.
-        h_max, nominal_area : float, optional
-            As for `Surface`; by default h_max is that of the line, which is lower than that of a surface.
+        extrapolate_to, extrapolate_hurst, **treatment : as for `from_map`
+        h_max, nominal_area : as for `Surface`
+            By default h_max is that of the line, which is lower than that of a surface.
 
         Returns
         -------
@@ -275,7 +266,7 @@ class Surface(SelfAffine):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class MeasuredSurface(SpectralSurface):
-    """A surface given by its isotropic spectrum, with the parameters of `SpectralSurface`."""
+    """A surface given by its isotropic spectrum; its parameters are those of `SpectralSurface`."""
 
     @classmethod
     def of(cls, known: SpectralSurface) -> MeasuredSurface:
@@ -329,4 +320,5 @@ def _modelled(surface: MeasuredSurface, model: str, band: Any) -> Surface | Meas
     return surface
 
 
+Surface.spectral = MeasuredSurface
 Surface.__init__ = hinted(Surface.__init__)  # type: ignore[method-assign]

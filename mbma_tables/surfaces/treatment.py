@@ -1,7 +1,4 @@
-"""Measured maps and line scans, treated by SurfaceTopography (the extra `maps`), each step on record.
-
-Terms are those of that library: detrend modes, harmonic filling of undefined data, short and long cut-off.
-"""
+"""Measured maps and line scans, treated in the terms of SurfaceTopography (the extra `maps`), each step on record."""
 
 from __future__ import annotations
 
@@ -19,22 +16,16 @@ from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of
 
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
 DETRENDS = ("mean", "plane", "quadratic", "median", "height", "mad-tilt", "slope", "curvature", "mad-curvature")
-FILLS = ("harmonic",)
 MIN_GRID = 32  # points along each side: 16 wavenumbers, the first of which is distorted by a window
 FREE_HOLES = 0.05  # share of undefined points that is filled without being requested
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
 OVERLAP = 35 / 18  # Fourier components along an axis under a Hann window that count as one independent component
 MIN_POWER = 1e-24  # power over that of the strongest wavelength: lower values are rounding
-LENGTHS = ("short_cutoff", "long_cutoff", "s_filter", "l_filter")  # options that are lengths
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
 USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier; share of points up to which they are reported
-CALLED = {
-    "long_cutoff": "a long cut-off",
-    "short_cutoff": "a short cut-off",
-    "s_filter": "an S-filter",
-    "l_filter": "an L-filter",
-}
+CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
+CALLED |= {"s_filter": "an S-filter", "l_filter": "an L-filter"}
 GAUSSIAN = math.log(2)  # factor in the filter's exponent: wavelengths equal to the nesting index are halved
 LAST_WAVES = 0.01  # amplitude below which wavelengths count as removed by an S-filter
 Provenance = tuple[Mapping[str, Any], ...]
@@ -71,10 +62,10 @@ class Treatment:
     l_filter: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("outliers", *LENGTHS):
+        for name in ("outliers", *CALLED):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, number_in(name, getattr(self, name), MIN_LENGTH, MAX_LENGTH))
-        for name, allowed in (("fill", FILLS), ("detrend", DETRENDS)):
+        for name, allowed in (("fill", ("harmonic",)), ("detrend", DETRENDS)):
             if getattr(self, name) not in (None, *allowed):
                 raise InputError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
 
@@ -95,6 +86,11 @@ class Treated:
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
     uncut: Any = None  # heights before the short cut-off, where there is one
     form: Any = None  # what detrending removed, if more than a plane
+
+    @property
+    def overlap(self) -> float:
+        """Fourier components, under the window, that count as one independent component."""
+        return 1.0 if self.periodic else OVERLAP**self.heights.ndim
 
     def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
         """The heights after a step, with its record."""
@@ -124,29 +120,23 @@ class Treated:
 
 
 def treat(
-    grid: Any,
-    steps: tuple[float, ...],
-    periodic: bool,
-    treatment: Treatment,
-    unit: str | None = None,
+    grid: Any, steps: tuple[float, ...], periodic: bool, treatment: Treatment, unit: str | None = None
 ) -> Treated:
     """Heights [length] made ready for their spectrum; NaN and masked points are undefined."""
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
-        raise InputError(
-            f"{' x '.join(map(str, heights.shape))} points have too few wavelengths; needed are at least "
-            f"{' x '.join([str(MIN_GRID)] * heights.ndim)}"
-        )
+        own, least = (" x ".join(map(str, shape)) for shape in (heights.shape, (MIN_GRID,) * heights.ndim))
+        raise InputError(f"{own} points have too few wavelengths; needed are at least {least}")
     known = Treated(heights, steps, periodic, unit)
     with warnings.catch_warnings():
         # warnings of numpy inside that library are ignored
         warnings.simplefilter("ignore")
-        known = _without_outliers(known, treatment.outliers)
-        known = _flattened(_filled(known, treatment.fill), treatment.detrend)
-        known = _within(known, treatment)
-    shortest = 2 * math.pi / treatment.short_cutoff if treatment.short_cutoff else math.inf
-    shortest = min(shortest, last_wave(treatment.s_filter) if treatment.s_filter else math.inf)
-    return dataclasses.replace(known, waves=(2 * math.pi / (treatment.long_cutoff or math.inf), shortest))
+        known = _filled(_without_outliers(known, treatment.outliers), treatment.fill)
+        known = _within(_flattened(known, treatment.detrend), treatment)
+    ends = [2 * math.pi / treatment.short_cutoff] if treatment.short_cutoff else []
+    ends += [last_wave(treatment.s_filter)] if treatment.s_filter else []
+    longest = 2 * math.pi / (treatment.long_cutoff or math.inf)
+    return dataclasses.replace(known, waves=(longest, min(ends, default=math.inf)))
 
 
 def _flattened(known: Treated, mode: str | None) -> Treated:
@@ -162,10 +152,9 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
         raise InputError(f"the map is flat: without its {trend} it is zero")
     before, after = float(np.std(heights)), float(np.std(flat))
     told = f"{trend} subtracted" + (f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else "")
-    for more, form in ((1, "tilt"), (2, "bow")) if degree is not None else ():
+    for more, form, remedy in ((1, "tilt", "plane"), (2, "bow", "quadratic")) if degree is not None else ():
         share = 1 - (float(np.std(without_polynomial(flat, more))) / after) ** 2 if more > (degree or 0) else 0.0
         if share > FORM:
-            remedy = "plane" if more == 1 else "quadratic"
             told += f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} removes it"
             break
     removed = None if trend in ("mean", "plane") else heights - flat
@@ -198,22 +187,23 @@ def _without_outliers(known: Treated, asked: float | None) -> Treated:
     limit = USUAL_LIMIT if asked is None else asked
     found = measured & (np.abs(difference) > limit * scale)
     count = int(found.sum())
-    if asked is None:
-        if not 0 < count <= FEW * heights.size:
-            return known
-        told = f"{_counted(count, heights.size)} stand out by more than {limit:g} standard deviations: "
-        return known.after(heights, "outliers seen", f"{told}outliers={limit:g} removes them", points=count)
-    told = f"{_counted(count, heights.size)} stood out by more than {limit:g} standard deviations: taken out"
-    left = np.ma.masked_array(np.ma.getdata(heights), ~measured | found)
-    return known.after(left, "outliers", told, limit=limit, points=count)
+    out = f"out by more than {limit:g} standard deviations: "
+    if asked is not None:
+        left = np.ma.masked_array(np.ma.getdata(heights), ~measured | found)
+        told = f"{_counted(count, heights.size)} stood {out}taken out"
+        return known.after(left, "outliers", told, limit=limit, points=count)
+    if not 0 < count <= FEW * heights.size:
+        return known
+    told = f"{_counted(count, heights.size)} stand {out}outliers={limit:g} removes them"
+    return known.after(heights, "outliers seen", told, points=count)
 
 
 def _filled(known: Treated, fill: str | None) -> Treated:
     """Heights without undefined points."""
     size, count = known.heights.size, int(np.ma.getmaskarray(known.heights).sum())
+    share = count / size
     if count == 0:
         return dataclasses.replace(known, heights=_harmonic(known))
-    share = count / size
     if share > FREE_HOLES and fill is None:
         raise InputError(
             f"the map has {count} holes among {size} points, more than {FREE_HOLES:.0%}: fill them, smooth, "

@@ -1,4 +1,4 @@
-"""Open and check table files (netCDF-4); `generate.tables.writing` writes them.
+"""Open and check table files (netCDF-4), which `generate.tables.writing` writes; write those of a user's own surface.
 
 A file ends in a line with the SHA-256 of all bytes before it, which is checked before the HDF5 library opens the file,
 since that may crash on damaged bytes. HDF5 ignores what follows its own end of file.
@@ -12,19 +12,22 @@ import json
 import os
 import pathlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbma_tables.common.errors import InputError, TableFileError
-from mbma_tables.common.files import read_file
+from mbma_tables.common.files import read_file, write_file, written_bytes
 from mbma_tables.tablefiles import schema
 
 if TYPE_CHECKING:
     import netCDF4
 
 REMEDY = "rebuild it with `python -m generate tables {}` or reinstall mbma_tables"
+# tables of a user's own surface, BEM results of one map
+OWN, OWN_FORMAT = "simulated_map", "2.0"
+OWN_REMEDY = "make it anew: `mbma fit MAP --simulate --out OWN.nc`"
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
 MAX_BYTES = 256 * 2**20  # largest size of a file, and of its values
@@ -154,3 +157,62 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.
         content = _content(dataset, found)
         schema.check_content(content)
     return content
+
+
+def is_own(path: os.PathLike[str] | str) -> bool:
+    """Whether a file ends with a table's checksum."""
+    try:
+        with open(path, "rb") as stream:
+            stream.seek(-SEAL_LENGTH, os.SEEK_END)
+            return stream.read().startswith(SEAL)
+    except (OSError, ValueError):
+        return False
+
+
+def holds_own(path: os.PathLike[str] | str) -> bool:
+    """Whether a file is such a table, damaged or not, and no other."""
+    return is_own(path) and OWN.encode() in pathlib.Path(path).read_bytes()
+
+
+def write_own(
+    path: os.PathLike[str] | str,
+    variables: Mapping[str, tuple[tuple[str, ...], Any, str, str]],
+    attributes: Mapping[str, str],
+) -> None:
+    """Write variables (dimensions, values, long_name, units) and attributes whole, or not at all."""
+    import netCDF4
+
+    arrays = {name: np.asarray(entry[1], float) for name, entry in variables.items()}
+    own = {"mbma_kind": OWN, "format_version": OWN_FORMAT, "values_sha256": digest_arrays(arrays), **attributes}
+
+    def write(draft: str) -> None:
+        with HDF5_LOCK, netCDF4.Dataset(draft, "w", format="NETCDF4") as dataset:
+            for name, (over, _, meaning, units) in variables.items():
+                for dimension, size in zip(over, arrays[name].shape, strict=True):
+                    if dimension not in dataset.dimensions:
+                        dataset.createDimension(dimension, size)
+                variable = dataset.createVariable(name, "f8", over, zlib=bool(over), endian="little", fill_value=False)
+                variable.setncatts({"long_name": meaning, "units": units})
+                variable[...] = arrays[name]
+            dataset.setncatts(own)
+            dataset.setncattr("attributes_sha256", attributes_digest(dataset))
+
+    try:
+        body = written_bytes(pathlib.Path(path).name, write)
+        write_file(path, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
+    except (InputError, OSError) as fault:
+        raise TableFileError(f"cannot write {path}: {fault}") from None
+
+
+def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Values and attributes of such a file, checked; TableFileError for damaged, edited and other ones."""
+    with opened(path, OWN_REMEDY) as dataset:
+        own, _, values = verified(dataset, ("mbma_kind", "format_version", "values_sha256"))
+        if (own["mbma_kind"], own["format_version"]) != (OWN, OWN_FORMAT):
+            raise ValueError(
+                f"holds a {own['mbma_kind']} of format {own['format_version']}, not a {OWN} of {OWN_FORMAT}"
+            )
+        lost = [name for name, array in values.items() if not np.isfinite(array).all()]
+        if lost:
+            raise ValueError(f"has variable {lost[0]}, which is not finite")
+    return values, own

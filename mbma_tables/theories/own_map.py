@@ -18,7 +18,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.tablefiles.own import ADVICE, read_own, write_own
+from mbma_tables.tablefiles.netcdf import OWN_REMEDY, read_own, write_own
 from mbma_tables.theories.calibrated_curves import own_law
 
 # A/A0 by the law of the map, at which it is simulated
@@ -56,11 +56,7 @@ def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
 
 
 def reduced(values: FloatArray, points: float, mirrored: bool) -> tuple[FloatArray, float, float]:
-    """A map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps.
-
-    Every second point is left out until at most `MOST_POINTS` remain; where that leaves fewer than four along the
-    shortest wavelength, shorter ones than four are cut off.
-    """
+    """A map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps."""
     step, cut = 1.0, 0.0
     while values.size > MOST_POINTS:
         step *= 2
@@ -79,13 +75,7 @@ def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
 
 
 def map_of(surface: AnySurface) -> Treated:
-    """The map that a surface was made from.
-
-    Raises
-    ------
-    InputError
-        Where there is none.
-    """
+    """The map that a surface was made from, an InputError where there is none."""
     whole = surface.map if isinstance(surface, MeasuredSurface) else None
     if whole is None or whole.heights.ndim != 2:
         raise InputError(
@@ -166,7 +156,7 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
             provenance=tuple(json.loads(own["provenance"])),
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
-        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {ADVICE}") from None
+        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {OWN_REMEDY}") from None
 
 
 def _plain(value: Any) -> Any:

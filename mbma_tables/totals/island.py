@@ -84,7 +84,7 @@ def island(
     variant : {"reported", "printed", "fitted"} or Variant
         Variant of the paper's equations.
     E_star : array_like or str
-        Effective modulus, perhaps with its unit, "100 GPa"; force is in that unit times length squared.
+        Effective modulus, a number or text with a unit, "100 GPa"; force is in that unit times length squared.
     rtol : float
         Requested relative error of force and area.
 

@@ -24,7 +24,7 @@ from mbma_tables.core import core, in_blocks
 from mbma_tables.islands.geometry import floors_of, geometry, kinks, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.power_laws import Place
+from mbma_tables.surfaces.spectrum import Place
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force

@@ -77,7 +77,7 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "law", *WITHOUT["--surface"]], "one surface is needed"),
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
         (["cobol", "--out", "law", *LAW], "cobol"),
-        (["c_law", "--out", "law", *LAW], "no target is called 'c_law': did you mean 'c-law'?"),
+        (["c_law", "--out", "law", *LAW], "no target is named 'c_law'; did you mean 'c-law'?"),
         (["c", "--out", "code", "--rows", "3", "--rtol", "0.1"], "leave --rows and --rtol out"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"], "pressure must be at most 2.02721 MPa, at d ="),

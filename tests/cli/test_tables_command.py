@@ -1,4 +1,4 @@
-"""`mbma tables list | info | verify`: what they print and refuse."""
+"""`mbma tables info | verify`: what they print and refuse."""
 
 import json
 import re
@@ -19,22 +19,6 @@ def folder(tmp_path, monkeypatch):
         write_table(tmp_path / f"{kind}.nc", small_table(kind))
     monkeypatch.setattr(tabulated, "shipped", lambda kind: tmp_path / f"{kind}.nc")
     return tmp_path
-
-
-def test_list(folder):
-    lines = run("tables", "list").splitlines()
-    assert [line.partition(":")[0] for line in lines] == list(KINDS)
-    assert re.search(r"universal: \d+ cells; variant any", lines[0])
-    assert "8 X x 14 spread x 8 sphere x 8 hurst; variant reported" in lines[1]
-    rows = json.loads(run("tables", "list", "--json"))["tables"]
-    for row, kind, line in zip(rows, KINDS, lines, strict=True):
-        path, content = folder / f"{kind}.nc", read_table(folder / f"{kind}.nc")
-        known = {name: content.attributes[name] for name in ("variant", "data_version")}
-        known["largest_error"] = {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")}
-        assert row == known | {
-            "kind": kind, "path": str(path), "bytes": path.stat().st_size, "size": content.size,
-        }  # fmt: skip
-        assert f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}" in line
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -77,7 +61,7 @@ def test_a_wrong_checksum_is_an_error(json_form, folder):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    for arguments in (["list"], ["info", "universal"], ["verify"], ["verify", "island4d", str(path)]):
+    for arguments in (["info", "universal"], ["verify"], ["verify", "island4d", str(path)]):
         message = refused("tables", *arguments, *json_form)
         assert f"{path}: is damaged (its checksum does not match)" in message
         assert re.search("`python -m generate tables (all|universal)`", message)
@@ -90,7 +74,7 @@ def test_a_missing_table_and_a_wrong_kind(folder):
     (folder / "universal.nc").replace(folder / "island4d.nc")
     assert "holds a table of kind 'universal', not island4d" in refused("tables", "verify", "island4d")
     assert "holds a table of kind 'universal', not island4d" in refused("tables", "info", "island4d")
-    assert "universal.nc: cannot be read" in refused("tables", "list")
+    assert "universal.nc: cannot be read" in refused("tables", "verify")
 
 
 def test_misuse(folder):

@@ -1,7 +1,6 @@
 """The boundary-element campaign: its engine against closed forms, its surfaces, its file."""
 
 import dataclasses
-import functools
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import xarray as xr
 
 from generate import files
 from generate.boundary_elements.run import SOLVERS, TEXTS, dataset, group, run
-from generate.boundary_elements.solve import Contact, simulate, simulate_to
+from generate.boundary_elements.solve import Contact, simulate
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Recipe, Task, campaign, heights
 from generate.calibrated_file import write_part
 from mbma_tables import InputError
@@ -139,7 +138,7 @@ def test_groups_name_the_code_that_made_them(kind):
 @pytest.mark.parametrize("kind", ["hardness", "leakage"])
 def test_other_campaigns_keep_what_their_files_hold(kind, tmp_path):
     tasks = [Task(Recipe("self_affine", 0.8, 4, 2, 5, 32), "training")]
-    run(tasks, tmp_path, solve=functools.partial(simulate_to, solve=SOLVERS[kind]))
+    run(tasks, tmp_path, solve=SOLVERS[kind])
     shipped = files.dataset(kind)
     assert set(dataset(tasks, tmp_path, kind).variables) == set(shipped.variables)
     assert len(campaign(kind)) == shipped.sizes["surface"]

@@ -1,6 +1,5 @@
-"""Tables: certificates against fresh exact solutions, targets, physical checks, and the same bytes again."""
+"""Tables: configurations, certificates against fresh exact solutions, physical checks, and the same bytes again."""
 
-import concurrent.futures
 import dataclasses
 import json
 import os
@@ -9,15 +8,16 @@ import sys
 
 import numpy as np
 import pytest
-from small_tables import small, small_build
+from click.testing import CliRunner
+from small_tables import SMALL, small, small_build
 
+from generate.__main__ import main
 from generate.files import ROOT
 from generate.provenance import versions
-from generate.tables import chunks
-from generate.tables.certificate import UncertifiedError
-from generate.tables.chunks import ChunkedSolver, phi
-from generate.tables.commands import KINDS
-from generate.tables.configuration import load
+from generate.tables import certificate
+from generate.tables.certificate import Kind, UncertifiedError, phi
+from generate.tables.commands import KINDS, TABLES
+from generate.tables.configuration import MIN_SHIPPED_POINTS, load
 from generate.tables.island4d import evaluate
 from generate.tables.writing import write_table
 from mbma_tables.islands import greenwood_tripp
@@ -76,33 +76,20 @@ def test_fresh_points_confirm_the_certificate_and_the_local_bound(kind, tmp_path
     kind.check(read_table(write_table(tmp_path / "table.nc", content)))
 
 
-def test_certificate_points_stand_off_the_nodes_and_half_of_them_where_surfaces_go(nodes):
-    kind, content = nodes
-    count = 300
-    places = kind.held_out(content.axes, count, 11)
-    assert all(place.size == count for place in places)
-    for axis, place in zip(content.axes, places, strict=True):
-        assert ((axis.low <= place) & (place <= axis.high)).all()
-        assert (axis.position(place) != np.round(axis.position(place))).all()
-    visited = kind.manifold(count // 2)
-    for place, own in zip(places, visited, strict=True):
-        np.testing.assert_array_equal(place[count // 2 :], own)
-
-
 def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
     kind, content = nodes
     places = kind.held_out(content.axes, 100, 11)
     places[0][3] = content.axes[0].low
     monkeypatch.setattr(kind, "held_out", lambda *_: places)
     with pytest.raises(UncertifiedError, match="a held-out point lies on a node"):
-        kind.certify(content.axes, content.coefficients, ChunkedSolver())
+        kind.certify(content.axes, content.coefficients)
 
 
 @pytest.mark.parametrize(("kind", "targets"), [("universal", (1e-4, 1e-6, 1e-8)), ("island4d", (1e-1, 2e-2))])
 def test_a_tighter_target_takes_more_coefficients_and_is_met(kind, targets, tmp_path):
     sizes, largest = [], []
     for target in targets:
-        content = KINDS[kind](load(kind, small(tmp_path, kind), target)).build(ChunkedSolver())
+        content = KINDS[kind](load(kind, small(tmp_path, kind), target)).build()
         largest.append(max(content.attributes[f"largest_error_{f}"] for f in "FA"))
         assert largest[-1] <= target
         sizes.append(content.coefficients.size)
@@ -116,34 +103,27 @@ def test_a_target_that_is_missed_is_refused(nodes):
     kind, content = nodes
     tight = dataclasses.replace(kind.configuration, target=1e-6)
     with pytest.raises(UncertifiedError, match=r"the largest held-out error is .*, the target 1\.00e-06"):
-        type(kind)(tight).certify(content.axes, content.coefficients, ChunkedSolver())
-
-
-def bump(content, place, height):
-    """A wave between the nodes: coefficients of alternating sign add nothing that the nodes would show at once."""
-    spoiled = content.coefficients.copy()
-    spoiled[place] += height
-    return dataclasses.replace(content, coefficients=spoiled)
-
-
-def middle(content, function, spread=0):
-    return (*(slice(n // 2 - spread, n // 2 + 1 + spread) for n in content.coefficients.shape[:-1]), function)
+        type(kind)(tight).certify(content.axes, content.coefficients)
 
 
 def test_what_no_islands_can_do_breaks_a_rule(nodes):
     kind, content = nodes
-    first, second, *others = content.coefficients.shape[:-1]
-    rest = (slice(None),) * len(others)
-    dips = (first // 2, slice(None), *rest), (slice(None), second // 2, *rest)
-    spoilt = [("force increasing in X", (*dips[0], 0), -12.0), ("area increasing in X", (*dips[0], 1), -12.0)]
-    # at the smallest spread mu is about 0.01
-    spoilt += [("force increasing with the spread", (*dips[1], 0), -12.0), ("rigid limit", (Ellipsis, 1), -5.0)]
-    for number in (0, 1):
-        spoilt.append(("force and area finite", middle(content, number), np.nan))
-        spoilt.append(("no larger than a rigid sphere's", middle(content, number, 1), 20.0))
-    for rule, place, height in spoilt:
+    X, spread, *_ = (n // 2 for n in content.coefficients.shape)
+    near = slice(X - 1, X + 2), slice(spread - 1, spread + 2)
+    for rule, place, height in (
+        ("force increasing in X", (X, ..., 0), -12.0),
+        ("area increasing in X", (X, ..., 1), -12.0),
+        ("force increasing with the spread", (slice(None), spread, ..., 0), -12.0),
+        # at the smallest spread mu is about 0.01
+        ("rigid limit", (..., 1), -5.0),
+        ("force and area finite", (X, spread, ..., 0), np.nan),
+        ("no larger than a rigid sphere's", (*near, ..., 0), 20.0),
+        ("no larger than a rigid sphere's", (*near, ..., 1), 20.0),
+    ):
+        spoilt = content.coefficients.copy()
+        spoilt[place] += height
         with pytest.raises(UncertifiedError, match=rule):
-            kind.check(bump(content, place, height))
+            kind.check(dataclasses.replace(content, coefficients=spoilt))
 
 
 def test_what_no_islands_can_do_breaks_a_rule_in_a_cell():
@@ -169,15 +149,13 @@ def test_what_no_islands_can_do_breaks_a_rule_in_a_cell():
             kind.check(dataclasses.replace(content, coefficients=series))
 
 
-def test_any_executor_gives_the_same_bits(monkeypatch):
-    monkeypatch.setattr(chunks, "CHUNK", 10)
+def test_any_workers_give_the_same_bits(monkeypatch):
+    monkeypatch.setattr(certificate, "CHUNK", 10)
     X, mu = np.linspace(0.0, 5.0, 40), np.geomspace(1e-3, 10.0, 40)
     expected = phi(X, mu, 1e-6)
-    np.testing.assert_array_equal(ChunkedSolver().phi("test", X, mu, 1e-6), expected)
-    square = ChunkedSolver().phi("test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6)
-    np.testing.assert_array_equal(square, expected.reshape(8, 5, 2))
-    with concurrent.futures.ThreadPoolExecutor(3) as threads:
-        np.testing.assert_array_equal(ChunkedSolver(threads).phi("test", X, mu, 1e-6), expected)
+    for workers in (1, 2):
+        found = Kind(load("universal"), workers).phi("test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6)
+        np.testing.assert_array_equal(found, expected.reshape(8, 5, 2))
 
 
 @pytest.mark.slow
@@ -194,3 +172,91 @@ def test_the_shipped_tables_rebuild_to_the_last_bit(kind, tmp_path):
     differing = {key for key in old if old[key] != new[key]}
     # the record of the source follows every edit of it
     assert differing <= {"source_sha256", "source_modules", "attributes_sha256"}
+
+
+def refused(kind, folder, *arguments):
+    """What a refusal says; it is one line and leaves the folder as it was."""
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    result = CliRunner().invoke(main, ["tables", kind, "--workers", "1", *arguments])
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert result.stderr.startswith("generate: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    return result.stderr
+
+
+LOW = "low = -2.0\nhigh = 6.0"
+WRONG = [
+    ("zzz = 1", "own.toml: top level: unknown key 'zzz'"),
+    ("[axes.Y]\nlow = 1", "[axes]: unknown key 'Y'"),
+    ("[axes.X]\nlwo = 1e-3", "[axes.X]: unknown key 'lwo'; did you mean 'low'"),
+    ("[axes]\nX = [1, 2]", "axes.X: [1, 2] is not of type 'object'"),
+    ("kind = 'island4d'", "kind: 'universal' was expected"),
+    ("target = 1e-12", "target: 1e-12 is less than the minimum of 1e-11"),
+    ("target = nan", "not JSON compliant"),
+    ("max_nodes = 1.5", "max_nodes: 1.5 is not of type 'integer'"),
+    ("variant = 'rubbed'", "variant: 'rubbed' is not known"),
+    ("[axes.mu]\nhigh = 1e11", "axes.mu.high: 100000000000.0 is greater than the maximum of 10000000000.0"),
+    ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X: its nodes must increase from low to high"),
+    ("variant = [", "is not a TOML file"),
+    (SMALL["universal"].replace("max_nodes = 5000", "max_nodes = 100"), "more than the 100 allowed; raise max_nodes"),
+    (SMALL["universal"].replace(LOW, "low = 90.0\nhigh = 100.0"), "hardly a surface visits these axes"),
+]
+WRONG_4D = [
+    ("[axes.hurst]\nhigh = 1.1", "axes.hurst.high: 1.1 is greater than the maximum of 1"),
+    ("[axes.hurst]\noffset = 1.0", "[axes.hurst]: unknown key 'offset'"),
+    ("[axes.X]\noffset = -0.5", "axes.X: its nodes must increase from low to high, and low + offset be above 0"),
+    ("[axes.X]\nnodes = 50000", "nodes, max_nodes allows"),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "message"),
+    [("universal", *row) for row in WRONG] + [("island4d", *row) for row in WRONG_4D],
+)
+def test_a_bad_configuration_is_refused(kind, text, message, tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    said = refused(kind, tmp_path, "--config", str(path), "--out", str(tmp_path / "sub" / "table.nc"))
+    assert message in said
+    assert not (tmp_path / "sub").exists()
+
+
+def test_misuse_of_the_command_line_is_refused(tmp_path):
+    assert "--config and --target belong to one table" in refused("all", tmp_path, "--target", "1e-6")
+    assert "'--workers'" in refused("universal", tmp_path, "--workers", "0")
+    assert "'univresal'" in refused("univresal", tmp_path)
+    message = refused("universal", tmp_path, "--target", "1e-4", "--out", str(tmp_path))
+    assert "--out must name a file" in message
+
+
+def test_few_certificate_points_are_for_tables_that_are_not_shipped(tmp_path):
+    path = tmp_path / "few.toml"
+    path.write_text(f"certificate_points = {MIN_SHIPPED_POINTS - 1}")
+    for out in ((), ("--out", str(TABLES / "other.nc"))):
+        message = refused("universal", tmp_path, "--config", str(path), *out)
+        assert f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in" in message
+    assert not (TABLES / "other.nc").exists()
+    for kind in KINDS:
+        assert load(kind).certificate_points >= MIN_SHIPPED_POINTS
+
+
+def test_a_target_alone_is_a_configuration():
+    shipped, same = load("island4d"), load("island4d", target=4e-4)
+    assert same == shipped
+    loose, tight = load("island4d", target=0.1), load("island4d", target=shipped.target / 2)
+    # errors are of fourth order
+    assert [axis.nodes for axis in tight.axes.values()] == [27, 55, 10, 16]
+    assert {axis.nodes for axis in loose.axes.values()} < set(range(8, 20))
+    assert load("universal", target=1e-6).target == 1e-6
+    assert len({made.digest() for made in (shipped, loose, tight, load("universal"))}) == 4
+
+
+def test_a_file_changes_what_it_names(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text("[axes.spread]\nhigh = 10.0\nnodes = 17")
+    found, shipped = load("island4d", path), load("island4d")
+    assert found.axes["spread"] == dataclasses.replace(shipped.axes["spread"], high=10.0, nodes=17)
+    assert found.axes["X"] == shipped.axes["X"]

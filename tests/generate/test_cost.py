@@ -1,7 +1,6 @@
 """The study of costs on few islands and surfaces, its clock replaced: errors, counts, and what goes into the files."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from click.testing import CliRunner
 
@@ -9,7 +8,6 @@ from generate import cost, cost_distances, distances
 from generate.boundary_elements import studies
 from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
-from generate.pages.cost import pareto_front
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
@@ -81,21 +79,10 @@ def test_a_study_becomes_data(tmp_path, monkeypatch):
     assert read_costs(tmp_path / "tables" / "cost.csv") == shipped
 
 
-def test_the_pareto_front_is_what_nothing_dominates():
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        rows = pd.DataFrame(rng.integers(1, 6, (12, 2)).astype(float), columns=["cost", "error"])
-        front = pareto_front(rows).to_numpy()
-        at_least = (front[None] <= rows.to_numpy()[:, None]).all(axis=2)
-        assert at_least.any(axis=1).all()
-        # none of the front is better than another
-        assert (at_least[pareto_front(rows).index].sum(axis=1) == 1).all()
-
-
 def test_the_gauge_names_every_theory_and_way_at_its_measured_place():
     known = read_csv(ROOT / "tables" / "distance.csv")
     rows = pages_cost.gauge_rows(known)
-    assert set(rows["theory"]) == set(pages_cost.LABELS)
+    assert set(rows["theory"]) == set(pages_cost.COLOURS)
     law = rows[(rows["theory"] == "calibrated") & (rows["way"] == "law")].iloc[0]
     shipped = next(row for row in shipped_distances() if (row.theory, row.way) == ("calibrated", "law"))
     assert law["us"] == pytest.approx(1e6 * shipped.cost * shipped_costs().seconds)
@@ -103,8 +90,9 @@ def test_the_gauge_names_every_theory_and_way_at_its_measured_place():
     simulated = rows[rows["theory"] == "simulated"].iloc[0]
     assert 1e5 < simulated["us"] < 1e7
     assert simulated["force_light"] < 1 < simulated["area_light"] < 3
-    for panel in pages_cost.draw_gauge(rows).axes:
-        assert {label for label, *_ in pages_cost.LABELS.values()} <= {text.get_text() for text in panel.texts}
+    for panel, name in zip(pages_cost.draw_gauge(rows).axes, pages_cost.GAUGES, strict=True):
+        drawn = {line.get_label(): len(line.get_xydata()) for line in panel.lines}
+        assert drawn == dict.fromkeys(drawn, 0) | rows[rows[name].notna()].groupby("theory").size().to_dict()
 
 
 @pytest.mark.slow

@@ -7,10 +7,9 @@ import pytest
 from scipy.stats import norm
 
 from generate.files import dataset
-from generate.machined import campaign, coverage
-from generate.machined import errors as page
+from generate.machined import campaign, evaluation
+from generate.machined.campaign import solved, surface_of
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
-from generate.machined.solve import solved, surface_of
 from mbma_tables.laws.map_curves import PLATEAU_SHIFT, MapLaw
 from mbma_tables.theories.saturated import BoundaryElements, Corrected
 
@@ -73,8 +72,8 @@ def test_the_file_is_of_these_makers(data):
 
 @pytest.mark.parametrize(("quantity", "bar"), [("area", 0.03), ("pressure", 0.02), ("stiffness", 0.05), ("flow", 0.15)])
 def test_a_pressed_map_is_as_near_to_the_full_grid_as_asked(data, quantity, bar):
-    found = page.errors(data, "simulated", quantity)
-    kept = page.seen(data, "simulated", quantity)
+    found = evaluation.errors(data, "simulated", quantity)
+    kept = evaluation.seen(data, "simulated", quantity)
     for family in FAMILIES:
         own = kept & (data.family.values == family)[:, None, None]
         # lattices of dimples touch along rings, one after the other
@@ -83,9 +82,9 @@ def test_a_pressed_map_is_as_near_to_the_full_grid_as_asked(data, quantity, bar)
 
 
 @pytest.mark.parametrize("form", campaign.FORMS)
-@pytest.mark.parametrize("quantity", page.QUANTITIES)
+@pytest.mark.parametrize("quantity", evaluation.QUANTITIES)
 def test_where_valid_the_scatter_covers_the_errors(data, form, quantity):
-    once, twice, number = page.coverage(data, form, quantity, valid=True)
+    once, twice, number = evaluation.coverage(data, form, quantity, True)
     if (form, quantity) == ("calibrated", "flow"):
         assert number == 0  # channels and walls of maps are not in their isotropic spectrum
         return
@@ -95,9 +94,9 @@ def test_where_valid_the_scatter_covers_the_errors(data, form, quantity):
 
 
 @pytest.mark.parametrize("form", ["corrected", "simulated"])
-@pytest.mark.parametrize("quantity", page.QUANTITIES)
+@pytest.mark.parametrize("quantity", evaluation.QUANTITIES)
 def test_constants_of_the_other_families_cover_the_errors_of_one(data, form, quantity):
-    ratio = coverage.left_out(data, form, quantity)
+    ratio = evaluation.left_out(data, form, quantity)
     every = np.concatenate([*ratio.values()])
     assert 0.6 < np.mean(every < 1) < 0.93
     assert np.mean(every < 2) > 0.95
@@ -108,24 +107,24 @@ def test_constants_of_the_other_families_cover_the_errors_of_one(data, form, qua
 
 @pytest.mark.parametrize("quantity", ["area", "pressure", "stiffness"])
 def test_constants_of_the_other_maps_cover_the_errors_of_the_calibrated_law(data, quantity):
-    ratio = coverage.left_out(data, "calibrated", quantity)
+    ratio = evaluation.left_out(data, "calibrated", quantity)
     assert [family for family, own in ratio.items() if own.size] == ["gaussian"]
     assert 0.6 < np.mean(ratio["gaussian"] < 1) < 0.85
     assert np.mean(ratio["gaussian"] < 2) > 0.92
 
 
 @pytest.mark.parametrize("theory", [BoundaryElements, Corrected])
-@pytest.mark.parametrize("quantity", page.QUANTITIES)
+@pytest.mark.parametrize("quantity", evaluation.QUANTITIES)
 def test_the_librarys_constants_are_those_of_the_fit(data, theory, quantity):
-    found = coverage.by_area(data, theory.name, quantity, np.arange(data.sizes["surface"]))
+    found = evaluation.by_area(data, theory.name, quantity, np.arange(data.sizes["surface"]))
     known = np.isfinite(found)
     np.testing.assert_allclose(np.array(theory.scatters[quantity])[known], found[known], rtol=0.03)
 
 
 def test_a_fit_finds_constants_that_are_known():
     ratio = np.random.default_rng(3).standard_normal(20_000)
-    expected = max(norm.ppf((1 + coverage.ONCE) / 2), norm.ppf((1 + coverage.TWICE) / 2) / 2)
-    assert coverage.reached(np.abs(ratio)) == pytest.approx(expected, rel=0.03)
+    expected = max(norm.ppf((1 + evaluation.ONCE) / 2), norm.ppf((1 + evaluation.TWICE) / 2) / 2)
+    assert evaluation.reached(np.abs(ratio)) == pytest.approx(expected, rel=0.03)
 
 
 def test_hardness_of_maps(data):
@@ -138,10 +137,13 @@ def test_hardness_of_maps(data):
 
 def test_the_quick_law_is_wrong_where_it_is_not_valid(data):
     for quantity in ("area", "pressure", "stiffness"):
-        error, kept = np.abs(page.errors(data, "calibrated", quantity)), page.seen(data, "calibrated", quantity)
+        error, kept = (
+            np.abs(evaluation.errors(data, "calibrated", quantity)),
+            evaluation.seen(data, "calibrated", quantity),
+        )
         valid = data.calibrated_valid.values[..., None] > 0.5
         assert np.median(error[kept & ~valid]) > np.median(error[kept & valid])
-        once, twice, _ = page.coverage(data, "calibrated", quantity, valid=False)
+        once, twice, _ = evaluation.coverage(data, "calibrated", quantity, False)
         assert once > 0.6
         assert twice > 0.88
 

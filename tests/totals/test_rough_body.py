@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from generate.pages.bodies import spheres
+from generate.pages.simulations import spheres
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, rough_contact
 from mbma_tables.export.law_code import law_files, law_text
 from mbma_tables.export.law_rows import describe_law

@@ -1,19 +1,22 @@
-"""Measured parts of docs/joints.md, docs/lubrication.md and docs/rough_bodies.md."""
+"""The library beside simulations and published fits: joints, lubrication, rough bodies, fidelity, and the data set."""
 
 import itertools
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from generate import distances
 from generate.boundary_elements.run import surfaces
-from generate.boundary_elements.studies import LIGHT_BINS, LIGHT_LOADS, compared
-from generate.calibrated_file import binned
+from generate.boundary_elements.studies import LIGHT_BINS, compared
+from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import dataset
-from generate.page import Measured, panels, table
+from generate.page import Measured, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Joint, Surface, flow_factors, rough_contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.law.rough_body import CELLS, mean_wavelength
+from mbma_tables.data import boundary_elements
+from mbma_tables.law.rough_body import mean_wavelength
 from mbma_tables.totals.conductance import cooper_mikic_yovanovich, mean_conductivity
 
 PAIRS = {"steel on aluminium": ("steel 4140 hard", "aluminium 6061 hard"), "copper on copper": "copper C11000 hard"}
@@ -38,7 +41,6 @@ def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArr
 
 def joints() -> Measured:
     """Stiffness at light loads against boundary elements, conductance against a usual correlation."""
-    figure, (left, right) = panels(1, 2, (10, 3.8))
     by_waves, lines = dict[int, list[FloatArray]](), []
     for one in surfaces(dataset("light_loads")):
         by_waves.setdefault(int(one.waves), []).append(compared(one))
@@ -46,16 +48,9 @@ def joints() -> Measured:
         area, stiffness, _ = np.concatenate(parts, axis=1)
         bins = binned(area, stiffness, LIGHT_BINS)
         lines.append([str(waves), *(f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else "" for part in bins)])
-        style: dict[str, Any] = {"markersize": 2, "color": f"C{int(np.log2(waves))}", "rasterized": True}
-        for own in parts:
-            right.semilogx(own[0], np.exp(own[1]), ".", **style)
-    right.set(xlabel="contact A/A0", ylabel="simulated stiffness over law", ylim=(0, 2), xlim=(LIGHT_LOADS[0], 0.03))
-    right.set_title("light loads, by longest wavelengths a side")
-    for waves in by_waves:
-        right.plot([], [], ".", color=f"C{int(np.log2(waves))}", label=str(waves))
-    right.legend(fontsize=7)
     contacts = " | ".join(f"{low:.2%} to {high:.2%}" for low, high in itertools.pairwise(LIGHT_BINS))
 
+    figure, axes = panels(size=(6.5, 4))
     usual, pressure = [], np.geomspace(0.1, 300, 40)
     for (name, materials), shortest in itertools.product(PAIRS.items(), SHORTEST):
         face = {"hurst": 0.8, "longest": "250 um", "shortest": shortest}
@@ -63,10 +58,10 @@ def joints() -> Measured:
         pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
         usual.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
         law, correlation = conductances(joint, pressure)
-        (line,) = left.loglog(pressure, law, label=f"{name}, {shortest}")
-        left.loglog(pressure, correlation, "--", color=line.get_color())
-    left.set(xlabel="pressure [MPa]", ylabel="conductance [W/(m² K)]", title="law; dashed: Cooper-Mikic-Yovanovich")
-    left.legend(fontsize=7)
+        (line,) = axes.loglog(pressure, law, label=f"{name}, {shortest}")
+        axes.loglog(pressure, correlation, "--", color=line.get_color())
+    axes.set(xlabel="pressure [MPa]", ylabel="conductance [W/(m² K)]", title="law; dashed: Cooper-Mikic-Yovanovich")
+    axes.legend(fontsize=7)
     header = f"joint | shortest wavelength | {' | '.join(f'{p:g} MPa' for p in PRESSURES)}"
     blocks = {"light": table(f"longest wavelengths a side | {contacts}", lines), "usual": table(header, usual)}
     return blocks, {"docs/figures/joints.svg": figure}
@@ -134,22 +129,77 @@ def rough_bodies() -> Measured:
     header = "width over mean wavelength | contacts | approach [h_rms]: mean, sd, largest | ln F at the approach | "
     header += "ln A at the force | ln mean radius | valid: within 1, 2 sd"
     forms = "{} | {} | {:+.2f}, {:.2f}, {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f}"
-    figure, axes = panels(1, 3, (13, 4))
+    figure, (left, right) = panels(1, 2, (9, 4))
     forces = [f"{10.0**k} N" for k in (-1, 0, 1, 2)]
     ball = rough_contact(FACE, "5 mm", force=forces, E_star="110 GPa", theory="calibrated")
     for r, p, force in zip(ball.position, ball.pressure, np.asarray(ball.force), strict=True):
-        axes[0].semilogy(r, 1e3 * p, label=f"{force:.3g} N")
-    axes[0].set(xlabel="distance from the middle [um]", ylabel="mean pressure [MPa]", ylim=(1, None))
+        left.semilogy(r, 1e3 * p, label=f"{force:.3g} N")
+    left.set(xlabel="distance from the middle [um]", ylabel="mean pressure [MPa]", ylim=(1, None))
     law = ball.law(1e-3)
     x = np.linspace(law.first, 4, 200)[1:]
-    axes[1].semilogy(x, law.force(x), label="rough")
-    smooth = 4 / 3 * 110e-3 * np.sqrt(5e3) * np.maximum(x, 0) ** 1.5  # N, of um and GPa
-    axes[1].semilogy(x[x > 0], smooth[x > 0], "--", label="smooth (Hertz)")
-    axes[1].set(xlabel="approach [um]", ylabel="force [N]", ylim=(1e-4, 200))
-    axes[2].semilogx(seen["width"], seen["off"], ".", label="boundary elements")
-    n = np.geomspace(1, 12, 50)
-    axes[2].fill_between(n, -CELLS[0] / n ** CELLS[1], CELLS[0] / n ** CELLS[1], alpha=0.2, label="stated, 1 sd")
-    axes[2].set(xlabel="width of contact over mean wavelength", ylabel="difference of approach [h_rms]")
-    for one in axes:
-        one.legend(fontsize="small")
+    right.semilogy(x, law.force(x), label="rough")
+    smooth = 4 / 3 * 110e-3 * np.sqrt(5e3) * x[x > 0] ** 1.5  # N, of um and GPa
+    right.semilogy(x[x > 0], smooth, "--", label="smooth (Hertz)")
+    right.set(xlabel="approach [um]", ylabel="force [N]", ylim=(1e-4, 200))
+    for axes in (left, right):
+        axes.legend(fontsize="small")
     return {"spheres": table(header, rows, forms)}, {"docs/figures/rough_bodies.svg": figure}
+
+
+BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
+
+
+def summary_table(sets: Iterable[distances.DataSet]) -> str:
+    """Root mean square deviations of every theory from data sets: area, force and stiffness."""
+    rows = []
+    for one in sets:
+        cells = []
+        for name, theory in distances.THEORIES.items():
+            found = distances.distances(one.seen, theory)
+            sums = [distances.summed_up(one.seen, values) for values in found.values()]
+            text = " / ".join(percent(rms) for rms, _ in sums)
+            # stiffness may be missing at a last load by itself
+            short = " †" if 0 < sums[0][1] < 0.995 else ""
+            cells.append("—" if text == "— / — / —" else f"{text}{'*' if name in one.fitted else ''}{short}")
+        rows.append([f"{one.title} ({len(one.seen)})", *cells])
+    return table(f"simulated surfaces (number) | {' | '.join(distances.THEORIES)}", rows)
+
+
+def by_contact() -> Any:
+    """Theory over simulation against contact on held-out surfaces: means, of two theories with a standard deviation."""
+    figure, axes = panels(3, 1, (9, 9), sharex=True)
+    seen = distances.held_out()
+    area, middle = np.concatenate([one.area for one in seen]), np.sqrt(np.multiply(BINS[1:], BINS[:-1]))
+    for (theory, make), hue in zip(distances.THEORIES.items(), distances.HUES, strict=True):
+        for ax, values in zip(axes, distances.distances(seen, make).values(), strict=True):
+            mean, spread, count = by_bin(area, values, BINS, np.mean, np.std, np.size).T
+            x, mean, spread = (each[count > 4] for each in (middle, mean, spread))
+            ax.plot(x, np.exp(mean), ".-", color=hue, label=theory)
+            if theory in ("MBMA reported", "calibrated"):
+                ax.fill_between(x, np.exp(mean - spread), np.exp(mean + spread), color=hue, alpha=0.15, lw=0)
+    for ax, quantity in zip(axes, QUANTITIES, strict=True):
+        ax.axhline(1, color="k", lw=0.5)
+        ax.set(xscale="log", xlim=(2e-4, 1.1), yscale="log", ylim=(0.1, 10), ylabel=f"{quantity}, theory / simulation")
+        ax.grid(alpha=0.3)
+    axes[0].set(yscale="linear", ylim=(0.4, 1.6), title=f"{len(seen)} held-out self-affine surfaces")
+    axes[-1].set_xlabel(r"$A/A_0$ simulated")
+    # below, where it hides no curve
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
+    return figure
+
+
+def fidelity() -> Measured:
+    parts = {"summary": summary_table(distances.data_sets().values())}
+    parts["scores"] = distances.scores(distances.THEORIES | distances.theories_of(distances.OTHERS))
+    return parts, {"docs/figures/fidelity.svg": by_contact()}
+
+
+def data() -> Measured:
+    """Groups of the data set."""
+    rows = []
+    for name, group in boundary_elements().children.items():
+        own = group.to_dataset()
+        of = own.to_dataframe() if "contact" in own.dims else None
+        count = own.sizes["surface"] if of is None else of.groupby([*of.columns[: of.columns.get_loc("force")]]).ngroups
+        rows.append([f"`{name}`", own.attrs["title"], count, int(np.isfinite(own.area).sum())])
+    return {"groups": table("group | content | surfaces | contacts", rows)}, {}
