@@ -55,18 +55,19 @@ _HOMES = {
     "open_table": "mbma_tables.models.tables",
     "rough_contact": "mbma_tables.law.rough_body",
     "sensitivity": "mbma_tables.answers.sensitivity",
+    # modules
+    "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
+    "theories": "mbma_tables.theories",
 }
-_MODULES = {"greenwood_tripp": "mbma_tables.islands.greenwood_tripp", "theories": "mbma_tables.theories"}
 
-__all__ = sorted([*_ERRORS, *_HOMES, *_MODULES])
+__all__ = sorted([*_ERRORS, *_HOMES])
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return importlib.import_module(_MODULES[name])
-    if name in _HOMES:
-        return getattr(importlib.import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'mbma_tables' has no attribute {name!r}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mbma_tables' has no attribute {name!r}")
+    module = importlib.import_module(_HOMES[name])
+    return getattr(module, name, module)
 
 
 def __dir__() -> list[str]:
