@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from mbma_tables.theories.mbma import Mbma
-    from mbma_tables.theories.protocol import Theory
 
 VALIDITY = ("valid", "scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
 YIELDED = ("yielded", "mean_pressure", "plane_separation", "unloading_stiffness")
@@ -211,16 +210,11 @@ class OtherTheory(NamedTuple):
 def other_theory(
     name: str, surface: AnySurface, gap: FloatArray, E_star: float, hardness: float = math.inf
 ) -> OtherTheory:
-    """A theory, one of `problem.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
+    """A theory, by its name, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories import get_theory
     from mbma_tables.theories.numerical import answer_where_finite
 
-    if name == "persson_simplified":
-        from mbma_tables.theories.persson import Persson
-
-        theory: Theory = Persson("simplified")
-    else:
-        theory = get_theory(name, surface)
+    theory = get_theory(name, surface)
     if hardness < math.inf:
         from mbma_tables.theories.yielding import with_hardness
 

@@ -54,7 +54,7 @@ class Scene(Problem):
     deltas : array_like, optional
         Approaches [length] of the islands of "pressure_profile".
     theories : sequence of str
-        For "comparison": names of other theories, or "persson_simplified".
+        For "comparison": names of other theories.
     points : int
         Points of the distribution of "island_statistics", over the approach.
     title : str, optional
