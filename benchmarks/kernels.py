@@ -28,8 +28,6 @@ SEED, ROUNDS = 7, 9
 BEFORE: dict[str, float] = {
     "universal table, random": 2.498,
     "universal table, path": 1.73,
-    "universal table with slopes, random": 5.013,
-    "universal table with slopes, path": 2.758,
     "totals, a new surface each": 311.4,
     "1,000 gaps on a new surface": 34.41,
     "1,000 gaps on a known surface": 11.53,
@@ -80,8 +78,6 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     return {
         "universal table, random": (lambda: universal.answer(X, mu, outside="nan"), MANY),
         "universal table, path": (lambda: universal.answer(*path, outside="nan"), MANY),
-        "universal table with slopes, random": (lambda: universal.slopes(X, mu), MANY),
-        "universal table with slopes, path": (lambda: universal.slopes(*path), MANY),
         "totals, a new surface each": (lambda: contact(surfaces, separation=gaps), SURFACES),
         "1,000 gaps on a new surface": (
             lambda: [contact(another(), separation=some) for _ in range(DESIGNS)],

@@ -110,10 +110,8 @@ static mbma_spline spline_of(const argument *a) {
     /* closed_forms.h */ \
     FN(closed_form, "i Dn Dn D?n D?n wn", (uint64_t)I(0) < 8 && (I(0) < 6 || (P(3) && P(4))), \
        closed_form((size_t)I(0), N(1), P(1), P(2), P(3), P(4), P(5))) \
-    /* phi.c */ \
-    FN(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3), \
-       mbma_phi(N(0), P(0), P(1), CELLS(2), (int)I(5), P(6), P(7))) \
     /* totals.c */ \
+    FN(phi, "Dn Dn D J D6 w3n b?n", true, mbma_phi(N(0), P(0), P(1), CELLS(2), P(5), P(6))) \
     FN(totals, "Dn Dn Dn Dn d D8 D J D6 w4n wn bn l1", true, \
        mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), P(9), P(10), P(11), P(12))) \
     FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \

@@ -70,9 +70,6 @@ class UniversalModel(Ranged):
     >>> table = open_table("universal")
     >>> round(float(table.answer(2.0, [0.1, 10.0]).phi_F[1]), 4)
     4.5589
-    >>> value, by_X, by_mu = table.slopes(2.0, 0.1)
-    >>> round(float(by_X.phi_A), 4)
-    5.1162
     """
 
     name = "universal"
@@ -95,24 +92,13 @@ class UniversalModel(Ranged):
         outside : {"raise", "exact", "nan"}
             Where X or mu is not covered: an error, the exact solver, or NaN.
         """
-        return self._answered(X, mu, outside, lambda flat_X, flat_mu: self._filled(flat_X, flat_mu, False).T)
 
-    def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool) -> FloatArray:
-        """Rows of Phi_F, Phi_A, error, and with `slopes` of the derivatives by X and mu; NaN outside."""
-        rows = np.empty((X.size, 7 if slopes else 3))
+        def rows(flat_X: FloatArray, flat_mu: FloatArray) -> FloatArray:
+            out = np.empty((flat_X.size, 3))
+            in_blocks(lambda k: core.phi(flat_X[k], flat_mu[k], *self.cells, out[k], None), flat_X.size, BLOCK)
+            return out.T
 
-        def fill(block: slice) -> None:
-            core.phi(X[block], mu[block], *self.cells, int(slopes), rows[block], None)
-
-        in_blocks(fill, X.size, BLOCK)
-        return rows
-
-    def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
-        """Results and their derivatives by X and by mu, in one pass; the errors are those of the results."""
-        flat_X, flat_mu, shape = self._flat(X, mu)
-        columns = self._filled(flat_X, flat_mu, True).T
-        force, area, error, F_X, F_mu, A_X, A_mu = (column.reshape(shape)[()] for column in columns)
-        return IslandAnswer(force, area, error), IslandAnswer(F_X, A_X, error), IslandAnswer(F_mu, A_mu, error)
+        return self._answered(X, mu, outside, rows)
 
     @functools.cached_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:

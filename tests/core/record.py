@@ -90,7 +90,6 @@ def use():
     universal = open_table("universal")
     X, mu = np.linspace(-5, 40, 300), np.geomspace(1e-6, 1e5, 300)
     universal.answer(X, mu)
-    universal.slopes(X, mu)
     greenwood_tripp.rigid_sphere(X, mu)
     greenwood_tripp.solve(X[50:250:10], mu[50:250:10]).pressure.sum()
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
