@@ -17,7 +17,6 @@ from mbma_tables.export.law_rows import describe_law
 from mbma_tables.surfaces.averages import average
 from mbma_tables.surfaces.heights import SHARES, Heights
 from mbma_tables.surfaces.maps import extrapolated
-from mbma_tables.surfaces.spectral import resolution
 from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.surface import MeasuredSurface
 
@@ -162,7 +161,7 @@ def measured(end):
 
 
 def test_the_last_octave():
-    found = resolution(measured(100.0))
+    found = measured(100.0).resolved().provenance[-1]
     assert found["shortest"] == pytest.approx(2 * np.pi / 100)
     expected = float(measured(100.0).rms_gradient / measured(50.0).rms_gradient)
     assert found["area_without_last_octave"] == pytest.approx(expected, rel=1e-3)
@@ -172,7 +171,8 @@ def test_the_last_octave():
 def test_waves_that_hold_no_power_are_not_known():
     q = np.geomspace(1.0, 400.0, 200)
     C = WHOLE.power_spectrum(q * (1 - 1e-12)) * np.where(q > 100, 1e-6, 1.0)
-    found, known = resolution(Surface.from_spectrum(q, C, h_max=1.0, unit="um")), resolution(measured(100.0))
+    sampled = Surface.from_spectrum(q, C, h_max=1.0, unit="um")
+    found, known = (surface.resolved().provenance[-1] for surface in (sampled, measured(100.0)))
     assert found["shortest"] == pytest.approx(2 * np.pi / 100, rel=0.04)
     assert found["area_without_last_octave"] == pytest.approx(known["area_without_last_octave"], rel=0.02)
     assert "(sampled to 0.01571 um, without power there)" in found["told"]

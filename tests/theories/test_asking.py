@@ -152,16 +152,13 @@ def test_mbma_says_where_it_is_not_to_be_trusted():
     assert contact(beyond, mean_separation=[2.25, 0.5], outside="exact").valid.tolist() == [False, False]
 
 
-def test_a_modulus_names_its_unit_in_lists_and_attributes():
+def test_units_of_lists_and_of_named_arrays():
     listed = contact(SURFACE, pressure="1 MPa", E_star=["100 GPa", "200 GPa"])
     assert listed.pressure == pytest.approx([1e-3, 1e-3])
     named = xr.DataArray([100.0, 200.0], dims="body", attrs={"units": "GPa"})
     assert contact(SURFACE, pressure="1 MPa", E_star=named).units["pressure"] == "GPa"
     with pytest.raises(InputError, match="hardness is in 'MPa'"):
         contact(SURFACE, pressure=0.001, E_star=named, hardness=named.assign_attrs(units="MPa"))
-
-
-def test_what_is_read_of_named_arrays_has_its_unit():
     gaps = xr.DataArray([0.5, 1.0], dims="gap", name="mine")
     found = contact(dataclasses.replace(SURFACE, unit="um"), separation=gaps, E_star="100 GPa", hardness="1.5 GPa")
     expected = {"stiffness": "GPa/um", "mean_pressure": "GPa", "mean_separation": "um", "separation_scatter": "um"}

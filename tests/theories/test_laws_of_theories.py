@@ -88,9 +88,8 @@ def test_slopes_and_energy_are_those_of_the_force(theory):
     d = 2 * np.array([0.9, 2.0, 3.3, 4.4]) - law.h_max
     step = 1e-4
     for value, slope in with_slopes(law):
-        assert slope(separation=d) == pytest.approx(
-            (value(separation=d - step) - value(separation=d + step)) / (2 * step), rel=1e-6
-        )
+        steep = (value(separation=d - step) - value(separation=d + step)) / (2 * step)
+        assert slope(separation=d) == pytest.approx(steep, rel=1e-6)
     end = law.h_max if law.highest == math.inf else law.highest
     for gap, energy in zip(d, law.energy(separation=d), strict=True):
         work = quad(lambda d: law.pressure(separation=d), gap, min(end, gap + 60), epsabs=0, epsrel=1e-9, limit=400)[0]

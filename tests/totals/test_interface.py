@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from helpers import refusals
 
 from generate.boundary_elements.solve import load_at
 from generate.boundary_elements.surfaces import Recipe, heights
@@ -99,6 +100,8 @@ def test_two_bodies_add_their_compliances():
     known = named.tangential()
     assert known.ratio == pytest.approx(tangential_ratio((0.29, 0.33), (205.0, 69.0)))
     assert known.stiffness == pytest.approx(named.unloading_stiffness / known.ratio)
+    share = lambda nu: 0.2 + 0.1 * nu  # noqa: E731
+    assert tangential_ratio((0.3, 0.3), (210.0, 70.0), share) == pytest.approx(tangential_ratio(0.3, share=share))
     two = {"nu": (0.3, 0.3)}
     for wrong in (two, two | {"E": (1.0, -1.0)}, {"nu": 0.6}, {"nu": 0.3, "E": (1.0, 1.0)}, {}):
         with pytest.raises(InputError):
@@ -155,11 +158,6 @@ def test_a_lay_is_stiffer_across():
         found.tangential(0.2, nu=0.3, direction="along").shear(1e-9)
     with pytest.raises(OutOfRangeError, match="area"):
         contact(stretched, area=0.001).tangential(nu=0.3, direction="along")
-
-
-def test_two_unlike_bodies_with_a_lay():
-    c = lambda nu: 0.2 + 0.1 * nu  # noqa: E731
-    assert tangential_ratio((0.3, 0.3), (210.0, 70.0), c) == pytest.approx(tangential_ratio(0.3, share=c))
 
 
 FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
@@ -233,21 +231,16 @@ def test_contacts_have_it_in_watts():
     np.testing.assert_allclose(named.gap_conductance().values, plain, rtol=1e-9)
 
 
-def test_gases_that_are_refused():
-    joint = contact(FACE, pressure="1 MPa", theory="calibrated", E_star="10 GPa")
-    for given, message in (
-        ({"gas": "argon"}, "no gas is named 'argon'"),
-        ({"temperature": 100.0}, "from 200 to 600 K"),
-        ({"temperature": np.nan}, "finite"),
-        ({"gas_pressure": 0.0}, "positive"),
-        ({"gas_pressure": "1 um"}, "unit of stress"),
-        ({"accommodation": 1.5}, r"in \(0, 1\]"),
-    ):
-        with pytest.raises(InputError, match=message):
-            joint.gap_conductance(**given)
-    unknown = contact(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), pressure=1e-4, theory="calibrated")
-    with pytest.raises(InputError, match="give the surface its unit"):
-        unknown.gap_conductance()
+test_gases_that_are_refused = refusals(
+    lambda face, given: contact(face, area=0.01, theory="calibrated", E_star="10 GPa").gap_conductance(**given),
+    (FACE, {"gas": "argon"}, "no gas is named 'argon'"),
+    (FACE, {"temperature": 100.0}, "from 200 to 600 K"),
+    (FACE, {"temperature": np.nan}, "finite"),
+    (FACE, {"gas_pressure": 0.0}, "positive"),
+    (FACE, {"gas_pressure": "1 um"}, "unit of stress"),
+    (FACE, {"accommodation": 1.5}, r"in \(0, 1\]"),
+    (Surface(0.8, 0.01, 2.0, 1.0, 3.0), {}, "give the surface its unit"),
+)
 
 
 def test_mean_conductivity_is_harmonic():

@@ -1,15 +1,12 @@
 """xarray in, xarray out; dask stays lazy and gives the same bits; cold tables opened by many threads."""
 
-import subprocess
-import sys
-
 import dask
 import dask.array
 import numpy as np
 import pytest
 import xarray as xr
 from dask.callbacks import Callback
-from helpers import refusals
+from helpers import fresh, refusals
 
 from mbma_tables import InputError, Surface, contact, contact_law, island
 
@@ -148,15 +145,13 @@ with dask.config.set(scheduler="threads", num_workers=8):
     lazy = contact(surface, separation=few), contact(surface, separation=many, island_model="island4d", rtol=1e-3)
     first, second = dask.compute(lazy[0].pressure, lazy[1].pressure)
 assert (abs(first - second) <= 0.01 * first).all()
-print("whole")
+print(len(first.gap))
 """
 
 
 @pytest.mark.slow
 def test_cold_tables_opened_by_many_threads():
-    done = subprocess.run([sys.executable, "-c", COLD], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == "whole\n"
+    assert fresh(COLD) == 120
 
 
 def test_islands_are_of_plain_arrays():

@@ -10,10 +10,9 @@ import weakref
 
 import numpy as np
 import pytest
-import scipy.integrate
-import scipy.optimize
 import xarray as xr
 from helpers import difference_weights, refusals, with_slopes
+from scipy.integrate import quad
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.core import core
@@ -104,12 +103,8 @@ def test_energy_is_the_integral_of_force(case):
     for depth in law.h_max * np.array([1e-6, 1e-3, 0.05, 0.4, 1.0, 1.999]):
         ends = [*roots[roots < math.sqrt(depth)], math.sqrt(depth)]
         # l = x^2; between breaks force is smooth
-        parts = [
-            scipy.integrate.quad(
-                lambda x: law.pressure(separation=law.h_max - x * x) * 2 * x, a, b, epsabs=0, epsrel=1e-11
-            )[0]
-            for a, b in itertools.pairwise(ends)
-        ]
+        force = lambda x: law.pressure(separation=law.h_max - x * x) * 2 * x  # noqa: E731
+        parts = [quad(force, a, b, epsabs=0, epsrel=1e-11)[0] for a, b in itertools.pairwise(ends)]
         gap = law.h_max - depth
         rounded = np.finfo(float).eps * law.h_max / depth
         assert 2 * law.energy(separation=gap) == pytest.approx(math.fsum(parts), rel=1e-8 + 10 * rounded, abs=0)
@@ -167,7 +162,7 @@ def test_as_a_function_of_c():
         assert asked.function(law.h_max + 1, asked.user_data) == 0.0
         for outside in (math.nextafter(-law.h_max, -9), math.nan, math.inf, -math.inf):
             assert math.isnan(asked.function(outside, asked.user_data))
-    work, _ = scipy.integrate.quad(law.compiled(), 1.0, law.h_max, epsabs=0)
+    work, _ = quad(law.compiled(), 1.0, law.h_max, epsabs=0)
     assert work == pytest.approx(2 * law.energy(separation=1.0), rel=1e-7, abs=0)
     with pytest.raises(InputError, match="quantity must be one of"):
         law.compiled("force")
