@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact as Contact
     from mbma_tables.answers.sensitivity import sensitivity as sensitivity
     from mbma_tables.islands import greenwood_tripp as greenwood_tripp
-    from mbma_tables.islands.height_integrals import height_integral as height_integral
+    from mbma_tables.islands.greenwood_tripp import height_integral as height_integral
     from mbma_tables.joint import Joint as Joint
     from mbma_tables.law.law import ContactLaw as ContactLaw
     from mbma_tables.law.make import contact_law as contact_law
@@ -50,7 +50,7 @@ _HOMES = {
     "contact": "mbma_tables.answers.contact",
     "contact_law": "mbma_tables.law.make",
     "flow_factors": "mbma_tables.answers.film",
-    "height_integral": "mbma_tables.islands.height_integrals",
+    "height_integral": "mbma_tables.islands.greenwood_tripp",
     "island": "mbma_tables.totals.island",
     "open_table": "mbma_tables.models.tables",
     "rough_contact": "mbma_tables.law.rough_body",
