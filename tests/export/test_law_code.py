@@ -18,7 +18,7 @@ from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 from mbma_tables import Surface, contact_law
 from mbma_tables.core import core
 from mbma_tables.export import LAWS
-from mbma_tables.export.law_code import core_text, law_text
+from mbma_tables.export.law_code import core_text, law_files, law_text
 from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.text import core_file
 
@@ -162,26 +162,27 @@ def test_digits_next_to_first_contact(compiled):
     assert (inverse(np.array([5e-324, 1e-310, 1e-200])) > 0).all()
 
 
-@needs("gcc")
-def test_two_laws_in_one_program(tmp_path):
-    laws = {"road": "mbma", "seal": "persson"}
-    for name, law in laws.items():
-        (tmp_path / f"{name}.c").write_text(law_points.text("c-law", law, name=name, leakage=True))
-    asks = "".join(f'printf("%.17g\\n", {name}_pressure(0.5));' for name in laws)
-    declared = "".join(f"double {name}_pressure(double c);" for name in laws)
-    (tmp_path / "ask.c").write_text(f"#include <stdio.h>\n{declared}\nint main(void) {{ {asks} return 0; }}\n")
-    run("gcc", "-O1", "road.c", "seal.c", "ask.c", "-lm", "-o", "ask", folder=tmp_path)
-    known = [float(points(law).law.pressure(separation=2.0)) for law in laws.values()]
-    np.testing.assert_allclose(np.array(run("./ask", folder=tmp_path).split(), dtype=float), known, rtol=VALUES)
-
-
-@needs("g++")
-def test_the_same_file_is_cpp(tmp_path):
-    (tmp_path / "road.c").write_text(law_points.text("c-law", "mbma", leakage=True, **HEAT))
+@needs("gcc", "g++")
+def test_two_laws_with_headers_in_c_and_cpp(tmp_path):
+    for name, law in {"road": "mbma", "seal": "persson"}.items():
+        surface, asked = ASKED[law]
+        files = law_files("c-law", surface, "13.3 MPa", name=name, leakage=True, **HEAT, **asked)
+        (tmp_path / f"{name}.c").write_text(files[""])
+        (tmp_path / f"{name}.h").write_text(files[".h"])
     (tmp_path / "uinter.c").write_text(law_points.text("abaqus-uinter", "mbma", **HEAT))
-    for file in ("road.c", "uinter.c"):
+    asks = (
+        "road_with_tangent(1.0, &k), road_leakage(1.0), road_conductance(1.0), road_overclosure(0.01), seal_area(0.5)"
+    )
+    text = '#include "road.h"\n#include "seal.h"\n#include "road.h"\n#include <stdio.h>\nint main(void) { double k; '
+    (tmp_path / "ask.c").write_text(f'{text}printf("%.17g %.17g %.17g %.17g %.17g", {asks}); return 0; }}\n')
+    law, seal = points("mbma").law, points("persson").law
+    known = [law.pressure(2.0), law.leakage(2.0), CONDUCTIVITY / 13.3 * law.stiffness(2.0)]
+    known += [3 - law.at_pressure(0.01).mean_separation, seal.area(2.5)]
+    for compiler in (("gcc", "-std=c99"), ("g++", "-x", "c++", "-std=c++11")):
         strict = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
-        run("g++", "-x", "c++", "-std=c++11", *strict, "-c", file, folder=tmp_path)
+        run(*compiler, *strict, "-c", "road.c", "seal.c", "uinter.c", "ask.c", folder=tmp_path)
+        run(compiler[0], "road.o", "seal.o", "ask.o", "-lm", "-o", "ask", folder=tmp_path)
+        np.testing.assert_allclose(np.array(run("./ask", folder=tmp_path).split(), float), known, rtol=1e-11)
 
 
 FORTRAN = """program ask
@@ -263,7 +264,11 @@ assert jax.tree.structure(by_law) == jax.tree.structure(road.LAW)
 inverse = jax.vmap(jax.grad(road.overclosure))(p[:100])
 assert jnp.abs(inverse * road.tangent(road.overclosure(p[:100])) - 1).max() < 1e-9
 assert jnp.abs(jax.vmap(jax.grad(road.energy))(c[:100]) / road.pressure(c[:100]) - 1).max() < 1e-9
-print(bool(jnp.isnan(road.pressure(1e9))))
+asked = [road.pressure, road.tangent, road.energy, road.area, road.leakage]
+beyond = [jax.value_and_grad(f)(x) for f in asked for x in (1e9, float("nan"))]
+print(bool(jnp.isnan(jnp.array([*beyond, jax.value_and_grad(road.overclosure)(1e9)])).all()))
+below, at, above = (float(jax.grad(road.leakage)(c)) for c in (-1e-9, 0.0, 1e-9))
+assert abs(above / at - 1) < 1e-6 and abs(below / at - 1) < 0.2
 """
 
 
@@ -489,3 +494,38 @@ def test_a_unit_never_becomes_code(target):
     ]
     assert live[0] == live[1]
     assert len(live[0]) > 40
+
+
+@pytest.mark.parametrize("more", [{}, {"leakage": True, **HEAT}])
+def test_types_of_a_law_in_javascript(more):
+    files = law_files("javascript-law", ASKED["mbma"][0], "13.3 MPa", name="road", **more)
+    exported = re.findall(r"^export (?:const|function) (\w+)", files[""], flags=re.M)
+    typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)
+    assert sorted(typed) == sorted(exported)
+
+
+@pytest.mark.parametrize(
+    "target", ["c-law", "javascript-law", "python-law", "matlab-law", "modelica-law", "fortran-law"]
+)
+def test_headers_name_functions_that_are_there(target):
+    head, _, text = law_points.text(target, "calibrated", name="road", **HEAT).partition("Example: ")
+    lines = " ".join(line.strip("*/!#%; ") for line in text.splitlines()[:4])
+    called = re.findall(r"(?:road[._]|law\.)?(\w+)\([\d.]", lines)
+    assert len(called) >= 2
+    for name in called:
+        assert re.search(rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text)
+    assert "{{" not in head
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_a_turn_is_told_of_where_there_is_one(name):
+    text, law = law_points.text("c-law", name), points(name).law
+    turns = law.turning_point is not None and law.turning_point > law.lowest + 1e-9 * law.h_max
+    assert ("where pressure turns down" in text) == turns
+
+
+def test_units_of_modelica(tmp_path):
+    text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)
+    for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
+        assert f'type {kind} = Real(unit = "{unit}");' in text
+    assert 'output Real y(unit = "mm3");' in text
