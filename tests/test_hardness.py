@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.differentiate import derivative
 
+from generate.boundary_elements.solve import Contact as Elastic
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.boundary_elements.tamaas_contact import Contact as Elastic
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws import hardness

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from small_tables import small, small_build
 
-from generate.files import ROOT
-from generate.provenance import versions
+from generate.files import ROOT, versions
 from generate.tables import certificate
 from generate.tables.certificate import Kind, UncertifiedError, phi
 from generate.tables.commands import KINDS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from generate.boundary_elements.tamaas_contact import Contact
+from generate.boundary_elements.solve import Contact
 from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law
 from mbma_tables.theories import theory_name
