@@ -36,8 +36,6 @@ from generate.files import ROOT
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.calibrated import Law, Spectrum
-from mbma_tables.models.island4d import at_places
-from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated
 
 POINTS = 20_000
@@ -49,11 +47,6 @@ CALLS = 10_000  # of one number: a loop of them, not its first ones
 DESIGNS = 20  # surfaces of a design loop, likewise
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
 SEED = 7
-
-
-def random_places(content: TableContent, rng: np.random.Generator) -> np.ndarray:
-    """Random points in node units, (points, axes)."""
-    return rng.uniform(size=(POINTS, len(content.axes))) * [axis.nodes - 1 for axis in content.axes]
 
 
 def peers(X: np.ndarray, mu: np.ndarray) -> dict[str, Callable[[], Any]]:
@@ -85,8 +78,8 @@ def _knots(nodes: list[np.ndarray], values: np.ndarray) -> tuple[tuple[np.ndarra
 
 
 def tables(rng: np.random.Generator) -> None:
-    """The universal table against its past and others' interpolators, the four-number table against scipy's."""
-    universal, four = open_table("universal"), open_table("island4d").content
+    """The universal table against its past and others' interpolators."""
+    universal = open_table("universal")
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
     click.echo("\nUniversal table: Phi_F, Phi_A and the bound on their error at once")
     some = slice(HELD_OUT)
@@ -101,19 +94,6 @@ def tables(rng: np.random.Generator) -> None:
     beside = rounds(own | others, 3)
     for name in others:
         report(f"faster than {name}, {GRID} x {GRID} nodes, one function", times_faster(beside, name, "own"), "x")
-
-    nodes = [np.arange(axis.nodes, dtype=float) for axis in four.axes]
-    cubic = RegularGridInterpolator(nodes, four.auxiliary["log_ratio_F"][1], method="cubic")
-    at_four = random_places(four, rng)
-    columns = np.ascontiguousarray(at_four.T)
-    value = {"value": lambda: at_places(four.coefficients, columns)}
-    taken = rounds({"scipy": lambda: cubic(at_four)} | value, 3)
-    click.echo("\nFour-number table: both functions at once")
-    report("value, a lookup", 1e3 * microseconds(taken["value"], POINTS), "ns")
-    report("  faster than scipy RGI, cubic, one function", times_faster(taken, "scipy", "value"), "x")
-    report(
-        "largest |log_ratio_F - scipy's|", np.abs(at_places(four.coefficients, columns)[0] - cubic(at_four)).max(), ""
-    )
 
 
 def one_step() -> dict[str, Callable[[], Any]]:

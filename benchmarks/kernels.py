@@ -28,9 +28,6 @@ SEED, ROUNDS = 7, 9
 BEFORE: dict[str, float] = {
     "universal table, random": 2.498,
     "universal table, path": 1.73,
-    "universal table with slopes, random": 5.013,
-    "universal table with slopes, path": 2.758,
-    "four-number table": 35.86,
     "totals, a new surface each": 311.4,
     "1,000 gaps on a new surface": 34.41,
     "1,000 gaps on a known surface": 11.53,
@@ -58,17 +55,10 @@ def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]
 def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     """Calls by name, with the number of answers of each."""
     rng = np.random.default_rng(SEED)
-    universal, four = open_table("universal"), open_table("island4d")
+    universal = open_table("universal")
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
     fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_variant("reported"))
     path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
-    raw = (
-        10 ** rng.uniform(-2, 0.5, MANY),
-        rng.uniform(1.5, 30, MANY),
-        rng.uniform(1.5, 60, MANY),
-        rng.uniform(0.3, 1, MANY),
-    )
-    raw = raw[0], raw[1], raw[1] * (1 + raw[2]), raw[3]
     surfaces, gaps = held_out(SURFACES, rng)
     one, fresh = Surface.named("asphalt"), itertools.count(1)
     some, many = (rng.uniform(-one.h_max, 0.9999 * one.h_max, count) for count in (SOME, MANY))
@@ -88,9 +78,6 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     return {
         "universal table, random": (lambda: universal.answer(X, mu, outside="nan"), MANY),
         "universal table, path": (lambda: universal.answer(*path, outside="nan"), MANY),
-        "universal table with slopes, random": (lambda: universal.slopes(X, mu), MANY),
-        "universal table with slopes, path": (lambda: universal.slopes(*path), MANY),
-        "four-number table": (lambda: four.lookup(*raw, outside="nan"), MANY),
         "totals, a new surface each": (lambda: contact(surfaces, separation=gaps), SURFACES),
         "1,000 gaps on a new surface": (
             lambda: [contact(another(), separation=some) for _ in range(DESIGNS)],

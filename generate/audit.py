@@ -16,7 +16,8 @@ import hypothesis
 import numpy as np
 from hypothesis import strategies as st
 
-from generate.files import ROOT, evidence
+from generate.boundary_elements.evidence import evidence
+from generate.files import ROOT
 from generate.page import table
 from generate.page import write as write_page
 from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity

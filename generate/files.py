@@ -24,7 +24,7 @@ SOLVER = (
     "mbma_tables.islands.spectral",
     "mbma_tables.islands.greenwood_tripp",
 )
-GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.islands.four_numbers")
+GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.models.island4d")
 MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 
@@ -45,14 +45,6 @@ def read_csv(name: str | pathlib.Path) -> Any:
 def dataset(group: str, path: pathlib.Path = FILE) -> Any:
     """A group of the data set of boundary-element simulations, in memory."""
     return boundary_elements(path)[group].to_dataset()
-
-
-@functools.cache
-def evidence() -> tuple[Any, ...]:
-    """The simulated surfaces (`Case`) of the data set."""
-    from generate.boundary_elements.evidence import cases
-
-    return tuple(cases(dataset("elastic")))
 
 
 def source_digest(modules: tuple[str, ...]) -> str:

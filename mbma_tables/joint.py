@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import os
 import pathlib
 from collections.abc import Mapping, Sequence
@@ -167,10 +166,6 @@ class Joint(Displayed):
 
     def law(self) -> ContactLaw:
         """The joint's contact law, for many gaps or pressures, as of `contact_law`."""
-        return self._law
-
-    @functools.cached_property
-    def _law(self) -> ContactLaw:
         return contact_law(self.surface, **self._asked)
 
     def sensitivity(self, pressure: float | str) -> Sensitivity:
@@ -185,27 +180,27 @@ class Joint(Displayed):
         heat: bool = True,
         friction_pressure: float | str | None = None,
     ) -> str | bytes:
-        """The joint for a solver: pressure, friction, and with `heat` conductance, in N, mm, MPa, mW.
+        """The joint as input of a solver: pressure, friction, and with `heat` conductance, in N, mm, MPa, mW.
 
         Parameters
         ----------
         target : str
-            One of `mbma export --help` that takes a law: rows such as "calculix", "abaqus" and "csv", functions such as
+            A target of `mbma export` that accepts a law: rows such as "calculix", "abaqus", "csv", functions such as
             "c-law", "modelica-law" and "fmu".
         pressures : pair of float or str
             Smallest and largest pressure of rows; plain numbers in MPa.
         name : str, optional
-            Of the surface interaction, or what functions begin with.
+            Name of the surface interaction, or prefix of function names.
         heat : bool
             Whether the conductance of the solid spots is also written.
         friction_pressure : float or str, optional
-            Where the one tangential stiffness of a friction card holds; else at the geometric mean of `pressures`.
+            Pressure at which a friction card's tangential stiffness is computed; default: the geometric mean.
 
         Returns
         -------
         str or bytes
-            The first file of the target, bytes of an FMU. Solvers have a friction card where the joint has a
-            coefficient of friction, functions the tangential stiffness.
+            The first file of the target, bytes for an FMU. Solver input has a friction card if the joint has a
+            coefficient of friction; functions contain the tangential stiffness.
 
         Examples
         --------

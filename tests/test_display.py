@@ -33,25 +33,19 @@ def thing(request):
     return request.param()
 
 
-def test_a_line_is_short_and_plain(thing):
-    line = repr(thing)
+def test_a_line_and_a_notebooks_table_with_a_small_picture(monkeypatch, thing):
+    line, shown = repr(thing), thing._repr_html_()
     assert "\n" not in line
     assert len(line) < 400
     assert line.startswith(type(thing).__name__)
     assert not re.search(r"np\.|array|object at", line)
-
-
-def test_a_notebook_shows_a_table_and_a_small_picture(thing):
-    shown = thing._repr_html_()
     assert shown.count("<tr>") == len(thing._facts())
     assert len(re.findall("src='data:image/png;base64,", shown)) == 1
     assert len(shown) < 60_000
-
-
-def test_without_matplotlib_the_table_stands_alone(monkeypatch, thing):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    assert "<img" not in thing._repr_html_()
-    assert "<table>" in thing._repr_html_()
+    alone = thing._repr_html_()
+    assert "<img" not in alone
+    assert "<table>" in alone
 
 
 def test_without_xarray_the_extra_is_named(monkeypatch):
@@ -61,19 +55,16 @@ def test_without_xarray_the_extra_is_named(monkeypatch):
             ask()
 
 
-def test_a_picture_is_kept(tmp_path):
-    ROAD.plot(tmp_path / "road.svg")
-    assert b"<svg" in (tmp_path / "road.svg").read_bytes()
-    with pytest.raises(InputError, match="must end with one of"):
-        ROAD.plot(tmp_path / "road.xyz")
-
-
-def test_a_figure_is_none_of_pyplots(thing):
+def test_a_figure_is_none_of_pyplots_and_kept(thing, tmp_path):
     before = "matplotlib.pyplot" in sys.modules
     figure = thing.plot()
     assert all(axes.get_xlabel() and axes.get_ylabel() for axes in figure.axes)
     assert figure._repr_png_().startswith(b"\x89PNG")
     assert ("matplotlib.pyplot" in sys.modules) == before
+    thing.plot(tmp_path / "thing.svg")
+    assert b"<svg" in (tmp_path / "thing.svg").read_bytes()
+    with pytest.raises(InputError, match="must end with one of"):
+        thing.plot(tmp_path / "thing.xyz")
 
 
 def test_every_variable_has_its_unit(thing):

@@ -23,10 +23,9 @@ from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedErr
 from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, to_axes
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.island4d import at_places
+from mbma_tables.islands.greenwood_tripp import height_integral
+from mbma_tables.models.island4d import SPHERE_FLOOR, band_fields, spline_of, to_axes
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell
@@ -47,7 +46,7 @@ def from_axes(sphere: Any, hurst: Any) -> Any:
 
 def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
     """The table's spline at positions in node units, shape (entries, 2)."""
-    return at_places(coefs, np.stack(positions)).T
+    return np.asarray(spline_of(coefs)(np.stack(positions, axis=-1)))
 
 
 def error_cells(axis: Axis) -> int:

@@ -204,19 +204,20 @@ class Universal(Kind):
         X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1][:, None] for name in CELL_EDGES)
         x, y = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(-0.99, 0.99, 5)]))
         X, mu = X_at(x, X_low, X_high).ravel(), mu_at(y, mu_low, mu_high).ravel()
-        value, by_X, by_mu = UniversalModel(content).slopes(X, mu)
-        found = np.stack([value.phi_F, value.phi_A])
+        answer = UniversalModel(content).answer
+        found = np.stack(answer(X, mu)[:2])
+        beside = X_at(x + 1e-3, X_low, X_high).ravel(), mu_at(y + 1e-3, mu_low, mu_high).ravel()
+        more_X, more_mu = (np.stack(answer(*place)[:2]) for place in ((beside[0], mu), (X, beside[1])))
         rigid = greenwood_tripp.rigid_sphere(X, mu)
-        still = greenwood_tripp.rigid_sphere(X, np.ones(X.size))
-        at_zero = UniversalModel(content).slopes(X, np.zeros(X.size))
-        limit = np.stack([at_zero[2].phi_F, at_zero[0].phi_A]) / still - 1
+        rigid_limit = X, np.full(X.size, SMALLEST_MU)
+        limit = np.stack(answer(*rigid_limit)[:2]) / greenwood_tripp.rigid_sphere(*rigid_limit) - 1
         target = self.configuration.target
         rules = {
             "force and area finite and positive": (np.isfinite(found) & (found > 0)).all(),
             "force and area no larger than a rigid sphere's": (found <= (1 + target) * rigid).all(),
-            "force increasing in X": (by_X.phi_F > 0).all(),
-            "area increasing in X": (by_X.phi_A > 0).all(),
-            "force increasing in mu": (by_mu.phi_F > 0).all(),
+            "force increasing in X": (more_X > found)[0].all(),
+            "area increasing in X": (more_X > found)[1].all(),
+            "force increasing in mu": (more_mu > found)[0].all(),
             "rigid limit at mu = 0": (np.abs(limit) <= target).all(),
         }
         self.require(rules)

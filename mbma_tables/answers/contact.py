@@ -249,22 +249,15 @@ def _of_labelled(
     surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, source: Source
 ) -> dict[str, Any]:
     """Fields of `contact` of DataArrays, lazily where they are."""
-    units = source.units
-    names = (*(("separation", "mean_separation") if by in QUANTITIES else ()), *QUANTITIES, "error")
+    names = ("separation", "mean_separation", *QUANTITIES, "error")
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
         _, found = _contact(block, asked, modulus, cap, by, source)
         return tuple(found[name] for name in names)
 
     outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star, "hardness": hardness}, len(names))
-    fields: dict[str, Any] = {name: named(found, name, units) for found, name in zip(outputs, names, strict=True)}
-    fields["islands"] = None
-    # the given quantity keeps its name and attributes
-    lowest, highest = (value, value) if source.theory.ends_at_h_max else (-np.inf, np.inf)
-    if by == "separation":
-        average = np.maximum((surface.h_max + value) / 2, lowest)
-        fields |= {by: value, "mean_separation": named(average, "mean_separation", units)}
-    elif by == "mean_separation":
-        gap = np.minimum(2 * value - surface.h_max, highest)
-        fields |= {by: value, "separation": named(gap, "separation", units)}
-    return fields
+    fields: dict[str, Any] = {
+        name: named(found, name, source.units) for found, name in zip(outputs, names, strict=True)
+    }
+    # a separation keeps its name and attributes
+    return fields | {"islands": None} | ({} if by in QUANTITIES else {by: value})

@@ -139,15 +139,15 @@ class Interface:
     def conductance(self: Any, k1: ArrayLike | str | None = None, k2: ArrayLike | str | None = None) -> Numbers:
         """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
 
-        By the incremental stiffness, with a hardness that of the frozen contact: both solve the same potential problem
-        (J. R. Barber, Proc. R. Soc. A 459 (2003)). The slope of the loading curve of yielded contacts is up to ten
-        times less.
+        It is proportional to the stiffness at constant contact area, as both solve the same potential problem (J. R.
+        Barber, Proc. R. Soc. A 459 (2003)). The slope of the loading curve of yielded contacts is up to ten times
+        smaller.
 
         Parameters
         ----------
         k1, k2 : array_like or str
-            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1, and without either they are
-            the thermal ones of the `materials` named.
+            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1, and without both they are
+            the thermal conductivities of the named `materials`.
 
         Returns
         -------
@@ -194,7 +194,7 @@ class Interface:
         gas_pressure : array_like or str
             [Pa], or with its unit.
         accommodation : array_like, optional
-            Thermal accommodation coefficient of the faces; else that of machined metals.
+            Thermal accommodation coefficient of the faces; default: that of machined metals.
 
         Examples
         --------
@@ -230,7 +230,7 @@ class Interface:
         Parameters
         ----------
         friction : float, optional
-            Coefficient of friction, for slip. With a hardness only full stick is known.
+            Coefficient of friction, for slip. With a hardness only full stick is computed.
         nu, E : optional
             As for `materials.tangential_ratio`; by default those of the `materials` named.
         direction : {"along", "across"}, optional

@@ -1,9 +1,4 @@
-"""Leakage of a contact: its flow coefficient with uncertainty, and leakage rates of liquids.
-
-The contact factor R of self-affine surfaces is from a table of ln R of `laws.effective_medium` over Hurst exponent,
-ln zeta_1 and ln A/(Ac - A). Below the smallest tabulated contact ln R is proportional to A^m, as the obstruction is;
-above the largest R is a power of Ac - A.
-"""
+"""Leakage of a contact: flow coefficient with uncertainty, by a table of `laws.effective_medium`, and leakage rates."""
 
 import dataclasses
 import functools
@@ -46,7 +41,7 @@ MEANINGS = {
     "xy": "flow coefficient of flow along one axis by pressure along the other",
     "hydraulic_aperture": "K^(1/3)",
     "flow_factor": "K over the cube of the mean separation",
-    "scatter": "standard deviation of ln K from simulation to simulation",
+    "scatter": "model uncertainty: standard deviation of ln K",
     "valid": "whether flow through such contacts was simulated",
     "blocked": "whether contact percolates",
 }
@@ -110,7 +105,7 @@ class Leakage(Displayed):
 
     @functools.cached_property
     def scatter(self) -> Any:
-        """Standard deviation of ln K from simulation to simulation, cells of four or more longest wavelengths a side.
+        """Model uncertainty, one standard deviation of ln K, of cells at least four longest wavelengths wide.
 
         NaN where not known, and where blocked.
         """
@@ -285,6 +280,7 @@ def shipped_flow() -> FlowTable:
 @np.errstate(all="ignore")
 def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
     """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
+    # below the table ln R is in proportion to A^obstruction, above it R is a power of threshold - A/A0
     numbers, found = given[1], np.empty(u.shape)
     threshold, obstruction, first = numbers[10], numbers[11], numbers[2]
     last = first + given[2][2] / numbers[5]

@@ -118,7 +118,7 @@ class Contact(Interface, Displayed):
         return draw_compression([self.curve()], title, pressure_label(unit), more=more)
 
     def curve(self, leakage: bool = False) -> Curve:
-        """A line of pictures, of one surface at several separations; optionally with its leakage."""
+        """The line that plots draw, for one surface at several separations; optionally with its leakage."""
         surface = self._source.surface
         if np.size(self.pressure) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
@@ -213,7 +213,7 @@ class Contact(Interface, Displayed):
 
     @described
     def unloading_stiffness(self) -> Any:
-        """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
+        """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields."""
         if not self._source.yields:
             return self.stiffness
         return (self._source.E_star * self._of_loading("unloading_stiffness", None))[()]
@@ -241,22 +241,22 @@ class Contact(Interface, Displayed):
 
     @described
     def scatter(self) -> Any:
-        """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
+        """Model uncertainty, one standard deviation of ln F at this mean separation; NaN if unknown."""
         return self._scatter("pressure")
 
     @described
     def area_scatter(self) -> Any:
-        """Standard deviation of ln A at this pressure, from simulation to simulation."""
+        """Model uncertainty, one standard deviation of ln A at this pressure."""
         return self._scatter("area")
 
     @described
     def stiffness_scatter(self) -> Any:
-        """Standard deviation of ln of `unloading_stiffness` at this pressure, and of conductance."""
+        """Model uncertainty, one standard deviation of ln `unloading_stiffness` and ln conductance at this pressure."""
         return self._scatter("stiffness")
 
     @described
     def separation_scatter(self) -> Any:
-        """Standard deviation of the mean separation at this pressure [length], `scatter` times F/(-dF/du)."""
+        """Model uncertainty of the mean separation at this pressure [length], `scatter` times F/(-dF/du)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 
@@ -282,7 +282,7 @@ class Contact(Interface, Displayed):
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
-        """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
+        """Reasons why entries are not `valid`, each with the mask of these entries as a plain array."""
         return self._source.reasons(*self._against)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.cli.options import Model, Output
+from mbma_tables.common.display import shown
 from mbma_tables.common.files import write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units, unit_of
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
+SCATTER = ("scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
 
 
@@ -115,11 +117,11 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     # a spectrum that is no power law has no Hurst exponent
     numbers = {name: float(value) for name, value in known.items() if value is not None}
     units = {name: shown_unit(name, specimen.units).strip("-") for name in numbers}
-    shown = (f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items())
+    listed = (f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items())
     assumed = [line for record in surface.provenance for line in record.get("assumed", ())]
     if isinstance(surface, Surface) and ASSUMED not in assumed:
         assumed.insert(0, ASSUMED)
-    notes = [f"surface: {', '.join(shown)}", *(f"assumed: {line}" for line in assumed)]
+    notes = [f"surface: {', '.join(listed)}", *(f"assumed: {line}" for line in assumed)]
     notes += [record["told"] for record in surface.provenance if "told" in record]
     facts: dict[str, Any] = {"length_unit": surface.unit, **numbers, "assumed": assumed}
     facts["provenance"] = [dict(record) for record in surface.provenance]
@@ -137,18 +139,11 @@ def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     if reasons:
         listed = "; ".join(f"{reason} ({len(places)})" for reason, places in reasons.items())
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
-    texts = {
-        "scatter": "ln force {} at a separation",
-        "area_scatter": "ln area {} at a force",
-        "stiffness_scatter": "ln stiffness {}",
-        "separation_scatter": f"u {{}} {answer.units['separation']}",
-    }
-    scatter = {name: np.atleast_1d(getattr(answer, name)) for name in texts}
-    known = {name: values[np.isfinite(values)] for name, values in scatter.items()}
-    said = [texts[name].format(f"{v.min():.2g} to {v.max():.2g}") for name, v in known.items() if v.size]
-    if said:
-        notes.append(f"scatter against simulations: {', '.join(said)}")
-    return notes, {"valid": valid.tolist(), "reasons": reasons, **{name: v.tolist() for name, v in scatter.items()}}
+    scatter = {name: getattr(answer, name) for name in SCATTER}
+    ranges = ", ".join(shown(values, answer.units[name]) for name, values in scatter.items())
+    if np.isfinite([*scatter.values()]).any():
+        notes.append(f"scatter of ln force at a separation, ln area at a force, ln stiffness, u: {ranges}")
+    return notes, {"valid": valid.tolist(), "reasons": reasons, **{n: np.ravel(v).tolist() for n, v in scatter.items()}}
 
 
 def report_answer(
@@ -188,5 +183,5 @@ def report_answer(
             )
         told, validity = _validity(answer)
         notes, facts = notes + told, facts | validity
-    shown = {name: shown_unit(name, specimen.units) for name in values}
-    return Report(command, specimen.title, notes, facts, values, shown | dict(units))
+    own = {name: shown_unit(name, specimen.units) for name in values}
+    return Report(command, specimen.title, notes, facts, values, own | dict(units))

@@ -107,14 +107,14 @@ class Displayed:
         return f"{table}<img src='data:image/png;base64,{picture}'></div>"
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """A picture of it, kept under `path` where that is given ("name.svg", .pdf, .png); notebooks show the figure.
+        """Plot the quantities and return the figure; with `path` ("name.svg", .pdf, .png) it is also saved.
 
         Raises
         ------
         InputError
-            Where there is no curve to draw, as of a single contact, or no such kind of picture.
+            If there is no curve to draw, as for a single contact, or the kind of file is unknown.
         MbmaError
-            Where matplotlib is missing.
+            If matplotlib is not installed.
         """
         figure = self._figure()
         if path is not None:
@@ -125,7 +125,7 @@ class Displayed:
         return figure
 
     def to_dataset(self) -> xr.Dataset:
-        """Its quantities as an xarray Dataset, each with unit and description."""
+        """The quantities as an xarray Dataset, with units and descriptions."""
         return dataset_of(self._variables(), {**self._facts(), **self._origin()})
 
 

@@ -71,15 +71,6 @@ static bool are_panels(const argument *a) {
 }
 #define NODES(k) ((const mbma_nodes[]){{(int64_t)N((k) + 1), P(k), P((k) + 1), P((k) + 2)}})
 
-/* How many coefficients a table of so many nodes has; 0 for an impossible one. */
-static size_t coefficients_of(const argument *nodes) {
-    const int64_t *const count = (const int64_t *)nodes->data;
-    size_t product = 2;
-    for (size_t k = 0; k < 4; k++)
-        product *= count[k] >= 2 && count[k] < 4096 ? (size_t)(count[k] + 2) : 0;
-    return product;
-}
-
 #define BASIS(k) ((const mbma_basis[]){{N(k), P(k), P((k) + 1), P((k) + 2), P((k) + 3)}})
 #define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
 #define INVERSE(k) ((const mbma_inverse[]){mbma_inverse_open(P(k), N(k))})
@@ -119,10 +110,8 @@ static mbma_spline spline_of(const argument *a) {
     /* closed_forms.h */ \
     FN(closed_form, "i Dn Dn D?n D?n wn", (uint64_t)I(0) < 8 && (I(0) < 6 || (P(3) && P(4))), \
        closed_form((size_t)I(0), N(1), P(1), P(2), P(3), P(4), P(5))) \
-    /* phi.c */ \
-    FN(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3), \
-       mbma_phi(N(0), P(0), P(1), CELLS(2), (int)I(5), P(6), P(7))) \
     /* totals.c */ \
+    FN(phi, "Dn Dn D J D6 w3n b?n", true, mbma_phi(N(0), P(0), P(1), CELLS(2), P(5), P(6))) \
     FN(totals, "Dn Dn Dn Dn d D8 D J D6 w4n wn bn l1", true, \
        mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), P(9), P(10), P(11), P(12))) \
     FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
@@ -140,9 +129,6 @@ static mbma_spline spline_of(const argument *a) {
        N(1) > 1 && I(3) > 0 && I(3) <= MBMA_PANEL_ROWS && N(2) == (N(1) - 1) * (size_t)I(3) * SERIES_TERMS && \
        N(5) == N(0) * (size_t)I(3) * (I(4) ? 2 : 1), \
        (mbma_profile_totals(N(0), P(0), N(1) - 1, P(1), P(2), (int)I(3), (int)I(4), P(5)), 0)) \
-    /* spline4.c */ \
-    FN(spline4, "D D L4 w", N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(3) == N(0) / 2, \
-       mbma_spline4(N(0) / 4, P(0), P(1), P(2), P(3))) \
     /* newton.c */ \
     FN(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2))) \
     FN(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0))) \

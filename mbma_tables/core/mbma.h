@@ -26,7 +26,7 @@ typedef enum {
     MBMA_OUTSIDE = 6     /* outside what a table or a law covers */
 } mbma_status;
 
-/* ---- phi.c: islands by the universal table ---------------------------------------------------------------------- */
+/* ---- totals.c: islands by the universal table, and force and area of surfaces ------------------------------------ */
 
 /* A cell: a bound on the relative error, x = (X - centre) rate, y = (mu top_mu + top)/(mu bottom_mu + bottom), and
  * Phi_F/mu and Phi_A as sums of c[j][i] x^i y^j. */
@@ -44,12 +44,8 @@ typedef struct {
     int64_t first_bucket, buckets;
 } mbma_cells;
 
-/* Rows of Phi_F, Phi_A and the bound on their relative error; with `slopes` also dPhi_F/dX, dPhi_F/dmu, dPhi_A/dX and
- * dPhi_A/dmu. `status`, one for each entry, may be NULL. */
-size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *cells, int slopes, double *out,
-                uint8_t *status);
-
-/* ---- totals.c: force and area of surfaces ----------------------------------------------------------------------- */
+/* Rows of Phi_F, Phi_A and the bound on their relative error (34-40); `status`, one for each entry, may be NULL. */
+size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *cells, double *out, uint8_t *status);
 
 #define MBMA_MAX_ZETA_1 1e8
 #define MBMA_MIN_APPROACH 1e-140 /* squares of numbers of this order do not underflow */
@@ -117,12 +113,6 @@ void mbma_profile_series(const mbma_panel_rule *rules, size_t panels, const int6
 /* The sums at compressions, (rows, n), and with `slopes` their derivatives by it below; NaN beyond the last panel. */
 void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
                          int rows, int slopes, double *out);
-
-/* ---- spline4.c: islands by the four-number table ----------------------------------------------------------------- */
-
-/* Two functions f and g of four axes by their cubic tensor spline over equally spaced nodes. `places` is (4, n), from 0
- * to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2); `out` is (2, n). */
-size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, double *out);
 
 /* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 

@@ -9,6 +9,18 @@
 #include "island.h"
 #include "phi.h"
 
+size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *cells, double *out, uint8_t *status) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const phi found = phi_at(cells, X[k], mu[k]);
+        out[3 * k] = found.value[0], out[3 * k + 1] = found.value[1], out[3 * k + 2] = found.error;
+        bad += found.status != MBMA_OK;
+        if (status)
+            status[k] = (uint8_t)found.status;
+    }
+    return bad;
+}
+
 enum { MAX_INTERVALS = 200 };
 
 #define LEAST (-700.0) /* of exponents: below it a Gaussian is negligible */

@@ -34,7 +34,7 @@ from mbma_tables.theories import calibrated_table, persson
 from mbma_tables.totals.contact import QUADRATURE_SHARE
 
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
-CORE = ("phi.c", "totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
+CORE = ("totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
 MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")
 SELFTEST = "mbma_selftest.c"
 SOURCES = (*CORE, *MODEL[1:], SELFTEST)

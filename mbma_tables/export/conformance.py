@@ -27,7 +27,6 @@ FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
-    "slopes": "X, mu; the same, phi_F by X, phi_F by mu, phi_A by X, phi_A by mu",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness, error",
     "status": "X, mu; the status",
@@ -60,59 +59,8 @@ def rows(kind: str, arguments: Iterable[Any], answers: Any, scales: Any = None, 
         yield ",".join((kind, *map(repr, (most, len(own), *own, *numbers))))
 
 
-def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Rows:
-    """Values and slopes at flat (X, mu), mu > 0, by the compiled runtime."""
-    values, by_X, by_mu = model.slopes(X, mu)
-    slopes = np.stack([by_X.phi_F, by_mu.phi_F, by_X.phi_A, by_mu.phi_A])
-    # where a derivative changes sign, its error is taken relative to value/argument
-    places, numbers = np.array([X, mu, X, mu]), np.array([values.phi_F, values.phi_F, values.phi_A, values.phi_A])
-    scales = np.maximum(np.abs(slopes), np.where(places > 0, np.abs(numbers / np.maximum(places, 1e-300)), 0.0))
-    yield from rows("phi", (X, mu), values)
-    yield from rows("slopes", (X, mu), (*values, *slopes), (*values, *scales))
-
-
-def geometry_rows(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Variant) -> Rows:
-    """Islands by the library."""
-    fields = geometry(approach, hurst, zeta_1, variant)
-    yield from rows("geometry", (approach, hurst, zeta_1), [fields[name] for name in FIELDS])
-
-
-def total_rows(surface: tuple[float, ...], separations: Any, variant: Variant, rtol: float = RTOL) -> Rows:
-    """Totals of one surface, gap by gap."""
-    own, gaps = Surface(*surface), np.asarray(separations)
-    sums, model = np.zeros((5, gaps.size)), universal_model()
-    how, compression = Sums(model, variant, rtol), (own.h_max - gaps) / own.h_rms
-    by_table(own, compression, np.arange(gaps.size), model, how, sums)
-    stress = own.q0 * own.s
-    pressure, area, stiffness = stress * sums[0], sums[1], 2 * stress / own.h_rms * sums[2]
-    # at a maximum of force, stiffness is 0
-    least = np.maximum(np.abs(stiffness), np.where(pressure == 0, 1.0, pressure) / surface[4])
-    values, units = (pressure, area, stiffness, 0.0), (pressure, area, least, ANY)
-    yield from rows("total", (*surface, gaps, 1.0, rtol), values, units)
-
-
-def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0) -> Rows:
-    """The calibrated law of one surface at shares of h_max by the library."""
-    u = surface[4] * np.asarray(shares)
-    found = contact(Surface(*surface), mean_separation=u, theory="calibrated", E_star=E_star)
-    values = found.pressure, found.area, found.stiffness
-    yield from rows("calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY))
-    yield from rows("separation", (*surface, found.pressure, E_star), (u,))
-
-
-def status_rows(model: UniversalModel) -> Rows:
-    """Points outside the table, and the expected status."""
-    X, mu = model.content.axes
-    middle = 0.5 * (X.low + X.high)
-    places = {(X.low, 1.0): OK, (X.high, 1.0): OK, (middle, mu.high): OK, (middle, 0.0): OK}
-    places |= {(np.nextafter(X.low, -np.inf), 1.0): X_BELOW, (np.nextafter(X.high, np.inf), 1.0): X_ABOVE}
-    places |= {(middle, np.nextafter(mu.high, np.inf)): MU_ABOVE}
-    places |= dict.fromkeys([(math.nan, 1.0), (middle, math.nan), (middle, -1e-300)], INVALID)
-    yield from rows("status", np.array([*places]).T, [[*places.values()]])
-
-
 def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
-    """The closed form at the points that lie in its range."""
+    """The closed form at flat (X, mu) that lie in its range."""
     functions, form = FUNCTIONS[FORM], RANGES[FORM]
     (X_low, X_high), (_, mu_high) = form["X"], form["mu"]
     place = np.array([X, mu])[:, (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)]
@@ -120,9 +68,34 @@ def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
     yield from rows("formula", place, (functions["phi_F"](*place), functions["phi_A"](*place), error))
 
 
+def surface_rows(
+    surface: tuple[float, ...], variant: Variant, approach: Any, depths: Any, shares: Any, E_star: float = 1.0
+) -> Rows:
+    """Islands and totals of one surface, gap by gap, and the calibrated law at shares of h_max, by the library."""
+    own, model = Surface(*surface), universal_model()
+    fields = geometry(approach, own.hurst, own.zeta_1, variant)
+    yield from rows("geometry", (approach, own.hurst, own.zeta_1), [fields[name] for name in FIELDS])
+    gaps = own.h_max * (1 - np.asarray(depths))
+    sums, compression = np.zeros((5, gaps.size)), (own.h_max - gaps) / own.h_rms
+    by_table(own, compression, np.arange(gaps.size), model, Sums(model, variant, RTOL), sums)
+    stress = own.q0 * own.s
+    pressure, area, stiffness = stress * sums[0], sums[1], 2 * stress / own.h_rms * sums[2]
+    # at a maximum of force, stiffness is 0
+    least = np.maximum(np.abs(stiffness), np.where(pressure == 0, 1.0, pressure) / own.h_max)
+    yield from rows(
+        "total", (*surface, gaps, 1.0, RTOL), (pressure, area, stiffness, 0.0), (pressure, area, least, ANY)
+    )
+    if len(shares):
+        u = own.h_max * np.asarray(shares)
+        found = contact(own, mean_separation=u, theory="calibrated", E_star=E_star)
+        values = found.pressure, found.area, found.stiffness
+        yield from rows("calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY))
+        yield from rows("separation", (*surface, found.pressure, E_star), (u,))
+
+
 def points_text(model: UniversalModel, variant: Variant) -> str:
-    """The points' file: the table's own, and the runtime's slopes, islands, totals, refusals and calibrated law."""
-    points = model.content.conformance
+    """The points' file: the table's own, and the runtime's islands, totals, refusals and calibrated law."""
+    points, (X, mu) = model.content.conformance, model.content.axes
     places = points["X"], points["mu"]
     head = [
         f"conformance points of the MBMA model, variant {variant.name}",
@@ -132,13 +105,15 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
     ]
     # with the results and tolerances that are stored in the table
     known = points["table_F"], points["table_A"], model.answer(*places).error
-    lines = [*rows("phi", places, known, None, points["tolerance"])]
-    lines += [line for line in phi_rows(model, *places) if line.startswith("slopes")]
-    lines += [*status_rows(model), *formula_rows(*places)]
+    lines = [*rows("phi", places, known, None, points["tolerance"]), *formula_rows(*places)]
+    middle = 0.5 * (X.low + X.high)
+    statuses = {(X.low, 1.0): OK, (X.high, 1.0): OK, (middle, mu.high): OK, (middle, 0.0): OK}
+    statuses |= {(np.nextafter(X.low, -np.inf), 1.0): X_BELOW, (np.nextafter(X.high, np.inf), 1.0): X_ABOVE}
+    statuses |= {(middle, np.nextafter(mu.high, np.inf)): MU_ABOVE}
+    statuses |= dict.fromkeys([(math.nan, 1.0), (middle, math.nan), (middle, -1e-300)], INVALID)
+    lines += rows("status", np.array([*statuses]).T, [[*statuses.values()]])
     for surface in SURFACES:
-        zeta_1 = surface[2] / surface[1]
-        if zeta_1 > max(3.0, variant.floor_u):
-            lines += geometry_rows(np.geomspace(1e-3, 2 * surface[4] / surface[3], 8), surface[0], zeta_1, variant)
-            lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), variant)
-            lines += calibrated_rows(surface, SHARES)
+        if surface[2] / surface[1] > max(3.0, variant.floor_u):
+            approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)
+            lines += surface_rows(surface, variant, approach, DEPTHS, SHARES)
     return comment(head, "#") + "\n".join(lines) + "\n"

@@ -52,13 +52,13 @@ def to_csv(law: LawTable) -> bytes:
 
 
 def to_json(law: LawTable) -> bytes:
-    """One object: the header, and the columns by name."""
-    return (json.dumps(_content(law), indent=1) + "\n").encode()
+    """One object: the header, and the columns by name; of a conductance those of its pressure as "behaviour"."""
 
+    def content(table: LawTable) -> dict[str, Any]:
+        return _header(table) | {"columns": {name: values.tolist() for name, (values, _) in table.columns.items()}}
 
-def _content(law: LawTable) -> dict[str, Any]:
-    content = _header(law) | {"columns": {name: values.tolist() for name, (values, _) in law.columns.items()}}
-    return content if law.behaviour is None else content | {"behaviour": _content(law.behaviour)}
+    whole = content(law) | ({} if law.behaviour is None else {"behaviour": content(law.behaviour)})
+    return (json.dumps(whole, indent=1) + "\n").encode()
 
 
 def to_matlab(law: LawTable) -> bytes:
@@ -109,9 +109,8 @@ def to_parquet(law: LawTable) -> bytes:
     return stream.getvalue()
 
 
-def _matlab(law: LawTable, name: str) -> dict[str, bytes]:
-    return {"": to_matlab(law), ".m": matlab_reader(law, name)}
-
-
 _WRITE = {"csv": to_csv, "json": to_json, "netcdf": to_netcdf, "hdf5": to_netcdf, "parquet": to_parquet}
-TARGETS = (*(Target(name, write) for name, write in _WRITE.items()), Target("matlab", _matlab, end=".mat"))
+TARGETS = (
+    *(Target(name, write) for name, write in _WRITE.items()),
+    Target("matlab", lambda law, name: {"": to_matlab(law), ".m": matlab_reader(law, name)}, end=".mat"),
+)

@@ -10,16 +10,14 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import AGAINST, SI, Grammar
-from mbma_tables.export.text import checked_name, comment, number, opening
+from mbma_tables.export.text import comment, number, opening
 from mbma_tables.materials import tangential_ratio
 
-MAX_NAME = 40
 # p = 4.4086e-5 K E* (4 - (u - delta)/sigma)^6.804, K = 16 sqrt(2) pi/15 (eta beta sigma)^2 sqrt(sigma/beta)
 GREENWOOD_TRIPP, POWER, END, OF_K = 4.4086e-5, 6.804, 4.0, 16 * math.sqrt(2) * math.pi / 15
 CROWDING = 0.05  # eta beta sigma; the result depends on K only
@@ -49,32 +47,24 @@ def _nearest(shape: Callable[[float], FloatArray], log_y: FloatArray) -> tuple[f
     return t, factor, shape(t) + factor - log_y
 
 
-def _greenwood_tripp(law: LawTable) -> tuple[dict[str, float], NDArray[np.bool_], FloatArray]:
-    """MBDyn's numbers for the pressure of a film: sigma, eta, beta, delta, and H0, below which a tangent follows.
-
-    With the rows of the fit, from the least pressure that counts to A/A0 = 0.1, and ln(p of MBDyn/p of the law) there.
-    """
-    pressure, area = law.more["pressure"][0], law.more["area"][0]
+def _mbdyn(law: LawTable, name: str) -> str:
+    """Greenwood-Tripp numbers by the rows from the least pressure that counts to A/A0 = 0.1."""
+    pressure, area, stiffness = (law.more[key][0] for key in ("pressure", "area", "stiffness"))
     sigma, E_star = law.facts["h_rms"][0], law.facts["E_star"][0]
     kept = (pressure >= law.floor) & (area <= HEAVY)
     if kept.sum() < FEWEST:
         raise InputError(
             f"the Greenwood-Tripp fit needs {FEWEST} rows at pressures with A/A0 <= {HEAVY:g}, got {kept.sum()}"
         )
-    u = law.x[kept] / sigma
-    last, factor, misfit = _nearest(lambda beyond: POWER * np.log(u[-1] + beyond - u), np.log(pressure[kept]))
-    delta = u[-1] + last - END
+    u, pressure, length = law.x[kept], pressure[kept], law.x_unit
+    far = u / sigma
+    last, factor, misfit = _nearest(lambda beyond: POWER * np.log(far[-1] + beyond - far), np.log(pressure))
+    delta = far[-1] + last - END
     beta = sigma * (OF_K * CROWDING**2 * GREENWOOD_TRIPP * E_star / math.exp(factor)) ** 2
-    eta, H0 = CROWDING / (sigma * beta), float(u[0] - delta)
-    return {"sigma": sigma, "eta": eta, "beta": beta, "delta": float(delta * sigma), "H0": H0}, kept, misfit
-
-
-def _mbdyn(law: LawTable, name: str) -> str:
-    name, (numbers, kept, misfit) = checked_name(name, MAX_NAME), _greenwood_tripp(law)
-    u, pressure, length = law.x[kept], law.more["pressure"][0][kept], law.x_unit
-    slip = law.more["stiffness"][0][kept] / (pressure * tangential_ratio(NU))
-    numbers |= {"E": law.facts["E_star"][0], "sigma0": math.exp(np.log(slip).mean())}
-    numbers |= {"Rq": numbers["sigma"] / math.sqrt(2), "lambdax": law.facts["peklenik"][0]}
+    numbers = {"sigma": sigma, "eta": CROWDING / (sigma * beta), "beta": beta, "delta": float(delta * sigma)}
+    slip = stiffness[kept] / (pressure * tangential_ratio(NU))
+    numbers |= {"H0": float(far[0] - delta), "E": E_star, "sigma0": math.exp(np.log(slip).mean())}
+    numbers |= {"Rq": sigma / math.sqrt(2), "lambdax": law.facts["peklenik"][0]}
     said = (
         f"Greenwood-Tripp numbers fitted from p = {pressure[-1]:.4g} to {pressure[0]:.4g} {law.more['pressure'][1]}, u "
         f"= {u[-1]:.4g} to {u[0]:.4g} {length}: ln(p/p of the law) is {misfit.std():.2g} root mean square, "
@@ -90,7 +80,7 @@ def _mbdyn(law: LawTable, name: str) -> str:
 
 def _geos(law: LawTable, name: str) -> str:
     """Hydraulic aperture against the jump u - h_max; it, the aperture and its derivative against the normal stress."""
-    name, open_ = checked_name(name, MAX_NAME), law.y > 0
+    open_ = law.y > 0
     stress, aperture, slope, stiffness = (law.columns[key][0][open_] for key in OF_APERTURE)
     jump, w = (aperture - aperture[0])[::-1] + 0.0, law.y[open_][::-1]
     if w[-1] - w[-2] >= STEEPEST * (jump[-1] - jump[-2]):
@@ -121,7 +111,7 @@ def _geos(law: LawTable, name: str) -> str:
 
 
 def _moose(law: LawTable, name: str) -> str:
-    name, (x, *others) = checked_name(name, MAX_NAME), law.columns
+    x, *others = law.columns
     texts = {key: " ".join(map(number, values)) for key, (values, _) in law.columns.items()}
     blocks = (
         f"  [{name}_{key}]\n    type = PiecewiseLinear\n    x = '{texts[x]}'\n    y = '{texts[key]}'\n  []\n"
@@ -131,7 +121,7 @@ def _moose(law: LawTable, name: str) -> str:
 
 
 def _getdp(law: LawTable, name: str) -> str:
-    name, (x, *others) = checked_name(name, MAX_NAME), law.columns
+    x, *others = law.columns
     lines = [f"{name}_{key}() = {{{', '.join(map(number, values))}}};" for key, (values, _) in law.columns.items()]
     lines += [f"{name}_{key}[] = InterpolationLinear[$1]{{ListAlt[{name}_{x}(), {name}_{key}()]}};" for key in others]
     return "\n  ".join(["Function {", *lines]) + "\n}\n"

@@ -168,5 +168,4 @@ def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArra
     for keeps, accumulated in ((np.greater_equal, np.maximum), (np.less_equal, np.minimum)):
         if keeps(np.diff(fine_y), 0).all():
             moved = accumulated.accumulate(moved)
-    result: FloatArray = moved
-    return result
+    return np.asarray(moved)

@@ -12,11 +12,10 @@ from mbma_tables.common.arguments import whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import AGAINST, Grammar
-from mbma_tables.export.text import DIGITS, checked_name, number, opening
+from mbma_tables.export.text import DIGITS, number, opening
 
 MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
 MAX_ID = 99_999_999  # largest id in a card: eight columns
-MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
 PAIR = "*CONTACT PAIR, INTERACTION={name}, TYPE="
 CALCULIX_TABULAR = (
     f"Use this interaction with {PAIR}NODE TO SURFACE",
@@ -42,7 +41,7 @@ def _notes(lines: tuple[str, ...], **said: Any) -> str:
 
 
 def _interaction(name: str, *cards: str) -> str:
-    return f"*SURFACE INTERACTION, NAME={checked_name(name, MAX_NAME)}\n{''.join(cards)}"
+    return f"*SURFACE INTERACTION, NAME={name}\n{''.join(cards)}"
 
 
 def _card(head: str, law: LawTable) -> str:
@@ -123,7 +122,7 @@ def _columns(law: LawTable) -> str:
 
 
 def _matrix(law: LawTable, name: str) -> str:
-    return f"double {checked_name(name, MAX_NAME)}({law.x.size},{len(law.columns)})\n{_columns(law)}"
+    return f"double {name}({law.x.size},{len(law.columns)})\n{_columns(law)}"
 
 
 calculix = Grammar(

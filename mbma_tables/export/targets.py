@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.text import comment
+from mbma_tables.export.text import checked_name, comment
 
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
@@ -23,6 +23,7 @@ GROUPS = {
     "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "c_code",
 }  # fmt: skip
 SI = ("m", "Pa")
+MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
 # by quantity: options for it alone, and the abscissa of its rows
 OPTIONS = {
     "conductance": {"conductivity", "conductivity_unit"}, "tangential_stiffness": {"kappa"}, "film": {"peklenik"},
@@ -81,7 +82,7 @@ class Grammar:
         ):
             if not allowed:
                 raise InputError(f"{self.program} takes {takes} here, got {got}")
-        named = {} if self.named is None else {"name": self.named if name is None else name}
+        named = {} if self.named is None else {"name": checked_name(self.named if name is None else name, MAX_NAME)}
         said = [self.friction] if "friction" in law.facts else []
         head = comment([*law.comments, *said, self.beyond], self.mark)
         return self.first + head + self.body[law.quantity](law, **named, **numbers)

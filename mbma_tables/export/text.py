@@ -1,6 +1,7 @@
 """Writing text and numbers into other codes, so that no text of a user or a table is executed there."""
 
-import importlib.resources
+import functools
+import pathlib
 import re
 import shlex
 import textwrap
@@ -14,6 +15,7 @@ from mbma_tables.common.errors import InputError
 
 COMMENT_WIDTH = 108
 DIGITS = 10  # of the numbers in a law's file
+_ROOT = pathlib.Path(__file__).parent
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
 # begin or end of a C comment, end of a script in a page, trigraphs
 _MARKS = re.compile(r"\*(?=/)|/(?=\*)|<(?=[/!])|\?(?=\?)")
@@ -22,13 +24,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def printable(text: str) -> str:
-    r"""Text as printable ASCII on one line; other characters as escapes.
-
-    Examples
-    --------
-    >>> print(printable("W/(µm K)\n*INCLUDE"))
-    W/(um K)\n*INCLUDE
-    """
+    """Text as printable ASCII on one line; other characters as escapes."""
     return "".join(
         letter if " " <= letter <= "~" else letter.encode("unicode_escape").decode("ascii")
         for letter in text.translate(_ASCII)
@@ -42,46 +38,28 @@ def comment(lines: Iterable[str], mark: str) -> str:
     return "".join(f"{mark} {printable(line)}".rstrip() + "\n" for line in lines)
 
 
-def block_comment(lines: Iterable[str]) -> str:
-    """Lines as one comment of C and JavaScript.
-
-    Examples
-    --------
-    >>> print(block_comment(["text */ more"]))
-    /*
-     * text * / more
-     */
-    """
-    body = "".join(f" * {_MARKS.sub(lambda mark: mark[0] + ' ', printable(line))}".rstrip() + "\n" for line in lines)
-    return f"/*\n{body} */"
-
-
 def opening(paragraphs: Iterable[str], mark: str) -> str:
-    """Head of a source file: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
+    """Head of a source file: wrapped paragraphs as comments by their mark, "/*" for one comment of C and JavaScript."""
     wrap = textwrap.TextWrapper(COMMENT_WIDTH, break_long_words=False, break_on_hyphens=False).wrap
     lines = [line for text in paragraphs for line in wrap(text)]
-    return (block_comment(lines) if mark == "/*" else comment(lines, mark)).rstrip()
+    if mark != "/*":
+        return comment(lines, mark).rstrip()
+    return f"/*\n{comment((_MARKS.sub(lambda mark: mark[0] + ' ', printable(line)) for line in lines), ' *')} */"
 
 
-def wrapped(items: Iterable[str], indent: str = "", end: str = "") -> str:
-    """Items of a list, with commas between them, on lines of 120 columns that end as a continued line must."""
-    text = textwrap.fill(", ".join(items), 118, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
-    return text.replace("\n", f"{end}\n")
-
-
-def template(name: str) -> str:
-    """The text of a template."""
-    return (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
+def wrapped(items: Iterable[str]) -> str:
+    """Items of a list, with commas between them, on lines of 118 columns."""
+    return textwrap.fill(", ".join(items), 118, break_on_hyphens=False)
 
 
 def core_file(name: str) -> str:
     """A file of the core, as the library is compiled from it."""
-    return (importlib.resources.files("mbma_tables.core") / name).read_text(encoding="utf-8")
+    return (_ROOT.parent / "core" / name).read_text(encoding="utf-8")
 
 
 def page_file(name: str) -> bytes:
     """A file of the explorer's page, or a compiled module beside it."""
-    return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
+    return (_ROOT / "page" / name).read_bytes()
 
 
 def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
@@ -92,10 +70,11 @@ def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
     chosen = re.compile(r"@(?:IF ([A-Z]+)|EACH)@(\n)?(.*?)@END@(?(2)\n)", re.S)
 
     def repeated(text: str) -> str:
-        own = ({"WHAT": what, "PLACE": what.upper(), "RATIO": ratio} for what, ratio in each.items())
-        return "".join(re.sub("@(WHAT|PLACE|RATIO)@", lambda place: one[place[1]], text) for one in own)  # noqa: B023
+        places = ((("@WHAT@", what), ("@PLACE@", what.upper()), ("@RATIO@", ratio)) for what, ratio in each.items())
+        return "".join(functools.reduce(lambda part, place: part.replace(*place), own, text) for own in places)
 
-    text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), template(name))
+    text = (_ROOT / "templates" / f"{name}.in").read_text(encoding="utf-8")
+    text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), text)
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 

@@ -1,9 +1,4 @@
-"""The block of a contact law (layout in `core/mbma.h`): its indices, inverse, and the fit of its polynomials.
-
-A side of a law has its own x in (0, 1]: the depth below h_max, or the height above full compression. Octaves of x are
-cut into equal buckets, doubled in number until every polynomial meets the tolerance. Of 16 Chebyshev coefficients nine
-are kept; the others bound the error of value and of slope.
-"""
+"""The block of a contact law (layout in `core/mbma.h`): its indices, the fit of its polynomials, and its inverse."""
 
 import itertools
 import math
@@ -33,7 +28,7 @@ HEAD = 18
 
 INVERSE_DEGREE = 5
 INVERSE_BITS = 2  # bits of the mantissa: 4 buckets per octave of force or area
-INVERSE_RECORD = 3 + INVERSE_DEGREE + 1
+INVERSE_RECORD = 3 + INVERSE_DEGREE + 1  # centre, rate, sign of the side, coefficients
 INVERSE_HEAD = 6
 Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)
 OCTAVES = 100  # below the largest value; lighter loads are found by iteration
@@ -41,7 +36,7 @@ LEAST = float(np.finfo(float).tiny)
 POINTS = chebyshev.chebpts1(INVERSE_DEGREE + 1)
 TRANSFORM: Any = np.linalg.inv(np.vander(POINTS, increasing=True)).T  # values there to monomials
 
-SAMPLES = 16
+SAMPLES = 16  # of these Chebyshev coefficients DEGREE + 1 are kept; the others bound the error of value and of slope
 MAX_RECORDS = 4000
 TAIL_SHARE = 4.0  # factor on the last two coefficients for all later ones, which fall at least by 2 each
 NEAR = 1e-7  # relative width of a bucket too narrow to fit, for which its neighbour's polynomials are used
@@ -107,7 +102,7 @@ def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
 
 
 def side_pieces(side: Side, rtol: float) -> Pieces:
-    """The records of a side, its first one excepted."""
+    """The records of a side, its first one excepted: octaves of x in buckets, doubled until all meet the tolerance."""
     first, coarse = math.floor(math.log2(side.start)), rtol > COARSE
     slopes = (COARSE_SLOPES if coarse else SLOPES) * rtol
     counts = {e: 1 if coarse else FIRST_BUCKETS.get(e, 2) for e in range(first, 0)}
@@ -267,11 +262,7 @@ def _first_fall(series: FloatArray, end: float) -> float | None:
 
 
 def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
-    """The inverse of force or area of a block, down to the gap `end`: starting values for a Newton step on the law.
-
-    Polynomials of x in buckets of force or area, found from their bits: `INVERSE_HEAD` numbers, then records of centre,
-    rate, the sign of the side and INVERSE_DEGREE + 1 coefficients.
-    """
+    """Polynomials of x in buckets of force or area down to the gap `end`: starting values for Newton's method."""
     ends = bool(block.view(np.int64)[ENDS])
     top = block[H_MAX] - block[LOW] / block[SCALE] if ends else block[HIGHEST]
     values = np.empty(3)

@@ -66,7 +66,7 @@ class Derived:
     def unloading_stiffness(
         self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
     ) -> Numbers:
-        """-dp/du of a small unloading, the contact area frozen [stress/length]; `stiffness` where nothing yields.
+        """-dp/du of a small unloading at constant contact area [stress/length]; `stiffness` where nothing yields.
 
         With a hardness it is made from the law of the elastic contact, which is fitted when this is first called.
         """
@@ -113,15 +113,15 @@ class Derived:
     def continued(self: Any, pressures: tuple[Any, Any] | None = None) -> ContinuedLaw:
         """The law continued by its tangents beyond two pressures, for the trial steps of Newton's method.
 
-        From bodies that just touch, where the law has neither pressure nor stiffness, and from trial steps beyond full
-        compression, where it raises, Newton's method comes back by these lines. Check `inside` at the solution; where
-        bodies are apart there, iterate on from it with the law itself.
+        With the tangents, Newton's method returns from trial steps without contact, where the law has neither pressure
+        nor stiffness, and from steps beyond full compression, where it raises an error. Check `inside` at the solution;
+        if the bodies are apart there, continue the iteration with the law itself.
 
         Parameters
         ----------
         pressures : pair of float or str, optional
-            Smallest and largest pressure of the law itself; else those at 1% and 99% of its compression, or where its
-            stiffness begins to fall.
+            Pressures between which the law itself is used; default: those at 1% and 99% of its compression, or where
+            its stiffness begins to decrease.
 
         Examples
         --------
@@ -149,7 +149,7 @@ class Derived:
 
     @functools.cached_property
     def softening(self: Any) -> float | None:
-        """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
+        """Mean separation u [length] below which the stiffness decreases with compression; None if it never does."""
         from scipy.optimize import minimize_scalar
 
         lowest = max(self.lowest, -self.h_max)
@@ -167,7 +167,7 @@ class Derived:
 
     @functools.cached_property
     def leakage(self: Any) -> LeakageLaw:
-        """Flow coefficient at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
+        """Flow coefficient at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`, made when read.
 
         Examples
         --------

@@ -1,7 +1,4 @@
-"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses, from one record each.
-
-A record has the polynomials of a stretch of gaps and is found from the bits of the gap (`core/law.c`).
-"""
+"""A contact law of any theory: pressure, area, slopes and energy against the gap, and inverses, by `core/law.c`."""
 
 from __future__ import annotations
 
@@ -99,7 +96,7 @@ class ContactLaw(Law, Derived, Displayed):
         return self.block[self.block.view(np.int64)[at.RECORDS] :].reshape(-1, at.RECORD)
 
     def separations(self, mean_separation: Any = None, separation: Any = None) -> FloatArray:
-        """Separations d, checked, of mean separations or of separations, one of them."""
+        """Separations d, checked, from either mean separations or separations."""
         return self._in_range(*self._known(mean_separation, separation))[1]
 
     def _known(self, mean_separation: Any, separation: Any) -> tuple[str, Any]:
@@ -166,7 +163,7 @@ class ContactLaw(Law, Derived, Displayed):
         return LawValues(*self._values(("pressure", "area", "stiffness", "energy"), mean_separation, separation))
 
     def separation(self, *, pressure: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
-        """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero.
+        """Separation d at a pressure or area, on the branch of first contact; h_max at zero, if contact ends there.
 
         Raises
         ------
@@ -260,7 +257,7 @@ class ContactLaw(Law, Derived, Displayed):
         return {name: Variable(value, unit_of(name, self.units), MEANINGS[name]) for name, value in values.items()}
 
     def compiled(self, quantity: str = "pressure") -> LowLevelCallable:
-        """A quantity at a separation as a function of C, ``double (double, void *)``, which scipy calls without Python.
+        """A quantity as a C function of the separation, ``double (double, void *)``, which scipy calls without Python.
 
         Parameters
         ----------
@@ -269,7 +266,7 @@ class ContactLaw(Law, Derived, Displayed):
         Returns
         -------
         scipy.LowLevelCallable
-            NaN outside the law. For other callers of C, `function` is a ctypes function and `user_data` its last
+            NaN outside the range. For other C callers, `function` is a ctypes function and `user_data` its last
             argument, which keeps the law alive.
 
         Examples

@@ -22,10 +22,7 @@ MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LeakageLaw:
-    """Flow coefficient k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it.
-
-    Of a simulated map it is the geometric mean of both axes.
-    """
+    """Flow coefficient [length^3] of a surface against its gap; of a simulated map the geometric mean of both axes."""
 
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
@@ -69,11 +66,7 @@ class LeakageLaw:
 
 
 def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -> LeakageLaw:
-    """Leakage of a contact law's surface, as polynomials of the gap that begin where contact blocks it.
-
-    Of a simulated map in a `direction`, in degrees from x, or the geometric mean of both axes; InputError where it is
-    blocked at the lightest load.
-    """
+    """Leakage of a contact law's surface; of a simulated map in a direction in degrees, or the mean of both axes."""
     h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
     top = min(law.h_max, law.highest) if law.block.view(np.int64)[fit.ENDS] else law.highest
     turns: tuple[float, ...] = ()

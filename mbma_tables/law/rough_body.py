@@ -73,7 +73,7 @@ class RoughContact(Displayed):
         Parameters
         ----------
         rtol : float
-            Of the polynomials, in [1e-6, 0.1]: at 1e-5 some 400 contacts are solved.
+            Relative error of the polynomials, in [1e-6, 0.1]; at 1e-5 about 400 contacts are solved.
 
         Examples
         --------

@@ -9,7 +9,6 @@ import numpy as np
 from mbma_tables.common.errors import InputError
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.spectral import resolution
 from mbma_tables.surfaces.surface import MeasuredSurface
 
 SQUARES = ("h_rms", "gradient")  # fields averaged as squares
@@ -67,7 +66,7 @@ def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
         for values in [[float(getattr(scan, name)) for scan in known]]
     )
     told = f"average of {len(known)} scans: {spread}"
-    whole = MeasuredSurface(
+    return MeasuredSurface(
         q,
         spectra.sum(axis=0) / np.maximum(covered, 1),
         heights=_heights([scan.heights for scan in known]),
@@ -77,8 +76,7 @@ def average(scans: Sequence[MeasuredSurface]) -> MeasuredSurface:
         unit=first.unit,
         scans=tuple(known),
         provenance=({"step": "average", "of": [list(scan.provenance) for scan in known], "told": told},),
-    )
-    return dataclasses.replace(whole, provenance=(*whole.provenance, resolution(whole)))
+    ).resolved()
 
 
 def _mean(parts: Sequence[Any], name: str) -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, one_number, positive_array, require
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, positive_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 
@@ -98,11 +98,6 @@ class Heights:
     def is_gaussian(self) -> bool:
         """Whether skewness and kurtosis are exactly Gaussian, that is, the heights were not measured."""
         return self.skewness == 0 and self.kurtosis == 3
-
-
-def one_height(h_max: Any) -> float:
-    """h_max as one positive number."""
-    return float(positive_array("h_max", one_number("h_max", h_max)))
 
 
 def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, probability: ArrayLike = 0.5) -> FloatArray:

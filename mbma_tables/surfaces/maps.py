@@ -12,11 +12,11 @@ from mbma_tables.common.arguments import FloatArray, nearest, number_in, require
 from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
-from mbma_tables.surfaces.heights import Heights, one_height
+from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import SCATTER, log_bins
-from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface, resolution
+from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface
 from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.treatment import CALLED, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
 
@@ -187,7 +187,7 @@ def _disagreement(q: FloatArray, C: FloatArray, variance: float, slopes: float) 
     ]
 
 
-def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
+def measured_map(treated: Treated) -> SpectralSurface:
     """A height map as its own radial spectrum, heights and curves; see `Surface.from_map`."""
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
@@ -228,10 +228,9 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     known = SpectralSurface(
         bins.q,
         C_bins,
-        None if h_max is None else one_height(h_max) / scale,
-        own,
-        curves,
-        bearing.radial_spectrum(values, sizes),
+        heights=own,
+        bearing=curves,
+        bands=bearing.radial_spectrum(values, sizes),
         samples=1 / (1 / bins.weight - SCATTER**2),
         anisotropy=curves.anisotropy,
     ).scaled(scale, treated.unit)
@@ -246,8 +245,8 @@ def measured_surface(
     """The surface of a treated map or line scan, extrapolated to a shorter wavelength if requested."""
     if (shortest is None) != (hurst is None):
         raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
-    surface = (measured_profile if treated.heights.ndim == 1 else measured_map)(treated, h_max)
-    known = dataclasses.replace(surface, provenance=(*surface.provenance, resolution(surface)))
+    found = (measured_profile if treated.heights.ndim == 1 else measured_map)(treated)
+    known = (found if h_max is None else dataclasses.replace(found, h_max=h_max)).resolved()
     return known if shortest is None else extrapolated(known, shortest, hurst)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.surfaces.heights import Heights, one_height
+from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.treatment import MIN_POWER, Treated
@@ -28,7 +28,7 @@ LONGEST, ROLLED_OFF = 4, 0.5  # longest wavelengths of a trace: with half of the
 MIN_NODES = 5
 
 
-def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
+def measured_profile(treated: Treated) -> SpectralSurface:
     """The isotropic surface of a treated line scan; see `Surface.from_profile`."""
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
@@ -67,13 +67,8 @@ def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
         notes += ({"step": "no roll-off", "share": longest, "told": told},)
     end = min(high, float(edges[-1]))
     q = np.append(edges[edges < end], end)
-    surface = SpectralSurface(
-        q,
-        PowerLaws(edges, nodes).at(q),
-        None if h_max is None else one_height(h_max) / scale,
-        heights,
-        samples=np.interp(np.log(q), np.log(edges[:-1]), count / overlap),
-    ).scaled(scale, treated.unit)
+    own, samples = PowerLaws(edges, nodes).at(q), np.interp(np.log(q), np.log(edges[:-1]), count / overlap)
+    surface = SpectralSurface(q, own, heights=heights, samples=samples).scaled(scale, treated.unit)
     return dataclasses.replace(surface, provenance=treated.history(found, *notes))
 
 

@@ -186,10 +186,10 @@ class SelfAffine(AnySurface):
         nominal_area: Any = None,
         unit: str | None = None,
     ) -> Any:
-        """The surface that numbers of a drawing or a profilometer describe.
+        """A surface from the roughness parameters of a drawing or a profilometer.
 
-        One height, one highest point, a Hurst exponent, and two of slope, longest and shortest wavelength; nothing is
-        filled in. `provenance` holds the meaning assumed for each number; docs/surfaces.md has typical values.
+        Required are one height, one highest point, the Hurst exponent, and two of slope, longest and shortest
+        wavelength. `provenance` contains the assumed meaning of each number; docs/surfaces.md has typical values.
 
         Parameters
         ----------
@@ -203,8 +203,8 @@ class SelfAffine(AnySurface):
         longest, shortest : array_like, optional
             Wavelengths at which the roughness ends [length].
         rolloff : float or str, optional
-            Wavelength down from which the spectrum follows its power law [length]; between `longest` and it the
-            spectrum is flat, as of most machined faces. Without, the law holds from `longest` on.
+            Longest wavelength of the power law [length]; between `longest` and it the spectrum is flat, as for most
+            machined faces. Default: `longest`.
 
         Returns
         -------

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import finite_array, positive_array, require
+from mbma_tables.common.arguments import finite_array, one_number, positive_array, require
 from mbma_tables.common.display import Variable
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.any_surface import AnySurface, frozen
-from mbma_tables.surfaces.heights import Heights, of_area, one_height
+from mbma_tables.surfaces.heights import Heights, of_area
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1, PowerLaws
 from mbma_tables.surfaces.treatment import Treated
 
@@ -145,7 +145,7 @@ class SpectralSurface(AnySurface):
             raise InputError(
                 "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
             )
-        top = heights.h_max if top is None else one_height(top)
+        top = heights.h_max if top is None else float(positive_array("h_max", one_number("h_max", top)))
         heights = Heights.gaussian(self.h_rms, top) if heights is None else heights
         vars(self).update(heights=heights, h_max=top, provenance=provenance)
 
@@ -275,12 +275,15 @@ class SpectralSurface(AnySurface):
         sides = np.stack([grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)], axis=1).ravel()
         q, C = np.repeat(grid, 2)[1:-1], self.laws.at(sides) + other.laws.at(sides)
         kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
-        told = []
+        told, stretch = [], None
         if self.bearing is not None or other.bearing is not None:
             told.append(
                 "curves of the maps' summits and valleys are not used: the relative position of the maps is not known"
             )
-        if (stretch := _anisotropy(self, other)) is not None:
+        if self.anisotropy is not None or other.anisotropy is not None:
+            # the largest of a sum: parallel, their tensors of mean gradients have the same axes
+            parts = [(float(one.m2), (one.anisotropy or 1.0) ** 2) for one in (self, other)]
+            stretch = math.sqrt(sum(m2 * a / (1 + a) for m2, a in parts) / sum(m2 / (1 + a) for m2, a in parts))
             told.append(f"lays are assumed to be parallel: anisotropy {stretch:.3g} at most")
         record = {"step": "combined", "of": [list(self.provenance), list(other.provenance)]}
         both = type(self)(
@@ -291,35 +294,21 @@ class SpectralSurface(AnySurface):
             unit=self.unit,
             provenance=(record | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),),
         )
-        if not self.resolution and not other.resolution:
-            return both
-        return dataclasses.replace(both, provenance=(*both.provenance, resolution(both)))
+        return both.resolved() if self.resolution or other.resolution else both
 
-
-def resolution(surface: SpectralSurface) -> dict[str, Any]:
-    """A record of the influence of the shortest octave of a measured spectrum."""
-    laws, q = surface.laws, surface.q
-    below = laws.below(2, laws.place(q))
-    # the map may be sampled more finely than its shortest wavelength
-    end = float(q[np.argmax(below >= (1 - NO_POWER) * below[-1])])
-    before = float(laws.below(2, laws.place(np.asarray(end / 2))))
-    factor = math.sqrt(laws.moment(2) / before) if before > 0 else math.inf
-    shortest, unit = 2 * math.pi / end, f" {surface.unit}" if surface.unit else ""
-    finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
-    told = (
-        f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the last "
-        f"octave of them area at light load would be {factor:.2f} times larger"
-    )
-    return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
-
-
-def _anisotropy(one: SpectralSurface, other: SpectralSurface) -> float | None:
-    """The largest anisotropy of a sum: parallel, their tensors of mean gradients have the same axes."""
-    if one.anisotropy is None and other.anisotropy is None:
-        return None
-    along = across = 0.0
-    for surface in (one, other):
-        square = (surface.anisotropy or 1.0) ** 2
-        along += float(surface.m2) * square / (1 + square)
-        across += float(surface.m2) / (1 + square)
-    return math.sqrt(along / across)
+    def resolved(self) -> Self:
+        """The same measured surface, with a record of the influence of its shortest octave of wavelengths."""
+        laws, q = self.laws, self.q
+        below = laws.below(2, laws.place(q))
+        # the map may be sampled more finely than its shortest wavelength
+        end = float(q[np.argmax(below >= (1 - NO_POWER) * below[-1])])
+        before = float(laws.below(2, laws.place(np.asarray(end / 2))))
+        factor = math.sqrt(laws.moment(2) / before) if before > 0 else math.inf
+        shortest, unit = 2 * math.pi / end, f" {self.unit}" if self.unit else ""
+        finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
+        told = (
+            f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the "
+            f"last octave of them area at light load would be {factor:.2f} times larger"
+        )
+        record = {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
+        return dataclasses.replace(self, provenance=(*self.provenance, record))

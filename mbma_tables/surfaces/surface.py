@@ -80,12 +80,12 @@ class Surface(SelfAffine):
         q : array_like, shape (n,)
             Wavenumber, 1/length, positive, in any order and spacing.
         C : array_like, shape (n,)
-            Spectrum [length^4], not negative; a power law is taken between neighbours. Masked entries are left out.
+            Spectrum [length^4], not negative, interpolated by power laws. Masked entries are left out.
         h_max, nominal_area, unit : as for `Surface`
             The highest point is that of `heights` if none is given.
         heights : array_like, optional
-            Heights measured anywhere on the surface [length], of any shape; their mean is taken off. A Gaussian that
-            ends at h_max if not given.
+            Heights measured anywhere on the surface [length], of any shape; their mean is subtracted. Default: a
+            Gaussian distribution that ends at h_max.
         convention : {"paper", "isotropic"}, optional
             h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi).
         model : {"measured", "self-affine"}, optional
@@ -153,8 +153,8 @@ class Surface(SelfAffine):
             SurfaceTopography reads (the extra `maps`); or an object with that library's `heights()`,
             `physical_sizes` and `is_periodic`.
         dx, dy : float, optional
-            Sampling steps along the first and the second axis [length]; dy is dx if not given. A topography has its
-            own, most files too.
+            Sampling steps along the first and the second axis [length]; dy is dx if not given. Topographies
+            and most files contain them.
         periodic : bool, optional
             Whether the map continues periodically; else a Hann window is applied. A topography's own flag, False for
             an array.
@@ -173,7 +173,7 @@ class Surface(SelfAffine):
             Unit of the result and of plain lengths; lengths of a file are converted to it, or taken to be in it if the
             file names none. dx may have its own, such as "195 nm", which is then that of heights if `unit` is missing.
         channel : int, optional
-            Of a file with several maps.
+            Index of the map in a file with several maps.
 
         Returns
         -------

@@ -152,10 +152,9 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
         raise InputError(f"the map is flat: without its {trend} it is zero")
     before, after = float(np.std(heights)), float(np.std(flat))
     told = f"{trend} subtracted" + (f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else "")
-    for more, form in ((1, "tilt"), (2, "bow")) if degree is not None else ():
+    for more, form, remedy in ((1, "tilt", "plane"), (2, "bow", "quadratic")) if degree is not None else ():
         share = 1 - (float(np.std(without_polynomial(flat, more))) / after) ** 2 if more > (degree or 0) else 0.0
         if share > FORM:
-            remedy = "plane" if more == 1 else "quadratic"
             told += f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} removes it"
             break
     removed = None if trend in ("mean", "plane") else heights - flat

@@ -1,7 +1,4 @@
-"""The calibrated law's table: ln F_G over Hurst exponent, zeta_1 and mean separation, and errors against simulations.
-
-F_G is the force on a surface without end; the end at h_max and the area are closed forms, applied by the core.
-"""
+"""The calibrated law's table: ln F_G over Hurst exponent, zeta_1 and separation, and errors against simulations."""
 
 import dataclasses
 import functools
@@ -70,7 +67,7 @@ class SurfaceSpline:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table(SurfaceSpline):
-    """The shipped table in memory: ln F_G, in single precision."""
+    """The shipped table: ln of the force on a surface without end; the core applies the end at h_max and the area."""
 
     constants: Constants  # of the law
     error: float  # largest relative error of force against the law's own quadrature, at held-out points
@@ -78,11 +75,7 @@ class Table(SurfaceSpline):
     log_area: FloatArray  # ln of contact fractions
 
     def prepared(self, surfaces: FloatArray, entries: int) -> list[Callable[..., FloatArray]]:
-        """Two functions for surfaces (columns: H, ln zeta_1, h_max/h_rms) and about so many entries.
-
-        Of (owners, u) [h_rms], rows force, area and -dF/du; of (owners, force F/(A0 E* g) > 0), one row of mean
-        separations [h_rms], NaN where they lie beyond the table.
-        """
+        """Force, area, -dF/du by (owners, u/h_rms), and u/h_rms by (owners, force > 0), NaN beyond the table."""
         ends = np.empty((surfaces.shape[1], 2))
         core.calibrated_ends(*self.core_table, *surfaces, None, None, ends)
         given = *self.core_table, *surfaces, ends, self.shared(surfaces, entries)

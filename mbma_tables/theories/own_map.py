@@ -56,11 +56,7 @@ def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
 
 
 def reduced(values: FloatArray, points: float, mirrored: bool) -> tuple[FloatArray, float, float]:
-    """A map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps.
-
-    Every second point is left out until at most `MOST_POINTS` remain; where that leaves fewer than four along the
-    shortest wavelength, shorter ones than four are cut off.
-    """
+    """A map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps."""
     step, cut = 1.0, 0.0
     while values.size > MOST_POINTS:
         step *= 2
@@ -79,13 +75,7 @@ def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
 
 
 def map_of(surface: AnySurface) -> Treated:
-    """The map that a surface was made from.
-
-    Raises
-    ------
-    InputError
-        Where there is none.
-    """
+    """The map that a surface was made from, an InputError where there is none."""
     whole = surface.map if isinstance(surface, MeasuredSurface) else None
     if whole is None or whole.heights.ndim != 2:
         raise InputError(

@@ -1,7 +1,4 @@
-"""Persson's theory of area and average separation (Eqs. 18-21).
-
-The double integral (19) is u_P of `mbma_tables.laws.calibrated` with the weight W = gamma P + (1 - gamma) P^3.
-"""
+"""Persson's theory (Eqs. 18-21); (19) is u_P of `laws.calibrated` with the weight W = gamma P + (1 - gamma) P^3."""
 
 import functools
 import math
@@ -108,13 +105,7 @@ class Persson(Theory):
         return self.name if self.method == "full" else f"{self.name}_{self.method}"
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force, area and stiffness at mean separations u [length], positive for the full form.
-
-        Raises
-        ------
-        OutOfRangeError
-            Also where the force over- or underflows.
-        """
+        """Force, area and stiffness at mean separations u [length]; an error where the force over- or underflows."""
         u = finite_array("mean_separation", mean_separation)
         u = np.broadcast_to(u, np.broadcast_shapes(u.shape, surface.shape))
         allowed = u >= 0 if self.method == "simplified" else u > 0

@@ -1,8 +1,4 @@
-"""The interface of theories: pressure, area and stiffness of a surface at mean separations.
-
-A user's object with a `name` and an ``answer(surface, mean_separation)`` is also accepted; what has no closed form
-(energy, the separation at a given load) is computed from its forces.
-"""
+"""The interface of theories, and what has no closed form: energy, and the separation at a given load or area."""
 
 from __future__ import annotations
 
@@ -144,10 +140,7 @@ class Theory(abc.ABC):
         return np.asarray(found.integral.sum(axis=0))
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Function for inversions: force or area of a surface against mean separation, without checks of arguments.
-
-        It returns each value, approximately its -d/du (NaN if not known), and whether this is exact.
-        """
+        """Unchecked force or area by mean separation for inversions: value, nearly its -d/du or NaN, whether exact."""
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
             found = self.answer(surface, u)
@@ -268,11 +261,7 @@ def _middle(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 class Search:
-    """The solutions, from values at gaps in order from last contact on.
-
-    The values are rows of one column for all entries, or of one for each. Unless `exact`, `steep` is an approximate
-    -dvalue/du, and differences are used. `end` is the last gap with contact, which may be infinite.
-    """
+    """Solutions from values at gaps in order from last contact on; differences are used unless `steep` is exact."""
 
     def __init__(
         self, seen: FloatArray, exact: bool, wanted: FloatArray, end: FloatArray, low: FloatArray, high: FloatArray

@@ -90,15 +90,7 @@ plastic = functools.lru_cache(KEPT)(Plastic)
 
 
 class Saturated(Yielding):
-    """A simulated map whose pressures cannot exceed a hardness.
-
-    Parameters
-    ----------
-    theory : BoundaryElements
-        The elastic one.
-    hardness : array_like
-        p_m/E*, positive; each different one is simulated, which takes as long as the elastic contact or twice as long.
-    """
+    """A simulated map whose pressures cannot exceed a hardness; each takes one or two times the elastic time."""
 
     elastic: BoundaryElements
     tested_eta = 0.1

@@ -117,10 +117,7 @@ class BoundaryElements(Theory):
         return cls(surface, np.array([force, *rows]), points, gaps, own_map.origin_of(whole, cls.tolerance))
 
     def to_netcdf(self, path: os.PathLike[str] | str) -> None:
-        """Write the results, with the spectrum and curves of the surface, as a table that opens without the map.
-
-        A file that cannot be written is a `TableFileError`.
-        """
+        """Write a table that opens without the map; a file that cannot be written is a `TableFileError`."""
         own_map.write_table(self, path)
 
     @classmethod
@@ -195,11 +192,8 @@ class BoundaryElements(Theory):
         return self.pressed.flows(self.fit.x, self.fit.separation)
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked.
-
-        Along an axis that closes at u1, ln K over ln(u - u1) is a monotone cubic, straight below the last open load;
-        xy is sqrt(xx yy) times what is linear in u.
-        """
+        """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked."""
+        # ln K is a monotone cubic of ln(u - u1) where an axis closes at u1; xy is sqrt(xx yy) times what is linear in u
         # bodies apart are farther apart than the theory needs
         u = np.maximum(self._within(surface, mean_separation), mean_separation)
         gaps, known = self.flows

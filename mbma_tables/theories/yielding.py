@@ -1,8 +1,4 @@
-"""Any theory with a hardness: its elastic result is corrected by `mbma_tables.laws.hardness`.
-
-Force at a mean gap is closed between the elastic force and the bearing curve; area is that at equal force, with
-pressures capped at the hardness. u is the mean gap, points that yield flattened.
-"""
+"""Any theory with a hardness: its elastic result is corrected by `mbma_tables.laws.hardness`."""
 
 import dataclasses
 import functools
@@ -50,10 +46,7 @@ class Scatter(NamedTuple):
     def standard_deviation(
         self, theory: str, quantity: str, eta: FloatArray, area: FloatArray, elastic: FloatArray
     ) -> FloatArray:
-        """Standard deviation of ln(theory/simulation); if not measured, from those of the `elastic` theory and the law.
-
-        NaN where neither is known; the effect of a hardness on errors of stiffness was not measured.
-        """
+        """Standard deviation of ln(theory/simulation), or from those of the `elastic` theory and the law; else NaN."""
         row = QUANTITIES.index(quantity)
         own = self.rms.get(theory)
         if own is not None and np.isfinite(own[row]).any():
@@ -108,7 +101,7 @@ class Loaded:
 
 
 class Yielding(Theory):
-    """A theory whose pressures cannot exceed a hardness.
+    """A theory whose pressures cannot exceed a hardness; u is the mean gap, points that yield flattened.
 
     Parameters
     ----------

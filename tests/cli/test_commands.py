@@ -104,21 +104,10 @@ def test_every_source_is_the_same_surface(folder):
     band["q1"] = YANG_PERSSON["q0"] * 216
     surface = Surface.named("yang-persson")
     moments = {name: float(getattr(surface, name)) for name in ("hurst", "m0", "m2", "m4", "h_max")}
-    files = {
-        "named": '[surface]\nname = "yang-persson"\n',
-        "zeta_1": toml(YANG_PERSSON),
-        "band": toml(band),
-        "moments": toml(moments) + 'length_unit = "nm"\n',
-    }
-    for name, content in files.items():
-        (folder / f"{name}.toml").write_text(content)
-    sources = [
-        ["--surface", "yang-persson"],
-        *(options(numbers) for numbers in (YANG_PERSSON, band, moments)),
-        *(["--file", f"{name}.toml"] for name in files),
-    ]
+    (folder / "s.toml").write_text(toml(moments) + 'length_unit = "nm"\n')
+    numbers = [options(each) for each in (YANG_PERSSON, band, moments)]
     expected = contact(surface, separation=[2.0, 0.5])
-    for source in sources:
+    for source in (["--surface", "yang-persson"], *numbers, ["--file", "s.toml"]):
         found = json.loads(run("contact", *source, "-d", "2,0.5", "--json"))
         for name in ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m4", "alpha"):
             assert found["surface"][name] == pytest.approx(getattr(surface, name), rel=1e-11), (source, name)
@@ -142,20 +131,17 @@ def test_material_from_options_and_from_a_file(folder):
     material = {"E1": 10.0, "nu1": 0.5, "E2": 30000.0, "nu2": 0.0}
     modulus = effective_modulus(*material.values())
     (folder / "s.toml").write_text(toml(CONCRETE) + toml(material, "material"))
-    (folder / "e.toml").write_text(toml(CONCRETE) + f"[material]\nE_star = {float(modulus)!r}\n")
     example = os.path.join(os.path.dirname(__file__), os.pardir, os.pardir, "examples", "concrete.toml")
-    for source, E_star in (
-        (["--surface", "concrete", *(f"--{key}={value}" for key, value in material.items())], modulus),
-        (["--file", "s.toml"], modulus),
-        (["--file", "e.toml"], modulus),
-        (["--file", "s.toml", "--E-star", "2"], 2.0),
-        (["--file", example], effective_modulus(10.0, 0.5, 30000.0, 0.2)),
+    for source, E_star, unit in (
+        (["--surface", "concrete", *(f"--{key}={value}" for key, value in material.items())], modulus, "mm"),
+        (["--file", "s.toml"], modulus, None),
+        (["--file", "s.toml", "--E-star", "2"], 2.0, None),
+        (["--file", example], effective_modulus(10.0, 0.5, 30000.0, 0.2), "mm"),
     ):
         found = json.loads(run("contact", *source, "-d", "0.3", "--json"))
         expected = float(contact(Surface.named("concrete"), separation=0.3, E_star=E_star).pressure)
-        assert found["E_star"] == E_star
+        assert (found["E_star"], found["surface"]["length_unit"]) == (E_star, unit)
         assert found["columns"]["pressure"] == pytest.approx([expected], rel=1e-12)
-        assert (found["surface"]["length_unit"] == "mm") == (source[0] == "--surface" or source[1] == example)
 
 
 def test_a_curve_and_its_picture_beside_other_theories(folder):
@@ -224,44 +210,26 @@ test_bad_input_of_one_command = told(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("[surface\n", "is not a TOML file"),
-        ("[surface]\nhrust = 0.7\n", "unknown key 'hrust'; did you mean 'hurst'?"),
-        ("[surface]\nname = 'concrete'\nxyz = 1\n", "unknown key 'xyz'; known are name, map"),
-        (toml(CONCRETE).replace("0.7", "'0.7'"), "surface.hurst: '0.7' is not of type 'number'"),
-        ("[surface]\nmap = 'missing.nc'\n", "missing.nc"),
+        ("[surface]\nname = 'concrete'\nxyz = 1\n", "s.toml: [surface]: unknown key 'xyz'; known are name, map"),
+        (toml(CONCRETE).replace("0.7", "'0.7'"), "s.toml: surface.hurst: '0.7' is not of type 'number'"),
     ],
 )
 def test_bad_files(folder, content, message):
     (folder / "s.toml").write_text(content)
-    found = refused("contact", "--file", "s.toml", "-d", "0.1")
-    assert message in found
-    assert "s.toml" in found or "missing.nc" in found
+    assert message in refused("contact", "--file", "s.toml", "-d", "0.1")
 
 
-@pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        (
-            FileNotFoundError(2, "No such file or directory", "a.txt"),
-            "mbma: [Errno 2] No such file or directory: 'a.txt'\n",
-        ),
-        (OSError("odd\nfault"), "mbma: odd fault\n"),
-    ],
-)
-def test_faults_of_the_system_are_one_line(folder, fault, said, monkeypatch):
+def test_faults_of_the_system_are_one_line(folder, monkeypatch):
     def fail(*_, **__):
-        raise fault
+        raise OSError("odd\nfault")
 
     monkeypatch.setattr("mbma_tables.answers.contact.contact", fail)
-    assert refused("contact", "--surface", "concrete", "-d", "0.1") == said
+    assert refused("contact", "--surface", "concrete", "-d", "0.1") == "mbma: odd fault\n"
 
 
-def test_without_a_command_it_shows_its_help():
+def test_help_has_many_options_in_sections():
     assert run() == run("--help")
     assert run().startswith("Usage: mbma [OPTIONS] [COMMAND]")
-
-
-def test_many_options_are_in_sections():
     headings = re.findall(r"^(\w.*):$", run("contact", "--help"), re.MULTILINE)
     assert headings == [
         "What is known", "Surface", "Measured map", "Surface in numbers", "Surface by roughness parameters", "Bodies",

@@ -41,9 +41,6 @@ def test_it_tells_what_was_found_and_done(map_file, tmp_path):
         assert text in said
     assert "area depends on resolution" in said
     assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-
-
-def test_it_says_what_is_left_out():
     found = json.loads(run("fit", "docs/data/maps/top-1.top", "--short-cutoff", "9.4nm", "--json"))
     assert found["columns"]["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1])
     assert any(note.startswith("contact of 0.3, 0.6 left out: area must be at most 0.1062") for note in found["notes"])
@@ -55,7 +52,10 @@ def test_a_line_scan(line_file):
     assert found["anisotropy"] is None
     assert set(found["columns"]["valid"]) <= {"yes", "no"}
     assert np.isfinite(found["columns"]["pressure"]).all()
-    assert found["h_rms"] == pytest.approx(float(Surface.from_profile(line_file).h_rms))
+    own = Surface.from_profile(line_file)
+    assert found["h_rms"] == pytest.approx(float(own.h_rms))
+    said = run("contact", "--map", line_file, "--model", "self-affine", "-a", "0.1")
+    assert f"fit: hurst {own.fit().fit.hurst:.6g}" in said
 
 
 def test_every_command_takes_maps_and_says_so(map_file):
@@ -113,9 +113,3 @@ def test_plain_lengths_of_a_map_are_in_the_unit_asked_for(map_file):
     found = json.loads(run("fit", map_file, *words)), json.loads(run("contact", "--map", map_file, "-a0.01", *words))
     own = 1e3 * float(Surface.from_map(map_file, short_cutoff=2.0).h_rms)
     assert (found[0]["h_rms"], found[1]["surface"]["h_rms"]) == (pytest.approx(own), pytest.approx(own))
-
-
-def test_five_numbers_may_be_fitted_to_a_line(line_file):
-    said = run("contact", "--map", line_file, "--model", "self-affine", "-a", "0.1")
-    own = Surface.from_profile(line_file).fit()
-    assert f"fit: hurst {own.fit.hurst:.6g}" in said

@@ -87,11 +87,10 @@ def use():
         core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
     core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
 
-    open_table("island4d").lookup(np.linspace(1.0, 2.0, 100), 3.0, 20.0, 0.8)
     universal = open_table("universal")
     X, mu = np.linspace(-5, 40, 300), np.geomspace(1e-6, 1e5, 300)
     universal.answer(X, mu)
-    universal.slopes(X, mu)
+    greenwood_tripp.rigid_sphere(X, mu)
     greenwood_tripp.solve(X[50:250:10], mu[50:250:10]).pressure.sum()
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
     many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)

@@ -27,7 +27,7 @@ INTEL = platform.machine() in ("x86_64", "AMD64")
 EXACT = {
     *("calibrated_contact", "calibrated_ends", "calibrated_separation", "elementary"),
     *("spline_values", "height_integrals", "island_extents", "islands_work"),
-    *("phi", "profile_missed", "self_affine", "solve_islands", "spline4", "spline_pieces"),
+    *("phi", "profile_missed", "self_affine", "solve_islands", "spline_pieces"),
 }
 
 # coefficients of polynomials, of which small ones are differences of large numbers

@@ -17,9 +17,8 @@ QUICK = [
     "core/test_calibrated_core.py",
     "islands/test_core_islands.py",
     "tablefiles/test_splines.py",
-    "test_hardness.py",
 ]
-QUICK += [f"totals/test_{name}.py" for name in ("kernel", "law_core", "island_models")]
+QUICK += [f"totals/test_{name}.py" for name in ("kernel", "law", "island_models")]
 MORE = ["islands/test_geometry.py", "models", "totals/test_contact.py"]
 MORE += ["theories/test_calibrated_theory.py", "theories/test_yielding.py"]
 pytestmark = pytest.mark.slow

@@ -11,11 +11,14 @@ from helpers import random_map
 from scipy.special import erf
 
 from generate import distances
+from generate.__main__ import main
 from generate.boundary_elements.studies import measured_maps
 from generate.files import ROOT
 from generate.pages import simulations
-from mbma_tables import Surface, contact
+from generate.theories_of_others import FORCES, Corrected
+from mbma_tables import InputError, Surface, contact
 from mbma_tables.common.files import shipped_file
+from mbma_tables.laws.calibrated import PERSSON, Law, Spectrum
 from mbma_tables.surfaces.surface import MeasuredSurface
 
 PAGE = (ROOT / "docs" / "fidelity.md").read_text("utf-8")
@@ -96,3 +99,66 @@ def test_committed_page_is_what_the_code_computes():
         assert re.sub(NUMBER, "", before) == re.sub(NUMBER, "", line)
         found, expected = (list(map(float, re.findall(NUMBER, one))) for one in (before, line))
         assert found == pytest.approx(expected, rel=0.06), line  # two digits are printed
+
+
+# an exponential law, which is inverted in closed form, as a function of the gap and as an object by pressure
+POWER, DECAY, KAPPA = 0.4, 0.5, 1.8
+FILE = f"""
+import numpy as np
+
+name = "by gap"
+
+def answer(surface, mean_separation):
+    pressure = {POWER} * surface.q0 * surface.h_rms * np.exp(-mean_separation / ({DECAY} * surface.h_rms))
+    return pressure, {KAPPA} * pressure / surface.rms_gradient
+
+class Exponential:
+    name = "by pressure"
+
+    def at_pressure(self, surface, pressure):
+        p0 = {POWER} * surface.q0 * surface.h_rms
+        return {KAPPA} * pressure / surface.rms_gradient, -{DECAY} * surface.h_rms * np.log(pressure / p0)
+
+theory = Exponential()
+"""
+
+
+def deviations():
+    """Deviations of area and pressure of the file's law [%], in closed form."""
+    seen = distances.held_out()
+    force, area, u = (np.concatenate([getattr(one, name) for one in seen]) for name in ("force", "area", "u"))
+    g = np.concatenate([np.full(one.force.shape, one.surface.rms_gradient) for one in seen])
+    touching = np.where(force * g < POWER, np.log(KAPPA * force / area), np.nan)
+    errors = touching, np.log(POWER / g / force) - u / DECAY
+    inside = [(area >= low) & (area <= high) for low, high in distances.RANGES]
+    return [100 * np.sqrt(np.nanmean(own[some] ** 2)) for own in errors for some in inside]
+
+
+def test_scores_of_a_file(tmp_path):
+    (tmp_path / "own.py").write_text(FILE)
+    done = CliRunner().invoke(main, ["score", str(tmp_path / "own.py")], catch_exceptions=False)
+    assert done.exit_code == 0
+    rows = [[float(x) for x in re.findall(r"\b[\d.]+", line)] for line in done.stdout.splitlines()[2:]]
+    for row in rows:
+        assert row[:4] == pytest.approx(deviations(), rel=0.05)
+
+
+def test_perssons_theory_is_the_correction_without_one():
+    surface = Surface(0.7, 1.0, 40.0, 1.0, 3.3)
+    law = Law(Spectrum.self_affine(0.7, 40.0), None, PERSSON)
+    force = FORCES[(FORCES > 1e-3) & (FORCES < 2)]
+    area, u = Corrected("none", (1.0,)).at_pressure(surface, force * float(surface.rms_gradient))
+    assert area == pytest.approx(law.area(force), rel=1e-3)
+    assert u == pytest.approx(law.separation(force), rel=1e-3, abs=1e-7)
+    # the cover by its own equation solves it
+    xu = distances.theories_of(distances.OTHERS)["Xu et al. 2024"]
+    P = xu.cover(np.array([0.3, 1.0]))
+    right = 2 * FORCES**2 / (np.array([[0.3], [1.0]]) * (xu.gamma + (1 - xu.gamma) * P))
+    assert pytest.approx(erf(np.sqrt(right)), abs=1e-9) == P
+
+
+@pytest.mark.parametrize("text", ["", "x = 3\n", "class Theory:\n    name = 'a'\n    def answer(self, s, u): ...\n"])
+def test_files_without_a_theory_are_refused(text, tmp_path):
+    (tmp_path / "none.py").write_text(text)
+    with pytest.raises(InputError, match=r"must have a function answer\(surface, mean_separation\) or at_pressure"):
+        distances.theories_of(tmp_path / "none.py")

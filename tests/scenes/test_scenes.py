@@ -117,14 +117,6 @@ def test_island_statistics_add_up():
     np.testing.assert_allclose(load, island(CONCRETE, [0.1, 0.4], E_star=3.0).force, rtol=5e-2)
 
 
-def test_explain_names_steps_and_what_is_left_out():
-    text = scene_of("pressure", "area", without=("subscale_area",)).explain()
-    assert text.startswith("Scene  (rtol=1.0e-06, error=")
-    steps = "first use in a process", "-> contact by universal", "-> hertz area by universal"
-    for part in (*steps, "left out: stiffness, energy", "switched off: subscale_area\n"):
-        assert part in text
-
-
 def test_the_certificate_decides_between_table_and_solver(monkeypatch):
     bound = plans.certified_error("universal", 1.0)
     certificate = open_table("universal").content.attributes
@@ -168,7 +160,12 @@ def test_answers_do_not_depend_on_what_ran_before():
     assert "pressure" in fresh
 
 
-def test_a_result_names_what_made_it():
+def test_a_plan_and_a_result_name_what_they_are_made_of():
+    text = scene_of("pressure", "area", without=("subscale_area",)).explain()
+    assert text.startswith("Scene  (rtol=1.0e-06, error=")
+    steps = "first use in a process", "-> contact by universal", "-> hertz area by universal"
+    for part in (*steps, "left out: stiffness, energy", "switched off: subscale_area\n"):
+        assert part in text
     found = scene_of("pressure", rtol=1e-8, variant="printed").run()
     assert found.attrs["variant"] == "printed"
     assert set(json.loads(found.attrs["table_hashes"])) <= set(json.loads(found.attrs["island_models"]).values())

@@ -1,6 +1,5 @@
 """Surfaces from spectra and maps: known surfaces come back, everything else is refused with its reason."""
 
-import dataclasses
 import functools
 import math
 import sys
@@ -46,7 +45,6 @@ def seen_in(truth, q0, q1):
 X, Y = np.meshgrid(np.arange(POINTS) / POINTS, np.arange(POINTS) / POINTS, indexing="ij")
 ROUGH = Surface(0.8, 4.0, 100.0, 1.0, 3.0)
 BASE = synthetic(ROUGH, gaussian=True, seed=5)
-CUT_OUT = synthetic(Surface(0.8, 1.0, 400.0, 1.0, 3.0), 1024, gaussian=True, seed=5)[:POINTS, :POINTS]
 
 
 class TestKnownMaps:
@@ -106,15 +104,6 @@ class TestKnownMaps:
         assert periodic or found.fit.roll_off == pytest.approx(4, rel=0.1)
         assert found.hurst == pytest.approx(0.8, abs=0.05)
 
-    def test_form_is_removed_by_the_right_trend(self):
-        bowl = CUT_OUT + 30 * (X**2 + Y**2)
-        plain = from_map(CUT_OUT, STEP, detrend="quadratic")
-        found = from_map(bowl, STEP, detrend="quadratic")
-        assert dataclasses.astuple(found.fit)[:3] == pytest.approx(dataclasses.astuple(plain.fit)[:3], rel=1e-6)
-        assert found.h_max == pytest.approx(plain.h_max, rel=1e-9)
-        with pytest.raises(NotSelfAffineError, match="a wavelength stands out"):
-            from_map(bowl, STEP)
-
     def test_a_forced_band_is_taken(self):
         found = from_map(BASE, STEP, periodic=True, band=(8, 60), h_max=4.5)
         assert (found.q0, found.q1, found.h_max) == (8.0, 60.0, 4.5)
@@ -138,8 +127,8 @@ class TestKnownMaps:
         assert found.fit.hurst == pytest.approx(1.03, abs=0.005)
 
 
-class TestRadialSpectrum:
-    def test_agrees_with_surface_topography(self):
+class TestTopography:
+    def test_radial_spectra_agree(self):
         topography = topographies().Topography(BASE, (SIDE, SIDE), periodic=True)
         edges = np.arange(1, 100, 3) - 0.4375  # edges of this library's rings too
         _, other = topography.power_spectrum_from_area(collocation=edges)
@@ -151,8 +140,6 @@ class TestRadialSpectrum:
         # the first bin but one holds the map's first waves, and reaches below them
         np.testing.assert_allclose(own[2:] / count[2:], np.asarray(other)[2:] / (4 * math.pi**2), rtol=1e-10)
 
-
-class TestTopography:
     def test_is_taken_as_it_is(self):
         topography = topographies().Topography(BASE, (SIDE, SIDE), periodic=True, unit="um")
         found, plain = from_map(topography), from_map(BASE, STEP, periodic=True)
@@ -160,41 +147,28 @@ class TestTopography:
         assert (found.fit, found.unit) == (plain.fit, "um")
 
     def test_odd_ones_are_refused(self):
-        holed = np.ma.masked_where(BASE > 1.0, BASE)
         named = types.SimpleNamespace(heights=lambda: np.ones((40, 40)), physical_sizes=("a", "b"))
         for heights, dx, message in (
             (topographies().Topography(BASE, (SIDE, SIDE), periodic=True), 1.0, "dx and dy belong to a plain array"),
             (named, None, "physical_sizes must be real numbers"),
-            (
-                topographies().Topography(holed, (SIDE, SIDE)),
-                None,
-                f"{holed.mask.sum()} holes among 65536 points, more",
-            ),
         ):
             with pytest.raises(InputError, match=message):
                 from_map(heights, dx)
 
 
-class TestSpectra:
-    def test_a_plateau_and_order_and_zeros(self):
-        truth = Surface(0.7, 2.0, 150.0, 1.0, 3.0)
-        q = np.geomspace(0.1, 200, 120)
-        C = np.where(q <= truth.q1, truth.power_spectrum(np.clip(q, 2, 150)), 0)
-        found = Surface.from_spectrum(q[::-1], C[::-1], h_max=3, model="self-affine")
-        assert found.fit.roll_off == found.q0 == pytest.approx(2, rel=0.01)
-        assert found.q1 == q[q <= 150][-1]
-        assert found.h_rms == pytest.approx(1, rel=0.01)
-
-    def test_masked_entries_are_left_out(self):
-        q = np.geomspace(1, 100, 40)
-        C = np.ma.masked_array(q**-3.4, np.arange(40) % 7 == 3)
-        C.data[C.mask] = np.nan
-        assert Surface.from_spectrum(q, C, h_max=3, model="self-affine").hurst == pytest.approx(0.7, rel=1e-9)
+def test_a_spectrum_with_a_plateau_zeros_and_masked_entries_in_any_order():
+    truth = Surface(0.7, 2.0, 150.0, 1.0, 3.0)
+    q = np.geomspace(0.1, 200, 120)
+    C = np.where(q <= truth.q1, truth.power_spectrum(np.clip(q, 2, 150)), 0)
+    C = np.ma.masked_array(np.where(np.arange(120) % 17 == 3, np.nan, C), np.arange(120) % 17 == 3)
+    found = Surface.from_spectrum(q[::-1], C[::-1], h_max=3, model="self-affine")
+    assert found.fit.roll_off == found.q0 == pytest.approx(2, rel=0.01)
+    assert found.q1 == q[q <= 150][-1]
+    assert (found.h_rms, found.hurst) == (pytest.approx(1, rel=0.01), pytest.approx(0.7, rel=1e-3))
 
 
 SLOPED = np.geomspace(1, 100, 40)
 WHITE = np.random.default_rng(1).standard_normal((128, 128))
-
 
 test_maps_that_are_not_self_affine = refusals(
     lambda heights, options: from_map(heights, STEP, **options),
@@ -217,13 +191,12 @@ test_spectra_that_are_not_self_affine = refusals(
     (SLOPED**-4.5, "exponent of 1.25 .*above 1"),
     (SLOPED**-3.4 * np.where(np.arange(40) == 20, 50.0, 1.0), "a wavelength stands out|scatters by"),
     (SLOPED**-3.4 * 10 ** (np.arange(40) % 2), "scatters by"),
-    (np.where(np.arange(40) % 9, 0, SLOPED**-3.4), "holds no height"),
     error=(InputError, NotSelfAffineError),
 )
 
 test_bad_maps = refusals(
     lambda change: from_map(**({"heights": BASE, "dx": STEP} | change)),
-    ({"heights": np.where(BASE > 1, np.nan, BASE)}, InputError, r"has \d+ holes"),
+    ({"heights": np.where(BASE > 1, np.nan, BASE)}, InputError, f"has {(BASE > 1).sum()} holes among 65536 points"),
     ({"heights": np.ma.masked_greater(BASE, 1)}, InputError, r"has \d+ holes"),
     ({"heights": BASE[0]}, InputError, "two-dimensional"),
     ({"heights": BASE * 1e40}, OutOfRangeError, "at most 1e30"),
@@ -235,16 +208,6 @@ test_bad_maps = refusals(
     ({"band": (10.0, 500.0)}, OutOfRangeError, "within the measured range"),
     ({"band": (10.0, 20.0)}, NotSelfAffineError, "too narrow: q1/q0 = 2"),
     ({"band": (10.0, 15.0)}, NotSelfAffineError, "only 4 spectral points"),
-)
-
-test_bad_spectra = refusals(
-    lambda change: Surface.from_spectrum(
-        **({"q": SLOPED, "C": SLOPED**-3.4, "h_max": 3} | change), model="self-affine"
-    ),
-    ({"q": SLOPED - 1}, OutOfRangeError, "leave q = 0 out"),
-    ({"q": SLOPED.reshape(2, 20), "C": SLOPED.reshape(2, 20)}, InputError, "two columns"),
-    ({"convention": "german"}, InputError, "'paper' or 'isotropic'"),
-    ({"band": (0.1, 50)}, OutOfRangeError, "within the measured range"),
 )
 
 
@@ -280,17 +243,12 @@ class TestFiles:
 
 def cut_out(seed, roll_off, points=128, tiles=4):
     """A part of a larger periodic map with H = 0.8 and its own mean squared gradient; 1 wide, six points a wave."""
-    count = tiles * points
-    k = np.hypot(*np.meshgrid(np.fft.fftfreq(count, 1 / points), np.fft.rfftfreq(count, 1 / points), indexing="ij"))
-    amplitude = np.where((k > 0) & (k <= points / 6), np.maximum(k, 1 / roll_off) ** -1.8, 0)
-    transform = amplitude * np.fft.rfft2(np.random.default_rng(seed).standard_normal((count, count)))
-    slopes = [
-        np.fft.irfft2(2j * np.pi * axis * transform)
-        for axis in (np.fft.fftfreq(count, 1 / points)[:, None], np.fft.rfftfreq(count, 1 / points))
-    ]
-    part = (slice(points), slice(points))
-    gradient = math.sqrt(sum(np.mean(slope[part] ** 2) for slope in slopes))
-    return np.fft.irfft2(transform)[part], gradient
+    count, part = tiles * points, (slice(points), slice(points))
+    truth = Surface(0.8, tiles / roll_off, count / 6, 1.0, 3.0)
+    whole = synthetic(truth, count, seed=seed, plateau=True, gaussian=True)
+    q, transform = 2 * np.pi * np.fft.fftfreq(count, 1 / points), np.fft.fft2(whole)
+    slopes = [np.fft.ifft2(1j * wave * transform).real[part] for wave in (q[:, None], q)]
+    return whole[part], math.sqrt(sum(np.mean(slope**2) for slope in slopes))
 
 
 @pytest.mark.parametrize("roll_off", [1.0, 0.5, 0.25])
@@ -404,16 +362,3 @@ def test_a_periodic_map_of_few_waves_keeps_its_height_and_gradient_or_tells(seed
     assert found.h_rms == pytest.approx(found.heights.h_rms, rel=1e-9)
     told = any("wavelengths are few" in entry.get("told", "") for entry in found.provenance)
     assert told == (abs(found.rms_gradient / found.bearing.gradient - 1) > 0.05)
-
-
-@pytest.mark.parametrize("kind", ["txt", "csv"])
-def test_rows_of_a_matrix_of_text_are_x(tmp_path, kind):
-    pytest.importorskip("SurfaceTopography")
-    values = 0.1 * np.add.outer(np.sin(np.arange(64) / 3), 0.2 * np.cos(np.arange(48) / 7))
-    np.savetxt(tmp_path / f"own.{kind}", values, delimiter="," if kind == "csv" else " ")
-    np.save(tmp_path / "own.npy", values)
-    text, array = (Surface.from_map(tmp_path / name, dx=0.5, dy=0.8, unit="um") for name in (f"own.{kind}", "own.npy"))
-    assert text.map.heights.shape == (64, 48)
-    assert text.map.steps == pytest.approx((0.5, 0.8))
-    np.testing.assert_allclose(text.map.heights, array.map.heights, atol=1e-12)
-    assert text.rms_gradient == pytest.approx(array.rms_gradient)

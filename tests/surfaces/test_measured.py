@@ -1,19 +1,22 @@
-"""Surfaces given by a spectrum: moments, heights, two surfaces as one, the shortest waves, power laws beyond them."""
+"""Surfaces given by a spectrum: moments, heights, two surfaces as one, the shortest waves, averages of scans."""
 
+import dataclasses
+import json
 import math
 
 import mpmath
 import numpy as np
 import pytest
-from helpers import random_map, refusals
+from helpers import random_map, refusals, run
 from hypothesis import given
 from hypothesis import strategies as st
 
+from generate.machined.makers import rough
 from mbma_tables import InputError, Surface, contact, contact_law
 from mbma_tables.export.law_rows import describe_law
+from mbma_tables.surfaces.averages import average
 from mbma_tables.surfaces.heights import SHARES, Heights
 from mbma_tables.surfaces.maps import extrapolated
-from mbma_tables.surfaces.spectral import resolution
 from mbma_tables.surfaces.spectrum import PowerLaws
 from mbma_tables.surfaces.surface import MeasuredSurface
 
@@ -77,8 +80,9 @@ class TestMeasuredSurface:
             (Q, C, {}, "h_max is missing"),
             (Q, -C, {"h_max": 1.0}, "C must be zero or positive"),
             (Q, np.where(Q == 1, np.nan, C), {"h_max": 1.0}, r"C must be finite, got nan at \(1,\)"),
-            (Q - 0.5, C, {"h_max": 1.0}, "q must be positive"),
+            (Q - 0.5, C, {"h_max": 1.0}, "leave q = 0 out"),
             (Q[:3], C[:2], {"h_max": 1.0}, "two columns of one length"),
+            (Q.reshape(3, 3), C.reshape(3, 3), {"h_max": 1.0}, "two columns of one length"),
             (Q[:1], C[:1], {"h_max": 1.0}, "no two neighbours"),
             ([1.0, 2.0], [1.0, 1.0], {"h_max": 1.0}, "greater than 3"),
             ([1.0, 9.0], [0.0, 0.0], {"h_max": 1.0}, "holds no height"),
@@ -126,9 +130,8 @@ class TestCombined:
         assert both.bearing is None
         assert "the relative position of the maps is not known" in both.provenance[0]["told"]
         # parallel lays: gradients' mean squares add along both axes
-        sums = [sum(float(s.m2) * share for s, share in zip((one, other), shares, strict=True)) for shares in zip(
-            *((a / (1 + a), 1 / (1 + a)) for a in (one.anisotropy**2, other.anisotropy**2)), strict=True)]  # fmt: skip
-        assert both.anisotropy == pytest.approx(np.sqrt(sums[0] / sums[1]))
+        square, m2 = np.array([one.anisotropy, other.anisotropy]) ** 2, np.array([one.m2, other.m2])
+        assert both.anisotropy == pytest.approx(np.sqrt(m2 @ (square / (1 + square)) / (m2 @ (1 / (1 + square)))))
         assert one.combined(FIVE).anisotropy < one.anisotropy
         assert FIVE.combined(FIVE).anisotropy is None
 
@@ -158,7 +161,7 @@ def measured(end):
 
 
 def test_the_last_octave():
-    found = resolution(measured(100.0))
+    found = measured(100.0).resolved().provenance[-1]
     assert found["shortest"] == pytest.approx(2 * np.pi / 100)
     expected = float(measured(100.0).rms_gradient / measured(50.0).rms_gradient)
     assert found["area_without_last_octave"] == pytest.approx(expected, rel=1e-3)
@@ -168,11 +171,10 @@ def test_the_last_octave():
 def test_waves_that_hold_no_power_are_not_known():
     q = np.geomspace(1.0, 400.0, 200)
     C = WHOLE.power_spectrum(q * (1 - 1e-12)) * np.where(q > 100, 1e-6, 1.0)
-    found = resolution(Surface.from_spectrum(q, C, h_max=1.0, unit="um"))
+    sampled = Surface.from_spectrum(q, C, h_max=1.0, unit="um")
+    found, known = (surface.resolved().provenance[-1] for surface in (sampled, measured(100.0)))
     assert found["shortest"] == pytest.approx(2 * np.pi / 100, rel=0.04)
-    assert found["area_without_last_octave"] == pytest.approx(
-        resolution(measured(100.0))["area_without_last_octave"], rel=0.02
-    )
+    assert found["area_without_last_octave"] == pytest.approx(known["area_without_last_octave"], rel=0.02)
     assert "(sampled to 0.01571 um, without power there)" in found["told"]
 
 
@@ -203,8 +205,78 @@ def test_every_answer_of_a_map_says_so():
     assert "resolution" not in repr(contact(WHOLE, pressure=0.01))
 
 
-def test_what_was_measured_is_not_replaced():
-    with pytest.raises(InputError, match="must be below the shortest measured wavelength"):
-        extrapolated(measured(50.0), 1.0, 0.7)
-    with pytest.raises(InputError, match="extrapolate_hurst must be a number"):
-        extrapolated(measured(50.0), 0.01, 1.7)
+test_what_was_measured_is_not_replaced = refusals(
+    lambda shortest, hurst: extrapolated(measured(50.0), shortest, hurst),
+    (1.0, 0.7, "must be below the shortest measured wavelength"),
+    (0.01, 1.7, "extrapolate_hurst must be a number"),
+)
+
+
+class TestScans:
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def scans():
+        whole = 0.3 * rough(np.random.default_rng(5), 256, 32, 6.0, 0.8)
+        corners = [(i, j) for i in (0, 64, 128, 192) for j in (0, 64, 128, 192)]
+        maps = [whole[i : i + 64, j : j + 64] for i, j in corners]
+        return Surface.from_map(whole, 1.0, periodic=True, unit="um"), [
+            Surface.from_map(part, 1.0, detrend="mean", unit="um") for part in maps
+        ]
+
+    def test_their_average_is_nearer_than_one(self, scans):
+        whole, parts = scans
+        mean = average(parts)
+        known = contact(whole, area=[0.03, 0.2], theory="calibrated")
+        found = contact(mean, pressure=known.pressure)
+        each = np.array([contact(one, pressure=known.pressure, theory="calibrated").area for one in parts])
+        assert found.theory == "calibrated"
+        assert (
+            np.abs(np.log(found.area / known.area)) < np.sqrt(np.mean(np.log(each / known.area) ** 2, axis=0))
+        ).all()
+        assert "average of 16 scans: h_rms" in mean.provenance[0]["told"]
+        assert mean.h_rms == pytest.approx(float(whole.h_rms), rel=0.1)
+
+    def test_their_spread_adds_to_the_scatter(self, scans):
+        parts, areas, names = scans[1][:4], [0.03, 0.2], ("scatter", "area_scatter", "stiffness_scatter")
+        mean = average(parts)
+        found, alone = (contact(one, area=areas) for one in (mean, dataclasses.replace(mean, scans=())))
+        each = [contact(one, pressure=found.pressure, theory="calibrated") for one in parts]
+        # of ln F at equal u, and of the others at equal F
+        pressure = [one.mean_separation * found.stiffness / found.pressure for one in each]
+        logs = np.log([[one.area for one in each], [one.stiffness for one in each]])
+        expected = np.std([pressure, *logs], axis=1, ddof=1)
+        added = [np.sqrt(getattr(found, name) ** 2 - getattr(alone, name) ** 2) for name in names]
+        np.testing.assert_allclose(added, expected, rtol=1e-3)
+        assert (expected > 0.01).all()
+        twice, once = (contact(one, area=areas) for one in (average(2 * parts[:1]), parts[0]))
+        for name in names:
+            np.testing.assert_allclose(getattr(twice, name), getattr(once, name), rtol=1e-6)
+
+    def test_the_average_of_one_scan_twice_is_that_scan(self, scans):
+        one = scans[1][0]
+        both = average([one, one.to("mm")])
+        for theory in ("calibrated", "persson"):
+            known = contact(one, pressure=0.01, theory=theory)
+            found = contact(both, pressure=0.01, theory=theory)
+            assert found.area == pytest.approx(known.area, rel=1e-3)
+            assert found.mean_separation == pytest.approx(known.mean_separation, rel=1e-3)
+        assert (both.skewness, both.kurtosis) == (pytest.approx(one.skewness), pytest.approx(one.kurtosis))
+
+    def test_refusals(self, scans):
+        whole, parts = scans
+        for wrong in ([whole], [whole, Surface(0.8, 0.1, 2.0, 1.0, 3.0)], [average(parts), whole]):
+            with pytest.raises(InputError, match="two or more"):
+                average(wrong)
+        with pytest.raises(InputError, match="some do not"):
+            average([whole, Surface.from_map(0.3 * random_map(64, 0.1, 0.3), 1.0)])
+
+    def test_on_the_command_line(self, tmp_path):
+        for seed in (1, 2):
+            np.save(tmp_path / f"{seed}.npy", 0.02 * random_map(64, 0.05, 0.25, seed=seed))
+        words = ("--dx", "1um", "--periodic", "--json")
+        found = json.loads(run("fit", tmp_path / "1.npy", tmp_path / "2.npy", *words))
+        assert found["provenance"][0]["told"].startswith("average of 2 scans")
+        one = json.loads(run("fit", tmp_path / "1.npy", *words))
+        values = np.load(tmp_path / "1.npy")
+        assert one["areal"]["Sq"] == pytest.approx(values.std(), rel=1e-6)
+        assert "core [um]: Sk" in run("fit", tmp_path / "1.npy", "--dx", "1um", "--periodic")

@@ -1,4 +1,4 @@
-"""Numbers of a drawing: back from a surface's own numbers, against a simulated profile, and what is refused."""
+"""Roughness parameters: a surface from those of a drawing, and back; those of a map."""
 
 import dataclasses
 import json
@@ -7,33 +7,28 @@ import pickle
 
 import numpy as np
 import pytest
-from helpers import refusals, refused, run
+import xarray as xr
+from helpers import random_map, refusals, refused, run
+from scipy.integrate import quad
+from scipy.special import ndtri
+from scipy.stats import norm
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
 from mbma_tables.scenes.specimen import from_numbers
 from mbma_tables.surfaces.heights import highest_point
+from mbma_tables.surfaces.roughness import areal_parameters, core
 
 SURFACE = Surface(0.75, 0.02, 5.0, 0.6, 2.1, unit="um")
 
 
 def drawn_from(surface):
     """What an ideal instrument says of a Gaussian isotropic surface."""
-    slope = float(np.sqrt(surface.m2))
-    return {
-        "Rq": surface.h_rms,
-        "Ra": math.sqrt(2 / math.pi) * surface.h_rms,
-        "Sq": surface.h_rms,
-        "Sa": math.sqrt(2 / math.pi) * surface.h_rms,
-        "Rdq": slope,
-        "Sdq": math.sqrt(2) * slope,
-        "Rsm": 2 * math.pi * surface.h_rms / slope,
-        "longest": 2 * math.pi / surface.q0,
-        "shortest": 2 * math.pi / surface.q1,
-        "Sp": surface.h_max,
-        "h_max": surface.h_max,
-        "hurst": surface.hurst,
-    }
+    slope, mean = float(np.sqrt(surface.m2)), math.sqrt(2 / math.pi) * surface.h_rms
+    heights = {"Rq": surface.h_rms, "Ra": mean, "Sq": surface.h_rms, "Sa": mean}
+    slopes = {"Rdq": slope, "Sdq": math.sqrt(2) * slope, "Rsm": 2 * math.pi * surface.h_rms / slope}
+    waves = {"longest": 2 * math.pi / surface.q0, "shortest": 2 * math.pi / surface.q1}
+    return heights | slopes | waves | {"Sp": surface.h_max, "h_max": surface.h_max, "hurst": surface.hurst}
 
 
 COMBINATIONS = [
@@ -60,9 +55,8 @@ def test_numbers_lead_back_to_their_surface(names):
 
 
 def test_arrays_and_units():
-    found = Surface.from_roughness(
-        Ra="400 nm", Rdq=[0.05, 0.1], longest="0.25 mm", hurst=0.8, h_max="1.8 um", unit="um"
-    )
+    given = {"Ra": "400 nm", "Rdq": [0.05, 0.1], "longest": "0.25 mm", "hurst": 0.8, "h_max": "1.8 um"}
+    found = Surface.from_roughness(**given, unit="um")
     assert found.shape == (2,)
     assert found.h_rms == pytest.approx([0.4 * math.sqrt(math.pi / 2)] * 2)
     np.testing.assert_allclose(np.sqrt(found.m2), [0.05, 0.1], rtol=1e-12)
@@ -73,19 +67,12 @@ def test_arrays_and_units():
 def test_a_simulated_profile_has_these_numbers():
     """A random surface of a given spectrum: its profiles by the definitions of the standard, mean over 400 lines."""
     points, surface = 2048, Surface(0.8, 2 * math.pi / 100, 2 * math.pi / 6, 1.0, 4.0)
-    q = 2 * math.pi * np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points))
-    inside = (q >= surface.q0) & (q <= surface.q1)
-    amplitude = np.where(inside, np.where(inside, q, 1.0) ** -1.8, 0.0)
-    noise = np.fft.rfft2(np.random.default_rng(3).standard_normal((points, points)))
-    heights = np.fft.irfft2(noise / np.abs(noise) * amplitude)
-    heights /= heights.std()
-    lines = heights[:: points // 400]
+    heights = random_map(points, 1 / 100, 1 / 6, seed=3, phases=True)
+    lines = heights[:: points // 400] / heights.std()
     slopes = np.fft.irfft(1j * 2 * math.pi * np.fft.rfftfreq(points) * np.fft.rfft(lines))
     upward = ((lines[:, 1:] >= 0) & (lines[:, :-1] < 0)).sum() / lines.size
-    numbers = {"Ra": np.abs(lines).mean(), "Rdq": slopes.std(), "Rsm": 1 / upward}
-    ideal = drawn_from(surface)
-    for name, rel in {"Ra": 0.01, "Rdq": 0.01, "Rsm": 0.01}.items():
-        assert numbers[name] == pytest.approx(ideal[name], rel=rel), name
+    for name, number in {"Ra": np.abs(lines).mean(), "Rdq": slopes.std(), "Rsm": 1 / upward}.items():
+        assert number == pytest.approx(drawn_from(surface)[name], rel=0.01), name
 
 
 GOOD = {"Rq": 0.6, "Rdq": 0.2, "longest": 300.0, "hurst": 0.8, "h_max": 2.0}
@@ -161,16 +148,14 @@ def test_every_constructor_takes_the_area():
     assert made.h_max == pytest.approx(float(highest_point(1.0, made.m2, 4e8)), rel=1e-15)
     assert made.provenance[-1]["from"] < made.h_max < made.provenance[-1]["to"]
     assert Surface(**NUMBERS, nominal_area=[4e8, 1e6]).h_max[0] == made.h_max
-    drawn = Surface.from_roughness(
-        Rq="1 um", longest=f"{2 * np.pi / 0.025!r} um", shortest=f"{2 * np.pi / 3.0!r} um", hurst=0.8,
-        nominal_area="4 cm^2",
-    )  # fmt: skip
+    ends = {"longest": f"{2 * np.pi / 0.025!r} um", "shortest": f"{2 * np.pi / 3.0!r} um"}
     moments = {name: getattr(made, name) for name in ("hurst", "m0", "m2", "m4")}
-    spectrum = np.geomspace(0.025, 3.0, 200)
+    q = np.geomspace(0.025, 3.0, 200)
+    spectrum = {"q": q, "C": made.power_spectrum(q), "nominal_area": 4e8}
     others = [
-        drawn,
+        Surface.from_roughness(Rq="1 um", **ends, hurst=0.8, nominal_area="4 cm^2"),
         Surface.from_moments(**moments, nominal_area=4e8),
-        Surface.from_spectrum(spectrum, made.power_spectrum(spectrum), nominal_area=4e8),
+        Surface.from_spectrum(**spectrum),
         made.sampled(),
         pickle.loads(pickle.dumps(made)),
         dataclasses.replace(made),
@@ -178,9 +163,7 @@ def test_every_constructor_takes_the_area():
     ]
     for other in others:
         assert float(other.h_max) == pytest.approx(made.h_max, rel=1e-6)
-    fitted = Surface.from_spectrum(
-        spectrum, made.power_spectrum(spectrum), nominal_area=4e8, model="self-affine", band=(0.025, 3.0)
-    )
+    fitted = Surface.from_spectrum(**spectrum, model="self-affine", band=(0.025, 3.0))
     assert float(fitted.h_max) == pytest.approx(made.h_max, rel=1e-3)
     line = np.random.default_rng(3).standard_normal(400).cumsum()[:400]
     short, long = (Surface.from_profile(line, dx=1.0, nominal_area=area) for area in (1e5, 1e8))
@@ -201,20 +184,14 @@ def test_files_and_options_take_the_area():
         from_numbers({"hurst": 0.8, "nominal_area": "4 cm^2"})
 
 
-def test_areas_that_are_refused():
-    for given, message in (
-        ({"h_max": 3.0, "nominal_area": 1e6}, "both given"),
-        ({}, "h_max is missing"),
-        ({"nominal_area": "4 cm"}, "must be like"),
-    ):
-        with pytest.raises(InputError, match=message):
-            Surface(**NUMBERS, **given)
-    for area in (0.0, -1.0, np.nan, np.inf, 100.0):
-        with pytest.raises(OutOfRangeError, match="nominal_area"):
-            Surface(**NUMBERS, nominal_area=area)
-    xr = pytest.importorskip("xarray")
-    with pytest.raises(InputError, match="DataArrays"):
-        Surface(**NUMBERS | {"h_rms": xr.DataArray([1.0, 2.0], dims="case")}, nominal_area=1e6)
+test_areas_that_are_refused = refusals(
+    lambda given: Surface(**NUMBERS | given),
+    ({"h_max": 3.0, "nominal_area": 1e6}, "both given"),
+    ({}, "h_max is missing"),
+    ({"nominal_area": "4 cm"}, "must be like"),
+    *(({"nominal_area": area}, OutOfRangeError, "nominal_area") for area in (0.0, -1.0, np.nan, np.inf, 100.0)),
+    ({"h_rms": xr.DataArray([1.0, 2.0], dims="case"), "nominal_area": 1e6}, "DataArrays"),
+)
 
 
 def test_beyond_the_heights_simulated_little_changes():
@@ -246,3 +223,57 @@ def test_a_roll_off_by_name():
             Surface.from_roughness(**given, **bad)
     with pytest.raises(InputError, match="rolloff needs longest and shortest"):
         Surface.from_roughness(**given | {"shortest": None, "Rdq": 0.1}, rolloff="250 um")
+
+
+RATIOS = (np.arange(200_000) + 0.5) / 200_000
+
+
+def gaussian_core():
+    """Of the standard normal distribution: the line over the middle 40%, by integrals of its quantiles."""
+    moment = quad(lambda p: (p - 0.5) * -ndtri(p), 0.3, 0.7)[0]
+    slope = moment / (2 * 0.2**3 / 3)
+    half = -slope / 2
+    share = norm.sf(half)
+    return 2 * half, 2 * (norm.pdf(half) / share - half), share
+
+
+def test_gaussian_heights():
+    found, (Sk, Spk, Smr1) = core(ndtri(RATIOS)), gaussian_core()
+    assert found["Sk"] == pytest.approx(Sk, rel=1e-3)
+    assert found["Spk"] == pytest.approx(Spk, rel=2e-3)
+    assert found["Svk"] == pytest.approx(Spk, rel=2e-3)
+    assert (found["Smr1"], found["Smr2"]) == (pytest.approx(Smr1, abs=1e-3), pytest.approx(1 - Smr1, abs=1e-3))
+
+
+def test_a_plateau_with_straight_valleys():
+    # ratio 0 to 0.8 from 1 to 0.9, then straight down to -3: the curve is two lines
+    curve = np.where(RATIOS < 0.8, 1 - RATIOS / 8, 0.9 - (RATIOS - 0.8) * 19.5)
+    found = core(curve)
+    assert found["Sk"] == pytest.approx(0.125, rel=1e-3)
+    assert found["Smr2"] == pytest.approx(0.8, abs=2e-3)
+    # the triangle between both lines is one already
+    lower = 0.875
+    assert found["Svk"] == pytest.approx(2 * np.maximum(lower - curve, 0).mean() / 0.2, rel=0.01)
+    assert found["Spk"] < 1e-3
+
+
+def test_moments_gradient_and_lay():
+    x, y = np.meshgrid(np.arange(256.0), 2.0 * np.arange(128), indexing="ij")
+    turn = np.radians(30)
+    q = 2 * np.pi / 64
+    # waves across a lay at 30 degrees, phases over whole periods and more
+    values = 0.3 * np.sin(q * (-x * np.sin(turn) + y * np.cos(turn)))
+    found = areal_parameters(values, (1.0, 2.0))
+    assert found["lay"] == pytest.approx(30, abs=0.5)
+    assert found["Sq"] == pytest.approx(0.3 / np.sqrt(2), rel=0.02)
+    assert found["Sa"] == pytest.approx(0.3 * 2 / np.pi, rel=0.02)
+    assert found["Sku"] == pytest.approx(1.5, rel=0.02)
+    assert found["Sdq"] == pytest.approx(0.3 * q / np.sqrt(2), rel=0.02)
+    assert found["Sz"] == pytest.approx(0.6, rel=0.01)
+    assert found["Sz"] == found["Sp"] + found["Sv"]
+
+
+def test_what_is_no_map():
+    for wrong in (np.zeros((4, 4)), np.ones(5), [[1.0, np.nan], [0.0, 1.0]]):
+        with pytest.raises(InputError):
+            areal_parameters(wrong, (1.0, 1.0))

@@ -1,11 +1,12 @@
 """What is done to a measurement before its spectrum is taken, and what is said of it."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 import scipy.signal
-from helpers import refusals, topographies
+from helpers import random_map, refusals, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
@@ -32,6 +33,7 @@ def waves(highest=12, seed=4, shape=(POINTS, POINTS)):
 
 
 MAP = waves()
+LIST = np.array([(i * STEP, j * STEP, MAP[i, j]) for i in range(40) for j in range(40)])
 
 
 def treated(heights=MAP, periodic=False, steps=(STEP, STEP), **options):
@@ -39,7 +41,7 @@ def treated(heights=MAP, periodic=False, steps=(STEP, STEP), **options):
 
 
 def told(result, step):
-    return next(entry["told"] for entry in result.provenance if entry["step"] == step)
+    return " ".join(entry["told"] for entry in result.provenance if entry["step"] == step)
 
 
 @pytest.mark.parametrize(
@@ -80,18 +82,17 @@ class TestHoles:
         assert np.isfinite(treated(holed, fill="harmonic").heights).all()
 
 
-class TestOutliers:
-    def test_a_bad_pixel_goes_and_little_else(self):
-        spoilt = MAP.copy()
-        spoilt[40, 50], spoilt[0, 0] = 30.0, -20.0
-        found = treated(spoilt, outliers=10)
-        assert "2 of 9216 points" in told(found, "outliers")
-        left = np.abs(found.heights - treated(MAP).heights)
-        assert left.max() < 0.3 * MAP.std()
-        assert left.mean() < 1e-3 * MAP.std()
-        clean = treated(outliers=10)
-        assert "0 of 9216 points" in told(clean, "outliers")
-        np.testing.assert_array_equal(clean.heights, treated().heights)
+def test_a_bad_pixel_goes_and_little_else():
+    spoilt = MAP.copy()
+    spoilt[40, 50], spoilt[0, 0] = 30.0, -20.0
+    found = treated(spoilt, outliers=10)
+    assert "2 of 9216 points" in told(found, "outliers")
+    left = np.abs(found.heights - treated(MAP).heights)
+    assert left.max() < 0.3 * MAP.std()
+    assert left.mean() < 1e-3 * MAP.std()
+    clean = treated(outliers=10)
+    assert "0 of 9216 points" in told(clean, "outliers")
+    np.testing.assert_array_equal(clean.heights, treated().heights)
 
 
 class TestCutoff:
@@ -128,6 +129,7 @@ class TestCutoff:
             lambda options: treated(periodic=True, **options),
             ({"short_cutoff": 5.0, "long_cutoff": 4.0}, "long_cutoff must be larger"),
             ({"short_cutoff": 1e9}, "leaves no wavelength"),
+            ({"l_filter": 1e-9}, "leaves no wavelength"),
             ({"short_cutoff": -1.0}, "short_cutoff must be a number"),
             ({"outliers": math.nan}, "outliers must be finite"),
             ({"fill": "zero"}, "fill must be one of harmonic"),
@@ -135,23 +137,70 @@ class TestCutoff:
     )
 
 
+class TestFilters:
+    @pytest.mark.parametrize(("name", "short"), [("s_filter", True), ("l_filter", False)])
+    def test_a_wave_of_the_nesting_index_is_halved(self, name, short):
+        x = np.arange(128.0)
+        q = 2 * np.pi * np.array([2, 8, 22]) / 128
+        values = sum(np.sin(one * x)[:, None] + 0 * x for one in q)
+        own = Surface.from_map(values, 0.5, periodic=True, unit="um", **{name: 0.5 * 16.0})
+        left = 2 * np.abs(np.fft.fft(own.map.heights[:, 5]))[[2, 8, 22]] / 128
+        # ISO 16610-61, alpha = sqrt(ln 2/pi)
+        passed = np.exp(-np.pi * (np.sqrt(np.log(2) / np.pi) * 16 / (2 * np.pi / q)) ** 2)
+        expected = passed if short else 1 - passed
+        # shorter than 0.39 times the nesting index: none is left
+        expected = np.where(short & (expected < 0.01), 0.0, expected)
+        np.testing.assert_allclose(left, expected, atol=1e-9)
+        assert left[1] == pytest.approx(0.5)
+
+    def test_they_are_told_and_limit_the_spectrum(self):
+        noise = 0.1 * np.random.default_rng(1).standard_normal((64, 64))
+        own = Surface.from_map(noise, 1.0, periodic=True, unit="um", s_filter="10 um")
+        assert "an S-filter at 10 um removes" in told(own, "s_filter")
+        assert "times larger than without" in told(own, "s_filter")
+        assert 2 * np.pi / float(own.q1) == pytest.approx(0.388 * 10, rel=0.1)
+
+
+BOW, TILT, SPIKE = (np.arange(64.0)[:, None] - 32) ** 2 / 100, np.arange(64.0) / 10, np.zeros((64, 64))
+SPIKE[10, 20] = 50.0
+
+
+@pytest.mark.parametrize(
+    ("form", "options", "said"),
+    [
+        (BOW, {}, "a bow has .* detrend='quadratic' removes it"),
+        (TILT, {"periodic": True}, "a tilt has .* detrend='plane' removes it"),
+        (SPIKE, {}, "1 of 4096 points .* outliers=10 removes them"),
+        (BOW, {"detrend": "quadratic"}, None),
+        (TILT, {"detrend": "plane"}, None),
+        (SPIKE, {"outliers": 10}, None),
+        (0.0, {}, None),
+    ],
+)
+def test_what_would_remove_form_and_outliers_is_told(form, options, said):
+    found = Surface.from_map(0.02 * random_map(64, 0.1, 0.3) + form, 1.0, **options)
+    every = " ".join(told(found, step) for step in ("outliers seen", "detrend"))
+    assert re.search(said, every) if said else " removes " not in every
+
+
 class TestReading:
-    def test_arrays_in_files(self, tmp_path):
-        np.save(tmp_path / "a.npy", MAP)
-        np.savetxt(tmp_path / "a.txt", MAP)
-        np.savetxt(tmp_path / "a.csv", MAP, delimiter=",")
-        plain = Surface.from_map(MAP, STEP, model="measured")
+    def test_rows_of_arrays_in_files_are_x(self, tmp_path):
+        values = waves(shape=(64, 48))
+        np.save(tmp_path / "a.npy", values)
+        np.savetxt(tmp_path / "a.txt", values)
+        np.savetxt(tmp_path / "a.csv", values, delimiter=",")
+        plain = Surface.from_map(values, 0.5, 0.8)
         for name in ("a.npy", "a.txt", "a.csv"):
-            found = Surface.from_map(tmp_path / name, STEP, unit="um", model="measured")
-            assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-9)
+            found = Surface.from_map(tmp_path / name, dx=0.5, dy=0.8, unit="um")
+            np.testing.assert_allclose(found.map.heights, plain.map.heights, atol=1e-12)
+            assert found.map.steps == pytest.approx((0.5, 0.8))
             assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
             assert found.unit == "um"
             with pytest.raises(InputError, match="has no lengths: give the sampling step dx"):
                 Surface.from_map(tmp_path / name)
 
     def test_a_list_of_points_with_gaps_is_no_matrix(self, tmp_path):
-        points = np.c_[[(i, j, MAP[i, j]) for i in range(40) for j in range(40)]]
-        np.savetxt(tmp_path / "a.txt", np.delete(points, [3, 77], axis=0))
+        np.savetxt(tmp_path / "a.txt", np.delete(LIST, [3, 77], axis=0))
         for dx in (None, 1.0):
             with pytest.raises(InputError, match="give missing ones a row with NaN"):
                 Surface.from_map(tmp_path / "a.txt", dx)
@@ -173,7 +222,6 @@ class TestReading:
     @pytest.mark.parametrize(
         ("header", "unit", "scale"),
         [
-            ("x [um] y [um] z [um]", "um", 1),
             ("# 2024-05-03, probe 7\n# X(mm);Y(mm);Z(mm)", "mm", 1),
             ("x[\xb5m]\ty[\xb5m]\tz[nm]", "um", 1e-3),
             ("# [um]", "um", 1),
@@ -181,8 +229,7 @@ class TestReading:
         ],
     )
     def test_units_in_the_header_of_points(self, tmp_path, header, unit, scale):
-        points = np.c_[[(i * STEP, j * STEP, MAP[i, j]) for i in range(40) for j in range(40)]]
-        (tmp_path / "a.xyz").write_text("\n".join([header, *(" ".join(map(str, p)) for p in points)]), "latin-1")
+        (tmp_path / "a.xyz").write_text("\n".join([header, *(" ".join(map(str, p)) for p in LIST)]), "latin-1")
         found, plain = Surface.from_map(tmp_path / "a.xyz"), Surface.from_map(MAP[:40, :40], STEP)
         assert found.unit == unit
         assert found.h_rms == pytest.approx(scale * plain.h_rms, rel=1e-9)
@@ -210,8 +257,7 @@ class TestReading:
             Surface(0.8, 1.0, 100.0, xr.DataArray(1.0, attrs={"units": "um"}), 3.0, unit="mm")
 
     def test_units_of_points_that_differ_along_the_axes(self, tmp_path):
-        points = [(i, j, MAP[i, j]) for i in range(40) for j in range(40)]
-        np.savetxt(tmp_path / "a.xyz", points, header="x [um] y [mm] z [nm]")
+        np.savetxt(tmp_path / "a.xyz", LIST, header="x [um] y [mm] z [nm]")
         with pytest.raises(InputError, match="names the units um, mm, nm: write x and y in one unit"):
             Surface.from_map(tmp_path / "a.xyz")
 

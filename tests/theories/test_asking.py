@@ -60,11 +60,6 @@ def test_scatter_of_stiffness_and_separation():
     for theory in ("calibrated", "mbma", "persson"):
         stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
         assert stated == pytest.approx(row[theories.index(theory)], rel=1e-6)
-    heights = np.minimum(np.random.default_rng(1).normal(size=(64, 64)), 0)
-    worn = Surface.from_spectrum(*(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=heights)
-    for given in ({}, {"hardness": 0.1 * float(worn.rms_gradient)}):
-        off = contact(worn, mean_separation=0.5 * worn.h_max, theory="calibrated", **given)
-        assert np.isnan([off.scatter, off.area_scatter, off.stiffness_scatter, off.separation_scatter]).all()
 
 
 def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
@@ -96,9 +91,12 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
 @each
 def test_labelled_arrays_keep_their_names(theory):
     pressure = xr.DataArray([1.0, 10.0], dims="load", coords={"load": [1.0, 10.0]})
-    surface = Surface(hurst=xr.DataArray([0.7, 0.8], dims="hurst"), q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+    hurst = xr.DataArray([0.7, 0.8], dims="hurst")
+    surface, lazy = (Surface(each, 0.01, 2.0, 1.0, 3.0) for each in (hurst, hurst.chunk(hurst=1)))
     asked = {"E_star": MODULUS, "theory": theory}
-    found = contact(surface, pressure=pressure, **asked)
+    found, later = contact(surface, pressure=pressure, **asked), contact(lazy, pressure=pressure, **asked).area
+    assert later.chunks is not None
+    np.testing.assert_array_equal(later.compute(), found.area)
     plain = contact(Surface([[0.7], [0.8]], 0.01, 2.0, 1.0, 3.0), pressure=[1.0, 10.0], **asked)
     names = ("separation", "mean_separation", "area", "stiffness", "mean_pressure", "valid")
     for labelled, expected in [(getattr(found, name), getattr(plain, name)) for name in names]:
@@ -154,16 +152,13 @@ def test_mbma_says_where_it_is_not_to_be_trusted():
     assert contact(beyond, mean_separation=[2.25, 0.5], outside="exact").valid.tolist() == [False, False]
 
 
-def test_a_modulus_names_its_unit_in_lists_and_attributes():
+def test_units_of_lists_and_of_named_arrays():
     listed = contact(SURFACE, pressure="1 MPa", E_star=["100 GPa", "200 GPa"])
     assert listed.pressure == pytest.approx([1e-3, 1e-3])
     named = xr.DataArray([100.0, 200.0], dims="body", attrs={"units": "GPa"})
     assert contact(SURFACE, pressure="1 MPa", E_star=named).units["pressure"] == "GPa"
     with pytest.raises(InputError, match="hardness is in 'MPa'"):
         contact(SURFACE, pressure=0.001, E_star=named, hardness=named.assign_attrs(units="MPa"))
-
-
-def test_what_is_read_of_named_arrays_has_its_unit():
     gaps = xr.DataArray([0.5, 1.0], dims="gap", name="mine")
     found = contact(dataclasses.replace(SURFACE, unit="um"), separation=gaps, E_star="100 GPa", hardness="1.5 GPa")
     expected = {"stiffness": "GPa/um", "mean_pressure": "GPa", "mean_separation": "um", "separation_scatter": "um"}

@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 
+import netCDF4
 import numpy as np
 import pytest
 from helpers import refused, run
@@ -72,35 +73,23 @@ def test_laws_scenes_and_other_units(surface, own):
     assert sensitivity(own, pressure=0.01).slopes["heights"]["area"] < -0.5
 
 
-def test_damage_and_other_files_are_refused(file, tmp_path):
+def test_damaged_edited_and_other_files_are_refused(file, tmp_path):
     content, bad = file.read_bytes(), tmp_path / "bad.nc"
     for broken in (content[:-10], content[:2000], content[:3000] + b"x" + content[3001:], b""):
         bad.write_bytes(broken)
         with pytest.raises(TableFileError, match="mbma fit MAP --simulate --out"):
             BoundaryElements.from_netcdf(bad)
-    with pytest.raises(TableFileError, match="not a simulated_map"):
-        BoundaryElements.from_netcdf("tables/universal.nc")
-
-
-def test_a_file_that_was_edited_and_sealed_again_is_refused(file, tmp_path):
-    bad = edited(tmp_path / "edited.nc", file.read_bytes(), lambda dataset: dataset["pressure"].__setitem__(0, 1e-9))
-    with pytest.raises(TableFileError, match="do not match their hash"):
-        BoundaryElements.from_netcdf(bad)
-
-
-def test_every_variable_explains_itself(file):
-    import netCDF4
-
-    with netCDF4.Dataset(file) as dataset:
-        assert "SHA-256" in dataset.source
-        for name, variable in dataset.variables.items():
-            assert variable.long_name, name
-            assert variable.units, name
-        assert dataset["mean_separation"].units == "um"
-        assert dataset["C"].units == "um^4"
+    sealed = edited(tmp_path / "edited.nc", content, lambda dataset: dataset["pressure"].__setitem__(0, 1e-9))
+    for path, match in ((sealed, "do not match their hash"), ("tables/universal.nc", "not a simulated_map")):
+        with pytest.raises(TableFileError, match=match):
+            BoundaryElements.from_netcdf(path)
 
 
 def test_info_and_verify(file, tmp_path):
+    with netCDF4.Dataset(file) as dataset:
+        assert "SHA-256" in dataset.source
+        assert all(variable.long_name and variable.units for variable in dataset.variables.values())
+        assert (dataset["mean_separation"].units, dataset["C"].units) == ("um", "um^4")
     table = json.loads(run("tables", "info", file, "--json"))
     assert table["attributes"]["mbma_kind"] == "simulated_map"
     assert table["variables"]["area"][1] > 0.9
@@ -124,7 +113,7 @@ def test_exports_have_the_leakage_along_an_axis(file, own, tmp_path):
     np.testing.assert_allclose(code["leakage"](own.h_max - gap), expected, rtol=1e-3)
     assert "direction y" in out.read_text()
     run("export", "csv", *words, "30", "--out", tmp_path / "rows.csv")
-    rows = np.genfromtxt(tmp_path / "rows.csv", delimiter=",", comments="#", skip_header=0)
+    rows = np.genfromtxt(tmp_path / "rows.csv", delimiter=",", comments="#")
     rows = rows[np.isfinite(rows).all(axis=1)]
     known = contact(own, pressure=rows[5, 0], E_star=1.0).leakage.along(30.0)
     assert rows[5, 1] == pytest.approx(known, rel=0.02)
@@ -163,13 +152,11 @@ class TestBeyondTheLoads:
         assert found.valid.tolist() == [False, True, False]
         assert np.isnan(found.scatter).tolist() == [True, False, True]
         assert (np.diff(found.area) > 0).all()
-        assert found.area[0] / found.pressure[0] == pytest.approx(
-            contact(own, pressure=1e-9).area / 1e-9, rel=1e-6
-        )  # in proportion
-        with pytest.raises(InputError, match="less: the mean separation vanishes"):
-            contact(own, pressure=1e3)
-        with pytest.raises(InputError, match="less than 1"):
-            contact(own, area=1.0)
+        # in proportion
+        assert found.area[0] / found.pressure[0] == pytest.approx(contact(own, pressure=1e-9).area / 1e-9, rel=1e-6)
+        for given, match in (({"pressure": 1e3}, "less: the mean separation vanishes"), ({"area": 1.0}, "less than 1")):
+            with pytest.raises(InputError, match=match):
+                contact(own, **given)
 
     def test_closed_forms(self):
         # force (2 - u)^3 and its energy between loads, and beyond them the same
@@ -234,13 +221,12 @@ class TestCache:
         monkeypatch.setenv(cache.VARIABLE, "off")
         np.testing.assert_allclose(found.rows, self.pressed().rows, rtol=5e-3)
 
-    def test_damaged_files_are_made_anew(self, place):
+    def test_damaged_files_are_made_anew_and_the_oldest_goes_first(self, place):
         first = self.pressed()
         for path, _ in cache.files():
             path.write_bytes(path.read_bytes()[:100])
         np.testing.assert_array_equal(self.pressed().rows, first.rows)
-
-    def test_the_oldest_goes_first(self, place):
+        cache.trim(0)
         for name, used in (("old", 100), ("new", 300), ("middle", 200)):
             cache.keep(name, values=np.random.default_rng(1).random(1000))
             os.utime(place / f"{name}.npz", (used, used))
@@ -250,14 +236,11 @@ class TestCache:
         assert cache.load("middle", values=(999,)) is None
         assert [path.stem for path, _ in cache.files()] == ["new", "middle"]
 
-    def test_command(self, place):
+    def test_the_command_and_it_may_be_off_or_impossible(self, place, monkeypatch, tmp_path):
         cache.keep("one", values=np.zeros(10))
         assert f"{place}: 1 files" in run("cache")
-        assert json.loads(run("cache", "--clear", "--json")) == {
-            "folder": str(place), "files": 0, "bytes": 0, "removed": 1
-        }  # fmt: skip
-
-    def test_it_may_be_off_or_impossible(self, monkeypatch, tmp_path):
+        cleared = {"folder": str(place), "files": 0, "bytes": 0, "removed": 1}
+        assert json.loads(run("cache", "--clear", "--json")) == cleared
         monkeypatch.setenv(cache.VARIABLE, "off")
         assert cache.folder() is None
         assert "nothing is kept" in run("cache")

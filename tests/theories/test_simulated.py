@@ -1,4 +1,6 @@
-"""Boundary elements of one map as a theory of it."""
+"""Boundary elements of one map as a theory of it, and `contact(...).map()`."""
+
+import math
 
 import numpy as np
 import pytest
@@ -8,13 +10,13 @@ from scipy.special import erf
 from generate.boundary_elements.solve import Contact
 from generate.machined import makers
 from generate.machined.makers import Part
-from mbma_tables import Surface, contact, contact_law
-from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.laws.boundary_elements import Contact as OwnContact
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.theories import BoundaryElements
 from mbma_tables.theories.own_map import law_loads
+from mbma_tables.theories.saturated import of_map
 
 pytest.importorskip("tamaas")
 
@@ -39,13 +41,17 @@ def test_it_answers_what_was_simulated(truth):
     assert found.theory == "simulated"
 
 
-def test_force_is_the_energys_slope(truth):
-    _, _, u, energy = truth.rows
+@pytest.mark.parametrize("name", ["simulated", "corrected"])
+def test_force_is_the_energys_slope(truth, name):
+    theory = of_map(name, truth.surface)
+    _, _, u, energy = theory.rows
     fine = np.geomspace(u[-1], u[0], 4001)
-    force = contact(truth.surface, mean_separation=fine, theory=truth).pressure
+    force = contact(truth.surface, mean_separation=fine, theory=name).pressure
+    assert (np.diff(force) < 0).all()
     work = np.sum((force[1:] + force[:-1]) / 2 * np.diff(fine))
-    assert work == pytest.approx(energy[-1] - energy[0], rel=0.01)
-    np.testing.assert_allclose(truth.energy(truth.surface, u), energy, rtol=1e-9)
+    assert work == pytest.approx(energy[-1] - energy[0], rel=0.01 if name == "simulated" else 0.02)
+    np.testing.assert_allclose(theory.energy(truth.surface, u), energy, rtol=1e-9)
+    assert contact(truth.surface, area=0.1, theory=name).leakage.x > 0
 
 
 def test_what_was_not_simulated_is_refused(truth):
@@ -195,3 +201,59 @@ def test_a_hardness_is_simulated(eta):
     assert law.at_pressure(pressure[1]).area == pytest.approx(found.area[1], rel=1e-3)
     with pytest.raises(OutOfRangeError, match="at most the hardness"):
         contact(surface, pressure=1.1 * cap, hardness=cap, theory="simulated")
+
+
+pytest.importorskip("tamaas")
+
+
+@pytest.fixture(scope="module")
+def honed():
+    return Surface.from_map(makers.heights(Part("honed", 1, 64)), 0.5, 1.0, periodic=True, unit="um")
+
+
+def test_pressures_gaps_and_contact_fit_each_other(honed):
+    found = contact(honed, pressure="20 MPa", E_star="2 GPa", theory="simulated")
+    pressed = found.map()
+    data = pressed.to_dataset()
+    assert data.pressure.mean() == pytest.approx(0.02, rel=1e-3)
+    assert (data.pressure.units, data.gap.units, data.x.units) == ("GPa", "um", "um")
+    assert data.x[1] == 0.5
+    assert data.y[1] == 1.0
+    assert not (data.gap.values[data.contact.values] > 0).any()
+    assert (data.gap.values[~data.contact.values] > 0).all()
+    assert data.gap.mean() == pytest.approx(float(found.mean_separation), rel=0.01)
+    # points in contact are more than the area, whose perimeter is corrected
+    assert float(found.area) < data.contact.mean() < 1.3 * float(found.area)
+    assert data.heights.values[data.contact.values].mean() > data.heights.values.std() / 2
+    assert repr(pressed).startswith("ContactMap(points 64 x 64, pressure 0.02")
+
+
+def test_a_map_that_is_not_periodic_is_cut_out_of_its_mirror_images():
+    half = makers.heights(Part("honed", 1, 64))[:40, :48]
+    own = Surface.from_map(half, 1.0, detrend="mean")
+    images = np.block([[half, half[:, ::-1]], [half[::-1], half[::-1, ::-1]]])
+    whole = Surface.from_map(images, 1.0, periodic=True)
+    one, other = (contact(s, pressure=0.01, theory="simulated").map() for s in (own, whole))
+    assert one.gap.shape == (40, 48)
+    np.testing.assert_allclose(one.gap, other.gap[:40, :48], atol=1e-3 * one.gap.max())
+
+
+def test_its_picture(honed, tmp_path):
+    pytest.importorskip("matplotlib")
+    contact(honed, pressure=0.01).map().plot(tmp_path / "map.png")
+    assert (tmp_path / "map.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_what_has_no_map(honed, tmp_path):
+    for found in (
+        contact(honed, pressure=[0.01, 0.02]),
+        contact(honed, pressure=0.01, hardness=[0.1, 0.2]),
+        contact(honed, mean_separation=2 * float(honed.h_max)),
+        contact(Surface(0.8, 0.1, 2.0, 1.0, 3.0), separation=1.0),
+    ):
+        with pytest.raises(InputError):
+            found.map()
+    BoundaryElements.of(honed).to_netcdf(tmp_path / "own.nc")
+    own = BoundaryElements.from_netcdf(tmp_path / "own.nc").surface
+    with pytest.raises(InputError, match="this surface has none"):
+        contact(own, pressure=0.01, hardness=math.inf).map()

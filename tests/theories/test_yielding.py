@@ -1,16 +1,24 @@
-"""Theories with a hardness: limits, bounds, monotony, and the ways to ask."""
+"""Contacts with a hardness: limits, bounds, monotony, against mpmath and boundary elements."""
 
+import json
 import pickle
 
+import mpmath
 import numpy as np
 import pytest
 import xarray as xr
 from helpers import random_map, refusals
+from scipy.differentiate import derivative
 
+from generate.boundary_elements.solve import Contact as Elastic
+from generate.boundary_elements.surfaces import Recipe, heights
+from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.laws import hardness
+from mbma_tables.laws.bearing_curve import bearing
+from mbma_tables.laws.boundary_elements import Contact, project
 from mbma_tables.theories import THEORIES, get_theory
-from mbma_tables.theories.calibrated_table import shipped
+from mbma_tables.theories.calibrated_table import shipped, shipped_part
 from mbma_tables.theories.yielding import MANY, Yielding
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
@@ -30,18 +38,6 @@ def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
             assert getattr(found, name)[:2] == pytest.approx(getattr(elastic, name)[:2], rel=rel, abs=0), name
         assert (found.yielded[:2] == 0).all()
         assert (np.broadcast_to(found.psi, 3)[:2] == 0).all()
-
-
-@each
-def test_soft_metal_follows_the_bearing_curve(theory):
-    u = np.array([0.3, 1.0, 2.0, 2.9])
-    cap = 1e-7 * MODULUS * float(SURFACE.rms_gradient)
-    found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
-    ends = get_theory(theory).ends_at_h_max
-    share = hardness.bearing_share(u, 3.0 if ends else None)[0]
-    assert found.pressure == pytest.approx(cap * share, rel=0.01)
-    assert found.area == pytest.approx(share, rel=0.01)
-    assert found.yielded == pytest.approx(np.ones(4), rel=1e-9)
 
 
 @each
@@ -138,21 +134,14 @@ def test_batches_labels_and_units():
     assert plain.area.shape == (2, 3)
     one = contact(SURFACE, pressure=30.0, E_star=MODULUS, hardness=1500.0, theory="calibrated")
     assert plain.area[1, 1] == pytest.approx(one.area, rel=1e-12)
-    labelled = contact(
-        SURFACE,
-        pressure=xr.DataArray([1.0, 30.0], dims="load"),
-        E_star=MODULUS,
-        hardness=xr.DataArray(caps, dims="metal"),
-        theory="calibrated",
-    )
+    named = {"pressure": xr.DataArray([1.0, 30.0], dims="load"), "hardness": xr.DataArray(caps, dims="metal")}
+    labelled = contact(SURFACE, **named, E_star=MODULUS, theory="calibrated")
     for name in ("area", "yielded", "unloading_stiffness", "scatter", "psi", "valid"):
         own = getattr(labelled, name)
         assert set(own.dims) <= {"load", "metal"}
         assert own.values == pytest.approx(np.broadcast_to(getattr(plain, name), own.shape), rel=1e-12), name
-    named = contact(
-        Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um"), pressure="30 MPa", E_star="100 GPa", hardness="1500 MPa",
-        theory="calibrated",
-    )  # fmt: skip
+    given = {"pressure": "30 MPa", "E_star": "100 GPa", "hardness": "1500 MPa"}
+    named = contact(Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um"), **given, theory="calibrated")
     assert named.area == pytest.approx(one.area, rel=1e-12)
     assert named.units["unloading_stiffness"] == "GPa/um"
 
@@ -183,16 +172,10 @@ test_what_cannot_be_asked = refusals(
 
 def test_scatter_of_any_theory():
     area, soft = np.array([0.02, 0.2]), 0.05 * float(SURFACE.rms_gradient)
-    for name in ("mbma", "persson", "greenwood_williamson"):
-        theory = get_theory(name)
+    for theory in map(get_theory, ("mbma", "persson", "greenwood_williamson")):
+        each = theory, Yielding(theory, soft), Yielding(get_theory("calibrated"), soft), Yielding(theory, 50 * soft)
         known, found, own, hard = (
-            np.array([one.scatter(SURFACE, what, area) for what in ("pressure", "area")])
-            for one in (
-                theory,
-                Yielding(theory, soft),
-                Yielding(get_theory("calibrated"), soft),
-                Yielding(theory, 50 * soft),
-            )
+            np.array([one.scatter(SURFACE, what, area) for what in ("pressure", "area")]) for one in each
         )
         assert (np.isfinite(found) == np.isfinite(known)).all()
         assert (found < known)[np.isfinite(known)].all()  # the area of a soft contact is F/p_m by any theory
@@ -228,17 +211,21 @@ def test_reasons_and_what_elastic_answers_say():
 @pytest.mark.parametrize("cap", [1e-320, 1e-300, 1e-100, 1e100, 1e200, 1.7e308])
 def test_hardnesses_of_any_size(theory, cap):
     # of next to none the bearing curve, of a huge one the elastic contact
-    elastic = contact(SURFACE, mean_separation=1.5, theory=theory)
-    pressure, area = (0.1 * cap, 0.1) if cap < 1 else (elastic.pressure, elastic.area)
-    for asked in ({"pressure": pressure}, {"mean_separation": 1.5}, {"area": area}):
+    u = np.array([0.3, 1.0, 1.5, 2.9 if cap > 1e-310 else 2.0])
+    elastic = contact(SURFACE, mean_separation=u, theory=theory)
+    share = hardness.bearing_share(u, 3.0 if get_theory(theory).ends_at_h_max else None)[0]
+    pressure, area = (cap * share, share) if cap < 1 else (elastic.pressure, elastic.area)
+    for asked in ({"pressure": pressure}, {"mean_separation": u}, {"area": area}):
         found = contact(SURFACE, **asked, theory=theory, hardness=cap)
         if cap < 1:
-            assert found.area == pytest.approx(found.pressure / cap, rel=1e-2 if cap < 1e-310 else 1e-12)
-            assert found.yielded == pytest.approx(1, rel=1e-2 if cap < 1e-310 else 1e-12)
+            rel = 1e-2 if cap < 1e-310 else 1e-12
+            assert found.pressure == pytest.approx(cap * share, rel=0.01)
+            assert found.area == pytest.approx(found.pressure / cap, rel=rel)
+            assert found.yielded == pytest.approx(np.ones(4), rel=rel)
         else:
             for name in ("mean_separation", "pressure", "area", "stiffness", "unloading_stiffness"):
                 assert getattr(found, name) == pytest.approx(getattr(elastic, name), rel=1e-10), name
-            assert found.yielded == 0
+            assert (found.yielded == 0).all()
 
 
 @pytest.mark.parametrize(("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)])
@@ -272,3 +259,124 @@ def test_the_lightest_pressures_are_held():
     for depth in np.geomspace(1e-5, 1e-3, 9):
         force = contact(surface, mean_separation=0.3 * (1 - depth), hardness=cap).pressure
         assert contact(surface, pressure=force, hardness=cap).pressure == pytest.approx(force, rel=1e-9)
+
+
+def between_walls(x, tau):
+    """Areas by images alone, in 60 digits."""
+    with mpmath.workdps(60):
+        x, width = mpmath.mpf(float(x)), 2 * mpmath.sqrt(mpmath.mpf(float(tau)))
+        reach = range(int(12 * width) + 3)
+        touching = mpmath.erf(x / width) + mpmath.fsum(
+            mpmath.erfc((2 * k - x) / width) - mpmath.erfc((2 * k + x) / width) for k in reach if k
+        )
+        yielded = mpmath.fsum(
+            mpmath.erfc((2 * k + 1 - x) / width) - mpmath.erfc((2 * k + 1 + x) / width) for k in reach
+        )
+        return float(touching), float(yielded)
+
+
+def test_areas_are_those_of_a_diffusion_between_walls():
+    rng = np.random.default_rng(3)
+    tau = np.append(10 ** rng.uniform(-3, 1, 60), [0.0599, 0.0601])
+    x = 10 ** rng.uniform(-12, 0, 62)
+    exact = np.array([between_walls(*point) for point in zip(x, tau, strict=True)])
+    for column, (sign, rel) in enumerate(((1.0, 1e-12), (-1.0, 1e-11))):
+        assert hardness.diffused(x, tau, sign) == pytest.approx(exact[:, column], rel=rel, abs=1e-250)
+
+
+def test_levels_of_mean_gaps():
+    u = np.append(10 ** np.random.default_rng(2).uniform(-290, 1, 40), [3.8e-4, np.nextafter(3.8e-4, 0), 3.0, 8.3])
+    u = np.append(u, np.geomspace(1e-6, 8, 60))
+    found = hardness._levels(u)
+    with mpmath.workdps(40):
+        for gap, level in zip(u.tolist(), found.tolist(), strict=True):
+            d = mpmath.mpf(level)
+            for _ in range(3):
+                below = mpmath.erfc(-d / mpmath.sqrt(2)) / 2
+                mean = d * below + mpmath.npdf(d)
+                d -= mpmath.log(mean / gap) * mean / below
+            assert level == pytest.approx(float(d), abs=1e-14, rel=1e-15)
+
+
+def test_bearing_curve_of_a_map_is_that_of_its_heights():
+    surface = heights(Recipe("worn", 0.8, 8, 4, 3, 128, 0.5))
+    known = bearing(surface, (1.0, 1.0))
+    curve = hardness.BearingCurve(known.mean_height / known.h_rms, known.h_max / known.h_rms)
+    levels = np.quantile(surface, [0.02, 0.1, 0.5, 0.9, 0.99])
+    u = np.array([np.maximum(level - surface, 0).mean() for level in levels])
+    assert curve(u)[0] == pytest.approx([0.98, 0.9, 0.5, 0.1, 0.01], rel=0.03)
+    slope = derivative(lambda x: curve(x)[0], u, initial_step=0.001).df
+    assert curve(u)[1] == pytest.approx(slope, rel=1e-2)
+    assert curve(known.h_max / known.h_rms)[0] == 0
+
+
+def test_a_flat_with_a_pit_has_no_bearing_curve():
+    pit = np.zeros((64, 64))
+    pit[30, 30] = -1
+    known = bearing(pit, (1.0, 1.0))
+    with pytest.raises(InputError, match="of the map or more is its highest point"):
+        hardness.BearingCurve(known.mean_height / known.h_rms, known.h_max / known.h_rms)
+
+
+def test_projection_is_the_nearest_allowed_field():
+    p = np.random.default_rng(1).normal(size=(16, 16))
+    found = project(p, 0.3, 0.8)
+    assert (found.mean(), found.min(), found.max()) == (pytest.approx(0.3, rel=1e-12), 0, 0.8)
+    shift = (p - found)[(found > 0) & (found < 0.8)]
+    assert np.ptp(shift) < 1e-12  # so it is the Euclidean projection
+
+
+@pytest.mark.parametrize(
+    "recipe", [Recipe("self_affine", 0.8, 8, 2, 1, 64), Recipe("stretched", 0.8, 8, 2, 1, 64, 4.0)]
+)
+def test_capped_boundary_elements(recipe):
+    unscaled = heights(recipe)
+    surface = unscaled / bearing(unscaled, recipe.sizes).gradient
+    elastic, capped = (Contact(surface, recipe.sizes, hardness=cap) for cap in (np.inf, 0.2))
+    for force in (0.01, 0.1):
+        free, held = elastic.press(force), capped.press(force)
+        other = Elastic(surface, recipe.sizes).press(force)
+        for name in ("area", "mean_separation", "energy"):
+            assert free[name] == pytest.approx(other[name], rel=2e-4), name
+        assert held["area"] >= force / 0.2 >= held["area_yielded"] > 0
+        assert capped.pressure.max() <= 0.2
+        assert held["mean_separation"] < free["mean_separation"]
+        # -dF/du of the elastic contact, whose area changes only to second order
+        step = 1e-3 * force
+        above, below = (elastic.press(force + way * step)["mean_separation"] for way in (1, -1))
+        elastic.press(force)
+        assert elastic.frozen_stiffness() == pytest.approx(2 * step / (below - above), rel=0.05)
+
+
+def test_held_out_surfaces_are_within_the_stated_bars():
+    variables, attributes = shipped_part("hardness")
+    assert all(attributes[f"law_{name}"] == value for name, value in vars(hardness.CONSTANTS).items())
+    sets, quantities = attributes["sets"].split(), attributes["quantities"].split()
+    numbers = dict(zip(sets, variables["accuracy"], strict=True))
+    held = np.stack([numbers[name] for name in ("held_out_surface", "held_out_spectrum")])
+    share = (held[..., 2] * held[..., 4]).sum(axis=0) / held[..., 4].sum(axis=0)
+    with_h_max, with_heights = (dict(zip(quantities, row, strict=True)) for row in share)
+    assert with_h_max["area"] > 0.97
+    assert min(with_h_max["yielded"], with_h_max["stiffness"], with_heights["stiffness"]) > 0.95
+    # of surfaces with two longest waves a side h_max says little of the highest heights
+    assert numbers["three_waves"][0, quantities.index("force"), 2] > 0.97
+    stretched = dict(zip(quantities, numbers["stretched"][1, :, 2], strict=True))
+    assert stretched["area"] > 0.97
+    assert with_heights["force"] == stretched["force"] == 1
+
+
+def test_surfaces_of_another_code():
+    errors = blind()
+    assert errors["area"].size > 1000
+    for quantity, least in {"area": 0.97, "yielded": 0.95, "force": 0.97, "stiffness": 0.95}.items():
+        assert np.mean(np.abs(errors[quantity]) < BARS[quantity]) > least, quantity
+
+
+def test_stated_scatter_is_what_held_out_errors_have():
+    _, attributes = shipped_part("hardness")
+    covered = json.loads(attributes["coverage"])
+    assert set(covered) == {f"{name} {q}" for name in (*FORMS, *OTHERS) for q in ("area", "force", "stiffness")}
+    for name, (one, two) in covered.items():
+        assert 0.55 < one < 0.8, name
+        # MBMA's stiffness is off by a bias more than by chance
+        assert 0.88 < two < (1.01 if name == "mbma stiffness" else 0.99), name

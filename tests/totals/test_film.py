@@ -1,13 +1,14 @@
-"""Flow factors: exact limits, Patir and Cheng's published curves, and Reynolds' equation on gaps that no fit saw."""
+"""Flow factors: exact limits, published curves, Reynolds' equation on gaps that no fit saw; its solver."""
 
 import numpy as np
 import pytest
+from helpers import random_map, refusals
 
 from generate.pages.simulations import PATIR_CHENG, published
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, flow_factors
 from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.laws.lay import factors
-from mbma_tables.laws.reynolds import flow_and_couette
+from mbma_tables.laws.reynolds import flow_and_couette, flow_conductance, open_ways
 from mbma_tables.theories import BoundaryElements
 
 BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
@@ -19,9 +20,8 @@ def test_wide_gaps_have_the_known_expansion():
         ratio, shear = factors(u, np.zeros(2), gamma, FlowConstants())
         plain, _ = factors(u, np.zeros(2), 1.0, FlowConstants())
         for k, c in enumerate((1 / (1 + gamma), gamma / (1 + gamma))):
-            np.testing.assert_allclose(
-                (1 - 1.5 / u**2) * ratio[k] / plain[k], 1 + 3 * (1 - 3 * c) / u**2, atol=30 / 30**4
-            )
+            expanded = (1 - 1.5 / u**2) * ratio[k] / plain[k]
+            np.testing.assert_allclose(expanded, 1 + 3 * (1 - 3 * c) / u**2, atol=30 / 30**4)
             np.testing.assert_allclose(shear[k] * u, 3 * c, rtol=0.01)
 
 
@@ -60,10 +60,8 @@ def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
 
 def test_isotropic_factors_are_those_of_the_leakage():
     u = np.array([0.6, 1.0, 1.7, 4.0])
-    found, known = (
-        flow_factors(BEARING, u, E_star="110 GPa"),
-        contact(BEARING, mean_separation=u, E_star="110 GPa", theory="calibrated"),
-    )
+    found = flow_factors(BEARING, u, E_star="110 GPa")
+    known = contact(BEARING, mean_separation=u, E_star="110 GPa", theory="calibrated")
     np.testing.assert_allclose(found.phi_x, known.leakage.flow_factor)
     np.testing.assert_array_equal(found.phi_x, found.phi_y)
     np.testing.assert_array_equal(found.pressure, known.pressure)
@@ -150,3 +148,60 @@ def test_units_and_what_is_refused(tmp_path):
     deep = flow_factors(BEARING, [0.2], peklenik=8.0)
     assert not deep.valid[0]
     assert any("uncertainty" in reason for reason in deep.reasons)
+
+
+def test_scale_of_gaps_and_sides():
+    gap = np.exp(0.3 * np.random.default_rng(1).standard_normal((20, 40)))
+    first = flow_conductance(gap, (1.0, 2.0))
+    np.testing.assert_allclose(flow_conductance(1e-3 * gap, (3.0, 6.0)), 1e-9 * first, rtol=1e-10)
+    np.testing.assert_allclose(flow_conductance(gap.T, (2.0, 1.0)), first[::-1], rtol=1e-10)
+
+
+def test_a_dam_blocks_one_way():
+    gap = np.ones((16, 16))
+    gap[5] = 0
+    np.testing.assert_allclose(flow_conductance(gap), [0.0, 15 / 16], rtol=1e-12)
+    gap[:, 7] = 0
+    assert flow_conductance(gap).tolist() == [0.0, 0.0]
+
+
+def test_a_slanted_channel_is_open_both_ways():
+    # steps of one along x and y in turn: 32 faces in series
+    gap = np.zeros((16, 16))
+    for i in range(16):
+        gap[i, i] = gap[i, (i + 1) % 16] = 1.0
+    assert open_ways(gap)[1] == (True, True)
+    np.testing.assert_allclose(flow_conductance(gap), 1 / 32, rtol=1e-12)
+
+
+def test_dead_ends_carry_nothing():
+    gap = np.zeros((16, 16))
+    gap[:, 3] = 1.0
+    straight = flow_conductance(gap)
+    # a branch, and a hole that leads nowhere
+    gap[4, 3:9] = gap[10:13, 10:13] = 5.0
+    gap[4, 3] = 1.0
+    assert (open_ways(gap)[0] > 0).sum() == 16 + 5
+    np.testing.assert_allclose(flow_conductance(gap), straight, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_another_solver():
+    transport = pytest.importorskip("reynoldsflow.transport")
+    field = random_map(64, 1.99 / 64, 12.01 / 64, power=0, seed=3)
+    # 5% and 30% of the points touch
+    for level, touching in ((1.6, 0.055), (0.5, 0.31)):
+        gap = np.maximum(field / field.std() + level, 0)
+        assert np.mean(gap == 0) == pytest.approx(touching, abs=0.03)
+        for axis, values in enumerate((gap, gap.T)):
+            kept, _, flux = transport.solve_fluid_problem(values, "scipy-spsolve", boundary_mode="periodic")
+            theirs, _ = transport.compute_total_flux(kept, flux, 64, "periodic")
+            assert flow_conductance(gap)[axis] == pytest.approx(theirs, rel=1e-6)
+
+
+test_no_gaps = refusals(
+    flow_conductance,
+    (np.ones(4), "gap must be a grid"),
+    (np.full((4, 4), -1.0), "gap must be at least 0"),
+    (np.full((4, 4), np.nan), "gap must be finite"),
+)

@@ -88,6 +88,6 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(generations):
     X, mu = rng.uniform(-6, 40, 500), 10 ** rng.uniform(-10, 6, 500)
     phi = []
     for one in generations:
-        phi.append(np.empty((500, 7)))
-        one.phi(X, mu, *universal_model().cells, 1, phi[-1], None)
+        phi.append(np.empty((500, 3)))
+        one.phi(X, mu, *universal_model().cells, phi[-1], None)
         assert phi[-1].tobytes() == phi[0].tobytes()

@@ -1,17 +1,14 @@
 """xarray in, xarray out; dask stays lazy and gives the same bits; cold tables opened by many threads."""
 
-import subprocess
-import sys
-
 import dask
 import dask.array
 import numpy as np
 import pytest
 import xarray as xr
 from dask.callbacks import Callback
-from helpers import refusals
+from helpers import fresh, refusals
 
-from mbma_tables import InputError, Surface, contact, contact_law, island, theories
+from mbma_tables import InputError, Surface, contact, contact_law, island
 
 FIELDS = ("pressure", "area", "error")
 SMOOTH = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
@@ -53,7 +50,7 @@ def test_dimensions_by_name():
     assert gaps.attrs == {"units": "mm", "long_name": "separation"}
     # above h_max the bodies are apart
     expected = np.maximum((h_max + gaps.values) / 2, gaps.values)
-    np.testing.assert_array_equal(found.mean_separation.transpose("case", "gap"), expected)
+    np.testing.assert_array_equal(found.mean_separation.isel(surface=0).transpose("case", "gap"), expected)
     assert xr.Dataset({name: getattr(found, name) for name in FIELDS}).sizes == {"surface": 3, "case": 2, "gap": 7}
 
 
@@ -138,21 +135,6 @@ def test_options_go_through():
     np.testing.assert_array_equal(rigid.pressure, contact(SMOOTH, separation=gaps.values, **options).pressure)
 
 
-@pytest.mark.parametrize(
-    "theory",
-    [theories.Persson(), theories.Persson("simplified"), "greenwood_williamson"],
-    ids=["persson", "simplified", "greenwood_williamson"],
-)
-def test_theories_of_labelled_surfaces_are_lazy(theory):
-    h_rms = xr.DataArray([1.0, 1.5, 2.0], dims="sample").chunk(sample=2)
-    gaps = xr.DataArray([0.4, 1.0], dims="gap")
-    lazy = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), mean_separation=gaps, theory=theory).area
-    assert lazy.dims == ("sample", "gap")
-    assert lazy.chunks is not None
-    plain = Surface(0.8, 1.0, 100.0, np.array([1.0, 1.5, 2.0])[:, None], 6.0)
-    np.testing.assert_array_equal(lazy.compute(), contact(plain, mean_separation=gaps.values, theory=theory).area)
-
-
 COLD = """
 import dask, numpy as np, xarray as xr
 from mbma_tables import Surface, contact
@@ -163,15 +145,13 @@ with dask.config.set(scheduler="threads", num_workers=8):
     lazy = contact(surface, separation=few), contact(surface, separation=many, island_model="island4d", rtol=1e-3)
     first, second = dask.compute(lazy[0].pressure, lazy[1].pressure)
 assert (abs(first - second) <= 0.01 * first).all()
-print("whole")
+print(len(first.gap))
 """
 
 
 @pytest.mark.slow
 def test_cold_tables_opened_by_many_threads():
-    done = subprocess.run([sys.executable, "-c", COLD], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == "whole\n"
+    assert fresh(COLD) == 120
 
 
 def test_islands_are_of_plain_arrays():

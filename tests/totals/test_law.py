@@ -1,23 +1,23 @@
-"""Contact laws against totals, differences and quadrature; inverses; what the model does; use from other codes."""
+"""Contact laws against totals, differences and quadrature; the same bits however asked; what the core refuses."""
 
 import functools
 import gc
 import itertools
 import math
 import pickle
+import sys
 import weakref
 
 import numpy as np
 import pytest
-import scipy.integrate
-import scipy.optimize
 import xarray as xr
 from helpers import difference_weights, refusals, with_slopes
+from scipy.integrate import quad
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.law import block as law_block
-from mbma_tables.law.block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
-from mbma_tables.models.named import get_model
+from mbma_tables.core import core
+from mbma_tables.law import block as at
+from mbma_tables.models import get_model
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import Mbma
 from mbma_tables.totals.contact import Sums, by_table
@@ -34,7 +34,6 @@ CASES = [
     (0.6, 50.0, 2.5, "reported"),
 ]
 FALLING = CASES[1]
-NAMES = ("pressure", "area", "stiffness", "area_slope", "energy")
 
 
 @functools.cache
@@ -54,7 +53,7 @@ def depths(law, seed, least=1e-9):
 
 
 def pieces_of(law):
-    centre, half = law.records[1:, CENTRE], 1 / law.records[1:, RATE]
+    centre, half = law.records[1:, at.CENTRE], 1 / law.records[1:, at.RATE]
     return 2 * law.h_max * (centre - half), 2 * law.h_max * (centre + half)
 
 
@@ -104,12 +103,8 @@ def test_energy_is_the_integral_of_force(case):
     for depth in law.h_max * np.array([1e-6, 1e-3, 0.05, 0.4, 1.0, 1.999]):
         ends = [*roots[roots < math.sqrt(depth)], math.sqrt(depth)]
         # l = x^2; between breaks force is smooth
-        parts = [
-            scipy.integrate.quad(
-                lambda x: law.pressure(separation=law.h_max - x * x) * 2 * x, a, b, epsabs=0, epsrel=1e-11
-            )[0]
-            for a, b in itertools.pairwise(ends)
-        ]
+        force = lambda x: law.pressure(separation=law.h_max - x * x) * 2 * x  # noqa: E731
+        parts = [quad(force, a, b, epsabs=0, epsrel=1e-11)[0] for a, b in itertools.pairwise(ends)]
         gap = law.h_max - depth
         rounded = np.finfo(float).eps * law.h_max / depth
         assert 2 * law.energy(separation=gap) == pytest.approx(math.fsum(parts), rel=1e-8 + 10 * rounded, abs=0)
@@ -151,7 +146,7 @@ def test_a_pickle_is_the_same_law_and_small(case):
     assert len(kept) < 20_000
     back, gaps = pickle.loads(kept), law.h_max - depths(law, 53)
     assert isinstance(back, ContactLaw)
-    for name in NAMES:
+    for name in at.QUANTITIES:
         np.testing.assert_array_equal(getattr(back, name)(separation=gaps), getattr(law, name)(separation=gaps))
     force = law.pressure(separation=law.h_max * np.array([0.9, 0.5, 0.1]))
     np.testing.assert_array_equal(back.separation(pressure=force), law.separation(pressure=force))
@@ -162,18 +157,16 @@ def test_a_pickle_is_the_same_law_and_small(case):
 
 def test_as_a_function_of_c():
     law = law_of(CASES[0])
-    for name in NAMES:
+    for name in at.QUANTITIES:
         asked = law.compiled(name)
         assert asked.function(law.h_max + 1, asked.user_data) == 0.0
         for outside in (math.nextafter(-law.h_max, -9), math.nan, math.inf, -math.inf):
             assert math.isnan(asked.function(outside, asked.user_data))
-    work, _ = scipy.integrate.quad(law.compiled(), 1.0, law.h_max, epsabs=0)
+    work, _ = quad(law.compiled(), 1.0, law.h_max, epsabs=0)
     assert work == pytest.approx(2 * law.energy(separation=1.0), rel=1e-7, abs=0)
     with pytest.raises(InputError, match="quantity must be one of"):
         law.compiled("force")
-
-
-def test_a_function_of_c_keeps_its_law():
+    # it keeps its law
     law = contact_law(surface_of(*CASES[0][:3]), rtol=1e-3)
     gone, expected, asked = weakref.ref(law), law.pressure(separation=1.0), law.compiled()
     del law
@@ -270,7 +263,7 @@ def test_laws_that_end_early_and_of_too_many_pieces(monkeypatch):
     surface = surface_of(*CASES[0][:3])
     labelled = Surface(xr.DataArray(0.8), surface.q0, surface.q1, surface.h_rms, surface.h_max)
     assert contact_law(labelled).pressure(separation=1.0) == law_of(CASES[0]).pressure(separation=1.0)
-    monkeypatch.setattr(law_block, "MAX_RECORDS", 3)
+    monkeypatch.setattr(at, "MAX_RECORDS", 3)
     with pytest.raises(ConvergenceError, match="more than 3 pieces") as caught:
         contact_law(surface)
     assert caught.value.mask
@@ -298,26 +291,26 @@ def test_slopes_are_within_their_bound(rtol):
 
 def rising_but_for(dip):
     """A law's one polynomial between x = 1/2 and 1 whose slope is that of `dip`, a polynomial in t."""
-    record = np.zeros((1, RECORD))
+    record = np.zeros((1, at.RECORD))
     integral = dip.integ()
-    record[0, [CENTRE, RATE]] = 0.75, 4.0
-    record[0, FORCE_AT : FORCE_AT + integral.coef.size] = integral.coef
+    record[0, [at.CENTRE, at.RATE]] = 0.75, 4.0
+    record[0, at.FORCE_AT : at.FORCE_AT + integral.coef.size] = integral.coef
     return record
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
-@pytest.mark.parametrize("at", np.linspace(-0.97, 0.99, 30))
+@pytest.mark.parametrize("place", np.linspace(-0.97, 0.99, 30))
 @pytest.mark.parametrize("width", [0.3, 1e-3, 1e-5])
-def test_a_narrow_dip_is_a_turning_point(at, width, sign):
-    t = np.polynomial.Polynomial([-at, 1.0])
+def test_a_narrow_dip_is_a_turning_point(place, width, sign):
+    t = np.polynomial.Polynomial([-place, 1.0])
     dip = (t**2 - width**2) * (1 + 0.3 * t**4)
-    assert dip.degree() < DEGREE
-    x, _ = law_block.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
+    assert dip.degree() < at.DEGREE
+    x, _ = at.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
     # compression goes from t = s to t = -s
-    expected = max(at - width, -1.0) if sign < 0 else min(at + width, 1.0)
+    expected = max(place - width, -1.0) if sign < 0 else min(place + width, 1.0)
     assert 4 * (x - 0.75) == pytest.approx(expected, abs=1e-9)
     above = rising_but_for(-sign * (dip + 2 * width**2))
-    assert law_block.first_falls(above, np.array([float(sign)]))[0][0] is None
+    assert at.first_falls(above, np.array([float(sign)]))[0][0] is None
 
 
 def slope_misses(surface, law, gap, variant="reported"):
@@ -351,10 +344,9 @@ def test_the_ends_of_the_branch(name):
     law = law_of(CASES[0])
     most = getattr(law, name)(separation=-law.h_max)
     assert law.separation(**{name: most}) == pytest.approx(-law.h_max, rel=1e-12, abs=0)
-    with pytest.raises(OutOfRangeError) as caught:
+    with pytest.raises(OutOfRangeError, match=f"at most {most:.6g}, at d = {-law.h_max:.6g} where the bran") as caught:
         law.separation(**{name: [0.5 * most, 1.001 * most]})
     assert caught.value.mask.tolist() == [False, True]
-    assert f"{name} must be at most {most:.6g}, at d = {-law.h_max:.6g} where the branch ends" in str(caught.value)
     with pytest.raises(OutOfRangeError, match=f"{name} must be at least 0"):
         law.separation(**{name: -1e-9})
     for given in ({}, {"pressure": 1e-6, "area": 1e-6}):
@@ -364,3 +356,161 @@ def test_the_ends_of_the_branch(name):
     assert law.separation(**{name: [[0.0, 5e-324], [1e-300, 1e-60]]}).tolist() == [[law.h_max] * 2] * 2
     with pytest.raises(OutOfRangeError, match="so high that force or area underflow"):
         contact_law(Surface(1.0, 1.0, 100.0, 1.0, 60.0), rtol=1e-3, island_model="rigid")
+
+
+SURFACES = {
+    "mbma": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {}),
+    "turning": (Surface(0.3, 1.0, 1e4, 0.7, 2.8), {}),
+    # two sides of d = 0
+    "calibrated": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {"theory": "calibrated"}),
+    # no last contact
+    "persson": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {"theory": "persson"}),
+}
+NO_GAPS = [math.nan, -math.nan, math.inf, -math.inf, -1e300, -2.9, np.int64(0x7FF4 << 48).view(float).item()]
+TINY = [5e-324, -5e-324, 1e-310, 2.2250738585072014e-308, 0.0, -0.0]
+
+
+@functools.cache
+def core_law_of(name):
+    surface, options = SURFACES[name]
+    return contact_law(surface, rtol=1e-6, E_star=3.0, **options)
+
+
+def gaps_of(law, count=3000):
+    top = law.h_max if math.isinf(law.highest) else law.highest
+    rng = np.random.default_rng(8)
+    near = top - (top - law.lowest) * 10 ** rng.uniform(-16, 0, count)
+    return np.concatenate([near, rng.uniform(law.lowest, top, count), TINY, [top, math.nextafter(top, 0), law.lowest]])
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_same_bits_however_asked(name):
+    law = core_law_of(name)
+    d = gaps_of(law)
+    u, named = (d[d > law.lowest + 1e-9] + law.h_max) / 2, xr.DataArray(d.reshape(-1, 3), dims=("a", "b"))
+    for what in at.QUANTITIES:
+        ask, asked = getattr(law, what), law.compiled(what)
+        whole = ask(separation=d)
+        assert np.isfinite(whole).all()
+        for size in (1, 7, 1000, 1001):
+            parts = [ask(separation=d[k : k + size]) for k in range(0, d.size, size)]
+            np.testing.assert_array_equal(np.concatenate(parts), whole)
+        np.testing.assert_array_equal([ask(separation=gap) for gap in d.tolist()], whole)
+        np.testing.assert_array_equal([asked.function(gap, asked.user_data) for gap in d.tolist()], whole)
+        np.testing.assert_array_equal(ask(separation=d.tolist()), whole)
+        np.testing.assert_array_equal(ask(separation=d.reshape(3, -1).T), whole.reshape(3, -1).T)
+        np.testing.assert_array_equal(ask(separation=np.tile(d, 12)), np.tile(whole, 12))
+        for labelled in (named, named.chunk(500)):
+            np.testing.assert_array_equal(ask(separation=labelled), whole.reshape(-1, 3))
+        np.testing.assert_array_equal([ask(gap) for gap in u.tolist()], ask(u))
+    together = law.values(separation=d)
+    np.testing.assert_array_equal(together, [getattr(law, what)(separation=d) for what in together._fields])
+    np.testing.assert_array_equal(law.pressure_and_stiffness(separation=d), (together.pressure, together.stiffness))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_inverses_have_the_same_bits_however_asked(name):
+    law = core_law_of(name)
+    d = gaps_of(law, 300)
+    force = law.pressure(separation=d[d > (law.lowest if law.turning_point is None else law.turning_point)])
+    whole = law.at_pressure(force)
+    assert [law.at_pressure(value).separation for value in force] == whole.separation.tolist()
+    assert [law.at_pressure(value).stiffness for value in force] == whole.stiffness.tolist()
+    np.testing.assert_array_equal(law.separation(pressure=force), whole.separation)
+    labelled = xr.DataArray(force, dims="a")
+    for given in (labelled, labelled.chunk(100)):
+        back = law.separation(pressure=given)
+        assert (back.dims, back.chunks) == (("a",), given.chunks)
+        np.testing.assert_array_equal(back, whole.separation)
+    np.testing.assert_array_equal(law.leakage(separation=d), [law.leakage(separation=gap) for gap in d])
+
+
+def filled(law, d, count=5):
+    out = np.full((5, d.size), -7.0)
+    bad = core.law_fill(d, law.block, *(out[k] if k < count else None for k in range(5)))
+    return bad, out
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_gaps_outside_are_nan_and_counted(name):
+    law = core_law_of(name)
+    d = np.concatenate([gaps_of(law, 500), NO_GAPS, gaps_of(law, 500), [-math.inf]])
+    outside = np.isin(np.arange(d.size), [*range(1009, 1009 + len(NO_GAPS)), d.size - 1])
+    bad, out = filled(law, d)
+    assert bad == outside.sum()
+    assert (np.isnan(out) == outside).all()
+    assert (law.leakage(separation=d[~outside]) >= 0).all()
+    for gap in NO_GAPS:
+        for ask in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy, law.values, law.leakage):
+            for given in (gap, np.array([gap]), np.array([1.0, gap]), np.full(2000, gap)):
+                with pytest.raises(OutOfRangeError, match=r"^separation must be") as caught:
+                    ask(separation=given)
+                assert caught.value.mask.sum() == np.size(given) - (np.size(given) == 2)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("which", [at.FORCE, at.AREA])
+def test_values_that_no_gap_has_are_nan_and_counted(name, which):
+    law = core_law_of(name)
+    inverse = law._inverse_block(at.QUANTITIES[which])
+    most = float((law.pressure, law.area)[which](separation=inverse[5]))
+    wanted = np.array([0.5 * most, math.nan, math.inf, -math.inf, -1.0, 1.001 * most, 1e300, 0.1 * most, -5e-324])
+    gap, area, stiffness = np.empty((3, wanted.size))
+    assert core.law_invert(wanted, law.block, inverse, which, gap, area, stiffness) == 7
+    for found in (gap, area, stiffness):
+        assert np.isfinite(found).tolist() == [True, *[False] * 6, True, False]
+    for bad in (math.nan, [math.inf], np.array([0.1 * most, math.nan])):
+        with pytest.raises(OutOfRangeError, match=f"{at.QUANTITIES[which]} must be finite"):
+            law.separation(**{at.QUANTITIES[which]: bad})
+    for tiny in (0.0, 5e-324, 1e-310):
+        if math.isinf(law.highest):
+            assert law.separation(**{at.QUANTITIES[which]: tiny}) == law.h_max
+
+
+def test_broken_blocks_are_refused():
+    law = core_law_of("calibrated")
+    out, d = np.empty(1), np.zeros(1)
+
+    def refused(block):
+        with pytest.raises(ValueError, match="sizes of the arrays of law_fill do not match"):
+            core.law_fill(d, block, out, None, None, None, None)
+
+    for words in (0, 1, at.HEAD, int(law.block.view(np.int64)[at.RECORDS]), law.block.size - 1):
+        refused(law.block[:words].copy())
+    for word, values in {
+        at.RECORDS: (-1, 0, at.HEAD - 1, at.HEAD, 1 << 62, -(1 << 63)),
+        at.EXPONENT: (-1, 0, 1022, 1 << 40, -(1 << 63)),
+        at.MINUS_ROWS: (-1, 1 << 40),
+        at.HIGH: (math.inf, math.nan, -1.0, 2.0),
+    }.items():
+        for value in values:
+            block = law.block.copy()
+            (block.view(np.int64) if isinstance(value, int) else block)[word] = value
+            refused(block)
+    with pytest.raises(ValueError, match="do not match"):
+        core.law_fill(d, law.block, np.empty(2), None, None, None, None)
+    with pytest.raises(TypeError, match="an array of 'd' was expected"):
+        core.law_fill(d.astype(np.float32), law.block, out, None, None, None, None)
+
+
+def test_questions_that_are_none():
+    law = core_law_of("mbma")
+    for ask in (law.pressure, law.energy):
+        with pytest.raises(TypeError, match="one mean separation is taken, or separation=, got 2 arguments"):
+            ask(1.0, 2.0)
+        with pytest.raises(TypeError, match="unexpected keyword argument 'v': mean_separation or separation is taken"):
+            ask(v=1.0)
+        with pytest.raises(TypeError, match="unexpected keyword argument 'mean_separation'"):
+            ask(1.0, mean_separation=1.0)
+
+
+def test_a_law_is_answered_without_leaving_anything():
+    law = core_law_of("mbma")
+    d = np.linspace(0, 2, 10)
+    law.pressure(separation=d), law.pressure(separation=1.0)
+    before = sys.getrefcount(law.block), sys.getrefcount(d)
+    for _ in range(100):
+        law.pressure(separation=d), law.pressure(separation=1.0), law.area(1.0)
+        with pytest.raises(OutOfRangeError):
+            law.pressure(separation=np.array([math.nan]))
+    assert (sys.getrefcount(law.block), sys.getrefcount(d)) == before
