@@ -19,7 +19,7 @@ SOLVER = (
     "mbma_tables.islands.spectral",
     "mbma_tables.islands.greenwood_tripp",
 )
-GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.islands.four_numbers")
+GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.models.island4d")
 MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 
