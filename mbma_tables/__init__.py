@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact as Contact
     from mbma_tables.answers.sensitivity import sensitivity as sensitivity
     from mbma_tables.islands import greenwood_tripp as greenwood_tripp
-    from mbma_tables.islands.height_integrals import height_integral as height_integral
+    from mbma_tables.islands.greenwood_tripp import height_integral as height_integral
     from mbma_tables.joint import Joint as Joint
     from mbma_tables.law.law import ContactLaw as ContactLaw
     from mbma_tables.law.make import contact_law as contact_law
@@ -50,23 +50,24 @@ _HOMES = {
     "contact": "mbma_tables.answers.contact",
     "contact_law": "mbma_tables.law.make",
     "flow_factors": "mbma_tables.answers.film",
-    "height_integral": "mbma_tables.islands.height_integrals",
+    "height_integral": "mbma_tables.islands.greenwood_tripp",
     "island": "mbma_tables.totals.island",
     "open_table": "mbma_tables.models.tables",
     "rough_contact": "mbma_tables.law.rough_body",
     "sensitivity": "mbma_tables.answers.sensitivity",
+    # modules
+    "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
+    "theories": "mbma_tables.theories",
 }
-_MODULES = {"greenwood_tripp": "mbma_tables.islands.greenwood_tripp", "theories": "mbma_tables.theories"}
 
-__all__ = sorted([*_ERRORS, *_HOMES, *_MODULES])
+__all__ = sorted([*_ERRORS, *_HOMES])
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return importlib.import_module(_MODULES[name])
-    if name in _HOMES:
-        return getattr(importlib.import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'mbma_tables' has no attribute {name!r}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mbma_tables' has no attribute {name!r}")
+    module = importlib.import_module(_HOMES[name])
+    return getattr(module, name, module)
 
 
 def __dir__() -> list[str]:

@@ -23,10 +23,9 @@ from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedErr
 from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, to_axes
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.island4d import spline_of
+from mbma_tables.islands.greenwood_tripp import height_integral
+from mbma_tables.models.island4d import SPHERE_FLOOR, band_fields, spline_of, to_axes
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell

@@ -41,7 +41,7 @@ MEANINGS = {
     "xy": "flow coefficient of flow along one axis by pressure along the other",
     "hydraulic_aperture": "K^(1/3)",
     "flow_factor": "K over the cube of the mean separation",
-    "scatter": "standard deviation of ln K from simulation to simulation",
+    "scatter": "model uncertainty: standard deviation of ln K",
     "valid": "whether flow through such contacts was simulated",
     "blocked": "whether contact percolates",
 }
@@ -105,7 +105,7 @@ class Leakage(Displayed):
 
     @functools.cached_property
     def scatter(self) -> Any:
-        """Standard deviation of ln K from simulation to simulation, cells of four or more longest wavelengths a side.
+        """Model uncertainty, one standard deviation of ln K, of cells at least four longest wavelengths wide.
 
         NaN where not known, and where blocked.
         """

@@ -38,10 +38,10 @@ MEANINGS = {
     "unloading_stiffness": "-dF/du per nominal area of a small unloading",
     "plane_separation": "gap between mean planes",
     "error": "bound on the relative numerical error against the theory",
-    "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
-    "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
-    "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, between simulations",
-    "separation_scatter": "standard deviation of the mean separation at this force from simulation to simulation",
+    "scatter": "model uncertainty: standard deviation of ln F at this mean separation",
+    "area_scatter": "model uncertainty: standard deviation of ln A at this pressure",
+    "stiffness_scatter": "model uncertainty: standard deviation of ln of the unloading stiffness at this pressure",
+    "separation_scatter": "model uncertainty: standard deviation of the mean separation at this pressure",
     "valid": "whether the theory was tested for such contacts",
 }
 MAX_GRADIENT = 1.0  # larger rms gradients suggest that heights and wavenumbers are in different units

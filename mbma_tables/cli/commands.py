@@ -125,12 +125,8 @@ def curve_command(
     picture = b""
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
-        own = np.asarray(answer.mean_separation / surface.h_rms)
-        curves = [answer.curve(leakage)]
-        for name in (name for name in DRAWN if name != model.theory):
-            line = other_theory(name, surface, gap, modulus, asked.get("hardness", math.inf))
-            known = np.isfinite(line.pressure)
-            curves.append(plots.Curve(plots.theory_label(name), own[known], *(field[known] for field in line)))
+        cap, others = asked.get("hardness", math.inf), [name for name in DRAWN if name != model.theory]
+        curves = [answer.curve(leakage), *(other_theory(name, surface, gap, modulus, cap) for name in others)]
         labels = plots.pressure_label(unit_of("pressure", specimen.units))
         flow = plots.leakage_label(unit_of("leakage", specimen.units))
         picture = plots.to_picture(plots.draw_compression(curves, title, labels, leakage_label=flow), plot.suffix[1:])

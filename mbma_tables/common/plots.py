@@ -25,7 +25,7 @@ KINDS = ("png", "svg", "pdf")  # formats of files of pictures
 GAP_LABEL = "mean separation  u/h_rms"
 PRESSURE_LABEL = "pressure  F/(A0 E*)"
 LEAKAGE_LABEL = "flow coefficient  k h_rms^3"
-LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "persson_simplified": "Persson, simplified"}
+LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson"}
 
 
 def theory_label(name: str) -> str:

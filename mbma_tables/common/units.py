@@ -146,23 +146,16 @@ class Units:
         """Conductivities and the unit that they have over this unit of length, which is an SI unit of texts."""
         if not any(isinstance(value, str) for value in given):
             return list(given), f"conductivity/{unit_of('separation', self)}"
-        numbers, units = [], set()
-        for value in given:
-            found = _NUMBER.fullmatch(str(value))
-            unit = None if found is None else re.sub(r"[\s()*]", "", found[2]).replace("/m/K", "/mK")
-            if found is None or unit not in CONDUCTIVITIES:
-                raise InputError(
-                    f"conductivities are numbers, or all texts such as '45 W/(m K)' or '6e7 S/m', got {value!r}"
-                )
-            numbers.append(float(found[1]))
-            units.add(CONDUCTIVITIES[unit])
-        if len(units) > 1:
-            raise InputError(f"conductivities must be in one unit, got {' and '.join(map(repr, given))}")
+        found: list[Any] = [_NUMBER.fullmatch(str(value)) for value in given]
+        names = {re.sub(r"[\s()*]", "", each[2]).replace("/m/K", "/mK") if each else "" for each in found}
+        if len(names) > 1 or not names <= CONDUCTIVITIES.keys():
+            allowed = "numbers, or texts in one unit such as '45 W/(m K)' or '6e7 S/m'"
+            raise InputError(f"conductivities are {allowed}, got {' and '.join(map(repr, given))}")
         if self.length is None:
             raise InputError(
                 f"conductivity {given[0]!r} beside lengths whose unit is not known: give the surface its unit"
             )
-        return [number * factor("m", self.length) for number in numbers], units.pop()
+        return [float(each[1]) * factor("m", self.length) for each in found], CONDUCTIVITIES[names.pop()]
 
 
 UNKNOWN = Units()

@@ -2,11 +2,9 @@
 
 
 def __getattr__(name: str) -> tuple[str, ...]:
-    """Names of the targets of a group: SOLVERS, FIELDS, DATA, LAWS, SUBROUTINES, FMUS, CODE."""
-    from mbma_tables.export.targets import GROUPS, group, names
+    """Names of the targets of a group: SOLVERS, DATA, LAWS, FMUS, CODE."""
+    from mbma_tables.export.targets import GROUPS, names
 
-    if name == "SUBROUTINES":
-        return tuple(target.name for target in group("LAWS").values() if "leakage" not in target.takes)
     if name not in GROUPS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return names(name)

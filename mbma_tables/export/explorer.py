@@ -33,7 +33,6 @@ from mbma_tables.theories import calibrated, calibrated_table, mbma
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
 SHOWN_VARIANTS = (REPORTED, PRINTED, FITTED)
-VARIANT_NAMES = tuple(variant.name for variant in SHOWN_VARIANTS)
 SCRIPTS = ("model.js", "state.js", "hardness.js", "curves.js", "downloads.js", "charts.js", "main.js")
 MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
@@ -117,7 +116,8 @@ def explorer_page(
     theory, chosen = theory or ("calibrated" if measured else "mbma"), get_variant(variant)
     if theory == "mbma" and measured:
         raise InputError("MBMA in the page is of five numbers: take another theory, or surface.fit()")
-    for what, given, known in (("theories", theory, THEORIES), ("variants", chosen.name, VARIANT_NAMES)):
+    names = tuple(one.name for one in SHOWN_VARIANTS)
+    for what, given, known in (("theories", theory, THEORIES), ("variants", chosen.name, names)):
         if given not in known:
             raise InputError(f"the page has the {what} {known}, got {given!r}")
     modulus = 1.0 if E_star is None else number_in("E_star", float(positive_array("E_star", E_star)), 1e-300, 1e300)

@@ -33,6 +33,7 @@ LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
 ROUNDS, PARTS = 4, 32  # rounds and parts of the search for an end of validity between two of them
+KAPPA = 0.5, 2.0  # range of normal over tangential stiffness
 OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a surface given by a spectrum
 
 
@@ -77,6 +78,20 @@ class ExportedLaw:
         """Numbers of a joint required by some programs, with their units."""
         own = {"h_rms": (float(self.surface.h_rms), self.length)}
         return own | {"rms_gradient": (float(self.surface.rms_gradient), "1"), "E_star": (self.modulus, self.stress)}
+
+    def slope(
+        self, quantity: str, conductivity: float | None = None, unit: str | None = None, kappa: Any = None
+    ) -> tuple[float, str]:
+        """Conductance, or tangential stiffness, over the law's slope, and its unit; of k_s, or of normal stiffness."""
+        if quantity == "tangential_stiffness":
+            return 1 / number_in("kappa", kappa, *KAPPA), f"{self.stress}/{self.length}"
+        if conductivity is None:
+            raise InputError("conductance needs conductivity, which is missing: k_s = 2 k1 k2/(k1 + k2)")
+        if not unit:
+            raise InputError("conductance needs conductivity_unit, which is missing: that of k_s, such as 'W/(m K)'")
+        if not isinstance(unit, str) or not unit.isprintable():
+            raise InputError(f"conductivity_unit is not printable: {unit!r}")
+        return number_in("conductivity", conductivity, 1e-300, 1e300) / self.modulus, f"{unit}/{self.length}"
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:
@@ -157,7 +172,8 @@ class ExportedLaw:
         spread = self._spread("one standard deviation of ln p at a given c", found.scatter, pressure)
         yield f"scatter of simulations about the theory, {spread}"
         if leakage:
-            yield from self._of_leakage(found.leakage.scatter, pressure)
+            spread = self._spread("one standard deviation of ln K", found.leakage.scatter, pressure)
+            yield from self._of_leakage(spread)
 
     def _last_valid(self, reason: str, good: float, bad: float, leakage: bool, rounding: str) -> str:
         """Pressure, rounded outward, at the last separation where a reason does not apply, by bisection between two."""
@@ -190,23 +206,22 @@ class ExportedLaw:
         listed = ", ".join(f"{sizes[k]:.2g} at {pressure[k]:.3g}" for k in places)
         return f"{what}: {listed} {self.stress}" if listed else "not known"
 
-    def _of_leakage(self, scatter: Numbers, pressure: FloatArray) -> tuple[str, ...]:
+    def _of_leakage(self, scatter: str) -> Iterator[str]:
         """Lines on leakage."""
-        blocked, least = self.leakage.blocked_at, "never blocked"
-        if blocked > -np.inf:
-            c = (self.law.h_max - blocked) / 2
-            load = float(self.law.pressure(separation=blocked))
-            least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
+        blocked, stress = self.leakage.blocked_at, self.stress
         way = "" if self.law.gaps is None else f", direction {self.direction or 'both, their geometric mean'}"
-        return (
+        yield (
             f"leakage is the flow coefficient K [{self.length}^3] of the gaps{way}: flow per length of seal is "
-            f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "
-            f"{1e-3 * factor('Pa', self.stress, 'stress'):.4g} {self.stress} s",
-            least,
-            f"K is within {self.leakage.error:.1e} of that at the law's area",
-            "scatter of K from simulation to simulation, "
-            + self._spread("one standard deviation of ln K", scatter, pressure),
+            f"K dp/(12 viscosity width), viscosity in {stress} s: 1e-3 Pa s, as water's, is "
+            f"{1e-3 * factor('Pa', stress, 'stress'):.4g} {stress} s"
         )
+        if blocked > -np.inf:
+            load, c = float(self.law.pressure(separation=blocked)), (self.law.h_max - blocked) / 2
+            yield f"blocked, K = 0, from p = {load:.10g} {stress}, c = {c:.10g} on"
+        else:
+            yield "never blocked"
+        yield f"K is within {self.leakage.error:.1e} of that at the law's area"
+        yield f"scatter of K from simulation to simulation, {scatter}"
 
 
 def exported_law(
@@ -248,19 +263,3 @@ def _known(name: str, unit: str | None) -> str:
         sample = {"length_unit": "'0.8 um'", "stress_unit": "E_star = '115 GPa'"}[name]
         raise InputError(f"{name} is missing: give it, or numbers with units, like {sample}")
     return unit
-
-
-def checked_kappa(kappa: Any) -> float:
-    """Normal over tangential stiffness."""
-    return number_in("kappa", kappa, 0.5, 2.0)
-
-
-def checked_conductivity(conductivity: float | None, unit: str | None) -> tuple[float, str]:
-    """k_s = 2 k1 k2/(k1 + k2) and its unit, both needed for a conductance."""
-    if conductivity is None:
-        raise InputError("conductance needs conductivity, which is missing: k_s = 2 k1 k2/(k1 + k2)")
-    if not unit:
-        raise InputError("conductance needs conductivity_unit, which is missing: that of k_s, such as 'W/(m K)'")
-    if not isinstance(unit, str) or not unit.isprintable():
-        raise InputError(f"conductivity_unit is not printable: {unit!r}")
-    return number_in("conductivity", conductivity, 1e-300, 1e300), unit

@@ -9,15 +9,8 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
-from mbma_tables.export.law_languages import (
-    FORTRAN_FUNCTION,
-    FORTRAN_INTERFACE,
-    LANGUAGES,
-    Language,
-    flow_numbers,
-    law_numbers,
-)
+from mbma_tables.export.exported_law import ExportedLaw, exported_law
+from mbma_tables.export.law_languages import LANGUAGES, Language, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import braces, checked_name, core_file, filled, numerals, opening, page_file, wrapped
 from mbma_tables.law import block as at
@@ -128,11 +121,9 @@ def asked_law(
     exported = exported_law(surface, E_star, **options)
     length, stress, law = exported.length, exported.stress, exported.law
     slopes, more = {}, {}
-    if conducts:
-        k_s, k_unit = checked_conductivity(conductivity, conductivity_unit)
-        slopes["conductance"], more["conductance"] = k_s / exported.modulus, f"{k_unit}/{length}"
-    if kappa is not None:
-        slopes["tangential_stiffness"], more["tangential_stiffness"] = 1 / checked_kappa(kappa), f"{stress}/{length}"
+    for quantity, wanted in (("conductance", conducts), ("tangential_stiffness", kappa is not None)):
+        if wanted:
+            slopes[quantity], more[quantity] = exported.slope(quantity, conductivity, conductivity_unit, kappa)
     if leakage:
         more["leakage"] = f"{length}^3"
     sloped, factor = law.unloading if slopes else (law, 1.0)
@@ -181,7 +172,11 @@ def text_of(target: str, asked: AskedLaw, template: str = "") -> str:
     }
     if template:
         return filled(template, each, **parts)
-    if language.array is None:
+    if target == "fortran-law":  # all functions are alike, but for the one of two answers
+        public = [what for what in FUNCTIONS if what in asked.more or what not in MORE]
+        parts["PUBLIC"], each = ", ".join(public), dict.fromkeys(public, "")
+        del each["with_tangent"]
+    elif language.array is None:
         parts |= _core(target, asked)
     else:
         parts |= _numbers(language, "", law_numbers(exported.law))
@@ -220,12 +215,9 @@ def _core(target: str, asked: AskedLaw) -> dict[str, str]:
         held = {"WASM": page_file(LAW_MODULE)}
         held |= {f"{own}_BLOCK": block.astype("<f8", copy=False).tobytes() for own, block in blocks.items()}
         return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
-    whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
     return parts | {
         "CORE": core_text(name),
         "DECLARED": filled("law.h", dict.fromkeys(asked.slopes, ""), HEADER="", NAME=name, LEAKAGE=leaks).lstrip(),
-        "INTERFACES": "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats),
-        "FUNCTIONS": "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats),
         "LAWS": "".join(_data(own, block) for own, block in blocks.items()).rstrip(),
     }
 

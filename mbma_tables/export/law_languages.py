@@ -151,19 +151,6 @@ C = Language(
     "{name}_{what}({x})",
     beside=((".h", "law.h"),),
 )
-FORTRAN_INTERFACE = """\
-    pure function c_{what}(x) bind(c, name="{name}_{what}") result(y)
-      import :: dp
-      real(dp), intent(in), value :: x
-      real(dp) :: y
-    end function c_{what}"""
-FORTRAN_FUNCTION = """\
-  elemental function {what}(x) result(y)
-    real(dp), intent(in) :: x
-    real(dp) :: y
-    y = c_{what}(x)
-  end function {what}
-"""
 CALLED = (
     "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
     "tests; not run in Abaqus."

@@ -14,7 +14,7 @@ import numpy as np
 from mbma_tables.answers.film import flow_factors
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.exported_law import ExportedLaw, checked_conductivity, checked_kappa, exported_law
+from mbma_tables.export.exported_law import KAPPA, ExportedLaw, exported_law
 from mbma_tables.export.law_table import MAX_ROWS, MIN_ROWS, LawTable, chosen_rows, rounded
 from mbma_tables.export.targets import AGAINST
 from mbma_tables.law.force_law import ForceLaw
@@ -134,11 +134,11 @@ def describe_law(
     said: list[str] = []
     if heat:
         behaviour = _table(exported, "pressure", unit, least, end, choose, 1.0, facts)
-        k_s, k_unit = checked_conductivity(conductivity, conductivity_unit)
-        scale, unit = k_s / exported.modulus, f"{k_unit}/{exported.length}"
-        facts = facts | {"conductivity": (k_s, k_unit)}
+        scale, unit = exported.slope(quantity, conductivity, conductivity_unit)
+        assert conductivity is not None
+        facts = facts | {"conductivity": (float(conductivity), str(conductivity_unit))}
     elif quantity == "tangential_stiffness":
-        scale, unit = 1 / checked_kappa(kappa), f"{unit}/{exported.length}"
+        scale, unit = exported.slope(quantity, kappa=kappa)
     elif quantity != "pressure":
         unit = exported.length if quantity == "hydraulic_aperture" else f"{exported.length}^3"
     if friction is not None:
@@ -180,7 +180,7 @@ def _friction(
         raise InputError("friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures")
     ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
     at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
-    ratio = checked_kappa(kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa)
+    ratio = number_in("kappa", kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa, *KAPPA)
 
     def stiffness(p: float) -> float:
         return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
@@ -256,11 +256,11 @@ def _range(exported: ExportedLaw, pressures: tuple[float | str, float | str] | N
     law, units = exported.law, exported.law.units
     if pressures is None:
         return None, exported.c_turn
-    if not isinstance(pressures, tuple | list | np.ndarray) or len(pressures) != 2:
+    two = isinstance(pressures, tuple | list | np.ndarray) and len(pressures) == 2
+    ends = [number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in (pressures if two else ())]
+    if not two or ends[0] >= ends[1]:
         raise InputError(f"pressures must be two rising numbers, got {pressures!r}")
-    low, high = (number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in pressures)
-    if low >= high:
-        raise InputError(f"pressures must be two rising numbers, got {low:g} and {high:g}")
+    low, high = ends
     found = (law.h_max - float(law.at_pressure(high).separation)) / 2
     if found <= 0:
         least = f"{float(law.pressure(law.h_max)):.4g} {units.stress}"

@@ -20,7 +20,7 @@ CODE = LAW | {"name", "leakage", "direction"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {
-    "SOLVERS": "solvers", "FIELDS": "fields", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "c_code",
+    "SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "c_code",
 }  # fmt: skip
 SI = ("m", "Pa")
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
@@ -70,7 +70,7 @@ class Grammar:
     units: tuple[str, str] | None = None  # of length and of stress, if they are prescribed
     friction: str = ""  # notes for the user of its friction card; empty without one
 
-    def __call__(self, law: LawTable, name: str | None = None, **numbers: int) -> str:
+    def __call__(self, law: LawTable, name: str | None = None) -> str:
         """The text of a file; a law that the program does not take raises an `InputError`."""
         own, most = tuple(law.facts[fact][1] for fact in ("h_rms", "E_star")), self.most.get(law.y_name, law.x.size)
         taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
@@ -85,7 +85,7 @@ class Grammar:
         named = {} if self.named is None else {"name": checked_name(self.named if name is None else name, MAX_NAME)}
         said = [self.friction] if "friction" in law.facts else []
         head = comment([*law.comments, *said, self.beyond], self.mark)
-        return self.first + head + self.body[law.quantity](law, **named, **numbers)
+        return self.first + head + self.body[law.quantity](law, **named)
 
     def target(self, name: str) -> Target:
         """The target of this name."""

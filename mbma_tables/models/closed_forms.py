@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, answered, broadcast_shape, finite_array, positive_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.core import core
-from mbma_tables.models import IslandAnswer
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.universal import Ranged
 from mbma_tables.surfaces.surface import Surface
@@ -18,8 +17,6 @@ from mbma_tables.surfaces.surface import Surface
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
-
-
 NAMES = [(form, name) for form in ISLAND_FORMS for name in RESULTS] + [(TOTALS, "pressure"), (TOTALS, "area")]
 
 
@@ -64,19 +61,14 @@ class FormulaModel(Ranged):
             raise InputError(f"form must be one of {ISLAND_FORMS}, got {form!r}")
         self.form, self.ranges, self.holds = form, RANGES[form], f", where the {form} form holds"
 
-    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A with the largest error that the form's certificate states, as `UniversalModel.answer`."""
-
-        def fill(flat_X: FloatArray, flat_mu: FloatArray) -> FloatArray:
-            out = np.full((3, flat_X.size), np.nan)
-            (low, high), (least, most) = self.ranges["X"], self.ranges["mu"]
-            inside = (flat_X >= low) & (flat_X <= high) & (flat_mu >= least) & (flat_mu <= most)
-            for row, name in enumerate(RESULTS):
-                out[row, inside] = FUNCTIONS[self.form][name](flat_X[inside], flat_mu[inside])
-            out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in RESULTS)
-            return out
-
-        return self._answered(X, mu, outside, fill)
+    def _rows(self, X: FloatArray, mu: FloatArray) -> FloatArray:
+        out = np.full((3, X.size), np.nan)
+        (low, high), (least, most) = self.ranges["X"], self.ranges["mu"]
+        inside = (low <= X) & (high >= X) & (mu >= least) & (mu <= most)
+        for row, name in enumerate(RESULTS):
+            out[row, inside] = FUNCTIONS[self.form][name](X[inside], mu[inside])
+        out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in RESULTS)
+        return out
 
 
 class ClosedTotals(NamedTuple):

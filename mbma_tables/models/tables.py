@@ -11,8 +11,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.four_numbers import to_axes
-from mbma_tables.models.island4d import Island4dModel
+from mbma_tables.models.island4d import Island4dModel, to_axes
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_table
 from mbma_tables.tablefiles.schema import ARGUMENTS, FUNCTIONS, ISLAND4D, UNIVERSAL, TableContent

@@ -1,7 +1,7 @@
 """The island model of the universal table: Phi_F and Phi_A over (X, mu)."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -24,32 +24,33 @@ class Ranged:
     ranges: Mapping[str, tuple[float, float]]
     holds = ""  # further text of the error beside a range
 
-    def _flat(self, X: ArrayLike, mu: ArrayLike, refuse: bool = True) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Flat arguments and their common shape; an error for those outside the model's range."""
+    def _rows(self, X: FloatArray, mu: FloatArray) -> FloatArray:
+        """Phi_F, Phi_A and error of flat arguments, (3, entries); NaN outside the ranges."""
+        raise NotImplementedError
+
+    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A with a bound on their relative error.
+
+        Parameters
+        ----------
+        X, mu : array_like
+            The arguments of Phi; they broadcast.
+        outside : {"raise", "exact", "nan"}
+            Where X or mu is not covered: an error, the exact solver, or NaN.
+        """
+        check_outside(outside)
         given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
-        for name, array in given.items() if refuse else ():
+        for name, array in given.items() if outside == "raise" else ():
             low, high = self.ranges[name]
             require(name, array, (array >= low) & (array <= high), f"in [{low:g}, {high:g}]{self.holds}")
         require("mu", given["mu"], given["mu"] >= 0, "at least 0")
         shape = broadcast_shape(**given)
         flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
-        return flat_X, flat_mu, shape
-
-    def _answered(
-        self, X: ArrayLike, mu: ArrayLike, outside: str, fill: Callable[[FloatArray, FloatArray], FloatArray]
-    ) -> IslandAnswer:
-        """Rows computed by `fill` from flat arguments, NaN outside the ranges."""
-        check_outside(outside)
-        flat_X, flat_mu, shape = self._flat(X, mu, outside == "raise")
-        out = fill(flat_X, flat_mu)
+        out = self._rows(flat_X, flat_mu)
         missing = np.isnan(out[2])
         if outside == "exact" and missing.any():
             out[:, missing] = SOLVER.answer(flat_X[missing], flat_mu[missing])
         return IslandAnswer(*(row.reshape(shape)[()] for row in out))
-
-    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A at X and mu."""
-        raise NotImplementedError
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands."""
@@ -82,23 +83,10 @@ class UniversalModel(Ranged):
     def __repr__(self) -> str:
         return f"UniversalModel({self.content.describe()})"
 
-    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A with the error bound that the table states.
-
-        Parameters
-        ----------
-        X, mu : array_like
-            The arguments of Phi; they broadcast.
-        outside : {"raise", "exact", "nan"}
-            Where X or mu is not covered: an error, the exact solver, or NaN.
-        """
-
-        def rows(flat_X: FloatArray, flat_mu: FloatArray) -> FloatArray:
-            out = np.empty((flat_X.size, 3))
-            in_blocks(lambda k: core.phi(flat_X[k], flat_mu[k], *self.cells, out[k], None), flat_X.size, BLOCK)
-            return out.T
-
-        return self._answered(X, mu, outside, rows)
+    def _rows(self, X: FloatArray, mu: FloatArray) -> FloatArray:
+        out = np.empty((X.size, 3))
+        in_blocks(lambda block: core.phi(X[block], mu[block], *self.cells, out[block], None), X.size, BLOCK)
+        return out.T
 
     @functools.cached_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:

@@ -76,9 +76,9 @@ class Costs(NamedTuple):
         if not rows:
             return math.nan
         # calls and opening a table have one row, without a tolerance
-        met = [row for row in rows if row.rtol is None or rtol is None or row.rtol <= rtol * (1 + 1e-9)]
-        row = max(met, key=lambda row: row.rtol or 0.0) if met else min(rows, key=lambda row: row.rtol or 0.0)
-        return self.seconds * row.cost
+        by_rtol = sorted((row.rtol or 0.0, row.cost) for row in rows)
+        met = [cost for tight, cost in by_rtol if rtol is None or tight <= rtol * (1 + 1e-9)]
+        return self.seconds * (met[-1] if met else by_rtol[0][1])
 
 
 class Distance(NamedTuple):
@@ -199,16 +199,15 @@ def duration(seconds: float) -> str:
     return f"{seconds / size:.3g} {unit}"
 
 
-def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
+def make_plan(problem: Problem) -> Plan:
     """The steps that meet the tolerance, or the tightest tolerance of `LADDER` whose steps fit the time budget."""
-    measured = shipped_costs() if costs is None else costs
     if problem.rtol is not None:
-        return _Planner(problem, problem.rtol, measured).plan()
+        return _Planner(problem, problem.rtol).plan()
     assert problem.seconds is not None
     least = math.nan
     for rtol in LADDER:
         try:
-            plan = _Planner(problem, rtol, measured).plan()
+            plan = _Planner(problem, rtol).plan()
         except InputError:
             continue  # too tight for the energy
         if plan.error > rtol:
@@ -240,7 +239,7 @@ class _Planner:
 
     problem: Problem
     rtol: float
-    costs: Costs
+    costs: Costs = dataclasses.field(default_factory=shipped_costs)
 
     @property
     def count(self) -> int:

@@ -22,7 +22,6 @@ OUTPUTS = (*OF_CONTACT[:6], *OF_ISLANDS, "comparison", *OF_CONTACT[6:])
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
-COMPARED = (*THEORIES, "persson_simplified")
 PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
 INVERTED = ("pressures", "areas")  # gaps follow from them
 MIN_RTOL, MAX_RTOL, MAX_SECONDS = 1e-10, 0.1, 1e6
@@ -31,7 +30,7 @@ NEEDS = {  # what an effect needs and no other uses
     "yield": ("hardness", "the largest pressure that the softer body bears"),
     "conductance": ("conductivities", "k1 and k2 of the two bodies"),
     "pressure_profile": ("deltas", "the approaches of the islands"),
-    "comparison": ("theories", f"one or more of {', '.join(COMPARED)}"),
+    "comparison": ("theories", f"one or more of {', '.join(THEORIES)}"),
 }
 
 
@@ -173,7 +172,7 @@ class Problem:
         else:
             get_theory(self.theory)
         for name in self.theories:
-            require_name("theory", name, COMPARED)
+            require_name("theory", name, THEORIES)
         if self.theory_name in self.theories:
             raise InputError(f"the scene is by theory {self.theory_name!r} itself: leave it out of theories")
         options = {

@@ -8,13 +8,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbma_tables.answers.source import MEANINGS
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from mbma_tables.theories.mbma import Mbma
-    from mbma_tables.theories.protocol import Theory
 
 VALIDITY = ("valid", "scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
 YIELDED = ("yielded", "mean_pressure", "plane_separation", "unloading_stiffness")
@@ -199,36 +199,19 @@ def profiles(run: Run, step: Step) -> None:
     run.errors[step.name] = float(np.max(solved.error))
 
 
-class OtherTheory(NamedTuple):
-    """Force and area by a theory, and standard deviations of their logarithms; NaN where the theory has none."""
-
-    pressure: FloatArray
-    area: FloatArray
-    scatter: FloatArray
-    area_scatter: FloatArray
-
-
-def other_theory(
-    name: str, surface: AnySurface, gap: FloatArray, E_star: float, hardness: float = math.inf
-) -> OtherTheory:
-    """A theory, one of `problem.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
+def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float, hardness: float = math.inf) -> Curve:
+    """A theory, by its name, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories import get_theory
     from mbma_tables.theories.numerical import answer_where_finite
 
-    if name == "persson_simplified":
-        from mbma_tables.theories.persson import Persson
-
-        theory: Theory = Persson("simplified")
-    else:
-        theory = get_theory(name, surface)
+    theory, u = get_theory(name, surface), (float(surface.h_max) + gap) / 2
     if hardness < math.inf:
         from mbma_tables.theories.yielding import with_hardness
 
         theory = with_hardness(theory, hardness, E_star)
-    found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
-    return OtherTheory(
-        E_star * found.pressure, found.area, *(theory.scatter(surface, name, found.area) for name in found._fields[:2])
-    )
+    found = answer_where_finite(theory, surface, u)
+    scatter = (theory.scatter(surface, quantity, found.area) for quantity in found._fields[:2])
+    return Curve(theory_label(name), u / surface.h_rms, E_star * found.pressure, found.area, *scatter)
 
 
 def comparison(run: Run, step: Step) -> None:

@@ -54,7 +54,7 @@ class Scene(Problem):
     deltas : array_like, optional
         Approaches [length] of the islands of "pressure_profile".
     theories : sequence of str
-        For "comparison": names of other theories, or "persson_simplified".
+        For "comparison": names of other theories.
     points : int
         Points of the distribution of "island_statistics", over the approach.
     title : str, optional
@@ -90,14 +90,32 @@ class Scene(Problem):
         file = pathlib.Path(path)
         entries = read_toml(file, "scene")
         try:
-            return cls(**_arguments(entries, file.parent, file.stem))
+            return cls.from_mapping(entries, file.parent, file.stem)
         except InputError as fault:
             raise InputError(f"{file}: {fault}") from None
 
     @classmethod
-    def from_mapping(cls, content: Mapping[str, Any]) -> Scene:
-        """The scene of the content of a TOML file; paths in it are relative to the current folder."""
-        return cls(**_arguments(content, pathlib.Path(), "scene"))
+    def from_mapping(
+        cls, content: Mapping[str, Any], folder: pathlib.Path = pathlib.Path(), title: str = "scene"
+    ) -> Scene:
+        """The scene of the content of a TOML file; paths in it are relative to `folder`, the current one by default."""
+        check(content, schema())
+        specimen = from_tables(content, folder, title)
+        if content.get("island_statistics") and "island_statistics" not in content["effects"]["on"]:
+            raise InputError("[island_statistics] is given and the effect is off: add it to on, or leave the table out")
+        found: dict[str, Any] = {
+            "surface": specimen.surface,
+            "effects": content["effects"]["on"],
+            "without": content["effects"].get("off", ()),
+            "E_star": specimen.modulus,
+            "title": title,
+        }
+        found |= {name: content[name] for name in ("title", "theory", "variant") if name in content}
+        for name in ("prescribed", "pressure_profile", "accuracy", "island_statistics", "comparison", "yield"):
+            found |= content.get(name, {})
+        if "conductance" in content:
+            found["conductivities"] = (content["conductance"]["k1"], content["conductance"]["k2"])
+        return cls(**found)
 
     def plan(self) -> Plan:
         """The planned steps with island models, tolerances, certified errors and measured costs."""
@@ -124,24 +142,3 @@ class Scene(Problem):
         from mbma_tables.scenes.run import run_plan
 
         return run_plan(self, self.plan())
-
-
-def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> dict[str, Any]:
-    """The arguments of `Scene` from a file's content; files that it names are relative to `folder`."""
-    check(content, schema())
-    specimen = from_tables(content, folder, title)
-    if content.get("island_statistics") and "island_statistics" not in content["effects"]["on"]:
-        raise InputError("[island_statistics] is given and the effect is off: add it to on, or leave the table out")
-    found: dict[str, Any] = {
-        "surface": specimen.surface,
-        "effects": content["effects"]["on"],
-        "without": content["effects"].get("off", ()),
-        "E_star": specimen.modulus,
-        "title": title,
-    }
-    found |= {name: content[name] for name in ("title", "theory", "variant") if name in content}
-    for name in ("prescribed", "pressure_profile", "accuracy", "island_statistics", "comparison", "yield"):
-        found |= content.get(name, {})
-    if "conductance" in content:
-        found["conductivities"] = (content["conductance"]["k1"], content["conductance"]["k2"])
-    return found

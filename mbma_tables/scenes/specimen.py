@@ -224,9 +224,5 @@ def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:
         tables = [name for name, entry in schema()["properties"].items() if unknown in entry.get("properties", ())]
         hint = f"it belongs to [{' or ['.join(f'{name}]' for name in tables)}" if tables else nearest(unknown, known)
         raise InputError(f"{table}: unknown key {unknown!r}; {hint}")
-    if fault.validator == "enum":
-        raise InputError(
-            f"{place}: {fault.instance!r} is not known; {nearest(str(fault.instance), fault.schema['enum'])}"
-        )
     hint = f"; write [{place}]" if fault.validator == "type" and fault.schema["type"] == "object" else ""
     raise InputError(f"{place or table}: {fault.message}{hint}")

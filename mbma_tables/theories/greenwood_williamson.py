@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import datetime
-import hashlib
 import json
 import os
 from collections.abc import Sequence
@@ -83,13 +82,6 @@ def map_of(surface: AnySurface) -> Treated:
             "Surface.from_map, neither combined nor extrapolated nor fitted"
         )
     return whole
-
-
-def origin_of(whole: Treated, tolerance: float) -> str:
-    """Description of the map simulated, and of the method."""
-    digest = hashlib.sha256(np.ascontiguousarray(whole.heights, "<f8").tobytes()).hexdigest()
-    points = " x ".join(map(str, whole.heights.shape))
-    return f"boundary elements, tolerance {tolerance:g}, of the map of {points} points with SHA-256 {digest[:16]}"
 
 
 def _fields(name: str) -> list[str]:

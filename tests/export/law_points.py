@@ -11,6 +11,7 @@ import pytest
 from mbma_tables import ContactLaw, Surface, contact_law
 from mbma_tables.export.law_code import law_text
 
+PLAIN = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")  # of rows of pressure alone
 POINTS = 10_000
 VALUES, TANGENTS = 1e-13, 1e-11  # what agreement is asked of exported laws
 CONDUCTIVITY, KAPPA = 3.0, 1.25

@@ -13,7 +13,7 @@ from law_points import needs
 
 from mbma_tables import InputError, Surface, contact_law, flow_factors
 from mbma_tables.cli import main
-from mbma_tables.export import DATA, data, fields, solvers
+from mbma_tables.export import DATA, data, solvers
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import targets
 
@@ -72,7 +72,7 @@ def test_mbdyn_finds_its_own_numbers_again():
     film = rows_of(**FILM)
     made = {"sigma": 5e-7, "eta": 0.05 / (5e-7 * 2e-6), "beta": 2e-6, "delta": 4e-7, "H0": -100.0}
     own = dataclasses.replace(film, more=dict(film.more) | {"pressure": (pressed(made, film.x, 1.1e11), "Pa")})
-    numbers = read(fields.mbdyn(own, name="joint"))
+    numbers = read(solvers.mbdyn(own, name="joint"))
     assert [numbers[key] for key in ("eta", "beta", "delta")] == pytest.approx(
         [made[key] for key in ("eta", "beta", "delta")], rel=1e-5
     )
@@ -81,7 +81,7 @@ def test_mbdyn_finds_its_own_numbers_again():
 @pytest.mark.parametrize("pressures", [None, ("1 MPa", "50 MPa")])
 def test_mbdyn_reads_the_pressure_within_the_stated_misfit(pressures):
     film = rows_of(**FILM, pressures=pressures)
-    text = fields.mbdyn(film, name="joint")
+    text = solvers.mbdyn(film, name="joint")
     numbers = read(text)
     low, high, unit = re.search(r"fitted from p = (\S+) to (\S+) (\w+),", text.replace("\n# ", " ")).groups()
     root, most = map(float, re.search(r"is (\S+) root mean\s(?:# )?square,\s(?:# )?(\S+) at", text).groups())
@@ -110,7 +110,7 @@ def test_mbdyn_reads_the_pressure_within_the_stated_misfit(pressures):
 
 def test_geos_takes_the_tables():
     law = rows_of(**APERTURE, **RANGE)
-    text = fields.geos(law)
+    text = solvers.geos(law)
     root = xml.etree.ElementTree.fromstring(text)
     held = {
         found.get("name"): [
@@ -149,7 +149,7 @@ def test_geos_takes_the_tables():
 @pytest.mark.parametrize("options", [FILM, HEAT | RANGE, APERTURE | RANGE, {"rows": 30}])
 def test_moose_takes_functions(options):
     law = rows_of(**options)
-    text = fields.moose_function(law, name="f")
+    text = solvers.moose_function(law, name="f")
     blocks = re.findall(
         r"^  \[f_(\w+)\]\n    type = PiecewiseLinear\n    x = '(.*)'\n    y = '(.*)'\n  \[\]$", text, re.M
     )
@@ -161,7 +161,7 @@ def test_moose_takes_functions(options):
 
 def test_lethe_conducts_within_the_stated_misfit():
     law = rows_of(**HEAT, **RANGE)
-    text = fields.lethe(law)
+    text = solvers.lethe(law)
     set_ = {key: float(value) for key, value in re.findall(r"set ([\w ]+) = (\S+)", text)}
     # two faces: squares add up, the harmonic mean of the hardness; calculate_microcontact_resistance times its area
     sigma, slope, H = (
@@ -196,7 +196,7 @@ MESH = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n2\n1 0 0 0\n2 1 0 0\n$EndN
 @pytest.mark.parametrize("options", [FILM, HEAT | RANGE])
 def test_getdp_interpolates(options, tmp_path):
     law = rows_of(**options)
-    (tmp_path / "law.pro").write_text(fields.getdp(law))
+    (tmp_path / "law.pro").write_text(solvers.getdp(law))
     (tmp_path / "a.msh").write_text(f"{MESH}$EndElements\n")
     x = np.linspace(law.x[0], law.x[-1], 7)
     names = list(law.columns)[1:]
@@ -294,12 +294,12 @@ def test_the_command_writes_them(words, ends, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("ask", "said"),
     [
-        (lambda: fields.mbdyn(rows_of()), "MBDyn takes film against mean_separation here, got pressure against"),
-        (lambda: fields.geos(rows_of(**FILM)), "GEOS takes hydraulic_aperture against pressure here, got phi_x"),
-        (lambda: fields.mbdyn(rows_of(**FILM, length_unit="um")), "MBDyn takes m and Pa here, got um and Pa"),
-        (lambda: fields.mbdyn(rows_of(**FILM), name="a b"), "a name must be a letter"),
+        (lambda: solvers.mbdyn(rows_of()), "MBDyn takes film against mean_separation here, got pressure against"),
+        (lambda: solvers.geos(rows_of(**FILM)), "GEOS takes hydraulic_aperture against pressure here, got phi_x"),
+        (lambda: solvers.mbdyn(rows_of(**FILM, length_unit="um")), "MBDyn takes m and Pa here, got um and Pa"),
+        (lambda: solvers.mbdyn(rows_of(**FILM), name="a b"), "a name must be a letter"),
         (
-            lambda: fields.mbdyn(rows_of(**FILM, pressures=("3 GPa", "4 GPa"))),
+            lambda: solvers.mbdyn(rows_of(**FILM, pressures=("3 GPa", "4 GPa"))),
             r"needs 3 rows at pressures with A/A0 <=",
         ),
         (lambda: rows_of(**FILM, rtol=1e-3), "rtol does not belong to quantity='film'"),

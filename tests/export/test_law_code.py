@@ -17,7 +17,7 @@ from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 
 from mbma_tables import Surface, contact_law
 from mbma_tables.core import core
-from mbma_tables.export import LAWS, SUBROUTINES
+from mbma_tables.export import LAWS
 from mbma_tables.export.law_code import core_text, law_text
 from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.text import core_file
@@ -120,7 +120,11 @@ def test_headers_say_what_is_there():
 
 test_requests_that_are_refused = refusals(
     lambda target, law, options: law_points.text(target, law, **options),
-    *((target, "calibrated", HEAT | {"leakage": True}, "has no place for leakage") for target in SUBROUTINES),
+    *(
+        (target, "calibrated", HEAT | {"leakage": True}, "has no place for leakage")
+        for target, each in LANGUAGES.items()
+        if each.subroutine
+    ),
     *((f"{code}-gapcon", "mbma", {}, "conductance needs conductivity") for code in ("abaqus", "calculix")),
     ("jax-law", "hardened", HEAT, "leave the hardness out"),
     ("c-law", "calibrated", {"kappa": 3.0}, "kappa must be"),

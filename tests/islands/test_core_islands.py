@@ -11,8 +11,7 @@ import scipy.special
 
 from mbma_tables import InputError
 from mbma_tables.core import core
-from mbma_tables.islands.greenwood_tripp import COARSE_NODES
-from mbma_tables.islands.height_integrals import ORDERS, height_integral
+from mbma_tables.islands.greenwood_tripp import COARSE_NODES, ORDERS, height_integral
 from mbma_tables.islands.spectral import basis
 
 OK, UNRESOLVED, INVALID = 0, 4, 5

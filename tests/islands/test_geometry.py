@@ -11,8 +11,8 @@ from catalogue import random_surfaces
 
 from generate.tables.exact_geometry import DIGITS, divisor, exact_island
 from mbma_tables import OutOfRangeError, Surface, greenwood_tripp, island
-from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.islands.geometry import FIELDS, geometry
+from mbma_tables.models.island4d import band_fields
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import PRINTED, REPORTED, VARIANTS
 

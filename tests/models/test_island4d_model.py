@@ -5,9 +5,8 @@ import pytest
 from small_tables import small_table
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
-from mbma_tables.islands.four_numbers import SPHERE_FLOOR, to_axes
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models.island4d import Island4dModel
+from mbma_tables.models.island4d import SPHERE_FLOOR, Island4dModel, to_axes
 from mbma_tables.models.tables import open_table
 from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.tablefiles.schema import ISLAND4D

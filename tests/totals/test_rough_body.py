@@ -13,7 +13,7 @@ from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, r
 from mbma_tables.export.law_code import law_files, law_text
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import targets
-from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.law.force_law import plane_basis
 from mbma_tables.law.rough_body import CELLS
 from mbma_tables.theories import Theory, TheoryAnswer
