@@ -15,8 +15,9 @@ import sympy
 from matplotlib.colors import LogNorm
 
 from benchmarks.import_circles import import_graph
+from generate.boundary_elements.evidence import evidence
 from generate.distances import pocket_errors
-from generate.files import ROOT, evidence
+from generate.files import ROOT
 from generate.formulas import HEADER, Function, read_functions
 from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact

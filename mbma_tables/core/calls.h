@@ -73,7 +73,11 @@ static bool are_panels(const argument *a) {
 
 #define BASIS(k) ((const mbma_basis[]){{N(k), P(k), P((k) + 1), P((k) + 2), P((k) + 3)}})
 #define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
-#define INVERSE(k) ((const mbma_inverse[]){mbma_inverse_open(P(k), N(k))})
+/* Records of an inverse, of whose words the first ones are its head. */
+#define GUESSES(k) ((N(k) - WORDS(mbma_inverse)) / WORDS(mbma_inverse_record) + 1)
+static bool is_inverse(const argument *a) {
+    return a->n >= WORDS(mbma_inverse) && (a->n - WORDS(mbma_inverse)) % WORDS(mbma_inverse_record) == 0;
+}
 
 /* First in all calls: coefficients; first nodes, rates, ends of the range, three constants; cells; of surfaces
  * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
@@ -142,8 +146,8 @@ static mbma_spline spline_of(const argument *a) {
        mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \
     FN(inverse_nodes, "Dn D i d wn wn", LAW(1)->head, \
        mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
-    FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head, \
-       mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
+    FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && is_inverse(&a[2]), \
+       mbma_law_invert(N(0), P(0), LAW(1), P(2), GUESSES(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
     /* calibrated.c */ \
     FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \
        mbma_spline_pieces(LOG_FORCE, SURFACES, P(8))) \

@@ -32,17 +32,13 @@ class Call(NamedTuple):
 
     def packed(self):
         """For replay.c."""
-        parts = [struct.pack("<64si", self.name.encode(), len(self.given))]
+        parts = [struct.pack("<64sq", self.name.encode(), len(self.given))]
         for one in self.given:
-            if one is None:
-                parts.append(struct.pack("<i", ord("N")))
-            elif isinstance(one, np.ndarray):
-                kind = {"q": "l", "?": "B"}.get(one.dtype.char, one.dtype.char)
-                parts += [struct.pack("<iiiI", ord("A"), ord(kind), one.itemsize, one.nbytes), one.tobytes()]
-            elif isinstance(one, float):
-                parts.append(struct.pack("<id", ord("d"), one))
+            if isinstance(one, np.ndarray):
+                parts += [struct.pack("<qqqd", one.nbytes, one.itemsize, 0, 0.0), one.tobytes()]
             else:
-                parts.append(struct.pack("<iq", ord("i"), operator.index(one)))
+                whole = 0 if one is None or isinstance(one, float) else operator.index(one)
+                parts.append(struct.pack("<qqqd", -1, 1, whole, 0.0 if one is None else one))
         return b"".join(parts)
 
 

@@ -13,12 +13,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.special import erf
 
-from generate.boundary_elements.evidence import cases
+from generate.boundary_elements.evidence import cases, evidence
 from generate.boundary_elements.run import surfaces
 from generate.boundary_elements.studies import LIGHT_BINS, compared
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.calibrated import errors
-from generate.files import dataset, evidence
+from generate.files import dataset
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.bearing_curve import QUANTILES
