@@ -46,7 +46,7 @@ class Generator(click.Group):
             click.echo("generate: interrupted", err=True)
             sys.exit(1)
         except ModuleNotFoundError as fault:
-            extras = "wheels" if fault.name in ("abi3info", "lief", "ziglang") else "generate"
+            extras = "wheels" if fault.name == "ziglang" else "generate"
             click.echo(f"generate: {fault}; install the extra: pip install -e '.[{extras}]'", err=True)
             sys.exit(2)
         except (click.ClickException, MbmaError, OSError, RuntimeError) as fault:

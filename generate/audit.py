@@ -6,7 +6,6 @@ README and docs/guarantees.md quote the counts.
 import functools
 import itertools
 import reprlib
-import signal
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -17,13 +16,15 @@ import hypothesis
 import numpy as np
 from hypothesis import strategies as st
 
-from generate.files import ROOT, evidence
+from generate.boundary_elements.evidence import evidence
+from generate.files import ROOT
 from generate.page import table
 from generate.page import write as write_page
 from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
 from mbma_tables.laws.calibrated import self_affine_law
 
 LONGEST = 10.0  # seconds of one request
+RANGES = ((0.05, 1.0), (np.log(3.1), np.log(1e5)), (1.0, 32.0), (-7.0, -0.5), (3.0, 9.0))  # of searches
 GAPS = 20  # of one surface
 ROUNDED = 4 * np.finfo(float).eps  # of a mean separation
 FORMATS = "{} | {:,} | {:,} | {} | {:.2g}"
@@ -39,14 +40,6 @@ class Found(NamedTuple):
     beyond: int
     worst: float
     where: str
-
-
-class Hang(BaseException):
-    """A request took longer than `LONGEST`; no handler of the library catches it."""
-
-
-def _hang(*_: Any) -> None:
-    raise Hang(f"longer than {LONGEST:g} s")
 
 
 def surface_of(hurst: float, log_zeta: float, height: float) -> Surface:
@@ -110,27 +103,18 @@ BOUNDS: dict[str, tuple[Callable[..., np.ndarray], int, dict[str, Any]]] = {
 }
 
 
-def bound(what: str, seed: int, scale: float) -> Found:
+def bound(what: str, seed: int, scale: float) -> list[Found]:
     """Search for surfaces, gaps and tolerances at which an answer is farthest from its reference."""
     ratio, examples, options = BOUNDS[what]
     count = refused = beyond = 0
     worst, where = 0.0, ""
+    phases, unchecked = [hypothesis.Phase.generate, hypothesis.Phase.target], list(hypothesis.HealthCheck)
+    options_of_search: dict[str, Any] = {"phases": phases, "suppress_health_check": unchecked, "database": None}
 
     @hypothesis.seed(seed)
-    @hypothesis.settings(
-        max_examples=max(int(scale * examples), 1),
-        deadline=None,
-        database=None,
-        phases=[hypothesis.Phase.generate, hypothesis.Phase.target],
-        suppress_health_check=list(hypothesis.HealthCheck),
-    )
-    @hypothesis.given(
-        hurst=st.floats(0.05, 1.0),
-        log_zeta=st.floats(np.log(3.1), np.log(1e5)),
-        height=st.floats(1.0, 32.0),
-        nearest=st.floats(-7.0, -0.5),
-        digits=st.floats(3.0, 9.0),
-    )
+    @hypothesis.settings(max_examples=max(int(scale * examples), 1), deadline=None, **options_of_search)
+    # hurst, log_zeta, height, nearest and digits
+    @hypothesis.given(*itertools.starmap(st.floats, RANGES))
     def search(hurst: float, log_zeta: float, height: float, nearest: float, digits: float) -> None:
         nonlocal count, refused, beyond, worst, where
         surface = surface_of(hurst, log_zeta, height)
@@ -150,10 +134,10 @@ def bound(what: str, seed: int, scale: float) -> Found:
         hypothesis.target(min(np.log(max(largest, 1e-12)), 50.0))
 
     search()
-    return Found(what, count, refused, beyond, worst, where)
+    return [Found(what, count, refused, beyond, worst, where)]
 
 
-def validity(seed: int, scale: float) -> Found:
+def validity(seed: int, scale: float) -> list[Found]:
     """Answers that are `valid` outside the ranges of the simulated surfaces in docs/data, or without a scatter."""
     rng, tested_ones = np.random.default_rng(seed), [one for one in evidence() if one.kind == "self_affine"]
     areas = np.concatenate([one.area for one in tested_ones])
@@ -174,7 +158,7 @@ def validity(seed: int, scale: float) -> Found:
         wrong = np.asarray(found.valid) & (found.pressure > 0) & ~(tested & spread)
         count, beyond = count + wrong.size, beyond + int(wrong.sum())
         where = where or (f"{theory}: {surface!r}, A/A0 = {found.area[wrong][0]:.3g}" if wrong.any() else "")
-    return Found("`valid` outside the simulated ranges", count, 0, beyond, float(beyond), where)
+    return [Found("`valid` outside the simulated ranges", count, 0, beyond, float(beyond), where)]
 
 
 NATURAL: list[Any] = [0.3, 1.0, 2, [0.5, 1.0], np.array([[0.2], [0.9]]), "1 um", "0.5 mm", "10 MPa", ["1 um", "2 um"]]
@@ -223,26 +207,25 @@ def requests(rng: np.random.Generator) -> Iterator[tuple[str, Callable[[], Any]]
     def number() -> Any:
         return one(NATURAL if rng.random() < 0.7 else NUMBERS)
 
-    def some(table: dict[str, list[Any]], share: float) -> dict[str, Any]:
-        return {name: one(values) for name, values in table.items() if rng.random() < share}
+    def some(share: float, *names: str) -> dict[str, Any]:
+        return {name: one(OPTIONS[name]) for name in names or OPTIONS if rng.random() < share}
 
     def surface() -> Any:
-        return SURFACES[rng.integers(3)] if rng.random() < 0.8 else one(SURFACES)
+        return one(SURFACES[:3] if rng.random() < 0.8 else SURFACES)
 
     def answer(name: str, *given: Any, **options: Any) -> tuple[str, Callable[[], Any]]:
         shown = [*map(reprlib.repr, given), *(f"{key}={reprlib.repr(value)}" for key, value in options.items())]
         return f"{name}({', '.join(shown)})", functools.partial(CALLS[name], *given, **options)
 
-    few = {name: OPTIONS[name] for name in ("rtol", "hardness", "E_star", "materials")}
-    bare = {name: OPTIONS[name] for name in ("rtol", "E_star", "variant")}
+    few = ("rtol", "hardness", "E_star", "materials")
     while True:
         known = {one(list(KNOWN)): number()}
-        yield answer("contact", surface(), **some(OPTIONS, 0.12), **known)
-        yield answer("law", one(list(METHODS)), number(), surface(), one(OPTIONS["theory"][:4]), **some(few, 0.15))
+        yield answer("contact", surface(), **some(0.12), **known)
+        yield answer("law", one(list(METHODS)), number(), surface(), one(OPTIONS["theory"][:4]), **some(0.15, *few))
         yield answer("surface", *(one(NUMBERS) if rng.random() < 0.3 else x for x in (0.8, 1.0, 100.0, 1.0, 3.0)))
         yield answer("sensitivity", surface(), **known)
         yield answer("flow_factors", surface(), number())
-        yield answer("island", surface(), number(), **some(bare, 0.15))
+        yield answer("island", surface(), number(), **some(0.15, "rtol", "E_star", "variant"))
         part = one([PART, PART | {one(list(PART)): number()}])
         area = one(["4 cm^2", "1 mm^2", number()])
         yield answer("joint", one(["10 MPa", number()]), part, PART, materials=one(METALS), nominal_area=area)
@@ -252,30 +235,26 @@ def failures(seed: int, scale: float) -> list[Found]:
     """Warnings, untyped errors, values that are not finite, and requests of more than 10 s."""
     count, refused, longest, slowest = 0, 0, 0.0, ""
     bad: dict[str, list[str]] = {"a warning": [], "an error of no type": [], f"more than {LONGEST:g} s": []}
-    before = signal.signal(signal.SIGALRM, _hang)
+    warned, untyped, slow = bad.values()
     for given, call in itertools.islice(requests(np.random.default_rng(seed)), int(14000 * scale)):
         start = time.perf_counter()
         try:
-            signal.setitimer(signal.ITIMER_REAL, LONGEST)
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 call()
         except MbmaError:
             refused += 1
-        except (Exception, Hang) as fault:
-            what = 0 if isinstance(fault, Warning) else 2 if isinstance(fault, Hang) else 1
-            [*bad.values()][what].append(f"{given}: {type(fault).__name__}: {fault!s:.200}")
-        finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
+        except Exception as fault:
+            found = warned if isinstance(fault, Warning) else untyped
+            found.append(f"{given}: {type(fault).__name__}: {fault!s:.200}")
         count, taken = count + 1, time.perf_counter() - start
         if taken > longest:
-            longest, slowest = taken, given
-    signal.signal(signal.SIGALRM, before)
-    warned, untyped, slow = (
-        Found(f"random requests: {what}", count, refused, len(all_), len(all_), "\n  ".join(all_))
-        for what, all_ in bad.items()
-    )
-    return [warned, untyped, slow._replace(worst=longest, where=slow.where or f"longest {longest:.2g} s: {slowest}")]
+            longest, slowest = taken, f"longest {taken:.2g} s: {given}"
+        if taken > LONGEST:
+            slow.append(f"{given}: {taken:.2g} s")
+    known = ((what, len(own), "\n  ".join(own)) for what, own in bad.items())
+    *few, last = (Found(f"random requests: {what}", count, refused, size, size, where) for what, size, where in known)
+    return [*few, last._replace(worst=longest, where=last.where or slowest)]
 
 
 @click.command()
@@ -285,19 +264,15 @@ def failures(seed: int, scale: float) -> list[Found]:
 @click.option("--write", is_flag=True, help="Write the counts to docs/guarantees.md.")
 def audit(seed: int, scale: float, only: str, write: bool) -> None:
     """Search for answers beyond their stated error, untested answers that are valid, warnings, errors and hangs."""
-    checks: list[tuple[str, Callable[[], list[Found]]]] = [
-        *((what, lambda what=what: [bound(what, seed, scale)]) for what in BOUNDS),
-        ("valid", lambda: [validity(seed, scale)]),
-        ("requests", lambda: failures(seed, scale)),
-    ]
+    checks: dict[str, Callable[[int, float], list[Found]]] = {
+        **{what: functools.partial(bound, what) for what in BOUNDS}, "valid": validity, "requests": failures,
+    }  # fmt: skip
     rows = []
-    for name, check in checks:
-        if only in name:
-            for found in check():
-                rows.append(found)
-                click.echo(f"{found.what:58}{found.answers:8}{found.refused:7}{found.beyond:7}{found.worst:10.3g}")
-                if found.beyond or found.worst > 0.9:
-                    click.echo(f"  {found.where}")
+    for found in itertools.chain.from_iterable(check(seed, scale) for name, check in checks.items() if only in name):
+        rows.append(found)
+        click.echo(f"{found.what:58}{found.answers:8}{found.refused:7}{found.beyond:7}{found.worst:10.3g}")
+        if found.beyond or found.worst > 0.9:
+            click.echo(f"  {found.where}")
     if write:
         block = f"```\npython -m generate audit --seed {seed} --scale {scale:g} --write\n```\n\n"
         header = "search | answers | refused | beyond | largest"

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from generate import calibrated_hardness
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, TheoryCurve, cases
 from generate.boundary_elements.surfaces import SPLITS, TRAINING
-from generate.calibrated_file import QUANTITIES, by_bin, cross_validated, fitted, within
+from generate.calibrated_file import QUANTITIES, TEXTS, by_bin, cross_validated, fitted, within
 from generate.calibrated_file import write as write_table
 from generate.files import dataset
 from generate.leakage_law import write as write_leakage
@@ -39,28 +39,6 @@ STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
 OPTIONS = {"x_scale": "jac", "diff_step": STEP, "ftol": CLOSE, "xtol": CLOSE}
 LABELS = ("1 wave", "2-3 waves", "4 waves", "stretched", "transformed")
 LARGE = 512  # points a side from which on surfaces are told apart
-PLAIN, FILTERED, EVERY = ("self_affine",), ("plateau", "filtered"), ("self_affine", "plateau", "filtered")
-# form, quantity, range of contact, limit to nine errors in ten, kinds of surfaces, longest waves a side
-BARS = (
-    ("spectrum", "area", (0.01, 0.03), 0.10, PLAIN, (2, 2)),
-    ("spectrum", "area", (0.01, 0.03), 0.05, PLAIN, (3, 99)),
-    ("spectrum", "area", (0.03, 0.97), 0.05, PLAIN, (2, 99)),
-    ("spectrum", "force", (0.01, 0.10), 0.20, PLAIN, (2, 99)),
-    ("spectrum", "force", (0.10, 0.97), 0.08, PLAIN, (2, 99)),
-    ("spectrum", "stiffness", (0.01, 0.10), 0.12, PLAIN, (2, 99)),
-    ("spectrum", "stiffness", (0.10, 0.90), 0.12, PLAIN, (2, 99)),
-    ("spectrum", "stiffness", (0.90, 0.98), 0.12, PLAIN, (2, 99)),
-    ("spectrum", "area", (0.002, 0.97), 0.12, FILTERED, (2, 99)),
-    ("spectrum", "force", (0.002, 0.03), 0.15, FILTERED, (2, 99)),
-    ("spectrum", "force", (0.03, 0.97), 0.10, FILTERED, (2, 99)),
-    ("map", "area", (0.002, 0.97), 0.10, EVERY, (1, 99)),
-    ("map", "force", (0.01, 0.10), 0.10, PLAIN, (2, 99)),
-    ("map", "force", (0.002, 0.01), 0.15, EVERY, (4, 99)),
-    ("map", "force", (0.002, 0.01), 0.25, EVERY, (1, 2)),
-    ("map", "area", (0.002, 0.97), 0.10, ("stretched",), (2, 99)),
-    ("map", "force", (0.002, 0.01), 0.15, ("stretched",), (2, 99)),
-    ("map", "force", (0.01, 0.10), 0.10, ("stretched",), (2, 99)),
-)
 Make = Callable[[Case], Any]
 
 
@@ -195,7 +173,7 @@ def measure(forms: dict[str, pd.DataFrame]) -> list[dict[str, Any]]:
     scatter: no law of the same knowledge that is right in the mean does better. `forms` has errors by form of the law.
     """
     told = []
-    for form, quantity, contact, limit, kinds, (low, high) in BARS:
+    for form, quantity, contact, limit, kinds, (low, high) in TEXTS["bars"]["rows"]:
         frame = forms[form]
         own = frame[frame["kind"].isin(kinds) & frame["waves"].between(low, high)]
         seen = own[own["split"] != TRAINING]

@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import pathlib
+import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
@@ -15,7 +16,7 @@ import xarray as xr
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
 
-from generate.provenance import source_digest, versions
+from generate.files import source_digest, versions
 from generate.splines import coefficients
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
@@ -29,9 +30,11 @@ QUANTITIES = ("area", "force", "stiffness")  # as the file names them: the libra
 FOLDS = 5
 # answered inside; nodes reach further, since a spline is worst near its ends
 COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_separation": (np.log(1e-6), np.log(8.0))}
-HURST = np.linspace(0.01, 1.09, 42)
-LOG_ZETA = np.linspace(np.log(1.7), np.log(2.5e5), 46)
-LOG_U = np.linspace(np.log(5e-7), np.log(10.0), 150)
+NODES = {
+    "hurst": np.linspace(0.01, 1.09, 42),
+    "log_zeta_1": np.linspace(np.log(1.7), np.log(2.5e5), 46),
+    "log_separation": np.linspace(np.log(5e-7), np.log(10.0), 150),
+}
 LOG_FORCE = np.linspace(-38.0, 1.3, 240)  # ln F^ between whose separations the nodes lie
 DEGREE = 5
 CERTIFICATE = (300, 40)  # held-out surfaces, separations of each
@@ -39,21 +42,7 @@ HIGHEST = (2.5, 6.0)  # their h_max/h_rms
 NEAREST = 0.95  # of h_max: nearer to it force is a small difference
 PROCESSES = 2
 MIN_ERRORS = 5  # that state a scatter
-STATISTICS = ("bias", "standard_deviation", "largest_of_nine_in_ten", "number")
-MODULES = (
-    *("mbma_tables.laws.calibrated", "mbma_tables.laws.map_curves"),
-    *("generate.calibrated", "generate.calibrated_file"),
-)
-LONG_NAMES = {
-    "hurst": "Hurst exponent",
-    "log_zeta_1": "natural logarithm of q1/q0",
-    "log_separation": "natural logarithm of the mean separation over h_rms",
-}
-COMMENT = (
-    "F = F_G (1 - r)^(3/2)/(1 + r), r = F_G(h_max)/F_G(u); lengths in h_rms. quantity: area at equal force, force at "
-    "equal mean separation, stiffness at equal force. calibrated_map: where a map is at hand. stated_scatter: of "
-    "calibrated from cross-validation, of calibrated_map on the training set, of other theories on self-affine surfaces"
-)
+TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("laws.toml").read_text(encoding="utf-8"))
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass of constants
 Variable = tuple[Any, Any, dict[str, Any]]
 
@@ -105,22 +94,38 @@ def variable(dimensions: str | Sequence[str], values: Any, meaning: str, **attri
     return dimensions, values, {"long_name": meaning, "units": "1", **attributes}
 
 
-def coordinates(
-    nodes: dict[str, FloatArray], meanings: dict[str, str], covered: dict[str, Any], edges: FloatArray, middles: Any
-) -> dict[str, Variable]:
-    """Coordinates of a table's nodes, with the range that is answered, and of bins of contact."""
-    return {name: variable(name, values, meanings[name], covered=covered[name]) for name, values in nodes.items()} | {
-        "contact": variable("contact", middles, "A/A0, middle of a bin"),
-        "contact_low": variable("contact", edges[:-1], "A/A0, low end of a bin"),
-        "contact_high": variable("contact", edges[1:], "A/A0, high end of a bin"),
-    }
+def law_group(
+    kind: str, arrays: dict[str, tuple[Any, Any]], constants: dict[str, Any], facts: dict[str, Any]
+) -> xr.Dataset:
+    """A group of the file: arrays with their dimensions, dataclasses of constants by prefix, and further attributes."""
+    texts = TEXTS[kind]
+    found = xr.Dataset({name: variable(*array, texts["variables"][name]) for name, array in arrays.items()})
+    found.attrs = {"Conventions": "CF-1.11", "institution": "mbma_tables contributors"}
+    found.attrs |= {name: text for name, text in texts.items() if name not in ("command", "modules", "variables")}
+    found.attrs["history"] = f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {texts['command']}"
+    for prefix, own in constants.items():
+        found.attrs |= {f"{prefix}_{name}": value for name, value in dataclasses.asdict(own).items()}
+    modules = {"source_sha256": source_digest(tuple(texts["modules"])), "source_modules": " ".join(texts["modules"])}
+    return found.assign_attrs(facts, versions=json.dumps(versions(), sort_keys=True), **modules)
 
 
-def made_by(modules: Sequence[str]) -> dict[str, str]:
+def law_table(
+    kind: str, nodes: dict[str, FloatArray], covered: dict[str, Any], arrays: dict[str, tuple[Any, Any]], **more: Any
+) -> xr.Dataset:
+    """A group with a table over these nodes, of which a range is answered, and statistics by bins of contact."""
+    found = law_group(kind, {name: (name, values) for name, values in nodes.items()} | arrays, **more)
+    for name, ends in covered.items():
+        found[name].attrs["covered"] = ends
+    return found.set_coords(["contact_low", "contact_high"])
+
+
+def bins(edges: Sequence[float], middles: Any) -> dict[str, tuple[Any, Any]]:
+    """Bins of contact."""
+    ends = np.array(edges)
     return {
-        "versions": json.dumps(versions(), sort_keys=True),
-        "source_sha256": source_digest(tuple(modules)),
-        "source_modules": " ".join(modules),
+        "contact": ("contact", middles),
+        "contact_low": ("contact", ends[:-1]),
+        "contact_high": ("contact", ends[1:]),
     }
 
 
@@ -146,16 +151,17 @@ def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "/")
 
 def log_force(law: Law) -> FloatArray:
     """ln F_G at the nodes in separation."""
+    log_u = NODES["log_separation"]
     u, _ = law.separation_persson(np.exp(LOG_FORCE))
-    x = make_interp_spline(np.log(u[::-1]), LOG_FORCE[::-1], k=5)(LOG_U)
+    x = make_interp_spline(np.log(u[::-1]), LOG_FORCE[::-1], k=5)(log_u)
     for _ in range(2):
         value, slope = law.separation_persson(np.exp(x))
-        x = x - np.clip((np.log(value) - LOG_U) * value / slope, -0.5, 0.5)
-    return np.asarray(x - law.tail * np.exp(3 * LOG_U))
+        x = x - np.clip((np.log(value) - log_u) * value / slope, -0.5, 0.5)
+    return np.asarray(x - law.tail * np.exp(3 * log_u))
 
 
 def _row(constants: Constants, hurst: float) -> FloatArray:
-    spectra = (Spectrum.self_affine(float(hurst), float(np.exp(z))) for z in LOG_ZETA)
+    spectra = (Spectrum.self_affine(float(hurst), float(np.exp(z))) for z in NODES["log_zeta_1"])
     return np.array([log_force(Law(spectrum, None, constants)) for spectrum in spectra])
 
 
@@ -191,43 +197,21 @@ def write(
     facts: dict[str, Any],
 ) -> dict[str, float]:
     """Write the root of the file, with statistics of errors by theory and by set; the table's certificate."""
-    values = np.array([*results("table", _row, [(constants, hurst) for hurst in HURST], PROCESSES)])
+    values = np.array([*results("table", _row, [(constants, hurst) for hurst in NODES["hurst"]], PROCESSES)])
     bias, deviation, _, number = np.moveaxis(np.array(list(stated.values())), -1, 0)
     scatter = np.where(number >= MIN_ERRORS, np.hypot(bias, deviation), np.nan)
-    spline = "ln F_G, F/(A0 E* g) of a surface without end: cardinal quintic B-splines"
-    meaning = "statistics of ln(theory/simulation), and their number"
-    ends, nodes = np.array(edges), dict(zip(AXES, (HURST, LOG_ZETA, LOG_U), strict=True))
-    data = xr.Dataset(
-        {
-            "spline": variable([f"{name}_knot" for name in AXES], coefficients(values, DEGREE, 3), spline),
-            "stated_scatter": variable(
-                ("theory", "quantity", "contact"), scatter, "root mean square of ln(theory/simulation)"
-            ),
-            "accuracy": variable(("set", "quantity", "contact", "statistic"), np.array(list(sets.values())), meaning),
-        },
-        coordinates(nodes, LONG_NAMES, COVERED, ends, np.sqrt(ends[1:] * ends[:-1])),
-    )
+    arrays = {
+        "spline": ([f"{name}_knot" for name in AXES], coefficients(values, DEGREE, 3)),
+        "stated_scatter": (("theory", "quantity", "contact"), scatter),
+        "accuracy": (("set", "quantity", "contact", "statistic"), np.array(list(sets.values()))),
+        **bins(edges, np.sqrt(np.multiply(edges[1:], edges[:-1]))),
+    }
+    known: dict[str, Any] = {"theories": " ".join(stated), "quantities": " ".join(QUANTITIES), "sets": "; ".join(sets)}
+    known |= {name: json.dumps(value) for name, value in facts.items()} | {"largest_error_force": np.nan}
+    own = {"law": constants, "map": map_constants}
+    data = law_table("calibrated", NODES, COVERED, arrays, constants=own, facts=known)
     # single precision keeps the certificate: where ln F_G is large, force is nothing
     data.spline.encoding["dtype"] = "f4"
-    data.attrs = {
-        "Conventions": "CF-1.11",
-        "title": "Contact of rough surfaces: Persson's energy integral calibrated on boundary elements, tabulated",
-        "institution": "mbma_tables contributors",
-        "source": "mbma_tables.laws.calibrated, constants fitted to the training set of the boundary-element campaign",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated",
-        "references": "docs/calibrated.md",
-        "comment": COMMENT,
-        "mbma_kind": "calibrated",
-        "theories": " ".join(stated),
-        "quantities": " ".join(QUANTITIES),
-        "statistics": " ".join(STATISTICS),
-        "sets": "; ".join(sets),
-        **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
-        **{f"map_{name}": value for name, value in dataclasses.asdict(map_constants).items()},
-        **{name: json.dumps(value) for name, value in facts.items()},
-        **made_by(MODULES),
-        "largest_error_force": np.nan,
-    }
     # read again to be certified
     write_part(path, data)
     found = certificate(pathlib.Path(path))

@@ -1,11 +1,9 @@
 """Constants of contacts with a hardness from capped boundary elements, and errors on surfaces that no fit saw."""
 
 import dataclasses
-import datetime
 import functools
 import json
 import os
-import pathlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,7 +13,8 @@ import xarray as xr
 
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
 from generate.boundary_elements.surfaces import SPLITS, TRAINING
-from generate.calibrated_file import by_bin, cross_validated, fitted, made_by, rms, variable, within, write_part
+from generate.calibrated_file import by_bin, cross_validated, fitted, law_group, rms, within, write_part
+from generate.files import read_csv
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness as cap
@@ -27,7 +26,6 @@ EDGES = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.95)  # contact fractions between wh
 BARS = {"area": 0.05, "yielded": 0.05, "force": np.log(1.25), "stiffness": np.log(1.25)}
 QUANTITIES = ("area", "yielded", "force", "stiffness")  # as the file names them
 LIBRARY = {"area": "area", "force": "pressure", "stiffness": "stiffness"}  # and as the library does
-STATISTICS = ("bias", "standard_deviation", "share_within_bar", "largest", "number")
 # constants of each part, and errors that count alike: "planes" is the gap between mean planes
 PARTS: dict[str, tuple[tuple[str, ...], float]] = {
     "area": (("area_power", "area_scale"), 0.015),
@@ -42,17 +40,14 @@ ELASTIC = "elastic"  # the simulated elastic contact and h_max, for what a hardn
 OTHERS = ("mbma", "persson")  # theories of which what is said of their errors is tested
 LEAST = 1e-9  # mean separation at which theories end [h_rms]
 TURN = 0.01  # of ln A_el, for derivatives
-REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
-MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_file", "generate.calibrated_hardness")
 
 
 def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:
     """Errors of a part where the elastic contact is the simulated one, so that its law's errors stay out."""
-    if part == "area":
-        return np.log(cap.area(one.force, one.elastic_area, one.eta, constants) / one.area)
-    if part == "yielded":
-        return (cap.area(one.force, one.elastic_area, one.eta, constants, True) - one.yielded) / one.area
+    if part in ("area", "yielded"):
+        found = cap.area(one.force, one.elastic_area, one.eta, constants, part == "yielded")
+        return np.log(found / one.area) if part == "area" else (found - one.yielded) / one.area
     if part == "force":
         return np.log(cap.force(one.elastic[0], 0.0, one.shares[share], 0.0, one.eta, constants)[0] / one.force)
     if part == "stiffness":
@@ -77,24 +72,6 @@ def fit(seen: Sequence[Capped]) -> cap.Constants:
     return found
 
 
-@functools.cache
-def errors_of_law(one: Capped, form: str, constants: cap.Constants) -> dict[str, FloatArray]:
-    """Of the whole law: ln of area and stiffness at equal force, ln of force at equal mean gap, the yielded share."""
-    if form == ELASTIC:
-        return {quantity: errors(one, quantity, constants, 1) for quantity in QUANTITIES}
-    by_map = form == "calibrated_map"
-    area = cap.area(one.force, one.elastic_areas[form], one.eta, constants)
-    yielded = cap.area(one.force, one.elastic_areas[form], one.eta, constants, True)
-    at_gap = one.map_curve.answer(one.u)[0] if by_map else one.by_law[0]
-    force = cap.force(at_gap, 0.0, one.shares[0 if by_map else 1], 0.0, one.eta, constants)[0]
-    return {
-        "area": np.log(area / one.area),
-        "yielded": yielded / area - one.yielded / one.area,
-        "force": np.log(np.maximum(force, 1e-6 * one.force) / one.force),
-        "stiffness": frozen_errors(one, one.curves[form], constants),
-    }
-
-
 def frozen_errors(one: Capped, elastic: tuple[FloatArray, ...], constants: cap.Constants) -> FloatArray:
     """ln of a theory's frozen stiffness over the simulated one at equal force, NaN where the theory ends before.
 
@@ -105,6 +82,39 @@ def frozen_errors(one: Capped, elastic: tuple[FloatArray, ...], constants: cap.C
     frozen = np.log(np.maximum(steep * cap.frozen_factor(one.eta, constants), 1e-30))
     at = np.interp(-np.log(one.force), -curve, frozen, left=np.nan)
     return np.asarray(at - np.log(one.frozen))
+
+
+@functools.cache
+def errors_of(one: Capped, name: str, constants: cap.Constants) -> dict[str, FloatArray]:
+    """Of a theory with a hardness: ln of area and stiffness at equal force, of force at equal u; the yielded share."""
+    if name == ELASTIC:
+        return {quantity: errors(one, quantity, constants, 1) for quantity in QUANTITIES}
+    if name in OTHERS:
+        return errors_of_other(one, name, constants)
+    by_map = name == "calibrated_map"
+    area, yielded = (cap.area(one.force, one.elastic_areas[name], one.eta, constants, own) for own in (False, True))
+    at_gap = one.map_curve.answer(one.u)[0] if by_map else one.by_law[0]
+    force = cap.force(at_gap, 0.0, one.shares[0 if by_map else 1], 0.0, one.eta, constants)[0]
+    return {
+        "area": np.log(area / one.area),
+        "yielded": yielded / area - one.yielded / one.area,
+        "force": np.log(np.maximum(force, 1e-6 * one.force) / one.force),
+        "stiffness": frozen_errors(one, one.curves[name], constants),
+    }
+
+
+def errors_of_other(one: Capped, name: str, constants: cap.Constants) -> dict[str, FloatArray]:
+    """Errors of force, area and frozen stiffness of a theory that is not the calibrated one."""
+    surface, theory = one.surface, get_theory(name)
+    gradient, force, area = float(surface.rms_gradient), *np.full((2, one.u.size), np.nan)
+    # what the theory reaches
+    loads, low = one.force * gradient, np.asarray(theory.interval(surface)[0])
+    most = theory.answer(surface, np.maximum(low, LEAST)).pressure
+    held = (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < most)
+    force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).pressure / gradient
+    area[held] = cap.area(one.force[held], theory.area_at(surface, loads[held]), one.eta, constants)
+    frozen = frozen_errors(one, elastic_curve(one.node, one.zeta_1, one.h_max, name), constants)
+    return {"force": np.log(force / one.force), "area": np.log(area / one.area), "stiffness": frozen}
 
 
 @functools.cache
@@ -120,7 +130,7 @@ def told(seen: Sequence[Capped], name: str, constants: Callable[[Capped], cap.Co
     """Errors of a theory on surfaces, a row a load, with what the surface is; `own` is the theory's own area."""
     parts = []
     for one in seen:
-        found = told_errors(one, name, constants(one))
+        found = errors_of(one, name, constants(one))
         known = {key: getattr(one, key) for key in ("kind", "split", "waves", "zeta_1", "eta")}
         parts.append(pd.DataFrame(known | {"contact": one.area} | found | {"own": one.area * np.exp(found["area"])}))
     return pd.concat(parts, ignore_index=True)
@@ -131,14 +141,10 @@ def between(contact: Any) -> Any:
 
 
 def statistics(frame: pd.DataFrame) -> FloatArray:
-    """`STATISTICS` of each quantity from 1% to 95% contact."""
-    errors = frame[between(frame["contact"])]
-    return np.array(
-        [
-            (np.mean(e), np.std(e), np.mean(np.abs(e) < bar), np.abs(e).max(), e.size)
-            for e, bar in ((errors[quantity].to_numpy(), BARS[quantity]) for quantity in QUANTITIES)
-        ]
-    )
+    """Statistics, as `laws.toml` names them, of each quantity from 1% to 95% contact."""
+    kept = frame[between(frame["contact"])]
+    pairs = ((kept[quantity].to_numpy(), BARS[quantity]) for quantity in QUANTITIES)
+    return np.array([(np.mean(e), np.std(e), np.mean(np.abs(e) < bar), np.abs(e).max(), e.size) for e, bar in pairs])
 
 
 def by_contact(frame: pd.DataFrame, quantity: str, area: str = "contact") -> FloatArray:
@@ -163,19 +169,15 @@ def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[s
         kept = fitted_to(one)
         found = {quantity: errors(one, quantity, constants)[kept] for quantity in QUANTITIES}
         parts.append(pd.DataFrame({"zeta_1": one.zeta_1, "eta": one.eta} | found))
-    means = pd.concat(parts).groupby(["zeta_1", "eta"]).mean()
-    return {
-        f"{zeta_1:g}": [float(max(own[quantity], key=abs)) for quantity in QUANTITIES]
-        for zeta_1, own in means.groupby("zeta_1")
-    }
+    means = pd.concat(parts).groupby(["zeta_1", "eta"]).mean().groupby("zeta_1")
+    return {f"{zeta:g}": [float(max(own[quantity], key=abs)) for quantity in QUANTITIES] for zeta, own in means}
 
 
 def blind() -> dict[str, FloatArray]:
     """Errors of `contact` on surfaces of another code, which no fit or choice of a form saw."""
-    table = pd.read_csv(REFERENCE, comment="#")
-    own = {
-        name: column.to_numpy() for name, column in table[np.isfinite(table["eta"]) & between(table["area"])].items()
-    }
+    table = read_csv("hardness.csv")
+    kept = table[np.isfinite(table["eta"]) & between(table["area"])]
+    own = {name: column.to_numpy() for name, column in kept.items()}
     surface = Surface(own["hurst"], 1.0, own["zeta_1"], 1.0, own["h_max_over_h_rms"])
     g = surface.rms_gradient
     options: dict[str, Any] = {"theory": "calibrated", "hardness": own["eta"] * g}
@@ -187,24 +189,6 @@ def blind() -> dict[str, FloatArray]:
         "force": np.log(closer.pressure / (own["force"] * g)),
         "stiffness": np.log(found.unloading_stiffness / (own["kappa"] * g)),
     }
-
-
-def told_errors(one: Capped, name: str, constants: cap.Constants) -> dict[str, FloatArray]:
-    """Errors of a theory with a hardness on one surface, of force, area and frozen stiffness."""
-    if name not in OTHERS:
-        return errors_of_law(one, name, constants)
-    surface = Surface(one.node[1], 1.0, one.zeta_1, 1.0, one.h_max)
-    gradient, theory = float(surface.rms_gradient), get_theory(name)
-    force, area = np.full(one.u.shape, np.nan), np.full(one.u.shape, np.nan)
-    # what the theory reaches
-    loads, low = one.force * gradient, np.asarray(theory.interval(surface)[0])
-    held = (
-        (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < theory.answer(surface, np.maximum(low, LEAST)).pressure)
-    )
-    force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).pressure / gradient
-    area[held] = cap.area(one.force[held], theory.area_at(surface, loads[held]), one.eta, constants)
-    frozen = frozen_errors(one, elastic_curve(one.node, one.zeta_1, one.h_max, name), constants)
-    return {"force": np.log(force / one.force), "area": np.log(area / one.area), "stiffness": frozen}
 
 
 def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter) -> dict[str, list[float]]:
@@ -225,42 +209,23 @@ def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter)
 def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
     """Root mean squares of errors by constants from other spectra, and how much of an elastic error is passed on."""
     others = cross_validated(training, fit)
-    frames = {name: told(training, name, lambda one: others[one.node]) for name in (*FORMS, ELASTIC)}
-    found = {name: np.array([by_contact(frame, q) for q in QUANTITIES]) for name, frame in frames.items()}
+    found = {}
+    for name in (*FORMS, ELASTIC):
+        frame = told(training, name, lambda one: others[one.node])
+        found[name] = np.array([by_contact(frame, q) for q in QUANTITIES])
     alike = [one for one in training if one.kind == "self_affine"]
     for name in OTHERS:
         # what they lack is what the elastic theories' become; by the theory's own area, which is what a user has
         found[name] = np.full_like(found[ELASTIC], np.nan)
         frame = told(alike, name, lambda one: others[one.node])
         found[name][QUANTITIES.index("stiffness")] = by_contact(frame, "stiffness", "own")
-    frame = pd.concat(
-        pd.DataFrame(
-            {"eta": one.eta, "contact": one.area} | {q: weight_of_elastic(one, q, constants) for q in ("area", "force")}
-        )
-        for one in training
-    )
-    weights = {LIBRARY[q]: by_contact(frame, q) for q in ("area", "force")}
+    frames = []
+    for one in training:
+        weight = {q: weight_of_elastic(one, q, constants) for q in ("area", "force")}
+        frames.append(pd.DataFrame({"eta": one.eta, "contact": one.area} | weight))
+    weights = {LIBRARY[q]: by_contact(pd.concat(frames), q) for q in ("area", "force")}
     log_area = np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1])))
     return Scatter(np.array(sorted({one.eta for one in training})), log_area, found, weights)
-
-
-def dataset(scatter: Scatter, accuracy: FloatArray) -> xr.Dataset:
-    of_accuracy = "statistics of ln(law/simulation), of the difference for the yielded share"
-    of_scatter = (
-        "root mean square of ln(law/simulation) on the training set, by constants from other spectra; of the theory "
-        "elastic with the simulated elastic contact; NaN: not measured"
-    )
-    of_weights = "root mean square of d ln(area, force) by d ln of the elastic one"
-    rows, weights = np.array([*scatter.rms.values()]), np.array([*scatter.weight.values()])
-    return xr.Dataset(
-        {
-            "accuracy": variable(("set", "form", "quantity", "statistic"), accuracy, of_accuracy),
-            "stated_scatter": variable(("theory", "quantity", "hardness", "contact"), rows, of_scatter),
-            "elastic_weight": variable(("force_or_area", "hardness", "contact"), weights, of_weights),
-            "eta": variable("hardness", scatter.eta, "p_m/(E* g)"),
-            "contact": variable("contact", np.exp(scatter.log_area), "A/A0, middle of a bin"),
-        }
-    )
 
 
 def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[cap.Constants, xr.Dataset]:
@@ -275,23 +240,22 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
     sets = {split: gaussian & (frames[0]["split"] == split) for split in SPLITS[:3]}
     sets |= {"three_waves": gaussian & late & (frames[0]["waves"] >= WAVES)}
     sets |= {"stretched": frames[0]["kind"] == "stretched"}
-    data = dataset(scatter, np.array([[statistics(frame[kept]) for frame in frames] for kept in sets.values()]))
-    data.attrs = {
-        "title": "Contact with a hardness: constants of mbma_tables.laws.hardness, and errors against BEM",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated --hardness",
-        "references": "docs/yield.md",
-        "comment": f"accuracy: contacts from {LIGHTEST:g} to {EDGES[-1]:g}; bars {json.dumps(BARS)}. area, yielded "
-        "and stiffness of the frozen contact at equal force, force at equal mean gap",
-        "theories": " ".join(scatter.rms),
-        "coverage": json.dumps(covered),
-        "drift": json.dumps(by_magnification([one for one in plain if one.kind == "self_affine"], constants)),
-        "quantities": " ".join(QUANTITIES),
-        "statistics": " ".join(STATISTICS),
-        "sets": " ".join(sets),
-        **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
-        "evidence": json.dumps({"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(found)}),
-        **made_by(MODULES),
+    arrays = {
+        "accuracy": (
+            ("set", "form", "quantity", "statistic"),
+            np.array([[statistics(frame[kept]) for frame in frames] for kept in sets.values()]),
+        ),
+        "stated_scatter": (("theory", "quantity", "hardness", "contact"), np.array([*scatter.rms.values()])),
+        "elastic_weight": (("force_or_area", "hardness", "contact"), np.array([*scatter.weight.values()])),
+        "eta": ("hardness", scatter.eta),
+        "contact": ("contact", np.exp(scatter.log_area)),
     }
+    drift = by_magnification([one for one in plain if one.kind == "self_affine"], constants)
+    made_of = {"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(found)}
+    facts: dict[str, Any] = {"coverage": covered, "drift": drift, "evidence": made_of}
+    facts = {name: json.dumps(value) for name, value in facts.items()}
+    facts |= {"theories": " ".join(scatter.rms), "sets": " ".join(sets)}
+    data = law_group(GROUP, arrays, {"law": constants}, facts)
     if path is not None:
         write_part(path, data, GROUP)
     return constants, data

@@ -25,8 +25,9 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import ISLAND_MODELS, answer_islands, get_model
+from mbma_tables.models import ISLAND_MODELS, answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
+from mbma_tables.models.named import get_model
 from mbma_tables.scenes.plan import UNIT, Row
 from mbma_tables.surfaces.variants import get_variant
 

@@ -15,11 +15,11 @@ import click
 import numpy as np
 from scipy.special import erf
 
-from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve, curves_of
+from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve, curves_of, evidence
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.calibrated import errors
 from generate.calibrated_file import QUANTITIES, rms
-from generate.files import DATA, ROOT, dataset, evidence, read_csv
+from generate.files import DATA, ROOT, dataset, read_csv
 from generate.page import percent, table
 from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray

@@ -1,13 +1,30 @@
-"""Files of a checkout: data of docs/data, and what several programs read of them."""
+"""Files of a checkout: data of docs/data, what several programs read of them, and where values came from."""
 
 import functools
+import hashlib
+import importlib.util
 import pathlib
+import platform
 from typing import Any
 
+import numpy as np
+
+from mbma_tables.core import ARITHMETIC
 from mbma_tables.data import FILE, boundary_elements
+from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
 ROOT = pathlib.Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
+SOLVER = (
+    "mbma_tables/core/elementary.h",
+    "mbma_tables/core/height_coefficients.h",
+    "mbma_tables/core/heights.h",
+    "mbma_tables/core/newton.c",
+    "mbma_tables.islands.spectral",
+    "mbma_tables.islands.greenwood_tripp",
+)
+GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.models.island4d")
+MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 
 def to_csv(head: str, frame: Any, form: str | None = None) -> bytes:
@@ -29,9 +46,32 @@ def dataset(group: str, path: pathlib.Path = FILE) -> Any:
     return boundary_elements(path)[group].to_dataset()
 
 
-@functools.cache
-def evidence() -> tuple[Any, ...]:
-    """The simulated surfaces (`Case`) of the data set."""
-    from generate.boundary_elements.evidence import cases
+def source_digest(modules: tuple[str, ...]) -> str:
+    """SHA-256 of the files of modules, or of C sources, as bytes: a record of what ran, compared with nothing."""
+    digest = hashlib.sha256()
+    for module in modules:
+        path: str | pathlib.Path = ROOT / module
+        if "/" not in module:
+            spec = importlib.util.find_spec(module)
+            if spec is None or spec.origin is None:
+                raise ModuleNotFoundError(module)
+            path = spec.origin
+        digest.update(pathlib.Path(path).read_bytes())
+    return digest.hexdigest()
 
-    return tuple(cases(dataset("elastic")))
+
+def versions() -> dict[str, str]:
+    """Versions of what computes, and whether the core's processor has fused multiply-add, which decides last bits."""
+    import netCDF4
+    import scipy
+
+    from mbma_tables import __version__
+
+    return {
+        "arithmetic": ARITHMETIC,
+        "mbma_tables": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "netCDF4": netCDF4.__version__,
+    }

@@ -14,9 +14,10 @@ from scipy.interpolate import RegularGridInterpolator
 from generate import files
 from generate.boundary_elements.evidence import Simulated, TheoryCurve, simulated
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.calibrated_file import FOLDS, by_bin, coordinates, fitted, made_by, rms, variable, within, write_part
+from generate.calibrated_file import FOLDS, bins, by_bin, fitted, law_table, rms, within, write_part
 from generate.splines import coefficients
 from generate.workers import results
+from mbma_tables.answers.leakage import GROUP
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 from mbma_tables.laws import effective_medium as leakage
@@ -33,25 +34,16 @@ MIN_WAVES = 4  # longest waves a side: below, the cell's own scatter rules
 EDGES = (0.004, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)  # contact fractions between which errors are told
 NOISE = (0.1, 6.0)  # errors of ln k that count as one: a + b (A/A0)^2, about what cells of one spectrum differ by
 COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_odds": (-14.0, 5.5)}
-HURST, LOG_ZETA = np.linspace(0.04, 1.06, 14), np.linspace(np.log(2.0), np.log(2e5), 14)
-LOG_ODDS = np.linspace(-14.6, 6.2, 53)  # ln A/(Ac - A)
+NODES = {
+    "hurst": np.linspace(0.04, 1.06, 14),
+    "log_zeta_1": np.linspace(np.log(2.0), np.log(2e5), 14),
+    "log_odds": np.linspace(-14.6, 6.2, 53),  # ln A/(Ac - A)
+}
 CERTIFICATE = 100  # held-out surfaces, each at its own odds
-STATISTICS = ("bias", "root_mean_square", "number")
-GROUP = "leakage"
 DEFAULT = FlowConstants()
 BLOCKED = -20.0  # residual of what a law blocks and simulation does not
 LARGE = 64.0  # zeta_1 from which surfaces decide between laws, and no constant
 DEGREE = 5
-AXES = ("hurst", "log_zeta_1", "log_odds")
-LONG_NAMES = {
-    "hurst": "Hurst exponent",
-    "log_zeta_1": "natural logarithm of q1/q0",
-    "log_odds": "ln A/(Ac - A), A = A/A0 and Ac = flow_threshold",
-}
-MODULES = (
-    *("mbma_tables.laws.calibrated", "mbma_tables.laws.effective_medium"),
-    *("generate.calibrated_file", "generate.leakage_law"),
-)
 PROCESSES = 2
 TABLE = files.ROOT / "tables" / "calibrated.nc"
 
@@ -254,8 +246,8 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
 
 def _row(constants: FlowConstants, contact: Constants, hurst: float) -> FloatArray:
     """ln R at the table's nodes of one Hurst exponent."""
-    area = constants.threshold / (1 + np.exp(-LOG_ODDS))
-    spectra = [Spectrum.self_affine(hurst, float(np.exp(z))) for z in LOG_ZETA]
+    area = constants.threshold / (1 + np.exp(-NODES["log_odds"]))
+    spectra = [Spectrum.self_affine(hurst, float(np.exp(z))) for z in NODES["log_zeta_1"]]
     return np.array([leakage.contact_factor(spectrum, area, constants, contact) for spectrum in spectra])
 
 
@@ -263,7 +255,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     """The group `leakage` of the calibrated law's file, with that law's constants."""
     flows = [Flow(one, contact) for one in found]
     constants = fit([flow for flow in flows if flow.one.split == TRAINING])
-    values = np.array([*results("table", _row, [(constants, contact, hurst) for hurst in HURST], PROCESSES)])
+    values = np.array([*results("table", _row, [(constants, contact, hurst) for hurst in NODES["hurst"]], PROCESSES)])
     misses = {label: [errors(f, law(f, constants)) for f in flows] for label, law in LAWS.items()}
     sets = {name: [k for k, f in enumerate(flows) if member(f.one)] for name, member in SETS.items()}
     sets = {name: own for name, own in sets.items() if own}
@@ -271,52 +263,32 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     stated = {"calibrated": left_out(flows, constants), **of_theories(flows, constants)}
     area, blocked = np.concatenate([one.blocked for one in found if one.isotropic], axis=1)
     shares = by_bin(area, blocked, EDGES, np.mean)[:, 0]
-    splined = "coefficients of cardinal quintic B-splines of ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R"
-    known = "bias, root mean square and number of ln(law/simulation)"
-    scatter, edges = np.array([rows[:, 1] for rows in stated.values()]), np.array(EDGES)
-    differ = "standard deviation of ln k between cells of one spectrum"
-    nodes = dict(zip(AXES, (HURST, LOG_ZETA, LOG_ODDS), strict=True))
-    data = xr.Dataset(
-        {
-            "spline": variable(
-                [f"{name}_knot" for name in AXES], coefficients(values, DEGREE, 3).astype("f4"), splined
-            ),
-            "accuracy": variable(("set", "law", "contact", "statistic"), accuracy, known),
-            "stated_scatter": variable(("theory", "contact"), scatter, "root mean square of ln(k/simulation)"),
-            "noise": variable("contact", noise_floor(found), differ),
-            "share_blocked": variable("contact", shares, "share of directions that are blocked"),
-        },
-        coordinates(nodes, LONG_NAMES, COVERED, edges, (edges[1:] + edges[:-1]) / 2),
-    )
-    below, beyond = certificate(values, constants, contact)
-    data.attrs = {
-        "title": "Flow coefficient of gaps: contact factor of an effective medium, and its errors against simulation",
-        "source": "mbma_tables.laws.effective_medium, its constants fitted to a training set of simulated flow",
-        "references": "docs/leakage.md",
-        "theories": " ".join(stated),
-        "laws": "; ".join(LAWS),
-        "sets": "; ".join(sets),
-        "statistics": " ".join(STATISTICS),
-        **{f"flow_{name}": value for name, value in dataclasses.asdict(constants).items()},
-        **{f"law_{name}": value for name, value in dataclasses.asdict(contact).items()},
-        "largest_error_simulated": below,
-        "largest_error_log_factor": beyond,
-        "coverage": np.array(coverage(flows, constants, stated["calibrated"])),
-        **made_by(MODULES),
+    arrays = {
+        "spline": ([f"{name}_knot" for name in NODES], coefficients(values, DEGREE, 3).astype("f4")),
+        "accuracy": (("set", "law", "contact", "statistic"), accuracy),
+        "stated_scatter": (("theory", "contact"), np.array([rows[:, 1] for rows in stated.values()])),
+        "noise": ("contact", noise_floor(found)),
+        "share_blocked": ("contact", shares),
+        **bins(EDGES, np.add(EDGES[1:], EDGES[:-1]) / 2),
     }
-    return data
+    below, beyond = certificate(values, constants, contact)
+    facts: dict[str, Any] = {"theories": " ".join(stated), "laws": "; ".join(LAWS), "sets": "; ".join(sets)}
+    facts |= {"largest_error_simulated": below, "largest_error_log_factor": beyond}
+    covered = np.array(coverage(flows, constants, stated["calibrated"]))
+    own = {"flow": constants, "law": contact}
+    return law_table("leakage", NODES, COVERED, arrays, constants=own, facts=facts | {"coverage": covered})
 
 
 def certificate(values: FloatArray, constants: FlowConstants, contact: Constants) -> list[float]:
     """Largest errors of ln R at held-out surfaces to `LARGE` and beyond, below `leakage.LARGEST_AREA`."""
-    table = RegularGridInterpolator((HURST, LOG_ZETA, LOG_ODDS), values, method="quintic")
+    table = RegularGridInterpolator(tuple(NODES.values()), values, method="quintic")
     rng, largest = np.random.default_rng(21), [0.0, 0.0]
     last = log_odds(np.array(leakage.LARGEST_AREA), constants.threshold)
     odds = np.sort(rng.uniform(COVERED["log_odds"][0], last, 12))
     area = constants.threshold / (1 + np.exp(-odds))
     for _ in range(CERTIFICATE):
         # a tenth of them at the ends of an axis
-        ends = (COVERED[name] for name in AXES[:2])
+        ends = (COVERED[name] for name in ("hurst", "log_zeta_1"))
         hurst, log_zeta = (low + (high - low) * np.clip(rng.uniform(-0.05, 1.05), 0, 1) for low, high in ends)
         spectrum = Spectrum.self_affine(hurst, float(np.exp(log_zeta)))
         exact = leakage.contact_factor(spectrum, area, constants, contact)

@@ -127,30 +127,6 @@ test_conflicts_in_python = refusals(
 )
 
 
-SURFACE = '[surface]\nhurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = "800 um"\nh_max = '
-IN_MM = SURFACE + '"3 mm"\n'
-REST = '[effects]\non = ["pressure"]\n'
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (SURFACE + "3\n", "h_max without a unit beside numbers in mm"),
-        (IN_MM + '[material]\nstress_unit = "MPa"\n', "no modulus"),
-        (
-            IN_MM + '[material]\nE1 = "210 GPa"\nnu1 = 0.3\nE2 = 70\nnu2 = 0.3\n',
-            "E2 without a unit beside numbers in GPa",
-        ),
-        (IN_MM + '[material]\nE_star = "210 mm"\n', "no known unit of stress"),
-    ],
-)
-def test_conflicts_in_toml(content, said, tmp_path):
-    (tmp_path / "scene.toml").write_text(content + REST)
-    with pytest.raises(InputError, match=said) as caught:
-        Scene.from_toml(tmp_path / "scene.toml")
-    assert "\n" not in str(caught.value)
-
-
 test_conflicts_on_the_command_line = told(
     lambda arguments: refused("contact", *arguments.split()),
     ("--hurst 0.8 --q0 0.1/mm --zeta-1 50 --h-rms 800um --h-max 3 -d 1", "h_max without a unit beside numbers in mm"),

@@ -103,10 +103,9 @@ def test_without_a_compiler(source, tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="made on Linux")
 def test_a_wheel_for_another_machine(tmp_path):
-    pytest.importorskip("abi3info", reason="of the extra wheels")
-    pytest.importorskip("lief", reason="of the extra wheels")
+    pytest.importorskip("abi3audit", reason="of the extra wheels")
     wheel = build("manylinux2014_aarch64", tmp_path)
     assert list(faults(wheel, "manylinux2014_aarch64")) == []
     found = "; ".join(faults(wheel, "musllinux_1_2_x86_64"))
-    for expected in ("it is not tagged", "is for ARM64", "asks for libc.so.6", "its modules are"):
+    for expected in ("it is not tagged", "its modules are"):
         assert expected in found

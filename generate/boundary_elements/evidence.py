@@ -11,6 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import erf, erfinv
 
 from generate.boundary_elements.surfaces import REFINEMENT, SPLITS
+from generate.files import dataset
 from mbma_tables import Surface
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness
@@ -213,6 +214,12 @@ def cases(data: xr.Dataset) -> list[Case]:
             Case(**vars(known), curves=curves_of(one), **dict(zip(("force", "area", "u"), loads, strict=True)))
         )
     return found
+
+
+@functools.cache
+def evidence() -> tuple[Case, ...]:
+    """The simulated surfaces of the data set."""
+    return tuple(cases(dataset("elastic")))
 
 
 def capped(data: xr.Dataset) -> list[Capped]:

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from generate.boundary_elements.solve import HARDNESSES, simulate, simulate_capped, simulate_to, solve_flow
 from generate.boundary_elements.surfaces import SPLITS, Recipe, Task, campaign
 from generate.calibrated_file import Variable, variable, write_part
-from generate.provenance import source_digest, versions
+from generate.files import source_digest, versions
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError

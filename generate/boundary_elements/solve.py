@@ -5,7 +5,9 @@ Tamaas has pressures capped at a hardness too (KatoSaturated), but its iteration
 
 import importlib.metadata
 import io
+import os
 import pathlib
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -13,11 +15,12 @@ import numpy as np
 from scipy.special import erfinv
 
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.boundary_elements.tamaas_contact import Contact as Contact
-from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray, needed
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.laws import bearing_curve, boundary_elements
 from mbma_tables.laws.bearing_curve import band_sums, bearing, radial_bands
+from mbma_tables.laws.boundary_elements import CORRECTION, TOLERANCE
 from mbma_tables.laws.boundary_elements import LOADS as LOADS
 from mbma_tables.laws.reynolds import flow_conductance
 
@@ -39,6 +42,62 @@ FLOW_AREAS = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)  # that lo
 LARGE = 1024
 OF_FLOW = ("area", "area_raw", "mean_separation", "residual", "seconds")
 LENGTHS = ("mean_separation", "plane_separation", "energy", "pressure_weighted_height")  # in h_rms
+
+MAX_ITERATIONS = 50_000  # surfaces stretched 1:16 take 4,000
+
+
+class Contact:
+    """A periodic map against a rigid plane: Polonsky and Keer's conjugate gradients as Tamaas has them, E* = 1.
+
+    Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact.
+    """
+
+    gap: FloatArray
+
+    def __init__(self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE) -> None:
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
+        tamaas = needed("tamaas")
+        tamaas.set_log_level(tamaas.LogLevel.error)
+        self.surface = np.ascontiguousarray(surface, dtype=float)
+        self.model = tamaas.ModelFactory.createModel(
+            tamaas.model_type.basic_2d, list(map(float, sizes)), list(surface.shape)
+        )
+        self.model.E, self.model.nu = 1.0, 0.0
+        self._solver = tamaas.PolonskyKeerRey(self.model, self.surface, tolerance)
+        self._solver.max_iter = MAX_ITERATIONS
+        self._tolerance = tolerance
+
+    @property
+    def traction(self) -> FloatArray:
+        return np.asarray(self.model.traction)
+
+    def press(self, force: float) -> dict[str, float]:
+        """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map."""
+        started = time.process_time()
+        try:
+            residual = self._solver.solve(force)
+        except (ArithmeticError, RuntimeError) as fault:
+            # of a single element in contact, for instance
+            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}") from None
+        if not residual <= self._tolerance:
+            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
+        seconds = time.process_time() - started
+        pressure, moved = self.traction, np.asarray(self.model.displacement)
+        touching = pressure > 0
+        edges = sum(int(np.count_nonzero(touching != np.roll(touching, 1, axis))) for axis in (0, 1))
+        raw = float(touching.mean())
+        # the engine moves the whole surface by the gap; elastic energy has the displacement about its mean
+        gap = moved - self.surface
+        self.gap = np.where(touching, 0.0, np.maximum(gap - gap[touching].mean(), 0.0))
+        return {
+            "area": raw - CORRECTION * edges / touching.size,
+            "area_raw": raw,
+            "mean_separation": float(gap.mean() - gap[touching].mean()),
+            "energy": float(np.mean(pressure * (moved - moved.mean())) / 2),
+            "pressure_weighted_height": float(np.mean(pressure * self.surface) / force),
+            "residual": float(residual),
+            "seconds": seconds,
+        }
 
 
 def engine() -> str:

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from generate.boundary_elements.run import TEXTS, collected, group, of_recipes
 from generate.boundary_elements.solve import LOADS, Contact, load_at, prepared, pressed
-from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, Recipe, campaign, heights
+from generate.boundary_elements.surfaces import CAMPAIGNS, HELD_OUT_SPECTRUM, Recipe, campaign, heights
 from generate.calibrated_file import rms, variable, write_part
 from generate.timing import seconds_of_work
 from mbma_tables import Surface, contact
@@ -51,20 +51,7 @@ AREAS = (0.003, 0.01, 0.03, 0.1, 0.2, 0.35, 0.55, 0.75)
 LIGHT, HEAVY = 0.05, 0.3  # contact fractions
 MANY = 3  # long waves a side from which the highest point is a surface's, not a map's
 HARDNESSES = {"fitted": (np.inf, 0.4, 0.1), "held out": (np.inf, 0.8, 0.2, 0.05)}
-PLAIN, PLATEAU = "self_affine", "plateau"
-# kind, H, zeta_1, waves and seed of surfaces by which the constants of `mbma_tables.laws.gas` were chosen, and others
-SURFACES = {
-    "fitted": (
-        *((PLAIN, 0.8, 16, 4, 1), (PLAIN, 0.8, 32, 2, 2), (PLAIN, 0.5, 16, 4, 3), (PLAIN, 0.3, 8, 4, 4)),
-        *((PLAIN, 1.0, 16, 4, 5), (PLATEAU, 0.8, 8, 8, 6), (PLAIN, 0.8, 8, 8, 7), (PLAIN, 0.8, 32, 3, 8)),
-        *((PLATEAU, 0.8, 16, 4, 9), (PLAIN, 0.5, 32, 2, 10), (PLAIN, 0.9, 12, 4, 11), (PLATEAU, 0.5, 8, 8, 12)),
-    ),
-    "held out": (
-        *((PLAIN, 0.7, 20, 3, 101), (PLAIN, 0.6, 12, 5, 102), (PLAIN, 0.9, 32, 2, 103), (PLAIN, 0.2, 8, 4, 104)),
-        *((PLAIN, 0.4, 10, 6, 105), (PLATEAU, 0.8, 10, 6, 106), ("filtered", 0.8, 5, 6, 107)),
-        *((PLAIN, 0.8, 16, 4, 108), (PLAIN, 0.8, 24, 2, 109), (PLAIN, 0.8, 64, 1, 110)),
-    ),
-}
+PLAIN = "self_affine"
 PATH: Any = click.Path(path_type=pathlib.Path)
 
 
@@ -117,21 +104,12 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
         solved.append(pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
-        click.echo(
-            f"{path}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(solved[-1]['anisotropy']):.3g}"
-        )
+        click.echo(f"{path}: h_rms {surface.std():.4g} {treated.unit}")
     found = {name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]}
     own = group("measured", found, engine=str(solved[0]["engine"])).assign_coords(
         surface=variable("surface", [path.stem for path in maps], "name of the map's file")
     )
     write_part(data, own, "measured")
-
-
-def light_recipes() -> list[Recipe]:
-    return [
-        Recipe("self_affine", hurst, zeta_1, waves, seed, 256)
-        for (waves, zeta_1), hurst, seed in itertools.product(LIGHT_BANDS, LIGHT_HURSTS, LIGHT_SEEDS)
-    ]
 
 
 def light_contacts(recipe: Recipe) -> FloatArray:
@@ -157,9 +135,8 @@ def compared(one: xr.Dataset) -> FloatArray:
     known = contact(face, pressure=LIGHT_LOADS * scale, theory="calibrated").mean_separation
     with np.errstate(invalid="ignore", divide="ignore"):
         stiffness = np.log(np.diff(known) / np.diff(u))
-        force = np.log(
-            LIGHT_LOADS * scale / contact(face, mean_separation=np.nan_to_num(u), theory="calibrated").pressure
-        )
+        by_gap = contact(face, mean_separation=np.nan_to_num(u), theory="calibrated").pressure
+        force = np.log(LIGHT_LOADS * scale / by_gap)
     return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
 
 
@@ -167,7 +144,9 @@ def compared(one: xr.Dataset) -> FloatArray:
 @click.option("--data", type=PATH, default=FILE, show_default=True)
 def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
-    recipes, over, texts = light_recipes(), ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
+    over, texts = ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
+    design = itertools.product(LIGHT_BANDS, LIGHT_HURSTS, LIGHT_SEEDS)
+    recipes = [Recipe(PLAIN, hurst, zeta_1, waves, seed, 256) for (waves, zeta_1), hurst, seed in design]
     h_max, area, u = np.array([light_contacts(recipe) for recipe in tqdm(recipes, disable=None)]).swapaxes(0, 1)
     columns = {"h_max": ("surface", h_max[:, 0]), "force": ("load", LIGHT_LOADS), "area": (over, area.astype("f4"))}
     columns["mean_separation"] = over, u.astype("f4")
@@ -181,8 +160,8 @@ def gap_errors(kind: str) -> pd.DataFrame:
 
     The chain, from pressure and hardness by the calibrated law, is that of self-affine surfaces, else NaN.
     """
-    found = []
-    for recipe, eta in itertools.product((Recipe(*numbers, 256) for numbers in SURFACES[kind]), HARDNESSES[kind]):
+    found, recipes = [], [Recipe(*row) for row in CAMPAIGNS["gaps"][kind]]
+    for recipe, eta in itertools.product(recipes, HARDNESSES[kind]):
         surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
         h_rms = float(surface.std())
         like = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, h_rms, known["h_max"] * h_rms)
@@ -204,7 +183,7 @@ def gap_errors(kind: str) -> pd.DataFrame:
 @click.command()
 def gaps() -> None:
     """Print errors of a gas's conductance against gaps of boundary elements, for docs/joints.md: six minutes."""
-    for kind in SURFACES:
+    for kind in HARDNESSES:
         known = gap_errors(kind)
         light, many = known["area"] < LIGHT, (known["waves"] >= MANY) & (known["area"] < HEAVY)
         law, one, chain = (100 * np.stack(known[name]) for name in ("law", "one gap", "chain"))

@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from generate.boundary_elements import run as campaigns
+from generate.boundary_elements.solve import Contact
 from generate.boundary_elements.surfaces import Task
-from generate.boundary_elements.tamaas_contact import Contact
 from generate.calibrated_file import variable, write_part
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
 from mbma_tables import Surface, contact

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.sparse.linalg import LinearOperator, cg
 
 from generate.boundary_elements.run import of_contacts
-from generate.boundary_elements.tamaas_contact import Contact
+from generate.boundary_elements.solve import Contact
 from generate.calibrated_file import rms, write_part
 from generate.machined.makers import FAMILIES, GRADIENT, Part, finished, heights, rough
 from mbma_tables import Surface, flow_factors

@@ -10,7 +10,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from generate.provenance import MODULES, source_digest, versions
+from generate.files import MODULES, source_digest, versions
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles import schema

@@ -32,8 +32,6 @@ from mbma_tables.theories import OPTIONS, THEORIES, default_theory, get_theory, 
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 
-KNOWN = ("separation", "mean_separation", "pressure", "area")  # quantities of which exactly one is given
-
 
 @hinted
 def contact(
@@ -70,9 +68,8 @@ def contact(
         A/A0, on the same branch.
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
-        `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or
-        where an option of MBMA is given; "corrected" for one given by a map of at most
-        2^18 points whose wavelengths are resolved, and "calibrated" otherwise.
+        `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or where an option
+        of MBMA is given; "corrected" for a resolved map of at most 2^18 points, and "calibrated" otherwise.
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body supports, in the unit of `E_star` (over E* if that is 1), or a text
         that `mbma_tables.materials.hardness` accepts: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
@@ -161,13 +158,13 @@ def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None,
 
 
 def one_known(**given: Any) -> tuple[str, Any]:
-    """Name of the one quantity of `KNOWN` that is given."""
+    """The one quantity that is given, its name first."""
     known = []
     for name, value in given.items():
         if value is not None:
             known.append(name)
     if len(known) != 1:
-        raise InputError(f"give exactly one of {', '.join(KNOWN)}; got {' and '.join(known) or 'none'}")
+        raise InputError(f"give exactly one of {', '.join(given)}; got {' and '.join(known) or 'none'}")
     return known[0], given[known[0]]
 
 
@@ -219,8 +216,15 @@ def _places(
             else:
                 average = theory.mean_separation_at(surface, by, wanted)
         except OutOfRangeError:
-            if by == "pressure":
-                _refuse_pressures(surface, asked, modulus, cap, theory, source.units.stress)
+            if by == "pressure":  # above the hardness or the theory's largest, in its own unit
+                unit, limits = source.units.stress, [(cap, "the hardness")]
+                with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
+                    deepest = theory.interval(surface, "pressure" if theory.ends_at_h_max else "area")[0]
+                    reached = modulus * theory.answer(surface, deepest).pressure
+                    limits.append((reached, f"what theory {theory.name!r} reaches on this surface"))
+                for limit, what in limits:
+                    name, end = "pressure" if unit in (None, "1") else f"pressure [{unit}]", spread(limit, asked.shape)
+                    require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
             raise
     gap = asked if by == "separation" else 2 * average - h_max
     if theory.ends_at_h_max:
@@ -228,21 +232,6 @@ def _places(
         average = np.maximum(average, gap) if by == "separation" else average
         gap = np.minimum(gap, average)
     return {"separation": gap[()], "mean_separation": average[()]}, lighter
-
-
-def _refuse_pressures(
-    surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: FloatArray, theory: Theory, unit: str | None
-) -> None:
-    """Reject pressures above the hardness or the theory's largest; the message has their own unit."""
-    name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
-    limits = [(hardness, "the hardness")]
-    with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
-        deepest = theory.interval(surface, "pressure" if theory.ends_at_h_max else "area")[0]
-        reached = modulus * theory.answer(surface, deepest).pressure
-        limits.append((reached, f"what theory {theory.name!r} reaches on this surface"))
-    for limit, what in limits:
-        end = spread(np.asarray(limit), asked.shape)
-        require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
 
 
 def _of_labelled(

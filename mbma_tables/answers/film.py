@@ -172,12 +172,10 @@ def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         K, carried = flow_and_couette(cell, sides)
         return float(cell.mean()), K / cell.mean() ** 3, (cell.mean() - carried) / h_rms
 
-    def pressed(known: float) -> Any:
-        return contact(surface, mean_separation=known, theory=source.theory)
-
     lightest = float(contact(surface, area=LIGHTEST, theory=source.theory).mean_separation)
     knots = np.geomspace(u.min(), lightest, KNOTS)[:-1] if u.min() < lightest else np.empty(0)
-    rows = [flow(pressed(known).map().gap) for known in (*knots.tolist(), lightest)]
+    pressed = (contact(surface, mean_separation=gap, theory=source.theory) for gap in (*knots.tolist(), lightest))
+    rows = [flow(one.map().gap) for one in pressed]
     top = float(heights.max())
     rows += [flow(known - heights) for known in np.geomspace(top * CLEAR, max(u.max(), 2 * top), KNOTS)]
     at, phi, shear = (np.array(part) for part in zip(*rows, strict=True))

@@ -8,6 +8,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.common.plots import new_figure, theory_label
+from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.roughness import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
@@ -45,9 +46,8 @@ def described(surface: MeasuredSurface) -> list[str]:
     if not surface.heights.is_gaussian:
         lines.append(f"heights: skewness {surface.skewness:.2g}, kurtosis {surface.kurtosis:.3g} (Gaussian: 0 and 3)")
     if surface.bearing is not None:
-        ratio, peaked = surface.bearing.anisotropy, surface.bearing.slope_kurtosis
-        text = f"anisotropy {ratio:.3g} (rms gradient along over across), kurtosis {peaked:.3g} (Gaussian: 3)"
-        lines.append(f"slopes: {text}")
+        ratio = f"anisotropy {surface.bearing.anisotropy:.3g} (rms gradient along over across)"
+        lines.append(f"slopes: {ratio}, kurtosis {surface.bearing.slope_kurtosis:.3g} (Gaussian: 3)")
     lines += [f"not valid: {reason}" for reason in surface.departures(by_map=surface.bearing is not None)]
     return lines + [entry["told"] for entry in surface.provenance if "told" in entry]
 
@@ -140,8 +140,6 @@ def _spectrum(axes: Any, surface: MeasuredSurface, unit: str) -> None:
 
 
 def _distribution(axes: Any, surface: MeasuredSurface) -> None:
-    from mbma_tables.surfaces.heights import SHARES
-
     # density of heights from their quantiles, smoothed over a few
     heights, h_rms = np.asarray(surface.heights.quantiles), float(surface.h_rms)
     grid = np.linspace(-4.5, 4.5, 61)

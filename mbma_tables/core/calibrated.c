@@ -6,7 +6,6 @@
 #include <float.h>
 
 #include "elementary.h"
-#include "ends.h"
 #include "mbma.h"
 
 enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };

@@ -3,7 +3,6 @@
 #ifndef MBMA_CALLS_H
 #define MBMA_CALLS_H
 
-#include "closed_forms.h"
 #include "elementary.h"
 #include "mbma.h"
 
@@ -29,17 +28,6 @@ static size_t elementary(int64_t which, size_t n, const double *x, double *out) 
     for (size_t k = 0; k < n; k++)
         out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k])
                  : which == 3 ? mbma_log1p(x[k]) : mbma_erf(x[k]);
-    return 0;
-}
-
-/* A closed form: of X and mu the first six, of d, h_max, zeta_1 and hurst the others. */
-static size_t closed_form(size_t which, size_t n, const double *x, const double *y, const double *z, const double *w,
-                          double *out) {
-    static double (*const OF_ISLANDS[])(double, double) = {mbma_pocket_phi_F,   mbma_pocket_phi_A, mbma_standard_phi_F,
-                                                           mbma_standard_phi_A, mbma_long_phi_F,   mbma_long_phi_A};
-    for (size_t k = 0; k < n; k++)
-        out[k] = which < 6 ? OF_ISLANDS[which](x[k], y[k])
-                           : (which == 6 ? mbma_totals_pressure : mbma_totals_area)(x[k], y[k], z[k], w[k]);
     return 0;
 }
 
@@ -73,7 +61,11 @@ static bool are_panels(const argument *a) {
 
 #define BASIS(k) ((const mbma_basis[]){{N(k), P(k), P((k) + 1), P((k) + 2), P((k) + 3)}})
 #define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
-#define INVERSE(k) ((const mbma_inverse[]){mbma_inverse_open(P(k), N(k))})
+/* Records of an inverse, of whose words the first ones are its head. */
+#define GUESSES(k) ((N(k) - WORDS(mbma_inverse)) / WORDS(mbma_inverse_record) + 1)
+static bool is_inverse(const argument *a) {
+    return a->n >= WORDS(mbma_inverse) && (a->n - WORDS(mbma_inverse)) % WORDS(mbma_inverse_record) == 0;
+}
 
 /* First in all calls: coefficients; first nodes, rates, ends of the range, three constants; cells; of surfaces
  * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
@@ -107,9 +99,6 @@ static mbma_spline spline_of(const argument *a) {
 #define FUNCTIONS(FN) \
     /* elementary.h */ \
     FN(elementary, "i Dn wn", true, elementary(I(0), N(1), P(1), P(2))) \
-    /* closed_forms.h */ \
-    FN(closed_form, "i Dn Dn D?n D?n wn", (uint64_t)I(0) < 8 && (I(0) < 6 || (P(3) && P(4))), \
-       closed_form((size_t)I(0), N(1), P(1), P(2), P(3), P(4), P(5))) \
     /* totals.c */ \
     FN(phi, "Dn Dn D J D6 w3n b?n", true, mbma_phi(N(0), P(0), P(1), CELLS(2), P(5), P(6))) \
     FN(totals, "Dn Dn Dn Dn d D8 D J D6 w4n wn bn l1", true, \
@@ -142,8 +131,8 @@ static mbma_spline spline_of(const argument *a) {
        mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \
     FN(inverse_nodes, "Dn D i d wn wn", LAW(1)->head, \
        mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
-    FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head, \
-       mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
+    FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && is_inverse(&a[2]), \
+       mbma_law_invert(N(0), P(0), LAW(1), P(2), GUESSES(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
     /* calibrated.c */ \
     FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \
        mbma_spline_pieces(LOG_FORCE, SURFACES, P(8))) \

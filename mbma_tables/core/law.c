@@ -3,7 +3,7 @@
 #include "mbma.h"
 
 enum { CHUNK = 256, STEPS = 200, INVERSE_BITS = 2 };
-enum { RECORD = sizeof(mbma_law_record) / sizeof(double), GUESS = sizeof(mbma_inverse_record) / sizeof(double) };
+enum { RECORD = sizeof(mbma_law_record) / sizeof(double) };
 static const double SURE = 3e-6;     /* step, in half records, below which another would change nothing */
 static const double EPSILON = 4e-16; /* steps that another would not shorten */
 
@@ -25,18 +25,6 @@ mbma_law mbma_law_open(const void *block, size_t words) {
                           (const mbma_law_record *)(const void *)((const double *)block + first),
                           (int64_t)((words - first) / RECORD) - 1};
     return law;
-}
-
-mbma_inverse mbma_inverse_open(const void *block, size_t words) {
-    const size_t begin = sizeof(mbma_inverse_head) / sizeof(double);
-    const mbma_inverse_head *const head = (const mbma_inverse_head *)block;
-    mbma_inverse inverse = {NULL, NULL, 0};
-    if (block != NULL && words >= begin + GUESS && (words - begin) % GUESS == 0) {
-        inverse.head = head;
-        inverse.records = (const mbma_inverse_record *)(const void *)(head + 1);
-        inverse.last = (int64_t)((words - begin) / GUESS) - 1;
-    }
-    return inverse;
 }
 
 /* Position of a gap in a law: its record, t, q = -s scale rate, and t/q. */
@@ -268,10 +256,10 @@ size_t mbma_inverse_nodes(size_t n, const double *wanted, const mbma_law *law, m
 
 /* Each by a polynomial and one step of third order; iteration finds those for which one step may not be enough. Loops
  * of their own find records, which vectorises, and keep more entries in flight. */
-size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, const mbma_inverse *inverse,
+size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, const mbma_inverse *inverse, size_t count,
                        mbma_quantity which, double *d, double *area, double *stiffness) {
     const mbma_law_head head = *law->head;
-    const mbma_inverse_head of = *inverse->head;
+    const mbma_inverse of = *inverse;
     const double width = 1.0 / head.scale;
     size_t bad = 0;
     for (size_t first = 0, some; first < n; first += some) {
@@ -284,7 +272,7 @@ size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, cons
         for (size_t k = 0; k < some; k++) {
             const double inside = mbma_held(y0[k], of.low, of.high);
             const int64_t number = (mbma_bits(inside) >> (52 - INVERSE_BITS)) - of.first_bucket + (inside > of.turn);
-            guesses[k] = &inverse->records[number_held(number, inverse->last)];
+            guesses[k] = &inverse->records[number_held(number, (int64_t)count - 1)];
             at.t[k] = (inside - guesses[k]->centre) * guesses[k]->rate;
         }
         for (size_t k = 0; k < some; k++) {

@@ -209,30 +209,24 @@ double mbma_law_overclosure(const mbma_law *law, mbma_quantity which, double wan
 
 /* The inverse of force or area: guesses of x in four buckets an octave of its value, which bits of the value pick. */
 typedef struct {
-    double least, low, high, turn; /* values: the law's least, ends of the buckets, that at d = 0 where s turns */
-    int64_t first_bucket;
-    double end; /* d, where force or area turns down */
-} mbma_inverse_head;
-
-typedef struct {
     double centre, rate, side;
     double x[MBMA_INVERSE_DEGREE + 1];
 } mbma_inverse_record;
 
 typedef struct {
-    const mbma_inverse_head *head;
-    const mbma_inverse_record *records;
-    int64_t last;
+    double least, low, high, turn; /* values: the law's least, ends of the buckets, that at d = 0 where s turns */
+    int64_t first_bucket;
+    double end;                     /* d, where force or area turns down */
+    mbma_inverse_record records[1]; /* and more */
 } mbma_inverse;
-
-mbma_inverse mbma_inverse_open(const void *block, size_t words); /* likewise */
 
 /* x, and s there, at values of force or area, down to the separation `end`: nodes of an inverse that is to be made. */
 size_t mbma_inverse_nodes(size_t n, const double *wanted, const mbma_law *law, mbma_quantity which, double end,
                           double *x, double *side);
 
-/* Separations at forces (areas), with area and stiffness there where their arrays are not NULL. */
-size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, const mbma_inverse *inverse,
+/* Separations at forces (areas), by an inverse of so many records, with area and stiffness there where their arrays are
+ * not NULL. */
+size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, const mbma_inverse *inverse, size_t count,
                        mbma_quantity which, double *d, double *area, double *stiffness);
 
 /* Flow coefficient of the gaps at separations: `flow` is a block like that of a law, with the conductance in place of
@@ -251,7 +245,7 @@ typedef struct {
 } mbma_spline;
 
 /* The calibrated law: forces F over A0 E* g with g the rms gradient; mean separations u and other heights over h_rms.
- * `ends.h` has how forces end at h_max. */
+ * `mbma_ended` of elementary.h has how forces end at h_max. */
 typedef struct {
     mbma_spline log_force;               /* of a surface without end, over ln u */
     double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */

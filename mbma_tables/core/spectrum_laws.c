@@ -5,7 +5,6 @@
  * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F, F over g(x) of the last one.
  */
 #include "elementary.h"
-#include "ends.h"
 #include "mbma.h"
 
 enum { ORDER = MBMA_ORDER, CELLS = 85, NODES = 12, FEW_NODES = 4, MOST_STEPS = 100 };

@@ -186,8 +186,6 @@ class Derived:
     def _figure(self: Any) -> Any:
         held = self._variables()
         lines = (held[name].values for name in ("mean_separation", "pressure", "area"))
-        label, gap = (
-            pressure_label(unit_of("pressure", self.units)),
-            f"mean separation u [{self.units.length or 'length'}]",
-        )
-        return draw_compression([Curve(theory_label(self.theory), *lines)], pressure_label=label, gap_label=gap)
+        pressure, gap = pressure_label(unit_of("pressure", self.units)), self.units.length or "length"
+        curve, gap = Curve(theory_label(self.theory), *lines), f"mean separation u [{gap}]"
+        return draw_compression([curve], pressure_label=pressure, gap_label=gap)

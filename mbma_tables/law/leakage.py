@@ -27,12 +27,9 @@ class LeakageLaw:
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
     blocked_at: float  # gap d at and below which contact percolates and nothing flows; -infinity where it never does
-    # bound on the relative error of the polynomials, against the flow at the law's area; errors of that area come on
-    # top, times -d ln k/d ln A, which grows without limit towards `blocked_at`
+    # bound on the polynomials' relative error at the law's area, whose own errors come on top times -d ln k/d ln A
     error: float
-    # in the layout of a law's block: the coefficient in place of force, and the hydraulic aperture in place of area;
-    # from `blocked_at` to h_max, or to the end of a law without last contact
-    block: FloatArray
+    block: FloatArray  # as a law's, with flow in place of force and hydraulic aperture in place of area
 
     def along(self, direction: str | float) -> LeakageLaw:
         """Of a simulated map, the same along an axis, "x" or "y", or in a direction in degrees from x; else itself."""

@@ -6,10 +6,9 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, number_in
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.surfaces.variants import Variant
 
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # options for islands that a table does not cover
@@ -125,45 +124,3 @@ def exact_model(rtol: float) -> ExactModel:
 def island_model_name(island_model: str | AnyModel) -> str:
     """The name of an island model in results."""
     return island_model if isinstance(island_model, str) else getattr(island_model, "name", "")
-
-
-def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> AnyModel:
-    """One of `ISLAND_MODELS`, or an object, which is checked, accurate enough for results at `rtol`.
-
-    A model made for one variant has the attribute `variant`.
-    """
-    asked = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL)
-    if isinstance(island_model, str) and island_model in ISLAND_MODELS:
-        model = _named(island_model, asked)
-    elif (
-        isinstance(island_model, IslandModel | GeometryModel)
-        and not isinstance(island_model, type)
-        and isinstance(island_model.name, str)
-    ):
-        model = island_model
-    else:
-        known = f"one of {ISLAND_MODELS} or an object with a name and answer(X, mu)"
-        raise InputError(f"island_model must be {known}, got {island_model!r}")
-    own = getattr(model, "variant", None)
-    if isinstance(own, Variant) and (own.density_divisor, own.summit_sigma) != (
-        variant.density_divisor,
-        variant.summit_sigma,
-    ):
-        raise InputError(
-            f"the {model.name} table was made for the variant {own.name!r}, not for {variant.name!r}; "
-            "island model 'universal' serves every variant"
-        )
-    return model
-
-
-def _named(island_model: str, rtol: float) -> AnyModel:
-    if island_model in ("exact", "rigid"):
-        return exact_model(rtol) if island_model == "exact" else RigidModel()
-    # closed forms and netCDF are imported when needed
-    if island_model == "formula":
-        from mbma_tables.models.closed_forms import FormulaModel
-
-        return FormulaModel()
-    from mbma_tables.models.tables import open_table
-
-    return open_table(island_model)

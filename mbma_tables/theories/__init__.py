@@ -94,8 +94,7 @@ def default_theory(name: str) -> Theory:
 def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
     """The given theory; by default "mbma" for five numbers or its options, the most accurate for measured surfaces.
 
-    The latter is "simulated" for a surface opened from a table, "corrected" for suitable maps, "calibrated" for
-    others.
+    The latter is "simulated" for a surface opened from a table, "corrected" for suitable maps, otherwise "calibrated".
     """
     from mbma_tables.surfaces.surface import Surface
 

@@ -239,6 +239,6 @@ class Calibrated(Theory):
         return np.hypot(stated, _spread(surface, quantity, area)) if surface.scans else stated
 
     def scatter_name(self, surface: AnySurface) -> str:
-        """Advice: with a map the scatter is much smaller."""
+        """With a map its own."""
         by_map = isinstance(surface, MeasuredSurface) and surface.bearing is not None
         return f"{self.name}_map" if by_map else self.name

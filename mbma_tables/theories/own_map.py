@@ -2,7 +2,6 @@
 
 import dataclasses
 import datetime
-import hashlib
 import json
 import os
 from collections.abc import Sequence
@@ -85,13 +84,6 @@ def map_of(surface: AnySurface) -> Treated:
     return whole
 
 
-def origin_of(whole: Treated, tolerance: float) -> str:
-    """Description of the map simulated, and of the method."""
-    digest = hashlib.sha256(np.ascontiguousarray(whole.heights, "<f8").tobytes()).hexdigest()
-    points = " x ".join(map(str, whole.heights.shape))
-    return f"boundary elements, tolerance {tolerance:g}, of the map of {points} points with SHA-256 {digest[:16]}"
-
-
 def _fields(name: str) -> list[str]:
     return [field.name for field in dataclasses.fields(PARTS[name])]
 
@@ -140,10 +132,8 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
     """The surface of such a file, with its table."""
     values, own = read_own(path)
     try:
-        parts = {
-            part: kind(**{name: _plain(values[f"{part}_{name}"]) for name in _fields(part)})
-            for part, kind in PARTS.items()
-        }
+        plain = {name: value.item() if value.size == 1 else value for name, value in values.items()}
+        parts = {part: kind(**{n: plain[f"{part}_{n}"] for n in _fields(part)}) for part, kind in PARTS.items()}
         numbers = [values[name].item() for name in NUMBERS]
         rows = np.stack([values[name] for name in ROWS])
         if values["flow"].shape != (*values["flow_gaps"].shape, 3) or rows.ndim != 2:
@@ -157,7 +147,3 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
         raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {OWN_REMEDY}") from None
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if value.size == 1 else value

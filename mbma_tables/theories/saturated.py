@@ -1,9 +1,9 @@
 """Simulated maps with a hardness, for each hardness anew, and quicker simulations, the default theory of maps."""
 
+import collections
 import functools
 from collections.abc import Callable
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,14 +25,7 @@ KEPT = 8  # hardnesses of maps whose simulations are kept
 # standard deviations of ln of a quantity, by `python -m generate machined`
 SCATTER = {"area": 0.010, "pressure": 0.011, "stiffness": 0.033}
 
-
-class Loaded(NamedTuple):
-    """As `yielding.Loaded`."""
-
-    answer: TheoryAnswer
-    yielded: FloatArray
-    unloading_stiffness: FloatArray
-    plane_separation: FloatArray
+Loaded = collections.namedtuple("Loaded", ("answer", "yielded", "unloading_stiffness", "plane_separation"))
 
 
 class Plastic(BoundaryElements):
@@ -167,12 +160,8 @@ class Saturated(Yielding):
         return np.where(np.isinf(self.hardness), elastic, np.hypot(elastic, SCATTER.get(quantity, 0.0)))
 
 
-def _with_hardness(theory: BoundaryElements, hardness: ArrayLike) -> Yielding:
-    """A map whose points are known is simulated anew; a table goes through the law of hardness."""
-    return (Saturated if isinstance(theory.pressed, Press) else Yielding)(theory, hardness)
-
-
-WITH_HARDNESS[BoundaryElements] = _with_hardness
+# a map whose points are known is simulated anew; a table goes through the law of hardness
+WITH_HARDNESS[BoundaryElements] = lambda own, cap: (Saturated if isinstance(own.pressed, Press) else Yielding)(own, cap)
 
 
 class Corrected(BoundaryElements):
@@ -182,14 +171,12 @@ class Corrected(BoundaryElements):
     areas = tuple(area for area in own_map.AREAS if area not in (7e-4, 0.3, 0.95))
     tolerance = 3e-4
     tested = 3e-3, 0.8
-    scatters = MappingProxyType(
-        {
-            "area": (0.0494, 0.0176, 0.00784, 0.0104, 0.0102, 0.002, 0.00622),
-            "pressure": (0.00485, 0.00251, 0.000943, 0.00116, 0.00155, 0.00133, 0.00239),
-            "stiffness": (0.0361, 0.0135, 0.00624, 0.00772, 0.0076, 0.0033, 0.0131),
-            "flow": (0.00594, 0.0106, 0.0111, 0.0125, 0.0125, 0.0125, 0.0125),
-        }
-    )
+    scatters: ClassVar[dict[str, tuple[float, ...]]] = {
+        "area": (0.0494, 0.0176, 0.00784, 0.0104, 0.0102, 0.002, 0.00622),
+        "pressure": (0.00485, 0.00251, 0.000943, 0.00116, 0.00155, 0.00133, 0.00239),
+        "stiffness": (0.0361, 0.0135, 0.00624, 0.00772, 0.0076, 0.0033, 0.0131),
+        "flow": (0.00594, 0.0106, 0.0111, 0.0125, 0.0125, 0.0125, 0.0125),
+    }
 
 
 def applies(surface: AnySurface) -> bool:

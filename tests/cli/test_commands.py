@@ -55,32 +55,25 @@ def table_rows(text: str) -> list[list[str]]:
 def test_contact_json_is_the_librarys_answer_digit_for_digit():
     arguments = ("-d", "0.5,-0.2", "-d", "-1.1", "--island-model", "rigid", "--rtol", "1e-6", "--E-star", "7.5")
     found = json.loads(run("contact", "--surface", "concrete", *arguments, "--json"))
-    answer = contact(
-        Surface.named("concrete"), separation=[0.5, -0.2, -1.1], island_model="rigid", E_star=7.5, rtol=1e-6
-    )
+    surface = Surface.named("concrete")
+    answer = contact(surface, separation=[0.5, -0.2, -1.1], island_model="rigid", E_star=7.5, rtol=1e-6)
     for name in ("separation", "mean_separation", "pressure", "area", "error"):
         assert found["columns"][name] == getattr(answer, name).tolist()
     assert (found["variant"], found["island_model"], found["rtol"], found["E_star"]) == ("reported", "rigid", 1e-6, 7.5)
-    assert found["units"]["separation"] == "mm"
-    assert found["units"]["pressure"] == "stress"
-    assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
+    assert (found["units"]["separation"], found["units"]["pressure"]) == ("mm", "stress")
+    assert found["surface"]["zeta_1"] == surface.zeta_1
 
 
 @pytest.mark.parametrize("theory", THEORIES)
 def test_contact_by_pressure_and_by_area(theory):
-    def asked(*known):
-        return json.loads(run("contact", "--surface", "concrete", "--theory", theory, *known, "--json"))
-
-    surface = Surface.named("concrete")
-    by_pressure = asked("-p", "1e-3,0.002", "--E-star", "5")
-    answer = contact(surface, pressure=[1e-3, 2e-3], E_star=5.0, theory=theory)
-    for name in ("separation", "mean_separation", "pressure", "area", "stiffness"):
-        assert by_pressure["columns"][name] == pytest.approx(getattr(answer, name).tolist(), rel=1e-12)
-    assert (by_pressure["theory"], by_pressure["valid"]) == (theory, answer.valid.tolist())
-    assert by_pressure["reasons"] == {why: np.flatnonzero(mask).tolist() for why, mask in answer.reasons.items()}
-    assert by_pressure["scatter"] == pytest.approx(answer.scatter.tolist(), rel=1e-12)
-    assert by_pressure["area_scatter"] == pytest.approx(answer.area_scatter.tolist(), rel=1e-12)
-    by_area = asked("--area", repr(by_pressure["columns"]["area"][1]))
+    asked = ("contact", "--surface", "concrete", "--theory", theory, "--json")
+    found = json.loads(run(*asked, "-p", "1e-3,0.002", "--E-star", "5"))
+    answer = contact(Surface.named("concrete"), pressure=[1e-3, 2e-3], E_star=5.0, theory=theory)
+    for name in ("separation", "mean_separation", "pressure", "area", "stiffness", "scatter", "area_scatter"):
+        assert found["columns"][name] == pytest.approx(getattr(answer, name).tolist(), rel=1e-12)
+    assert (found["theory"], found["valid"]) == (theory, answer.valid.tolist())
+    assert found["reasons"] == {why: np.flatnonzero(mask).tolist() for why, mask in answer.reasons.items()}
+    by_area = json.loads(run(*asked, "--area", repr(found["columns"]["area"][1])))
     assert by_area["columns"]["pressure"] == pytest.approx([2e-3 / 5], rel=1e-7)
 
 

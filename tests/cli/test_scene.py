@@ -48,14 +48,11 @@ test_mistakes_end_with_one_line = told(
 )
 
 
-def test_the_table_has_a_line_for_each_row():
+def test_costs_and_distances_have_a_line_for_each_row():
     title, _, header, *lines = run("cost").splitlines()
     assert len(lines) == sum(row.island_model != UNIT for row in shipped_costs().rows)
     assert "fixed piece of work" in title
     assert header.split() == ["island_model", "variant", "quantity", "error", "cost", "evaluations", "seconds"]
-
-
-def test_distances_are_told_beside_times():
     title, _, header, *lines = run("cost", "--distance").splitlines()
     assert title.endswith("s")
     assert header.split() == [*Distance._fields, "seconds"]

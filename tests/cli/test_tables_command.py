@@ -75,9 +75,6 @@ def test_a_missing_table_and_a_wrong_kind(folder):
     assert "holds a table of kind 'universal', not island4d" in refused("tables", "verify", "island4d")
     assert "holds a table of kind 'universal', not island4d" in refused("tables", "info", "island4d")
     assert "universal.nc: cannot be read" in refused("tables", "verify")
-
-
-def test_misuse(folder):
     assert "TABLE" in refused("tables", "info")
     assert "No such command" in refused("tables", "remake")
     assert refused("tables") == "mbma: Missing command.\n(see 'mbma tables --help')\n"

@@ -32,17 +32,13 @@ class Call(NamedTuple):
 
     def packed(self):
         """For replay.c."""
-        parts = [struct.pack("<64si", self.name.encode(), len(self.given))]
+        parts = [struct.pack("<64sq", self.name.encode(), len(self.given))]
         for one in self.given:
-            if one is None:
-                parts.append(struct.pack("<i", ord("N")))
-            elif isinstance(one, np.ndarray):
-                kind = {"q": "l", "?": "B"}.get(one.dtype.char, one.dtype.char)
-                parts += [struct.pack("<iiiI", ord("A"), ord(kind), one.itemsize, one.nbytes), one.tobytes()]
-            elif isinstance(one, float):
-                parts.append(struct.pack("<id", ord("d"), one))
+            if isinstance(one, np.ndarray):
+                parts += [struct.pack("<qqqd", one.nbytes, one.itemsize, 0, 0.0), one.tobytes()]
             else:
-                parts.append(struct.pack("<iq", ord("i"), operator.index(one)))
+                whole = 0 if one is None or isinstance(one, float) else operator.index(one)
+                parts.append(struct.pack("<qqqd", -1, 1, whole, 0.0 if one is None else one))
         return b"".join(parts)
 
 
@@ -82,9 +78,6 @@ def use():
     core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
-    for form in range(8):
-        more = [surfaces[2] if form > 5 else None] * 2
-        core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
     core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
 
     universal = open_table("universal")

@@ -11,54 +11,38 @@ static const struct {
     const char *name;
     bool (*call)(const argument *, long long *);
 } CALLS[] = {FUNCTIONS(ROW)};
+enum { COUNT = sizeof CALLS / sizeof *CALLS };
 
 static void get(void *out, size_t bytes) {
     if (bytes > 0 && fread(out, 1, bytes, stdin) != bytes)
         exit(3);
 }
 
-/* One of record.py's arguments; the bytes of its array. */
-static size_t get_argument(argument *a) {
-    int32_t kind, head[2] = {0, 1};
-    uint32_t bytes = 0;
-    memset(a, 0, sizeof *a);
-    get(&kind, sizeof kind);
-    if (kind == 'd')
-        get(&a->d, sizeof a->d);
-    else if (kind == 'i') {
-        get(&a->i, sizeof a->i);
-        a->d = (double)a->i;
-    } else if (kind == 'A') {
-        get(head, sizeof head); /* the kind of items and their size */
-        get(&bytes, sizeof bytes);
-        a->n = bytes / (uint32_t)head[1];
-        a->data = malloc(bytes + 1);
-        if (a->data == NULL)
-            exit(3);
-        get(a->data, bytes);
-    }
-    return bytes;
-}
-
 int main(void) {
     char name[64];
     while (fread(name, sizeof name, 1, stdin) == 1) {
         argument a[MOST_ARGUMENTS];
-        size_t bytes[MOST_ARGUMENTS], m = 0;
+        /* of each argument: bytes of its array, or -1, the size of an item, and a number */
+        int64_t count, head[MOST_ARGUMENTS][3], m = 0;
         long long found;
-        int32_t count;
         get(&count, sizeof count);
-        for (int k = 0; k < count && k < MOST_ARGUMENTS; k++)
-            bytes[k] = get_argument(&a[k]);
-        while (m < sizeof CALLS / sizeof *CALLS && strcmp(CALLS[m].name, name) != 0)
+        for (int k = 0; k < count; k++) {
+            get(head[k], sizeof head[k]);
+            get(&a[k].d, sizeof a[k].d);
+            const size_t bytes = head[k][0] > 0 ? (size_t)head[k][0] : 0;
+            a[k].n = bytes / (size_t)head[k][1];
+            a[k].i = head[k][2];
+            get(a[k].data = head[k][0] < 0 ? NULL : malloc(bytes + 1), bytes);
+        }
+        while (m < COUNT && strcmp(CALLS[m].name, name) != 0)
             m++;
-        if (m == sizeof CALLS / sizeof *CALLS || !CALLS[m].call(a, &found)) {
+        if (m == COUNT || !CALLS[m].call(a, &found)) {
             fprintf(stderr, "%s was refused\n", name);
             return 1;
         }
         fwrite(&found, sizeof found, 1, stdout);
         for (int k = 0; k < count; k++) {
-            fwrite(a[k].data, 1, bytes[k], stdout);
+            fwrite(a[k].data, 1, head[k][0] > 0 ? (size_t)head[k][0] : 0, stdout);
             free(a[k].data);
         }
     }

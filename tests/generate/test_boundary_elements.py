@@ -145,7 +145,7 @@ def test_other_campaigns_keep_what_their_files_hold(kind, tmp_path):
 
 
 def test_failures_come_last_and_are_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("generate.boundary_elements.tamaas_contact.MAX_ITERATIONS", 2)
+    monkeypatch.setattr("generate.boundary_elements.solve.MAX_ITERATIONS", 2)
     tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
     with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
         run(tasks, tmp_path)

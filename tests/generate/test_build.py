@@ -12,8 +12,7 @@ from click.testing import CliRunner
 from small_tables import SMALL, small, small_build
 
 from generate.__main__ import main
-from generate.files import ROOT
-from generate.provenance import versions
+from generate.files import ROOT, versions
 from generate.tables import certificate
 from generate.tables.certificate import Kind, UncertifiedError, phi
 from generate.tables.commands import KINDS, TABLES
@@ -197,7 +196,7 @@ WRONG = [
     ("target = 1e-12", "target: 1e-12 is less than the minimum of 1e-11"),
     ("target = nan", "not JSON compliant"),
     ("max_nodes = 1.5", "max_nodes: 1.5 is not of type 'integer'"),
-    ("variant = 'rubbed'", "variant: 'rubbed' is not known"),
+    ("variant = 'rubbed'", "variant: 'rubbed' is not one of"),
     ("[axes.mu]\nhigh = 1e11", "axes.mu.high: 100000000000.0 is greater than the maximum of 10000000000.0"),
     ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X: its nodes must increase from low to high"),
     ("variant = [", "is not a TOML file"),

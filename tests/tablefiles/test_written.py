@@ -9,7 +9,7 @@ import pytest
 from small_tables import small_table
 
 import mbma_tables
-from generate.provenance import MODULES, source_digest
+from generate.files import MODULES, source_digest
 from generate.tables.writing import write_table
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.islands import greenwood_tripp

@@ -8,7 +8,7 @@ import pytest
 from helpers import topographies
 from scipy.ndimage import gaussian_filter
 
-from generate.boundary_elements.tamaas_contact import Contact
+from generate.boundary_elements.solve import Contact
 from generate.machined.makers import Part, heights
 from generate.pages import maps
 from generate.pages.maps import BARS, ratios, read_rows

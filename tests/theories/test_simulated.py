@@ -7,7 +7,7 @@ import pytest
 from helpers import random_map
 from scipy.special import erf
 
-from generate.boundary_elements.tamaas_contact import Contact
+from generate.boundary_elements.solve import Contact
 from generate.machined import makers
 from generate.machined.makers import Part
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law

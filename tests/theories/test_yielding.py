@@ -10,8 +10,8 @@ import xarray as xr
 from helpers import random_map, refusals
 from scipy.differentiate import derivative
 
+from generate.boundary_elements.solve import Contact as Elastic
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.boundary_elements.tamaas_contact import Contact as Elastic
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.laws import hardness

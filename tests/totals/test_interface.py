@@ -160,9 +160,6 @@ def test_a_lay_is_stiffer_across():
         contact(stretched, area=0.001).tangential(nu=0.3, direction="along")
 
 
-FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-
-
 @pytest.mark.parametrize("eta", [np.inf, 0.1])
 @pytest.mark.parametrize(("hurst", "seed"), [(0.8, 901), (0.4, 902)])
 def test_gaps_of_boundary_elements(hurst, seed, eta):
