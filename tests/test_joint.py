@@ -128,7 +128,7 @@ def test_friction_cards_have_the_stiffness_before_slip(joint):
     )  # fmt: skip
     assert np.interp(7.0, rows.x, rows.y) == pytest.approx(stick[1], rel=1e-2)
     with pytest.raises(InputError, match="takes no friction"):
-        targets.group("SOLVERS")["lsdyna"].files(
+        targets.targets()["lsdyna"].files(
             describe_law(joint.surface, "57 GPa", stress_unit="MPa", friction=0.2, kappa=1.2, friction_pressure=1.0)
         )
     with pytest.raises(InputError, match="friction needs kappa"):

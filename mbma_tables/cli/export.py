@@ -14,7 +14,7 @@ from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file, write_file
 from mbma_tables.common.progress import echo
-from mbma_tables.export.targets import AGAINST, Target, group, names, targets
+from mbma_tables.export.targets import AGAINST, Target, targets
 from mbma_tables.export.text import written_by
 from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
@@ -31,7 +31,7 @@ class _Export(click.Command):
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         formatter.write_paragraph()
-        formatter.write_text(f"Targets: {', '.join(names())}.")
+        formatter.write_text(f"Targets: {', '.join(targets())}.")
 
 
 @click.command("export", cls=_Export, short_help="A contact law, or the whole model, for other codes.")
@@ -77,9 +77,9 @@ def export_command(target: str, out: Path, **values: Any) -> None:
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
-    require_name("target", target, names())
+    require_name("target", target, targets())
     given = {name: value for name, value in values.items() if value is not None and value != DEFAULTS.get(name)}
-    kind, code = targets()[target], target in group("CODE")
+    kind, code = targets()[target], target in targets("CODE")
     words = {"specimen": "the surface", "kappa": "--nu"}
     taken = kind.takes if code else kind.takes | {"specimen"}
     if unused := [words.get(name, f"--{name.replace('_', '-')}") for name in given if name not in taken]:

@@ -3,8 +3,8 @@
 
 def __getattr__(name: str) -> tuple[str, ...]:
     """Names of the targets of a group: SOLVERS, DATA, LAWS, FMUS, CODE."""
-    from mbma_tables.export.targets import GROUPS, names
+    from mbma_tables.export.targets import GROUPS, targets
 
     if name not in GROUPS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return names(name)
+    return tuple(targets(name))

@@ -106,7 +106,7 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
 def tables(model: UniversalModel) -> dict[str, Any]:
     """The arrays of the tables by their names in C."""
     cells, places, _ = model.cells
-    spline, *_ = calibrated_table.shipped().core_table
+    spline = calibrated_table.shipped().core_table[0]
     return {"MBMA_CELLS": cells.reshape(-1, RECORD), "MBMA_PLACES": places, "MBMA_SPLINE": spline}
 
 

@@ -14,8 +14,7 @@ from mbma_tables.answers.contact import contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
-from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
-from mbma_tables.models.closed_forms import FUNCTIONS
+from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.surface import Surface
@@ -60,12 +59,10 @@ def rows(kind: str, arguments: Iterable[Any], answers: Any, scales: Any = None, 
 
 
 def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
-    """The closed form at flat (X, mu) that lie in its range."""
-    functions, form = FUNCTIONS[FORM], RANGES[FORM]
-    (X_low, X_high), (_, mu_high) = form["X"], form["mu"]
-    place = np.array([X, mu])[:, (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)]
-    error = max(certificate.largest for certificate in CERTIFICATES[FORM].values())
-    yield from rows("formula", place, (functions["phi_F"](*place), functions["phi_A"](*place), error))
+    """The closed form at flat (X, mu), where they lie in its range."""
+    found = np.array(FormulaModel(FORM).answer(X, mu, outside="nan"))
+    inside = np.isfinite(found[2])
+    yield from rows("formula", np.array([X, mu])[:, inside], found[:, inside])
 
 
 def surface_rows(
@@ -105,13 +102,13 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
     ]
     # with the results and tolerances that are stored in the table
     known = points["table_F"], points["table_A"], model.answer(*places).error
-    lines = [*rows("phi", places, known, None, points["tolerance"]), *formula_rows(*places)]
+    lines = [*rows("phi", places, known, None, points["tolerance"])]
     middle = 0.5 * (X.low + X.high)
     statuses = {(X.low, 1.0): OK, (X.high, 1.0): OK, (middle, mu.high): OK, (middle, 0.0): OK}
     statuses |= {(np.nextafter(X.low, -np.inf), 1.0): X_BELOW, (np.nextafter(X.high, np.inf), 1.0): X_ABOVE}
     statuses |= {(middle, np.nextafter(mu.high, np.inf)): MU_ABOVE}
     statuses |= dict.fromkeys([(math.nan, 1.0), (middle, math.nan), (middle, -1e-300)], INVALID)
-    lines += rows("status", np.array([*statuses]).T, [[*statuses.values()]])
+    lines += [*rows("status", np.array([*statuses]).T, [[*statuses.values()]]), *formula_rows(*places)]
     for surface in SURFACES:
         if surface[2] / surface[1] > max(3.0, variant.floor_u):
             approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)

@@ -240,14 +240,12 @@ def exported_law(
         if E_star != 1.0 or hardness != np.inf or any((length_unit, stress_unit, theory)) or variant != "reported":
             raise InputError("a force law has its modulus, hardness, units and theory: give no others")
         body, layer = surface.body, surface.body.law
-        length = _known("length_unit", body.surface.unit)
-        _known("stress_unit", None if layer.units.stress == "1" else layer.units.stress)
+        length, _ = _known(body.surface.unit, layer.units.stress)
         numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
         return ExportedLaw(body.surface, surface.law, body.theory, *numbers, force=surface)
     one: AnySurface = in_unit(surface, length_unit)
     modulus, units = modulus_and_units(E_star, one, stress_unit)
-    length = _known("length_unit", units.length)
-    stress = _known("stress_unit", None if units.stress == "1" else units.stress)
+    length, stress = _known(units.length, units.stress)
     if one.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     modulus = number_in("E_star", modulus, 1e-300, 1e300)
@@ -258,8 +256,10 @@ def exported_law(
     return ExportedLaw(one, law, own, modulus, cap, length, stress, made_by, direction)
 
 
-def _known(name: str, unit: str | None) -> str:
-    if unit is None:
-        sample = {"length_unit": "'0.8 um'", "stress_unit": "E_star = '115 GPa'"}[name]
-        raise InputError(f"{name} is missing: give it, or numbers with units, like {sample}")
-    return unit
+def _known(length: str | None, stress: str | None) -> tuple[str, str]:
+    """The units, neither of which may be missing."""
+    if length is None:
+        raise InputError("length_unit is missing: give it, or numbers with units, like '0.8 um'")
+    if not stress or stress == "1":
+        raise InputError("stress_unit is missing: give it, or numbers with units, like E_star = '115 GPa'")
+    return length, stress

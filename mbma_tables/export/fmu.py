@@ -66,12 +66,13 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     """
     found = asked_law(surface, E_star, name, **asked)
     law, exported = text_of("c-law", found), found.exported
+    variables = _variables(found)
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, law)}}}"
     parts = {
         "LAW": law,
         "NAME": name,
         "TOKEN": token,
-        "START": repr(_start(exported)),
+        "START": variables[1]["start"],
         "LEAKAGE": found.more.get("leakage", ""),
         "SLOPED": "LAW" if found.sloped is exported.law else "ELASTIC",
         "LEAST": "-INFINITY" if exported.ends else repr(exported.c_least),
@@ -81,7 +82,10 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     built = _binaries(name, source, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
     said = "\n".join((*found.said, f"binaries: {listed}"))
-    files = {"modelDescription.xml": _description(name, token, said, found), f"sources/{name}.c": source.encode()}
+    files = {
+        "modelDescription.xml": _description(name, token, said, variables, exported),
+        f"sources/{name}.c": source.encode(),
+    }
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for path, content in (files | built).items():
@@ -110,15 +114,11 @@ def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
     return found
 
 
-def _start(exported: ExportedLaw) -> float:
-    return 0.0 if exported.ends else max(0.0, exported.c_least)
-
-
 def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """XML attributes of each variable, by value reference."""
     exported = found.exported
     length, stress = exported.length, exported.stress
-    asked = {"start": repr(_start(exported)), "max": repr(exported.c_most)}
+    asked = {"start": repr(0.0 if exported.ends else max(0.0, exported.c_least)), "max": repr(exported.c_most)}
     asked |= {} if exported.ends else {"min": repr(exported.c_least)}
     outputs = {
         "pressure": (stress, "force over nominal area"),
@@ -135,9 +135,9 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     ]
 
 
-def _description(name: str, token: str, text: str, found: AskedLaw) -> bytes:
+def _description(name: str, token: str, text: str, variables: list[dict[str, str]], exported: ExportedLaw) -> bytes:
     """modelDescription.xml."""
-    variables, length, stress = _variables(found), found.exported.length, found.exported.stress
+    length, stress = exported.length, exported.stress
     facts = {"fmiVersion": "2.0", "modelName": name, "guid": token, "description": text}
     facts |= {"generationTool": f"mbma_tables {__version__}", "variableNamingConvention": "flat"}
     root = ET.Element("fmiModelDescription", facts)

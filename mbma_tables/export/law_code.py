@@ -151,8 +151,8 @@ def text_of(target: str, asked: AskedLaw, template: str = "") -> str:
             f"{target} has no place for an unloading stiffness, which conductance and tangential stiffness of yielded "
             "contact follow: leave the hardness out, or take c-law, fortran-law, javascript-law, modelica-law or an FMU"
         )
-    lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
-    lines.append(_example(exported, language))
+    said = (line.replace("{", "{{").replace("}", "}}") for line in asked.said)
+    lines = [*said, language.usage, _example(exported, language)]
     first = 0.0 if exported.ends else (exported.law.h_max - exported.law.highest) / 2
     numbers = {"H_MAX": exported.law.h_max, "FIRST": first, "C_TURN": exported.c_turn}
     numbers |= {"C_LEAST": exported.c_least, "C_MOST": exported.c_most}
@@ -206,11 +206,10 @@ def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[s
 
 def _core(target: str, asked: AskedLaw) -> dict[str, str]:
     """The core, as C or compiled, and the law's own blocks."""
-    law, leaks, name = asked.exported.law, asked.more.get("leakage", ""), asked.name
+    law, leaks, name, parts = asked.exported.law, asked.more.get("leakage", ""), asked.name, dict[str, str]()
     blocks = {"LAW": law.block} | ({"ELASTIC": asked.sloped.block} if asked.sloped is not law else {})
     if leaks:
-        blocks["FLOW"] = asked.exported.leakage.block
-    parts = {"FLOW_H_RMS": repr(float(asked.exported.leakage.h_rms))} if leaks else {}
+        blocks["FLOW"], parts["FLOW_H_RMS"] = asked.exported.leakage.block, repr(float(asked.exported.leakage.h_rms))
     if target == "javascript-law":
         held = {"WASM": page_file(LAW_MODULE)}
         held |= {f"{own}_BLOCK": block.astype("<f8", copy=False).tobytes() for own, block in blocks.items()}
@@ -223,11 +222,12 @@ def _core(target: str, asked: AskedLaw) -> dict[str, str]:
 
 
 def _example(exported: ExportedLaw, language: Language) -> str:
-    """One line with values of the library's law."""
+    """One line with values of the library's law; Modelica solves for c itself."""
     c = float(f"{exported.c_turn / 4:.3g}")
     p, k = (float(value) for value in exported.law.pressure_and_stiffness(exported.law.h_max - c))
-    answers = {"pressure": (c, p), "tangent": (c, k)}
-    answers |= {} if language.template == "law.mo" else {"overclosure": (p, c)}  # Modelica solves for c itself
+    answers = {"pressure": (c, p), "tangent": (c, k)} | (
+        {"overclosure": (p, c)} if language.template != "law.mo" else {}
+    )
     said = ", ".join(
         f"{language.call.format(name='{name}', what=what, x=language.number(float(f'{x:.7g}')))} = {y:.7g}"
         for what, (x, y) in answers.items()
@@ -253,7 +253,7 @@ def _data(name: str, block: FloatArray) -> str:
     ]
     head = braces(*numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD]))
     rows = whole[at.HEAD : last].reshape(-1, 2)
-    data = ",\n".join(wrapped([part]) for part in (head, braces(*rows), braces(*records)))
+    data = ",\n".join(wrapped(part) for part in (head, braces(*rows), braces(*records)))
     return DATA.format(name=name, data=data, rows=len(rows), records=len(records))
 
 

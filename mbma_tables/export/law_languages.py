@@ -86,7 +86,7 @@ def _sides(block: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
 def brackets(values: FloatArray) -> str:
     """A column, or rows of polynomials, as Python has them."""
     if values.ndim == 1:
-        return f"[{wrapped(map(repr, values.tolist()))}]"
+        return f"[{wrapped(', '.join(map(repr, values.tolist())))}]"
     return f"[\n{_lines(_decimals(values), '[', '],')}\n]"
 
 

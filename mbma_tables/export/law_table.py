@@ -126,10 +126,15 @@ def _not_below(value: float) -> float:
 
 def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray:
     """Places of `count` rows along x whose chords have equal errors relative to max(y, floor), by iteration."""
+
+    def cut(filled: FloatArray, along: FloatArray) -> FloatArray:  # places between which `filled` grows equally
+        inner: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, along)[1:-1]
+        return np.concatenate([x[:1], inner, x[-1:]])
+
     scale = np.maximum(y, floor)
     # logarithmic in y above the floor to begin with, linear below
     filled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]) + np.linspace(0, 3, x.size)
-    places = _cut(filled, x, count)
+    places = cut(filled, x)
     best, found = np.inf, places
     for _ in range(ROUNDS):
         chords = np.interp(places, x, y)
@@ -141,15 +146,8 @@ def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray
             best, found = error.max(), places
         # the error of a chord falls like the square of its length
         root = np.sqrt(error + 1e-3 * error.max())
-        places = _cut(np.concatenate([[0.0], np.cumsum(root)]), places, count)
+        places = cut(np.concatenate([[0.0], np.cumsum(root)]), places)
     return found
-
-
-def _cut(filled: FloatArray, x: FloatArray, count: int) -> FloatArray:
-    """`count` places between which `filled` grows by equal amounts."""
-    places: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, x)
-    places[0], places[-1] = x[0], x[-1]
-    return places
 
 
 def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float) -> FloatArray:

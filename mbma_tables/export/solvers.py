@@ -1,8 +1,7 @@
 """Contact laws in the formats of other programs; each target is a `Grammar` of rows.
 
-CalculiX 2.20 and GetDP 3.2 were run. The others follow manuals and, from their sources: MBDyn's
-`module-hydrodynamic_plain_bearing2.cc` (`GreenwoodTrippCM`, `LinFDMesh`, `LugreFriction`) and the deck
-`mbdyn_post_ehd_load_output_13.tst` of mboct-mbdyn-pkg; GEOS's `TableFunction`, `HydraulicApertureTable` and
+CalculiX 2.20 and GetDP 3.2 were run. The others follow manuals and sources: MBDyn's `GreenwoodTrippCM`, `LinFDMesh` and
+`LugreFriction` of `module-hydrodynamic_plain_bearing2.cc`; GEOS's `TableFunction`, `HydraulicApertureTable` and
 `BartonBandis`; MOOSE's `PiecewiseTabularBase` and `GapFluxModelConduction`; Lethe's `particle_heat_transfer.cc`.
 """
 
@@ -46,7 +45,6 @@ CROWDING = 0.05  # eta beta sigma; the result depends on K only
 HEAVY, FEWEST = 0.1, 3  # largest A/A0 of that fit, and its rows
 NU = 0.3  # of the micro-slip stiffness
 BANDIS = 9.0  # w = w0/(1 + 9 stress/reference)
-OF_APERTURE = ("pressure", "aperture", "derivative", "stiffness")
 STEEPEST = 0.999  # slope of the last two rows for GEOS, which rejects 1 and more
 YOVANOVICH, EXPONENT = 1.25, 0.96  # h = 1.25 k_s m/sigma (p/H)^0.96, of which Lethe has the mean over Hertz's pressure
 MBDYN = """\
@@ -189,7 +187,9 @@ def _mbdyn(law: LawTable, name: str) -> str:
 def _geos(law: LawTable, name: str) -> str:
     """Hydraulic aperture against the jump u - h_max; it, the aperture and its derivative against the normal stress."""
     open_ = law.y > 0
-    stress, aperture, slope, stiffness = (law.columns[key][0][open_] for key in OF_APERTURE)
+    stress, aperture, slope, stiffness = (
+        law.columns[key][0][open_] for key in ("pressure", "aperture", "derivative", "stiffness")
+    )
     jump, w = (aperture - aperture[0])[::-1] + 0.0, law.y[open_][::-1]
     if w[-1] - w[-2] >= STEEPEST * (jump[-1] - jump[-2]):
         step = min(1e-3 * law.facts["h_rms"][0], -jump[-2] / 2)

@@ -19,9 +19,7 @@ ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "d
 CODE = LAW | {"name", "leakage", "direction"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
-GROUPS = {
-    "SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "c_code",
-}  # fmt: skip
+GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "c_code"}
 SI = ("m", "Pa")
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
 # by quantity: options for it alone, and the abscissa of its rows
@@ -30,8 +28,7 @@ OPTIONS = {
 }  # fmt: skip
 AGAINST = {
     "pressure": "overclosure", "conductance": "pressure", "tangential_stiffness": "pressure",
-    "leakage": "pressure", "hydraulic_aperture": "pressure",
-    "film": "mean_separation",
+    "leakage": "pressure", "hydraulic_aperture": "pressure", "film": "mean_separation",
 }  # fmt: skip
 
 
@@ -96,18 +93,7 @@ class Grammar:
 
 
 @functools.cache
-def group(name: str) -> dict[str, Target]:
-    """Targets of one of `GROUPS` by their names."""
-    declared = importlib.import_module(f"mbma_tables.export.{GROUPS[name]}").TARGETS
-    return {target.name: target for target in declared}
-
-
-@functools.cache
-def targets() -> dict[str, Target]:
-    """All targets by their names."""
-    return {name: target for key in GROUPS for name, target in group(key).items()}
-
-
-def names(*groups: str) -> tuple[str, ...]:
-    """Names of the targets of some groups, or of all."""
-    return tuple(name for key in groups or GROUPS for name in group(key))
+def targets(*groups: str) -> dict[str, Target]:
+    """Targets of some of `GROUPS`, or of all, by their names."""
+    modules = [importlib.import_module(f"mbma_tables.export.{GROUPS[name]}") for name in groups or GROUPS]
+    return {target.name: target for module in modules for target in module.TARGETS}

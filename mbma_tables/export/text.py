@@ -47,9 +47,7 @@ def opening(paragraphs: Iterable[str], mark: str) -> str:
     return f"/*\n{comment((_MARKS.sub(lambda mark: mark[0] + ' ', printable(line)) for line in lines), ' *')} */"
 
 
-def wrapped(items: Iterable[str]) -> str:
-    """Items of a list, with commas between them, on lines of 118 columns."""
-    return textwrap.fill(", ".join(items), 118, break_on_hyphens=False)
+wrapped = functools.partial(textwrap.fill, width=118, break_on_hyphens=False)
 
 
 def core_file(name: str) -> str:

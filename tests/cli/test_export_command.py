@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from mbma_tables.cli import main
 from mbma_tables.export import CODE, c_code
-from mbma_tables.export.targets import ROWS, names, targets
+from mbma_tables.export.targets import ROWS, targets
 
 LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
 NUMBERS = ["--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3"]
@@ -112,7 +112,7 @@ ANY = {
 }
 
 
-@pytest.mark.parametrize("target", names())
+@pytest.mark.parametrize("target", targets())
 def test_an_option_without_effect_is_refused(target, tmp_path):
     base = [] if target in CODE else BASE
     for option in {name.replace("_", "-") for name in ROWS} | {"check", "binaries"}:
