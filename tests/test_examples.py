@@ -18,7 +18,7 @@ pytest.importorskip("matplotlib")
 ROOT = pathlib.Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
 PAGE = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
-NEEDS = {"scatter": "dask", "heat": "skfem"}
+NEEDS = {"scatter": "dask", "heat": "skfem", "newton": "skfem"}
 
 
 def load(name):
@@ -139,3 +139,13 @@ def test_a_well_draws_what_the_leakage_of_the_contact_lets_through():
     K = contact(module.FRACTURE, pressure=module.NORMAL - p, E_star=module.E_STAR, theory="calibrated").leakage.K
     exact = 2 * np.pi * np.trapezoid(K, p) / (12 * module.VISCOSITY * np.log(module.EDGE / module.WELL))
     assert module.drawn(module.aperture_table(), 5e6) == pytest.approx(exact, rel=3e-3)
+
+
+def test_newton_in_scikit_fem_from_zero_load(capsys):
+    load("newton")
+    *steps, last = capsys.readouterr().out.splitlines()
+    residuals = [float(line.split()[1]) for line in steps]
+    assert residuals[-1] < 1e-12
+    assert len(residuals) <= 14
+    assert residuals[-2] < 1e-4 * residuals[-3]  # quadratic
+    assert "force 8.000000" in last

@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 import functools
-import importlib.util
 import re
 import shutil
 import urllib.parse
@@ -42,8 +41,7 @@ CSV = """() => {
 
 @pytest.fixture(scope="module")
 def opened():
-    if importlib.util.find_spec("playwright") is None:
-        pytest.skip("not installed: playwright")
+    pytest.importorskip("playwright")
     from generate.explorer import browser, program
 
     if program() is None:
@@ -318,11 +316,15 @@ def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tm
     assert law("pressure", [-0.1, 0.0]).tolist() == [0.0, 0.0]
 
 
+def press(tab, *keys):
+    tab.locator(".chart").first.focus()
+    for key in keys:
+        tab.keyboard.press(key)
+
+
 def test_numbers_under_the_cursor_by_keyboard(visit):
     tab = visit("theory=calibrated&beside=persson")
-    tab.locator(".chart").first.focus()
-    tab.keyboard.press("End")
-    tab.keyboard.press("ArrowLeft")
+    press(tab, "End", "ArrowLeft")
     rows = tab.locator("#readout tr")
     assert rows.count() == 3
     assert rows.nth(0).inner_text().startswith("u = 1.078 mm")
@@ -345,14 +347,14 @@ def test_concerns_are_those_of_the_library(visit):
 
 
 def test_where_a_theory_has_no_answer_the_page_says_why(visit):
-    tab = visit(urllib.parse.urlencode({"hurst": 0.1, "q0": 1, "q1": 1e7, "h_rms": 1, "h_max": 3, "theory": "mbma"}))
-    tab.locator(".chart").first.focus()
-    tab.keyboard.press("Home")
-    assert "MBMA: has no answer here: mu is above the range." in tab.inner_text("#concerns")
-    tab = visit("theory=mbma&against=pressure")
-    tab.locator(".chart").first.focus()
-    tab.keyboard.press("End")
-    assert "MBMA: has no answer here: it does not reach such a pressure." in tab.inner_text("#concerns")
+    steep = urllib.parse.urlencode({"hurst": 0.1, "q0": 1, "q1": 1e7, "h_rms": 1, "h_max": 3, "theory": "mbma"})
+    for state, key, why in (
+        (steep, "Home", "mu is above the range"),
+        ("theory=mbma&against=pressure", "End", "it does not reach such a pressure"),
+    ):
+        tab = visit(state)
+        press(tab, key)
+        assert f"MBMA: has no answer here: {why}." in tab.inner_text("#concerns")
 
 
 def test_on_a_phone_and_in_the_dark(visit, tmp_path):

@@ -39,15 +39,11 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 def random_islands():
     """X and mu over the table, then over the closed form's range, with the ends of both."""
     rng, found = np.random.default_rng(2008), []
-    axes, form = universal_model().content.axes, RANGES[conformance.FORM]
-    for (low, high), least, most in (
-        ((axes[0].low, axes[0].high), 1e-10, axes[1].high),
-        (form["X"], 1e-6, form["mu"][1]),
-    ):
-        X = rng.uniform(low, high, POINTS // 2)
-        mu = np.exp(rng.uniform(np.log(least), np.log(most), X.size))
-        X[:4], mu[:4] = (low, low, high, high), (least, most) * 2
-        found.append((X, mu))
+    (X, mu), form = universal_model().content.axes, RANGES[conformance.FORM]
+    for low, high, least, most in ((X.low, X.high, 1e-10, mu.high), (*form["X"], 1e-6, form["mu"][1])):
+        found.append(rng.uniform([[low], [np.log(least)]], [[high], [np.log(most)]], (2, POINTS // 2)))
+        found[-1][1] = np.exp(found[-1][1])
+        found[-1][:, :4] = (low, low, high, high), (least, most) * 2
     return np.concatenate(found, axis=1)
 
 
@@ -143,20 +139,14 @@ def test_a_wrong_number_is_seen(tmp_path, monkeypatch):
         check(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("code", "guessed"), "variant must be one of"),
-        (("code", "fitted"), "takes their cover"),
-        (("a_file",), "a_file"),
-    ],
-)
-def test_bad_requests_leave_no_file(arguments, message, tmp_path, monkeypatch):
+def test_bad_requests_leave_no_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a_file").write_text("kept", encoding="utf-8")
-    with pytest.raises(InputError, match=message) as caught:
-        write_code(*arguments)
-    assert len(str(caught.value).splitlines()) == 1
+    cases = ("code", "guessed", "must be one of"), ("code", "fitted", "takes their cover"), ("a_file", "a_file")
+    for *arguments, message in cases:
+        with pytest.raises(InputError, match=message) as caught:
+            write_code(*arguments)
+        assert len(str(caught.value).splitlines()) == 1
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a_file", "kept")]
 
 
@@ -178,18 +168,18 @@ def test_c_replays_its_points(c_folder, tmp_path):
     assert found.points["formula"] > 5
 
 
-@needs("gcc")
+@needs("gcc", "g++")
 @pytest.mark.parametrize(
-    "options", [("-O1", *SANITIZERS), ("-O3", "-march=native", "-ffp-contract=fast")], ids=["sanitized", "fast"]
+    "command",
+    [
+        ("gcc", "-std=c11", "-Wpedantic", "-O1", *SANITIZERS),
+        ("gcc", "-std=c11", "-Wpedantic", "-O3", "-march=native", "-ffp-contract=fast"),
+        ("g++", "-x", "c++", "-std=c++11", "-O1"),
+    ],
+    ids=["sanitized", "fast", "c++"],
 )
-def test_c_equals_the_runtime(options, c_folder, tmp_path):
-    command = ("gcc", "-std=c11", "-Wpedantic", *options)
+def test_c_equals_the_runtime(command, c_folder, tmp_path):
     assert_equal_to_runtime(replayed(c_folder, tmp_path, command, many_points()))
-
-
-@needs("g++")
-def test_cpp_compiles_it(c_folder, tmp_path):
-    assert replayed(c_folder, tmp_path, ("g++", "-x", "c++", "-std=c++11", "-O1")).failed == 0
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """Laws as rows: their error against the model, their spacing, their text in every target, and what is refused."""
 
 import dataclasses
+import functools
 import json
 import sys
 
@@ -280,28 +281,20 @@ def test_rows_of_leakage_are_the_contacts_flow_to_the_blocked_pressure():
 
 
 HARD = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-HARD_OPTIONS = {"theory": "calibrated", "hardness": "1500 MPa", "pressures": ("1 MPa", "500 MPa"), "rtol": 1e-2}
 
 
 def test_rows_of_a_law_with_a_hardness():
-    law = describe_law(HARD, "100 GPa", stress_unit="MPa", **HARD_OPTIONS)
+    joint = functools.partial(describe_law, HARD, "100 GPa", stress_unit="MPa", theory="calibrated", rtol=1e-2)
+    asked = {"hardness": "1500 MPa", "pressures": ("1 MPa", "500 MPa")}
+    known = functools.partial(contact, HARD, E_star=100e3, theory="calibrated", hardness=1500.0)
+    law, elastic = joint(**asked), joint()
     # chords lie about the law by as much as they may miss it
     kept = law.y > 1.0
-    u = 3.0 - law.x[kept]
-    found = contact(HARD, mean_separation=u, E_star="100 GPa", theory="calibrated", hardness="1500 MPa")
-    assert law.y[kept] == pytest.approx(1e3 * found.pressure, rel=1e-2)
-    text = " ".join(law.comments)
-    assert "hardness = 1500 MPa, plasticity index 3.61" in text
-    elastic = describe_law(HARD, "100 GPa", stress_unit="MPa", theory="calibrated", rtol=1e-2)
+    assert law.y[kept] == pytest.approx(known(mean_separation=3.0 - law.x[kept]).pressure, rel=1e-2)
+    assert "hardness = 1500 MPa, plasticity index 3.61" in " ".join(law.comments)
     assert "elastic: within 5% in area for hardnesses from 4922 MPa on" in " ".join(elastic.comments)
-
-
-def test_conductance_is_not_the_slope_of_loading():
-    law = describe_law(
-        HARD, "100 GPa", stress_unit="MPa", quantity="conductance", conductivity=20.0, conductivity_unit="mW/(mm K)",
-        **HARD_OPTIONS,
-    )  # fmt: skip
-    some = law.x > 2.0
-    found = contact(HARD, pressure=law.x[some], E_star=100e3, theory="calibrated", hardness=1500.0)
-    assert law.y[some] == pytest.approx(20.0 / 100e3 * found.unloading_stiffness, rel=1e-2)
+    # conductance is not the slope of loading
+    heat = joint(**asked, quantity="conductance", conductivity=20.0, conductivity_unit="mW/(mm K)")
+    found = known(pressure=heat.x[heat.x > 2.0])
+    assert heat.y[heat.x > 2.0] == pytest.approx(20.0 / 100e3 * found.unloading_stiffness, rel=1e-2)
     assert (np.asarray(found.unloading_stiffness) > 1.1 * found.stiffness).all()

@@ -1,16 +1,13 @@
-"""Rows of laws in CalculiX, Octave and R, and laws continued for Newton's method."""
+"""Rows of laws read by CalculiX, Octave and R."""
 
-import importlib.util
-import pathlib
 import re
 import subprocess
-import sys
 
 import numpy as np
 import pytest
 from law_points import needs
 
-from mbma_tables import InputError, Surface, contact, contact_law
+from mbma_tables import Surface, contact, contact_law
 from mbma_tables.export import solvers
 from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.law_rows import describe_law
@@ -95,51 +92,6 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     np.testing.assert_allclose(conductance(flux)[:-1], expected[:-1], rtol=1e-2)
     assert p[-1] > rows.x[-1]
     assert conductance(flux)[-1] == pytest.approx(rows.y[-1], rel=1e-2)
-
-
-@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
-@pytest.mark.parametrize("pressures", [None, ("1 kPa", "0.5 MPa")])
-def test_a_law_continued_by_its_tangents(theory, pressures):
-    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory=theory)
-    trial = law.continued(pressures)
-    inner = np.linspace(trial.heavy, trial.light, 50)
-    np.testing.assert_array_equal(trial.pressure(inner), law.pressure(inner))
-    np.testing.assert_array_equal(trial.stiffness(inner), law.stiffness(inner))
-    assert trial.inside(inner).all()
-    for end, side in ((trial.light, 1.0), (trial.heavy, -1.0)):
-        beyond = end + side * np.array([1e-9, 0.1, 1e3])
-        found, slope = trial.pressure_and_stiffness(beyond)
-        assert (slope == law.stiffness(end)).all()
-        np.testing.assert_allclose(found, law.pressure(end) - law.stiffness(end) * (beyond - end), rtol=1e-13)
-        assert not trial.inside(beyond).any()
-    # Newton's method from first contact, and from far beyond full compression
-    for u in (law.h_max, -5.0):
-        for _ in range(60):
-            p, k = trial.pressure_and_stiffness(u)
-            u += (p - 0.1) / k
-        assert law.pressure(u) == pytest.approx(0.1, rel=1e-12)
-    if pressures:
-        assert law.pressure([trial.light, trial.heavy]) == pytest.approx([1e-3, 0.5])
-
-
-def test_a_law_is_not_continued_beyond_pressures_that_do_not_rise():
-    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
-    for pressures in (("2 kPa", "1 kPa"), (0.0, 0.1), "12", (1, 2, 3)):
-        with pytest.raises(InputError, match="two rising numbers"):
-            law.continued(pressures)
-    with pytest.raises(InputError, match="must be finite"):
-        law.continued().pressure(np.nan)
-
-
-@pytest.mark.skipif(importlib.util.find_spec("skfem") is None, reason="not installed: scikit-fem")
-def test_newton_in_scikit_fem_from_zero_load():
-    example = pathlib.Path(__file__).parents[2] / "examples" / "newton.py"
-    *steps, last = subprocess.run([sys.executable, str(example)], stdout=-1, text=True, check=True).stdout.splitlines()
-    residuals = [float(line.split()[1]) for line in steps]
-    assert residuals[-1] < 1e-12
-    assert len(residuals) <= 14
-    assert residuals[-2] < 1e-4 * residuals[-3]  # quadratic
-    assert "force 8.000000" in last
 
 
 @needs("ccx")

@@ -492,3 +492,37 @@ def test_a_law_is_answered_without_leaving_anything():
         with pytest.raises(OutOfRangeError):
             law.pressure(separation=np.array([math.nan]))
     assert (sys.getrefcount(law.block), sys.getrefcount(d)) == before
+
+
+@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
+@pytest.mark.parametrize("pressures", [None, ("1 kPa", "0.5 MPa")])
+def test_a_law_continued_by_its_tangents(theory, pressures):
+    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory=theory)
+    trial = law.continued(pressures)
+    inner = np.linspace(trial.heavy, trial.light, 50)
+    np.testing.assert_array_equal(trial.pressure(inner), law.pressure(inner))
+    np.testing.assert_array_equal(trial.stiffness(inner), law.stiffness(inner))
+    assert trial.inside(inner).all()
+    for end, side in ((trial.light, 1.0), (trial.heavy, -1.0)):
+        beyond = end + side * np.array([1e-9, 0.1, 1e3])
+        found, slope = trial.pressure_and_stiffness(beyond)
+        assert (slope == law.stiffness(end)).all()
+        np.testing.assert_allclose(found, law.pressure(end) - law.stiffness(end) * (beyond - end), rtol=1e-13)
+        assert not trial.inside(beyond).any()
+    # Newton's method from first contact, and from far beyond full compression
+    for u in (law.h_max, -5.0):
+        for _ in range(60):
+            p, k = trial.pressure_and_stiffness(u)
+            u += (p - 0.1) / k
+        assert law.pressure(u) == pytest.approx(0.1, rel=1e-12)
+    if pressures:
+        assert law.pressure([trial.light, trial.heavy]) == pytest.approx([1e-3, 0.5])
+
+
+def test_a_law_is_not_continued_beyond_pressures_that_do_not_rise():
+    law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
+    for pressures in (("2 kPa", "1 kPa"), (0.0, 0.1), "12", (1, 2, 3)):
+        with pytest.raises(InputError, match="two rising numbers"):
+            law.continued(pressures)
+    with pytest.raises(InputError, match="must be finite"):
+        law.continued().pressure(np.nan)
