@@ -127,14 +127,8 @@ def told(seen: Sequence[Case], make: Make) -> pd.DataFrame:
         if one.kind in GAUSSIAN:
             label = "1 wave" if one.waves < MIN_WAVES else "2-3 waves" if one.waves < 4 else "4 waves"
         known = {name: getattr(one, name) for name in ("kind", "split", "waves", "points", "gaussian")}
-        known |= {
-            "contact": one.area,
-            "node": str(one.node),
-            "load": np.arange(one.area.size),
-            "label": label,
-            "surface": id(one),
-        }
-        law = make(one)
+        known |= {"contact": one.area, "load": np.arange(one.area.size), "node": str(one.node)}
+        law, known = make(one), known | {"label": label, "surface": id(one)}
         parts.append(pd.DataFrame(known | {quantity: errors(one, law, quantity) for quantity in QUANTITIES}))
     return pd.concat(parts, ignore_index=True)
 
@@ -204,16 +198,15 @@ def others(found: Sequence[Case]) -> dict[str, FloatArray]:
     plain, summed = [one for one in found if one.kind == "self_affine" and one.gaussian], {}
     variants = [Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")]
     for theory in (*variants, Persson(), Persson("simplified"), GreenwoodWilliamson()):
-        reached, curves = [], dict[int, TheoryCurve]()
+        curves = dict[Case, TheoryCurve]()
         for one in plain:
             curve = TheoryCurve(theory, one.surface)
             kept = np.isfinite(curve.separation(one.force))
             if kept.sum() > 3:
-                reached.append(one.at(kept))
-                curves[id(reached[-1])] = curve
+                curves[one.at(kept)] = curve
         # theories' scatter has one name on all surfaces of this kind
         name = theory.scatter_name(Surface(0.8, 1.0, 100.0, 1.0, 3.0))
-        summed[name] = summary(told(reached, lambda one, curves=curves: curves[id(one)]))  # type: ignore[misc]
+        summed[name] = summary(told([*curves], curves.__getitem__))
     return summed
 
 
@@ -239,10 +232,8 @@ def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, tail: bool, h
         "map": told(found, lambda one: one.map_law(constants, map_constants)),
     }
     by_map = forms["map"][forms["map"]["gaussian"]]
-    stated = {
-        "calibrated": cross_validate(training),
-        "calibrated_map": summary(by_map[by_map["split"] == TRAINING]),
-    }
+    of_map = summary(by_map[by_map["split"] == TRAINING])
+    stated = {"calibrated": cross_validate(training), "calibrated_map": of_map}
     covered = dict[str, list[float]]()
     for frame, scatter, suffix in zip(forms.values(), stated.values(), ("", " (map)"), strict=True):
         held_out = frame[frame["gaussian"] & (frame["split"] != TRAINING)]

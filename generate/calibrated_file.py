@@ -94,19 +94,29 @@ def variable(dimensions: str | Sequence[str], values: Any, meaning: str, **attri
     return dimensions, values, {"long_name": meaning, "units": "1", **attributes}
 
 
+def attributes(texts: dict[str, Any], made_by: dict[str, str]) -> dict[str, Any]:
+    """Attributes of a group, by its texts in a TOML file and the programs that made it."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": texts["title"],
+        "institution": "mbma_tables contributors",
+        "source": texts["source"].format_map(made_by),
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {texts['command']}",
+        "versions": json.dumps(versions() | made_by),
+        "code_sha256": source_digest(tuple(texts["modules"])),
+    } | {name: texts[name] for name in ("comment", "references") if name in texts}
+
+
 def law_group(
     kind: str, arrays: dict[str, tuple[Any, Any]], constants: dict[str, Any], facts: dict[str, Any]
 ) -> xr.Dataset:
     """A group of the file: arrays with their dimensions, dataclasses of constants by prefix, and further attributes."""
     texts = TEXTS[kind]
     found = xr.Dataset({name: variable(*array, texts["variables"][name]) for name, array in arrays.items()})
-    found.attrs = {"Conventions": "CF-1.11", "institution": "mbma_tables contributors"}
-    found.attrs |= {name: text for name, text in texts.items() if name not in ("command", "modules", "variables")}
-    found.attrs["history"] = f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {texts['command']}"
+    found.attrs = attributes(texts, {}) | texts["facts"] | facts
     for prefix, own in constants.items():
         found.attrs |= {f"{prefix}_{name}": value for name, value in dataclasses.asdict(own).items()}
-    modules = {"source_sha256": source_digest(tuple(texts["modules"])), "source_modules": " ".join(texts["modules"])}
-    return found.assign_attrs(facts, versions=json.dumps(versions(), sort_keys=True), **modules)
+    return found
 
 
 def law_table(

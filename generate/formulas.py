@@ -116,13 +116,7 @@ def module_text(certificates: Mapping[str, Mapping[str, Certificate]]) -> str:
 
 
 def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
-    """Values of all steps, by numpy functions.
-
-    Examples
-    --------
-    >>> evaluate({"w": "1.0 / (X + 3.0)"}, {"X": np.array([1.0, 2.0])})["w"]
-    array([0.25, 0.2 ])
-    """
+    """Values of all steps, by numpy functions."""
     names: dict[str, Any] = NAMES | dict(given)
     with np.errstate(all="ignore"):
         for name, text in steps.items():
@@ -162,14 +156,7 @@ def terms(text: str) -> list[tuple[str, str]]:
 
 
 def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS) -> tuple[float, FloatArray]:
-    """Coefficients whose largest error ``|A c - target|`` is least, by Lawson's reweighting; that error and they.
-
-    Examples
-    --------
-    >>> error, (mean,) = least_largest(np.ones((3, 1)), np.array([0.0, 1.0, 4.0]), 500)
-    >>> round(error, 2), round(float(mean), 2)
-    (2.0, 2.0)
-    """
+    """Coefficients whose largest error ``|A c - target|`` is least, by Lawson's reweighting; that error and they."""
     weight: Any = np.ones(target.size)
     best, found = math.inf, np.zeros(A.shape[1])
     for _ in range(rounds):
@@ -256,7 +243,7 @@ def log_Q(which: int, X: FloatArray, mu: FloatArray, phi: FloatArray) -> tuple[F
 def coefficients(function: Function, name: str, text: str) -> FloatArray:
     """Coefficients of the terms of one sum of a function, of least largest error."""
     start = " ".join(rest for number, rest in terms(text) if not number)
-    products = [powers(rest) for number, rest in terms(text) if number]
+    products = [collections.Counter(re.findall(r"[a-z]\w*", rest)) for number, rest in terms(text) if number]
     if name == "log_Q":
         given, truth = islands(function.form, POINTS, FIT_SEED)
         which = ("phi_F", "phi_A").index(function.result)
@@ -270,23 +257,20 @@ def coefficients(function: Function, name: str, text: str) -> FloatArray:
         target = rounded((np.log(truth[function.result]) - named["start"])[mine])
         used = set[str]().union(*products)
         named, weight = {letter: rounded(named[letter][mine]) for letter in used}, np.ones(target.size)
-    ones, columns = np.ones_like(target), []
+    columns = []
     for product in products:
         factors = (named[letter] ** power for letter, power in product.items())
-        columns.append(functools.reduce(np.multiply, factors, ones) * weight)
+        columns.append(functools.reduce(np.multiply, factors, np.ones_like(target)) * weight)
+
+    def place_of(k: int) -> tuple[Any, ...]:
+        own = products[k]
+        return "v" in own, "z" in own and "u" in own, "z" not in own, own["u"], own.total()
+
     # the last digits of a fit depend on the order of its terms
-    order = sorted(range(len(products)), key=lambda k: _order(products[k]))
+    order = sorted(range(len(products)), key=place_of)
     found = np.empty(len(products))
     found[order] = least_largest(np.stack(columns, axis=1)[:, order], target * weight)[1]
     return found
-
-
-def powers(product: str) -> collections.Counter[str]:
-    return collections.Counter(re.findall(r"[a-z]\w*", product))
-
-
-def _order(product: collections.Counter[str]) -> tuple[Any, ...]:
-    return "v" in product, "z" in product and "u" in product, "z" not in product, product["u"], product.total()
 
 
 def refitted(function: Function, fits: Mapping[str, FloatArray], digits: int) -> Steps:

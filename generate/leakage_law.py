@@ -40,7 +40,6 @@ NODES = {
     "log_odds": np.linspace(-14.6, 6.2, 53),  # ln A/(Ac - A)
 }
 CERTIFICATE = 100  # held-out surfaces, each at its own odds
-DEFAULT = FlowConstants()
 BLOCKED = -20.0  # residual of what a law blocks and simulation does not
 LARGE = 64.0  # zeta_1 from which surfaces decide between laws, and no constant
 DEGREE = 5
@@ -152,7 +151,7 @@ class Flow:
         return np.where(self._gaps.area < 1 - 1 / n, found, -np.inf)
 
 
-def fit(training: Sequence[Flow], first: FlowConstants = DEFAULT) -> FlowConstants:
+def fit(training: Sequence[Flow], first: FlowConstants | None = None) -> FlowConstants:
     """Constants of the law and of the closed form, by robust least squares up to `leakage.LARGEST_AREA`."""
     seen = [(flow, flow.one.area < leakage.LARGEST_AREA) for flow in training if flow.one.isotropic]
 
@@ -165,7 +164,7 @@ def fit(training: Sequence[Flow], first: FlowConstants = DEFAULT) -> FlowConstan
         best = fitted(start, names, functools.partial(residuals, form), diff_step=0.01, **options)
         return dataclasses.replace(best, **{name: round(getattr(best, name), 3) for name in names})
 
-    law = found(first, ("threshold", "obstruction"), Flow.medium, x_scale=[0.01, 0.1])
+    law = found(first or FlowConstants(), ("threshold", "obstruction"), Flow.medium, x_scale=[0.01, 0.1])
     return found(law, ("prefactor", "exponent"), Flow.closed_form)
 
 

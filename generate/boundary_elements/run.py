@@ -3,9 +3,7 @@
 `variables.toml` describes the file's variables.
 """
 
-import datetime
 import functools
-import json
 import pathlib
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
@@ -18,8 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from generate.boundary_elements.solve import HARDNESSES, simulate, simulate_capped, simulate_to, solve_flow
 from generate.boundary_elements.surfaces import SPLITS, Recipe, Task, campaign
-from generate.calibrated_file import Variable, variable, write_part
-from generate.files import source_digest, versions
+from generate.calibrated_file import Variable, attributes, variable, write_part
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
@@ -82,19 +79,6 @@ def of_recipes(recipes: Sequence[Recipe]) -> dict[str, Variable]:
         name: variable("surface", np.array([getattr(recipe, name) for recipe in recipes]), meaning)
         for name, meaning in TEXTS["recipe"].items()
     }
-
-
-def attributes(texts: dict[str, Any], made_by: dict[str, str]) -> dict[str, Any]:
-    """Attributes of a group of the data set, by its texts in `variables.toml` and the programs that made it."""
-    return {
-        "Conventions": "CF-1.11",
-        "title": texts["title"],
-        "institution": "mbma_tables contributors",
-        "source": texts["source"].format_map(made_by),
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {texts['command']}",
-        "versions": json.dumps(versions() | made_by),
-        "code_sha256": source_digest(tuple(texts["modules"])),
-    } | {name: texts[name] for name in ("comment", "references") if name in texts}
 
 
 def group(kind: str, variables: Any, **made_by: str) -> xr.Dataset:

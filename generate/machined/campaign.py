@@ -17,7 +17,7 @@ import xarray as xr
 from generate.boundary_elements import run as campaigns
 from generate.boundary_elements.solve import Contact
 from generate.boundary_elements.surfaces import Task
-from generate.calibrated_file import variable, write_part
+from generate.calibrated_file import attributes, variable, write_part
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
@@ -137,7 +137,7 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
     data = xr.Dataset(coords={n: variable(over[n], values, TEXTS["names"][n]) for n, values in names.items()})
     for form in ("", *FORMS):
         read = [dict(np.load(folder / form / f"{part.name}.npz")) for part in have]
-        data.attrs |= {} if form else campaigns.attributes(TEXTS, {"engine": str(read[0]["engine"])})
+        data.attrs |= {} if form else attributes(TEXTS, {"engine": str(read[0]["engine"])})
         for name in (name for name in TEXTS["columns"] if name in read[0]):
             values: Any = np.array([one[name] for one in read], "f4")
             data[f"{form}_{name}" if form else name] = variable(("surface", "load"), values, TEXTS["columns"][name])

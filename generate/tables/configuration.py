@@ -44,15 +44,11 @@ class Configuration:
     seed: int  # of the low-discrepancy sequences
     axes: dict[str, AxisRange]
 
-    def digest(self) -> str:
-        """SHA-256 of the configuration, the variant's numbers included."""
-        numbers = get_variant(self.variant).recorded if self.kind == ISLAND4D else []
-        return digest_json([dataclasses.asdict(self), numbers])
-
     def attributes(self) -> dict[str, Any]:
-        """Attributes of a table's file on what was wanted."""
-        text = json.dumps(dataclasses.asdict(self), sort_keys=True)
-        return {"target": self.target, "configuration": text, "configuration_sha256": self.digest()}
+        """Attributes of a table's file on what was wanted; the digest has the variant's numbers, too."""
+        own, numbers = dataclasses.asdict(self), get_variant(self.variant).recorded if self.kind == ISLAND4D else []
+        text, digest = json.dumps(own, sort_keys=True), digest_json([own, numbers])
+        return {"target": self.target, "configuration": text, "configuration_sha256": digest}
 
     def axis(self, name: str) -> Axis:
         own = self.axes[name]

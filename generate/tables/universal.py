@@ -38,14 +38,12 @@ AT_TESTS: FloatArray = np.asarray(chebyshev.chebvander(TESTS, TERMS - 1), dtype=
 def mu_at(y: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """mu at places in [-1, 1] of cells."""
     a, b, c, d = fractions_of_mu(low, high)
-    mu: FloatArray = np.clip((b - d * y) / (c * y - a), low, high)
-    return mu
+    return np.asarray(np.clip((b - d * y) / (c * y - a), low, high))
 
 
 def X_at(x: FloatArray, low: Any, high: Any) -> FloatArray:
     """X at places in [-1, 1] of cells."""
-    X: FloatArray = 0.5 * (low + high) + 0.5 * (high - low) * x
-    return X
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * x)
 
 
 def values(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
