@@ -209,6 +209,11 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     return known | kept(rows, OF_FLOW, h_rms) | found
 
 
+SOLVERS: dict[str, Callable[[Recipe], dict[str, Any]]] = {
+    "elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow,
+}  # fmt: skip
+
+
 def simulate_to(recipe: Recipe, solve: Callable[[Recipe], dict[str, Any]], folder: pathlib.Path) -> str | None:
     """Simulate one surface into a file of its own, which stands only when it is whole; what failed, or None."""
     try:

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from generate import distances
-from generate.boundary_elements.run import surfaces
-from generate.boundary_elements.studies import LIGHT_BINS, compared
+from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import dataset
 from generate.page import Measured, panels, percent, table

@@ -62,7 +62,7 @@ class Island4d(Kind):
     @threadpool_limits.wrap(limits=BLAS_THREADS)
     def build(self) -> TableContent:
         own = self.configuration
-        axes = tuple(own.axis(name) for name in own.axes)
+        axes = tuple(own.axes.values())
         grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
         values = self.log_ratio("island4d table", *self.arguments(*grid), rtol=self.rtol)
         coefs = coefficients(values, DEGREE, len(axes))

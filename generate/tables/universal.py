@@ -153,7 +153,7 @@ class Universal(Kind):
         series = np.moveaxis(rows[:, 6:].reshape(-1, 2, TERMS, TERMS), 1, -1)
         content = TableContent(
             kind=UNIVERSAL,
-            axes=tuple(own.axis(name) for name in own.axes),
+            axes=tuple(own.axes.values()),
             coefficients=np.ascontiguousarray(series),
             local_error=LOCAL_FACTOR * rows[:, 4:6] + self.rtol,
             auxiliary={n: (("cell",), r, label(t)) for (n, t), r in zip(CELL_EDGES.items(), rows.T, strict=False)},
