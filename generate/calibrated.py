@@ -34,9 +34,8 @@ LEAST = 1e-6  # ratio of forces that a law above its h_max counts as
 # errors that count alike: model noise plus the scatter of surfaces at light contact
 NOISE = {"area": (0.015, 0.15), "force": (0.02, 0.25), "map": (0.03, 0.1)}
 LIGHT = 0.01
-CLOSE = 1e-4  # relative changes of cost or constants that end a fit
-STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
-OPTIONS = {"x_scale": "jac", "diff_step": STEP, "ftol": CLOSE, "xtol": CLOSE}
+# a relative step of 1%, since laws of maps are interpolated
+OPTIONS = {"x_scale": "jac", "diff_step": 0.01, "ftol": 1e-4, "xtol": 1e-4}
 LABELS = ("1 wave", "2-3 waves", "4 waves", "stretched", "transformed")
 LARGE = 512  # points a side from which on surfaces are told apart
 Make = Callable[[Case], Any]
@@ -56,12 +55,9 @@ class Parts:
     """u_P of a spectrum on a grid of ln F, linear in the coefficients of W: of P^16, and what P and P^3 add."""
 
     def __init__(self, spectrum: Spectrum) -> None:
-        plain, first, cubic = (
-            Law(spectrum, None, dataclasses.replace(CONSTANTS, weight=a, cubic=b, weight_slope=0.0)).separation_persson(
-                np.exp(GRID)
-            )[0]
-            for a, b in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
-        )
+        flat, parts = dataclasses.replace(CONSTANTS, weight_slope=0.0), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+        laws = (Law(spectrum, None, dataclasses.replace(flat, weight=a, cubic=b)) for a, b in parts)
+        plain, first, cubic = (law.separation_persson(np.exp(GRID))[0] for law in laws)
         self.spectrum, self.plain, self.first, self.cubic = spectrum, plain, first - plain, cubic - plain
 
     def errors(self, one: Case, trial: Constants) -> FloatArray:

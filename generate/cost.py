@@ -136,7 +136,6 @@ def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
 
 @functools.cache
 def reference() -> tuple[dict[str, FloatArray], ...]:
-    """Force and area of every surface at every fifth of its gaps."""
     found = gap_batch(GAPS, EVERY, island_model="exact", rtol=REFERENCE_RTOL)
     return tuple({"pressure": np.asarray(one.pressure), "area": np.asarray(one.area)} for one in found)
 
@@ -224,7 +223,6 @@ def first_use_rows() -> Iterator[Row]:
 
 
 def study() -> bytes:
-    """Every measurement of tables/cost.csv, in a few minutes."""
     seconds, rows = [measure(lambda: None)[1]], list[Row]()
     for part in (island_rows, scene_rows, gap_rows, law_rows, theory_rows, first_use_rows):
         rows += part()

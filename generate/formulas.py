@@ -1,8 +1,7 @@
 """`python -m generate formulas`: fit the coefficients of the closed forms again, certify them on other samples.
 
-`core/closed_forms.h` is the one place where the forms are kept: the core is compiled with it, exports hold its text,
-and the equations of docs/formula.md are made from it; its expressions are read as Python. docs/formula.md says how the
-terms were chosen. Samples are rounded to `DATA_DIGITS`, so that the same coefficients come out on all processors.
+`core/closed_forms.h` is the one place where the forms are kept; its expressions are read as Python. docs/formula.md
+says how the terms were chosen. Samples are rounded, so that the same coefficients come out on all processors.
 
 With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X, mu)), right as
 mu -> 0 whatever Q is. Log Q is its own limit at large X, which is the smooth sphere of Hertz, and a sum of terms that
@@ -84,7 +83,6 @@ class Function:
 
 
 def read_functions(header: str) -> dict[str, Function]:
-    """The functions of a header's text by name."""
     found = {}
     for title, name, form, result, given, body in DEFINITION.findall(header):
         lines = (line.split() for line in body.replace("return", f"const double {result} =").split(";"))
@@ -94,7 +92,6 @@ def read_functions(header: str) -> dict[str, Function]:
 
 
 def header_text(header: str, functions: Mapping[str, Function]) -> str:
-    """A header with the titles and steps of these functions."""
 
     def written(match: re.Match[str]) -> str:
         function = functions[match[2]]
@@ -116,7 +113,6 @@ def module_text(certificates: Mapping[str, Mapping[str, Certificate]]) -> str:
 
 
 def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
-    """Values of all steps, by numpy functions."""
     names: dict[str, Any] = NAMES | dict(given)
     with np.errstate(all="ignore"):
         for name, text in steps.items():

@@ -108,7 +108,6 @@ class Flow:
 
     @functools.cache  # noqa: B019 - there are as many surfaces as the file has
     def log_factor(self, flow: FlowConstants) -> FloatArray:
-        """ln R at the loads."""
         return leakage.log_factor(self._gaps, flow)
 
     def medium(self, flow: FlowConstants, area: FloatArray | None = None, u: FloatArray | None = None) -> FloatArray:
@@ -209,7 +208,6 @@ def errors(flow: Flow, log_k: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def summary(parts: Sequence[tuple[FloatArray, FloatArray]], edges: Sequence[float] = EDGES) -> FloatArray:
-    """Bias, root mean square and number of errors between contact fractions."""
     area, miss = np.concatenate([*parts, np.empty((2, 0))], axis=1)
     return by_bin(area, miss, edges, np.mean, rms, np.size)
 
@@ -244,7 +242,6 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
 
 
 def _row(constants: FlowConstants, contact: Constants, hurst: float) -> FloatArray:
-    """ln R at the table's nodes of one Hurst exponent."""
     area = constants.threshold / (1 + np.exp(-NODES["log_odds"]))
     spectra = [Spectrum.self_affine(hurst, float(np.exp(z))) for z in NODES["log_zeta_1"]]
     return np.array([leakage.contact_factor(spectrum, area, constants, contact) for spectrum in spectra])

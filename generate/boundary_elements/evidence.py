@@ -104,8 +104,6 @@ class TheoryCurve:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Case(Simulated):
-    """With what else is known of its map, and what was found."""
-
     curves: dict[str, Any]
     force: FloatArray
     area: FloatArray
@@ -165,11 +163,6 @@ class Capped(Simulated):
         return self.law.contact(self.u)[::2]
 
     @functools.cached_property
-    def elastic_areas(self) -> dict[str, FloatArray]:
-        """At these forces, by each form of the law."""
-        return {"calibrated": self.law.area(self.force), "calibrated_map": self.map_curve.area(self.force)}
-
-    @functools.cached_property
     def shares(self) -> tuple[FloatArray, FloatArray]:
         """Q at these gaps, of the surface's heights and of Gaussian ones up to h_max."""
         return self.heights(self.u)[0], hardness.bearing_share(self.u, self.h_max)[0]
@@ -206,7 +199,6 @@ def cases(data: xr.Dataset) -> list[Case]:
 
 @functools.cache
 def evidence() -> tuple[Case, ...]:
-    """The simulated surfaces of the data set."""
     return tuple(cases(dataset("elastic")))
 
 

@@ -9,7 +9,7 @@ import itertools
 import pathlib
 import time
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import click
@@ -21,9 +21,9 @@ from tqdm import tqdm
 
 from generate.boundary_elements.solve import (
     HARDNESSES,
-    LOADS,
     SOLVERS,
     Contact,
+    Solve,
     load_at,
     prepared,
     pressed,
@@ -39,6 +39,7 @@ from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.data import FILE
 from mbma_tables.laws.bearing_curve import FRACTIONS, QUANTILES, bearing
+from mbma_tables.laws.boundary_elements import LOADS
 from mbma_tables.laws.boundary_elements import Contact as YieldingContact
 from mbma_tables.laws.gas import mean_inverse
 from mbma_tables.surfaces.maps import prepared as treated_map
@@ -51,12 +52,7 @@ BITS = {"band_energy": 10, "residual": 4, "seconds": 7}  # of mantissas that are
 LOADED = {"band_energy", "flow"}
 
 
-def run(
-    tasks: Sequence[Task],
-    folder: pathlib.Path,
-    workers: int = 1,
-    solve: Callable[[Any], dict[str, Any]] = SOLVERS["elastic"],
-) -> None:
+def run(tasks: Sequence[Task], folder: pathlib.Path, workers: int = 1, solve: Solve = SOLVERS["elastic"]) -> None:
     """Solve what `folder` does not hold yet, one file a surface; those that fail are named at the end."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
@@ -98,7 +94,6 @@ def stiffness(data: xr.Dataset) -> FloatArray:
 
 
 def of_recipes(recipes: Sequence[Recipe]) -> dict[str, Variable]:
-    """What random surfaces are made of."""
     return {
         name: variable("surface", np.array([getattr(recipe, name) for recipe in recipes]), meaning)
         for name, meaning in TEXTS["recipe"].items()
@@ -106,7 +101,6 @@ def of_recipes(recipes: Sequence[Recipe]) -> dict[str, Variable]:
 
 
 def group(kind: str, variables: Any, **made_by: str) -> xr.Dataset:
-    """A group of the data set with its attributes."""
     return xr.Dataset(variables, attrs=attributes(TEXTS["groups"][kind], made_by))
 
 
@@ -127,7 +121,6 @@ def _flags(values: Sequence[str], meanings: Sequence[str], name: str) -> xr.Vari
 
 
 def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") -> xr.Dataset:
-    """All solved surfaces of these tasks of a campaign."""
     solved, found = [], []
     for task in tasks:
         path = folder / f"{task.recipe.name}.npz"

@@ -44,6 +44,7 @@ OF_FLOW = ("area", "area_raw", "mean_separation", "residual", "seconds")
 LENGTHS = ("mean_separation", "plane_separation", "energy", "pressure_weighted_height")  # in h_rms
 
 MAX_ITERATIONS = 50_000  # surfaces stretched 1:16 take 4,000
+Solve = Callable[[Any], dict[str, Any]]  # of a recipe, what is kept of its simulation
 
 
 class Contact:
@@ -209,12 +210,10 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     return known | kept(rows, OF_FLOW, h_rms) | found
 
 
-SOLVERS: dict[str, Callable[[Recipe], dict[str, Any]]] = {
-    "elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow,
-}  # fmt: skip
+SOLVERS: dict[str, Solve] = {"elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow}
 
 
-def simulate_to(recipe: Recipe, solve: Callable[[Recipe], dict[str, Any]], folder: pathlib.Path) -> str | None:
+def simulate_to(recipe: Recipe, solve: Solve, folder: pathlib.Path) -> str | None:
     """Simulate one surface into a file of its own, which stands only when it is whole; what failed, or None."""
     try:
         found = solve(recipe)

@@ -34,7 +34,6 @@ class Part:
 
 
 def heights(part: Part) -> FloatArray:
-    """The map of a part."""
     rng = np.random.default_rng(zlib.crc32(part.family.encode()) % 10_000_000 * 100 + part.number)
     return finished(FAMILIES[part.family](rng, part.points, part.shortest), part.shortest)
 

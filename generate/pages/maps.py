@@ -188,7 +188,6 @@ def maps() -> Measured:
 
 
 def draw_families() -> Any:
-    """One map of each family."""
     figure, axes = panels(2, 7, (14, 4.4))
     for axis, family in itertools.zip_longest(axes.ravel(), makers.FAMILIES):
         axis.set_axis_off()
@@ -199,7 +198,6 @@ def draw_families() -> Any:
 
 
 def machined() -> Measured:
-    """Errors of answers on maps of machined surfaces by family, and how many their scatter covers."""
     data = dataset("machined")
     parts = {form: by_family(data, form) for form in FORMS} | {"yielding": yielding(data), "coverage": covered(data)}
     parts |= {f"left_out_{form}": families_left_out(data, form) for form in FORMS}

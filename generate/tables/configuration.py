@@ -25,8 +25,6 @@ MIN_SHIPPED_POINTS = 5000  # of the certificate of a table in the shipped folder
 
 @dataclasses.dataclass(frozen=True)
 class Configuration:
-    """What a table is to cover, and how well."""
-
     kind: str  # universal or island4d
     target: float  # largest relative error allowed on held-out points
     max_nodes: int  # of the whole table

@@ -190,7 +190,6 @@ class Island4d(Kind):
         return conformance(raw, found.X, found.mu, table, scales, 1e-4 * (1 + found.X) / found.sigma)
 
     def check(self, content: TableContent) -> None:
-        """Force and area finite and positive, below the rigid sphere's, increasing in X, force increasing in mu."""
         places = [np.arange(2 * (axis.nodes - 1) + 1) / 2 for axis in content.axes[:2]]
         places += [np.minimum(np.arange(axis.nodes - 0.5), axis.nodes - 1) for axis in content.axes[2:]]
         grid = np.meshgrid(*places, indexing="ij")

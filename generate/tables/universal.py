@@ -56,8 +56,6 @@ def values(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True)
 class Strip:
-    """A range of X, and what its cells are to meet."""
-
     low: float
     high: float
     mu_high: float
@@ -198,7 +196,6 @@ class Universal(Kind):
         return [X[chosen], mu[chosen]]
 
     def check(self, content: TableContent) -> None:
-        """Force and area positive and increasing in X, force increasing in mu, the rigid limit met."""
         X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1][:, None] for name in CELL_EDGES)
         x, y = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(-0.99, 0.99, 5)]))
         X, mu = X_at(x, X_low, X_high).ravel(), mu_at(y, mu_low, mu_high).ravel()
