@@ -5,11 +5,11 @@ import pytest
 from scipy.optimize import linprog
 
 from generate import formulas as fit
-from generate.formulas import HEADER, MODULE, evaluate, header_text, module_text, read_functions
+from generate.formulas import HEADER, MODULE, header_text, module_text
 from generate.pages.library import expressions
 from generate.pages.stability import rigid_truth
 from mbma_tables import Surface, contact, greenwood_tripp
-from mbma_tables.models.closed_forms import CERTIFICATES, FUNCTIONS, RANGES
+from mbma_tables.models.closed_forms import CERTIFICATES, FUNCTIONS, RANGES, evaluate, read_functions
 
 PRINTED = {"rel": 0.011, "abs": 0}  # three digits are stated, the largest error rounded up
 TEXT = HEADER.read_text(encoding="utf-8")
