@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.models import QUANTITIES, AnyModel, check_outside, island_model_name
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
