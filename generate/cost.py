@@ -29,7 +29,7 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import ISLAND_MODELS, answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.scenes.plan import UNIT, Row
 from mbma_tables.surfaces.variants import get_variant
 

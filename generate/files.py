@@ -16,7 +16,6 @@ from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 ROOT = pathlib.Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
 SOLVER = (
-    "mbma_tables/core/eight.h",
     "mbma_tables/core/elementary.h",
     "mbma_tables/core/height_coefficients.h",
     "mbma_tables/core/heights.h",

@@ -1,6 +1,6 @@
 """`python -m generate formulas`: fit the coefficients of the closed forms again, certify them on other samples.
 
-`core/closed_forms.h` is the one place where the forms are kept; its expressions are read as Python. docs/formula.md
+`models/closed_forms.h` is the one place where the forms are kept; its expressions are read as Python. docs/formula.md
 says how the terms were chosen. Samples are rounded, so that the same coefficients come out on all processors.
 
 With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X, mu)), right as
@@ -31,10 +31,10 @@ from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import Certificate
 from mbma_tables.models.closed_form_certificates import RANGES
+from mbma_tables.models.closed_forms import DEFINITION, Function, Steps, evaluate, read_functions
 
-HEADER = ROOT / "mbma_tables" / "core" / "closed_forms.h"
+HEADER = ROOT / "mbma_tables" / "models" / "closed_forms.h"
 MODULE = ROOT / "mbma_tables" / "models" / "closed_form_certificates.py"
-DEFINITION = re.compile(r"/\* ([^\n]*) \*/\ndouble mbma_((\w+?)_(\w+))\(([^\n]*)\) \{\n(.*?)\n\}\n", re.DOTALL)
 NUMBER = re.compile(r"\d[\d.]*(?:e-?\d+)?")
 WIDTH = 120
 DATA_DIGITS = 10
@@ -63,32 +63,6 @@ EDGE = 0.3  # share of each property that lies on an end of its range, where the
 TOTAL_SEED, TOTAL_HELD_OUT_SEED = 41, 42
 
 Samples = tuple[dict[str, FloatArray], dict[str, FloatArray]]  # arguments and results
-Steps = Mapping[str, str]
-NAMES = {"exp": np.exp, "log": np.log, "sqrt": np.sqrt, "where": np.where, "pow": lambda a, b: a**b}
-
-
-@dataclasses.dataclass(frozen=True)
-class Function:
-    """One closed form of one result: each step uses the arguments and earlier steps, the last is the value."""
-
-    form: str
-    result: str
-    arguments: tuple[str, ...]
-    title: str
-    steps: Steps
-
-    @property
-    def name(self) -> str:
-        return f"{self.form}_{self.result}"
-
-
-def read_functions(header: str) -> dict[str, Function]:
-    found = {}
-    for title, name, form, result, given, body in DEFINITION.findall(header):
-        lines = (line.split() for line in body.replace("return", f"const double {result} =").split(";"))
-        steps = {words[2]: " ".join(words[4:]) for words in lines if words}
-        found[name] = Function(form, result, tuple(given.replace("double ", "").split(", ")), title, steps)
-    return found
 
 
 def header_text(header: str, functions: Mapping[str, Function]) -> str:
@@ -110,14 +84,6 @@ def module_text(certificates: Mapping[str, Mapping[str, Certificate]]) -> str:
     wrapper = textwrap.TextWrapper(WIDTH, "    ", "        ", break_long_words=False, break_on_hyphens=False)
     lines = [wrapper.fill(f"{form!r}: {row!r},").replace("'", '"') for form, row in certificates.items()]
     return "\n".join([f"{text}CERTIFICATES: dict[str, dict[str, Certificate]] = {{", *lines, "}", ""])
-
-
-def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
-    names: dict[str, Any] = NAMES | dict(given)
-    with np.errstate(all="ignore"):
-        for name, text in steps.items():
-            names[name] = eval(text, names)
-    return names
 
 
 def rounded(values: FloatArray, digits: int = DATA_DIGITS) -> FloatArray:

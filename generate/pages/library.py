@@ -18,11 +18,12 @@ from benchmarks.import_circles import import_graph
 from generate.boundary_elements.evidence import evidence
 from generate.distances import pocket_errors
 from generate.files import ROOT
-from generate.formulas import HEADER, Function, read_functions
+from generate.formulas import HEADER
 from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
+from mbma_tables.models.closed_forms import Function, read_functions
 from mbma_tables.models.tables import shipped
 from mbma_tables.scenes.plan import shipped_costs, shipped_distances
 from mbma_tables.tablefiles.netcdf import read_table

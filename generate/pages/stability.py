@@ -21,7 +21,7 @@ from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands.geometry import geometry, kinks
 from mbma_tables.models import answer_islands
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.variants import get_variant
 
 ULP = np.finfo(float).eps

@@ -216,8 +216,15 @@ def _places(
             else:
                 average = theory.mean_separation_at(surface, by, wanted)
         except OutOfRangeError:
-            if by == "pressure":
-                _refuse_pressures(surface, asked, modulus, cap, theory, source.units.stress)
+            if by == "pressure":  # above the hardness or the theory's largest, in its own unit
+                unit, limits = source.units.stress, [(cap, "the hardness")]
+                with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
+                    deepest = theory.interval(surface, "pressure" if theory.ends_at_h_max else "area")[0]
+                    reached = modulus * theory.answer(surface, deepest).pressure
+                    limits.append((reached, f"what theory {theory.name!r} reaches on this surface"))
+                for limit, what in limits:
+                    name, end = "pressure" if unit in (None, "1") else f"pressure [{unit}]", spread(limit, asked.shape)
+                    require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
             raise
     gap = asked if by == "separation" else 2 * average - h_max
     if theory.ends_at_h_max:
@@ -225,21 +232,6 @@ def _places(
         average = np.maximum(average, gap) if by == "separation" else average
         gap = np.minimum(gap, average)
     return {"separation": gap[()], "mean_separation": average[()]}, lighter
-
-
-def _refuse_pressures(
-    surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: FloatArray, theory: Theory, unit: str | None
-) -> None:
-    """Reject pressures above the hardness or the theory's largest; the message has their own unit."""
-    name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
-    limits = [(hardness, "the hardness")]
-    with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
-        deepest = theory.interval(surface, "pressure" if theory.ends_at_h_max else "area")[0]
-        reached = modulus * theory.answer(surface, deepest).pressure
-        limits.append((reached, f"what theory {theory.name!r} reaches on this surface"))
-    for limit, what in limits:
-        end = spread(np.asarray(limit), asked.shape)
-        require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
 
 
 def _of_labelled(

@@ -11,11 +11,6 @@
 #include "calls.h"
 #include "stable_abi.h"
 
-static void release(Py_buffer *views, Py_ssize_t count) {
-    for (Py_ssize_t k = 0; k < count; k++)
-        PyBuffer_Release(&views[k]); /* no effect without a buffer */
-}
-
 /* One argument by its kind: d a double, i a whole number; arrays of D doubles, L int64, J int32, F floats to be read,
  * and w doubles, l int64, b bytes to be written. */
 static bool take(PyObject *given, char kind, argument *a, Py_buffer *view) {
@@ -87,7 +82,8 @@ static PyObject *called(const char *name, const char *kinds, bool (*call)(const 
             PyErr_Format(PyExc_ValueError, "core: sizes of the arrays of %s do not match", name);
     }
     const bool good = taken && fit && k == count && !*kinds;
-    release(views, taken ? k : k - 1);
+    for (Py_ssize_t used = taken ? k : k - 1; used-- > 0;)
+        PyBuffer_Release(&views[used]); /* no effect without a buffer */
     return good ? PyLong_FromLongLong(found) : NULL;
 }
 

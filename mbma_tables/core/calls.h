@@ -3,7 +3,6 @@
 #ifndef MBMA_CALLS_H
 #define MBMA_CALLS_H
 
-#include "closed_forms.h"
 #include "elementary.h"
 #include "mbma.h"
 
@@ -29,17 +28,6 @@ static size_t elementary(int64_t which, size_t n, const double *x, double *out) 
     for (size_t k = 0; k < n; k++)
         out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k])
                  : which == 3 ? mbma_log1p(x[k]) : mbma_erf(x[k]);
-    return 0;
-}
-
-/* A closed form: of X and mu the first six, of d, h_max, zeta_1 and hurst the others. */
-static size_t closed_form(size_t which, size_t n, const double *x, const double *y, const double *z, const double *w,
-                          double *out) {
-    static double (*const OF_ISLANDS[])(double, double) = {mbma_pocket_phi_F,   mbma_pocket_phi_A, mbma_standard_phi_F,
-                                                           mbma_standard_phi_A, mbma_long_phi_F,   mbma_long_phi_A};
-    for (size_t k = 0; k < n; k++)
-        out[k] = which < 6 ? OF_ISLANDS[which](x[k], y[k])
-                           : (which == 6 ? mbma_totals_pressure : mbma_totals_area)(x[k], y[k], z[k], w[k]);
     return 0;
 }
 
@@ -111,9 +99,6 @@ static mbma_spline spline_of(const argument *a) {
 #define FUNCTIONS(FN) \
     /* elementary.h */ \
     FN(elementary, "i Dn wn", true, elementary(I(0), N(1), P(1), P(2))) \
-    /* closed_forms.h */ \
-    FN(closed_form, "i Dn Dn D?n D?n wn", (uint64_t)I(0) < 8 && (I(0) < 6 || (P(3) && P(4))), \
-       closed_form((size_t)I(0), N(1), P(1), P(2), P(3), P(4), P(5))) \
     /* totals.c */ \
     FN(phi, "Dn Dn D J D6 w3n b?n", true, mbma_phi(N(0), P(0), P(1), CELLS(2), P(5), P(6))) \
     FN(totals, "Dn Dn Dn Dn d D8 D J D6 w4n wn bn l1", true, \

@@ -119,6 +119,18 @@ MBMA_INLINE double mbma_erf(double x) {
     return copysign(-mbma_expm1(-a * mbma_fma(p, t, 2.396521719854481)), x);
 }
 
+/* a . b in eight lanes */
+MBMA_INLINE double dot(const double *restrict a, const double *restrict b, size_t n) {
+    double s[8] = {0.0};
+    size_t k = 0;
+    for (; k + 8 <= n; k += 8)
+        for (size_t l = 0; l < 8; l++)
+            s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
+    for (size_t l = 0; k + l < n; l++)
+        s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
+    return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+}
+
 /* Forces of the calibrated law end at h_max as a Hertzian contact does: F = F_G (1 - r)^(3/2)/(1 + r) with F_G that of a
  * surface without end, r its value at h_max over that. F/F_G at ln r <= 0, and dF/dF_G. */
 MBMA_INLINE double mbma_ended(double log_r, double *slope) {

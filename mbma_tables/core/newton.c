@@ -6,12 +6,10 @@
  *
  * SPDX-License-Identifier: BSD-3-Clause. Copyright (c) 2026, mbma_tables contributors.
  */
-#include "eight.h"
 #include "heights.h"
 #include "mbma.h"
 
 enum {
-    RUNS = 2,           /* vectors of eight at once */
     LEAST_NODES = 8,    /* of a basis */
     TOGETHER = 4,       /* neighbouring modes; the largest is used, since single ones may vanish */
     MAX_STEPS = 200,    /* of Newton's method, which takes up to about 40 */
@@ -70,57 +68,39 @@ size_t mbma_island_extents(size_t n, const double *X, const double *mu, double s
 
 /* ---- linear algebra, in one order on every processor ---- */
 
-/* Columns of a row from `first` on, in groups of eight; the last ones overlap instead of leaving a remainder. */
-MBMA_INLINE void eights_from(size_t first, size_t n, size_t at[RUNS]) {
-    for (size_t r = 0; r < RUNS; r++)
-        at[r] = first + 8 * (r + 1) <= n ? first + 8 * r : n - 8;
+/* Adds the sum of factors[k] times row k of n numbers, from column `first` on, to `out`; in order of k, by four. */
+static void add_rows(size_t count, const double *factors, const double *rows, size_t n, size_t first,
+                     double *restrict out) {
+    size_t k = 0;
+    for (; k + 4 <= count; k += 4) {
+        const double *const a = rows + k * n, *const b = a + n, *const c = b + n, *const d = c + n, *const f = factors + k;
+        for (size_t j = first; j < n; j++)
+            out[j] = mbma_fma(d[j], f[3], mbma_fma(c[j], f[2], mbma_fma(b[j], f[1], mbma_fma(a[j], f[0], out[j]))));
+    }
+    for (; k < count; k++)
+        for (size_t j = first; j < n; j++)
+            out[j] = mbma_fma(rows[k * n + j], factors[k], out[j]);
 }
 
-/* out = sum over j of factors[j] times row j of n numbers */
 static void combine(size_t count, const double *factors, const double *rows, size_t n, double *out) {
-    static const double ZEROS[8] = {0.0};
-    for (size_t first = 0, at[RUNS]; first < n; first += 8 * RUNS) {
-        eight sums[RUNS];
-        eights_from(first, n, at);
-        for (size_t r = 0; r < RUNS; r++)
-            sums[r] = eight_of(ZEROS);
-        for (size_t j = 0; j < count; j++)
-            for (size_t r = 0; r < RUNS; r++)
-                sums[r] = fma8(eight_of(rows + j * n + at[r]), factors[j], sums[r]);
-        for (size_t r = 0; r < RUNS; r++)
-            memcpy(out + at[r], &sums[r], sizeof sums[r]);
-    }
+    memset(out, 0, n * sizeof *out);
+    add_rows(count, factors, rows, n, 0, out);
 }
 
 /* z becomes (1 + s A s)^-1 z, by 1 + s A s = U^T D U, ones on the diagonal of U, whose rows `m` receives, and `d` D. */
 static void solve_symmetric(const double *A, const double *s, size_t n, double *m, double *d, double *factors,
                             double *z) {
     for (size_t i = 0; i < n; i++) {
-        double inverse = 0.0;
-        for (size_t j = 0; j < i; j++)
-            factors[j] = -d[j] * m[j * n + i];
-        for (size_t first = i, at[RUNS]; first < n; first += 8 * RUNS) {
-            double run[RUNS][8];
-            eight sums[RUNS];
-            eights_from(first, n, at);
-            for (size_t r = 0; r < RUNS; r++) {
-                for (size_t l = 0; l < 8; l++)
-                    run[r][l] = s[i] * A[i * n + at[r] + l] * s[at[r] + l];
-                sums[r] = eight_of(run[r]);
-            }
-            for (size_t j = 0; j < i; j++)
-                for (size_t r = 0; r < RUNS; r++)
-                    sums[r] = fma8(eight_of(m + j * n + at[r]), factors[j], sums[r]);
-            memcpy(run, sums, sizeof run);
-            if (first == i) {
-                d[i] = 1.0 + run[0][i - at[0]];
-                inverse = 1.0 / d[i];
-            }
-            for (size_t r = 0; r < RUNS; r++)
-                for (size_t l = 0; l < 8; l++)
-                    m[i * n + at[r] + l] = run[r][l] * inverse;
-        }
-        z[i] = (z[i] + dot(factors, z, i)) * inverse;
+        double *const row = m + i * n;
+        for (size_t j = i; j < n; j++)
+            row[j] = s[i] * A[i * n + j] * s[j];
+        for (size_t k = 0; k < i; k++)
+            factors[k] = -d[k] * m[k * n + i];
+        add_rows(i, factors, m, n, i, row);
+        d[i] = 1.0 + row[i];
+        for (size_t j = i; j < n; j++)
+            row[j] *= 1.0 / d[i];
+        z[i] = (z[i] + dot(factors, z, i)) * (1.0 / d[i]);
     }
     for (size_t i = n - 1; i-- > 0;)
         z[i] -= dot(m + i * n + i + 1, z + i + 1, n - i - 1);

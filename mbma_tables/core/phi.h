@@ -2,20 +2,45 @@
 #ifndef MBMA_PHI_H
 #define MBMA_PHI_H
 
-#include "eight.h"
+#include "elementary.h"
 #include "mbma.h"
 
 #define BUCKET_BITS 49 /* 3 bits of the mantissa of mu: 8 buckets an octave */
 
+/* Four doubles at once: fma4(a, y, b) is a y + b, which compilers do not vectorise by themselves here. */
+#if defined(__FMA__)
+#include <immintrin.h>
+typedef __m256d four;
+MBMA_INLINE four four_of(const double *row) { return _mm256_loadu_pd(row); }
+MBMA_INLINE four fma4(four a, double y, four b) { return _mm256_fmadd_pd(a, _mm256_set1_pd(y), b); }
+#else
+typedef struct {
+    double lane[4];
+} four;
+MBMA_INLINE four four_of(const double *row) {
+    four found;
+    memcpy(&found, row, sizeof found);
+    return found;
+}
+MBMA_INLINE four fma4(four a, double y, four b) {
+    for (int i = 0; i < 4; i++)
+        b.lane[i] = mbma_fma(a.lane[i], y, b.lane[i]);
+    return b;
+}
+#endif
+
 /* The polynomial of a cell at x and y; the sum over powers of x by halves. */
 MBMA_INLINE double polynomial(const double c[8][8], double x, double y) {
     const double x2 = x * x;
-    eight row = eight_of(c[7]);
-    for (int k = 6; k >= 0; k--)
-        row = fma8(row, y, eight_of(c[k]));
-    const four sum = fma4(HIGH_FOUR(row), x2 * x2, LOW_FOUR(row));
-    const two whole = fma2(HIGH_TWO(sum), x2, LOW_TWO(sum));
-    return mbma_fma(whole[1], x, whole[0]);
+    four low = four_of(c[7]), high = four_of(c[7] + 4);
+    for (int k = 6; k >= 0; k--) {
+        low = fma4(low, y, four_of(c[k]));
+        high = fma4(high, y, four_of(c[k] + 4));
+    }
+    const four sum = fma4(high, x2 * x2, low);
+    double s[4];
+    memcpy(s, &sum, sizeof s);
+    return mbma_fma(mbma_fma(s[3], x2, s[1]), x, mbma_fma(s[2], x2, s[0]));
 }
 
 /* Phi_F and Phi_A of an island. */

@@ -26,6 +26,7 @@ from mbma_tables.export.targets import Target
 from mbma_tables.export.text import braces, core_file, filled, numerals, opening, written_by
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
+from mbma_tables.models.closed_forms import SOURCE
 from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
@@ -84,7 +85,7 @@ def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
     """The calls of one surface, under the opening comments of their files."""
     form, certificates = RANGES[FORM], CERTIFICATES[FORM]
-    _, prototypes, _, forms = core_file("closed_forms.h").split("\n\n", 3)
+    _, prototypes, _, forms = SOURCE.split("\n\n", 3)
     parts = {
         "PROTOTYPES": f"{prototypes}\n",
         "CLOSED_FORMS": re.sub(r"(\d)e0\b", r"\1.0", forms),

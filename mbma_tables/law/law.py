@@ -86,11 +86,6 @@ class ContactLaw(Law, Derived, Displayed):
     gaps: Any = None  #: of a simulated map, the theory that knows the flow through its gaps
 
     @property
-    def rows(self) -> Any:
-        """Shift and base of each octave of x, shape (octaves, 2)."""
-        return self.block[at.HEAD : self.block.view(np.int64)[at.RECORDS]].view(np.int64).reshape(-1, 2)
-
-    @property
     def records(self) -> FloatArray:
         """Centre, rate, polynomials of force and area, and energy of each piece, shape (records, RECORD)."""
         return self.block[self.block.view(np.int64)[at.RECORDS] :].reshape(-1, at.RECORD)
@@ -146,10 +141,6 @@ class ContactLaw(Law, Derived, Displayed):
     def _ask_one(self, what: int, mean_separation: Any, separation: Any) -> Any:
         """Arguments that a method of `Law` does not evaluate itself."""
         return self._values((QUANTITIES[what],), mean_separation, separation)[0]
-
-    def __call__(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Numbers:
-        """Same as `pressure`."""
-        return self.pressure(mean_separation, separation=separation)
 
     def pressure_and_stiffness(
         self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
@@ -222,23 +213,20 @@ class ContactLaw(Law, Derived, Displayed):
         l = h_max - d where contact ends there, else h_max + d. It includes the error of the polynomials, and for MBMA
         that of the islands as it propagates to slopes; not the error of another theory itself.
         """
-        d, head = self.separations(mean_separation, separation), self.block
+        d, head, words = self.separations(mean_separation, separation), self.block, self.block.view(np.int64)
         x = (self.h_max + np.where(d < 0, head[at.MINUS], head[at.PLUS]) * d) * head[at.SCALE]
-        bound = self.errors[self._records_at(d, x), 1]
-        if head.view(np.int64)[at.ENDS]:
+        # the records that hold the gaps, by shift and base of each octave of x
+        rows, bits = words[at.HEAD : words[at.RECORDS]].reshape(-1, 2), np.clip(x, head[at.LOW], head[at.HIGH])
+        bits = bits.view(np.int64)
+        row = rows[(bits >> 52) - words[at.EXPONENT] + np.where(d < 0, words[at.MINUS_ROWS], 0)]
+        kinks = sum(d * head[k] > head[k + 1] for k in (at.KINK_SIGN, at.KINK_SIGN_2))
+        number = np.clip((bits >> row[..., 0]) + row[..., 1] + kinks, 0, len(self.records) - 1)
+        bound = self.errors[np.where(x < head[at.LOW], 0, number), 1]
+        if words[at.ENDS]:
             left = self.h_max - d
             with np.errstate(divide="ignore", invalid="ignore"):
                 bound = np.where(left > 0, bound * left * head[at.SCALE] / x, 0.0)
         return bound[()]
-
-    def _records_at(self, d: FloatArray, x: FloatArray) -> Any:
-        """Numbers of the records that hold gaps."""
-        head, words = self.block, self.block.view(np.int64)
-        bits = np.clip(x, head[at.LOW], head[at.HIGH]).view(np.int64)
-        row = self.rows[(bits >> 52) - words[at.EXPONENT] + np.where(d < 0, words[at.MINUS_ROWS], 0)]
-        kinks = sum(d * head[k] > head[k + 1] for k in (at.KINK_SIGN, at.KINK_SIGN_2))
-        number = (bits >> row[..., 0]) + row[..., 1] + kinks
-        return np.where(x < head[at.LOW], 0, np.clip(number, 0, len(self.records) - 1))
 
     def _facts(self) -> dict[str, str]:
         unit, modulus = self.units.length or "1", unit_of("pressure", self.units)

@@ -17,7 +17,7 @@ from mbma_tables.law import block as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant

@@ -1,15 +1,17 @@
-"""Closed forms of `core/closed_forms.h` (docs/formula.md): the island model "formula", and total force and area."""
+"""Closed forms of `closed_forms.h` (docs/formula.md): the island model "formula", and total force and area."""
 
+import dataclasses
 import functools
-from collections.abc import Callable
+import pathlib
+import re
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, answered, broadcast_shape, finite_array, positive_array, require
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, positive_array, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.core import core
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.universal import Ranged
 from mbma_tables.surfaces.surface import Surface
@@ -17,19 +19,63 @@ from mbma_tables.surfaces.surface import Surface
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
-NAMES = [(form, name) for form in ISLAND_FORMS for name in RESULTS] + [(TOTALS, "pressure"), (TOTALS, "area")]
+SOURCE = pathlib.Path(__file__).with_suffix(".h").read_text(encoding="utf-8")
+DEFINITION = re.compile(r"/\* ([^\n]*) \*/\ndouble mbma_((\w+?)_(\w+))\(([^\n]*)\) \{\n(.*?)\n\}\n", re.DOTALL)
+NAMES = {"exp": np.exp, "log": np.log, "sqrt": np.sqrt, "where": np.where, "pow": lambda a, b: a**b}
+Steps = Mapping[str, str]
 
 
-def _of_core(number: int, *given: ArrayLike) -> Any:
-    rest = [None] * (4 - len(given))
-    return answered(lambda *rows: core.closed_form(number, *rows[:-1], *rest, rows[-1]), given)[0][()]
+@dataclasses.dataclass(frozen=True)
+class Function:
+    """One closed form of one result: each step uses the arguments and earlier steps, the last is the value."""
+
+    form: str
+    result: str
+    arguments: tuple[str, ...]
+    title: str
+    steps: Steps
+
+    @property
+    def name(self) -> str:
+        """Of the function in C, without its prefix."""
+        return f"{self.form}_{self.result}"
+
+    def __call__(self, *given: Any) -> Any:
+        """Of arrays, which broadcast."""
+        return evaluate(self.steps, dict(zip(self.arguments, given, strict=True)))[self.result]
 
 
-# of arrays, which broadcast
-FUNCTIONS: dict[str, dict[str, Callable[..., Any]]] = {
-    form: {name: functools.partial(_of_core, NAMES.index((form, name))) for name in own}
-    for form, own in CERTIFICATES.items()
-}
+def read_functions(header: str) -> dict[str, Function]:
+    """The functions of a header's text by name."""
+    found = {}
+    for title, name, form, result, given, body in DEFINITION.findall(header):
+        lines = (line.split() for line in body.replace("return", f"const double {result} =").split(";"))
+        steps = {words[2]: " ".join(words[4:]) for words in lines if words}
+        found[name] = Function(form, result, tuple(given.replace("double ", "").split(", ")), title, steps)
+    return found
+
+
+_compiled = functools.cache(lambda text: compile(text, "closed_forms.h", "eval"))
+
+
+def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
+    """Values of all steps, by numpy functions.
+
+    Examples
+    --------
+    >>> evaluate({"w": "1.0 / (X + 3.0)"}, {"X": np.array([1.0, 2.0])})["w"]
+    array([0.25, 0.2 ])
+    """
+    names: dict[str, Any] = NAMES | dict(given)
+    with np.errstate(all="ignore"):
+        for name, text in steps.items():
+            names[name] = eval(_compiled(text), names)
+    return names
+
+
+FUNCTIONS: dict[str, dict[str, Function]] = {form: {} for form in CERTIFICATES}
+for _one in read_functions(SOURCE).values():
+    FUNCTIONS[_one.form][_one.result] = _one
 
 
 class FormulaModel(Ranged):

@@ -1,7 +1,7 @@
 """The problem defined by a scene, with its effects, checked on construction; `plan` and `run` solve it."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,7 +65,7 @@ class Problem:
 
     def __post_init__(self) -> None:
         for name in ("effects", "without", "theories"):
-            if isinstance(getattr(self, name), str):
+            if isinstance(getattr(self, name), str) or not isinstance(getattr(self, name), Iterable):
                 raise InputError(f"{name} must be a list of names: write [{getattr(self, name)!r}]")
         self._choose_effects()
         outputs, dropped = self.outputs, self.dropped
@@ -99,11 +99,11 @@ class Problem:
 
     def _choose_effects(self) -> None:
         """Set the requested outputs and the refinements switched off, checked against each other."""
-        outputs, dropped = frozenset(self.effects), frozenset(self.without)
-        for name in outputs:
+        for name in self.effects:
             require_name("effect", name, OUTPUTS)
-        for name in dropped:
+        for name in self.without:
             require_name("refinement", name, REFINEMENTS)
+        outputs, dropped = frozenset(self.effects), frozenset(self.without)
         if not outputs:
             raise InputError(f"no effect is requested: on needs at least one of {', '.join(OUTPUTS)}")
         for name in sorted(dropped | outputs & set(ELASTIC)) if "yield" in outputs else ():

@@ -20,7 +20,7 @@ from mbma_tables.common.progress import doing
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.models import RigidModel, answer_islands
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
 from mbma_tables.surfaces.any_surface import AnySurface

@@ -179,8 +179,7 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
         return from_numbers(numbers, unit, title)
     path = folder / source
     if not path.is_file():
-        where = "paths are relative to the file that names them"
-        raise InputError(f"[surface]: map = {str(source)!r} is not a file; {where}")
+        raise InputError(f"[surface]: map = {str(path)!r} is not a file")
     return _from_map(path, treatment, unit)
 
 

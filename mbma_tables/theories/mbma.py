@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.models import QUANTITIES, AnyModel, check_outside, island_model_name
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
@@ -21,9 +20,8 @@ from mbma_tables.totals.contact import QUADRATURE_SHARE, Sums, Totals, totals_at
 from mbma_tables.totals.island import check_band
 from mbma_tables.totals.profile import profile
 
-GOLDEN = (5**0.5 - 1) / 2
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
-SECTIONS = 24  # golden sections of a scan's step, to 1e-6
+POINTS, REFINED = 9, 8  # points of a scan's step, and how often those beside the highest one bound the next
 
 MAX_AREA = 0.1  # above it islands begin to overlap (docs/fidelity.md)
 
@@ -151,21 +149,11 @@ class Mbma(Theory):
         if turns.size:
             peak, top = falls[turns].argmax(axis=-1), h_max.ravel()[turns]
             curve = self._scanned.curve(select(surface, surface.shape, turns), kind)
-            low, high = np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN
-            result[turns] = top * (1 - _highest(lambda x: np.asarray(curve(top * (1 - x))[row]), low, high))
+            low, high, own = np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN, np.arange(turns.size)
+            for _ in range(REFINED):  # scipy.optimize takes 0.3 s to import
+                x = np.linspace(low, high, POINTS)
+                values = np.nan_to_num(curve(top * (1 - x))[row], nan=-np.inf)
+                highest = values.argmax(axis=0).clip(1, POINTS - 2)
+                low, high = x[highest - 1, own], x[highest + 1, own]
+            result[turns] = top * (1 - (low + high) / 2)
         return result.reshape(surface.shape)
-
-
-def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
-    """Maximum of a function of arrays between `low` and `high`, by golden sections."""
-    # scipy.optimize takes 0.3 s to import
-    inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_inner, at_outer = value(inner), value(outer)
-    for _ in range(SECTIONS):
-        below = at_inner > at_outer
-        low, high = np.where(below, low, inner), np.where(below, outer, high)
-        at_kept = np.where(below, at_inner, at_outer)
-        inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        fresh = value(np.where(below, inner, outer))
-        at_inner, at_outer = np.where(below, fresh, at_kept), np.where(below, at_kept, fresh)
-    return (low + high) / 2

@@ -132,10 +132,8 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
     """The surface of such a file, with its table."""
     values, own = read_own(path)
     try:
-        parts = {
-            part: kind(**{name: _plain(values[f"{part}_{name}"]) for name in _fields(part)})
-            for part, kind in PARTS.items()
-        }
+        plain = {name: value.item() if value.size == 1 else value for name, value in values.items()}
+        parts = {part: kind(**{n: plain[f"{part}_{n}"] for n in _fields(part)}) for part, kind in PARTS.items()}
         numbers = [values[name].item() for name in NUMBERS]
         rows = np.stack([values[name] for name in ROWS])
         if values["flow"].shape != (*values["flow_gaps"].shape, 3) or rows.ndim != 2:
@@ -149,7 +147,3 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
         raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {OWN_REMEDY}") from None
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if value.size == 1 else value

@@ -186,7 +186,15 @@ class Theory(abc.ABC):
         search = Search(seen.reshape(3, len(shares), -1), exact, goal, ends, low, high)
         at_end = goal > seen[1][-1].ravel()
         if at_end.any():
-            at_end = self._at_end(surface, quantity, goal, first, shape)
+            largest = np.broadcast_to(getattr(self.answer(surface, first), quantity), shape)
+            wanted = goal.reshape(shape)
+            at_end, out = (wanted >= largest).ravel(), wanted > largest * (1 + self.reached)
+            if out.any():
+                raise OutOfRangeError(
+                    f"{quantity} must be at most what theory {self.name!r} reaches on this surface "
+                    f"({describe_entries(largest, out)}), got {describe_entries(wanted, out)}",
+                    out,
+                )
         left = np.flatnonzero((goal > 0) & ~at_end)
         for _ in range(STEPS):
             if not left.size:
@@ -200,21 +208,6 @@ class Theory(abc.ABC):
         missed[left] = True
         u = np.where(goal == 0, high, np.where(at_end, low, search.gap))
         return u.reshape(shape), missed.reshape(shape)
-
-    def _at_end(
-        self, surface: AnySurface, quantity: str, goal: FloatArray, first: FloatArray, shape: Any
-    ) -> NDArray[np.bool_]:
-        """Mask of wanted values equal to the largest one; an error if they exceed it."""
-        largest = np.broadcast_to(getattr(self.answer(surface, first), quantity), shape)
-        wanted = goal.reshape(shape)
-        out = wanted > largest * (1 + self.reached)
-        if out.any():
-            raise OutOfRangeError(
-                f"{quantity} must be at most what theory {self.name!r} reaches on this surface "
-                f"({describe_entries(largest, out)}), got {describe_entries(wanted, out)}",
-                out,
-            )
-        return np.asarray(wanted >= largest).ravel()
 
 
 @functools.cache

@@ -160,12 +160,8 @@ class Saturated(Yielding):
         return np.where(np.isinf(self.hardness), elastic, np.hypot(elastic, SCATTER.get(quantity, 0.0)))
 
 
-def _with_hardness(theory: BoundaryElements, hardness: ArrayLike) -> Yielding:
-    """A map whose points are known is simulated anew; a table goes through the law of hardness."""
-    return (Saturated if isinstance(theory.pressed, Press) else Yielding)(theory, hardness)
-
-
-WITH_HARDNESS[BoundaryElements] = _with_hardness
+# a map whose points are known is simulated anew; a table goes through the law of hardness
+WITH_HARDNESS[BoundaryElements] = lambda own, cap: (Saturated if isinstance(own.pressed, Press) else Yielding)(own, cap)
 
 
 class Corrected(BoundaryElements):

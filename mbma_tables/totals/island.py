@@ -20,7 +20,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import modulus_and_units
 from mbma_tables.islands.geometry import geometry, measured_islands
 from mbma_tables.models import AnyModel, answer_islands, island_model_name
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant, get_variant

@@ -78,9 +78,6 @@ def use():
     core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
-    for form in range(8):
-        more = [surfaces[2] if form > 5 else None] * 2
-        core.closed_form(form, surfaces[2], surfaces[2], *more, np.empty(20))
     core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
 
     universal = open_table("universal")

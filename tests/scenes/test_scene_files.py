@@ -38,7 +38,7 @@ MISTAKES = [
     (scene(surface="hurst = 0.8\nq0 = 1.0"), "a surface needs hurst, q0, q1"),
     (scene(surface='name = "concrete"\nhurst = 0.8'), r"name and numbers \(hurst\) are given"),
     (scene(surface='name = "concrete"\nmap = "a.nc"'), "one of name, map or numbers"),
-    (scene(surface='map = "none.nc"'), "is not a file; paths are relative"),
+    (scene(surface='map = "none.nc"'), "none.nc' is not a file"),
     (scene(surface='name = "concrete"\nlength_unit = "MPa"'), "no known unit of length"),
     (scene(effects=None), "'effects' is a required property"),
     (scene(effects="on = []"), "effects.on: .* should be non-empty"),

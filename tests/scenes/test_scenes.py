@@ -286,6 +286,7 @@ test_contradictions = refusals(
     ({"island_model": "exact", "without": ("sphere_deformation",)}, "leave island model out"),
     ({"island_model": object(), "seconds": 1.0}, "give rtol instead of seconds"),
     ({"effects": "pressure"}, "list of names"),
+    ({"effects": 5}, "list of names"),
     ({"separations": [[0.5]]}, "one number or a list"),
     ({"points": 1}, "points must be"),
     ({"surface": Surface([0.5, 0.7], 1.0, 50.0, 0.1, 0.3)}, "not a batch"),

@@ -65,17 +65,11 @@ class TestLimits:
         assert 0.9 <= two <= 0.99
 
 
-def surfaces(rng, number):
-    zeta = np.exp(rng.uniform(np.log(3.01), np.log(9e4), number))
-    h_rms = np.exp(rng.uniform(-7, 7, number))
-    q0 = np.exp(rng.uniform(-9, 0, number))
-    return Surface(rng.uniform(0.1, 1.0, number), q0, q0 * zeta, h_rms, h_rms * rng.uniform(2.5, 5.5, number))
-
-
 def test_falls_with_load_on_10000_random_cases():
-    rng = np.random.default_rng(3)
-    batch = surfaces(rng, 10_000)
-    area = np.exp(rng.uniform(np.log(1e-6), np.log(0.45), 10_000))
+    ends = [0.1, np.log(3.01), -7, -9, 2.5, np.log(1e-6)], [1.0, np.log(9e4), 7, 0, 5.5, np.log(0.45)]
+    hurst, zeta, h_rms, q0, top, area = np.random.default_rng(3).uniform(*ends, (10_000, 6)).T
+    zeta, h_rms, q0, area = np.exp([zeta, h_rms, q0, area])
+    batch = Surface(hurst, q0, q0 * zeta, h_rms, h_rms * top)
     light, heavy = (contact(batch, area=a, theory="calibrated").leakage for a in (area, area * 1.01))
     assert np.all((k_of(heavy) < k_of(light)) | heavy.blocked)
     assert np.all(light.blocked <= heavy.blocked)

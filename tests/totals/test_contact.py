@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from catalogue import LEVEL, OWN
 
-from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
+from mbma_tables import ConvergenceError, OutOfRangeError, Surface, greenwood_tripp
 from mbma_tables import contact as contact_by_island_model
 from mbma_tables.islands.geometry import geometry, kinks
 from mbma_tables.surfaces.variants import get_variant
@@ -112,20 +112,6 @@ def test_failure_has_the_shape_of_the_arguments(monkeypatch):
     with pytest.raises(ConvergenceError) as caught:
         contact(surfaces, separation=[0.0, 3.5, 1.0])
     assert caught.value.mask.tolist() == [[True, False, True], [True, True, True]]
-
-
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [
-        *(("rtol", rtol) for rtol in (0.0, 1e-12, 0.5, math.nan, "tight")),
-        *(("island_model", name) for name in ("magic", None)),
-        ("variant", "guessed"),
-        *(("E_star", modulus) for modulus in (0.0, -2.0)),
-    ],
-)
-def test_bad_options(option, value):
-    with pytest.raises(InputError, match=option):
-        contact(one_surface(0.8, 216.0), separation=1.0, **{option: value})
 
 
 ROUGH = Surface(0.8, 1.0, 216.0, 1.0, 3.0)

@@ -129,6 +129,9 @@ def test_outside_as_nan():
 test_bad_options = refusals(
     lambda options: contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, **options),
     ({"outside": "clamp"}, "outside must be one of"),
+    ({"variant": "guessed"}, "variant must be one of"),
+    *(({"rtol": rtol}, "rtol") for rtol in (0.0, 1e-12, 0.5, math.nan, "tight")),
+    *(({"E_star": modulus}, "E_star") for modulus in (0.0, -2.0)),
     ({"island_model": "formula4"}, "island_model must be one of"),
 )
 

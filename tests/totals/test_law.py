@@ -17,7 +17,7 @@ from scipy.integrate import quad
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.core import core
 from mbma_tables.law import block as at
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import Mbma
 from mbma_tables.totals.contact import Sums, by_table

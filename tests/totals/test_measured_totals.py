@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
 from mbma_tables.models import answer_islands
-from mbma_tables.models.named import get_model
+from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED
 from mbma_tables.theories import Mbma
 from mbma_tables.totals.profile import profile, source_of
