@@ -1,5 +1,6 @@
 """What several test files do alike."""
 
+import ctypes
 import json
 import os
 import re
@@ -140,3 +141,20 @@ def spoilt(content, rng):
         else:
             data = data[: max(at, 1)]
     return bytes(data)
+
+
+def compiled_law(source, *options, name="road"):
+    """A law in C, compiled by gcc without a warning: its functions, by what they answer, of arrays."""
+    library = source.with_suffix(".so")
+    command = ["gcc", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *options, "-shared", "-fPIC", str(source), "-lm"]
+    subprocess.run([*command, "-o", str(library)], check=True)
+    law = ctypes.CDLL(str(library))
+
+    def answer(what, given):
+        function = law[f"{name}_{what}"]
+        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
+        with np.errstate(invalid="ignore"):
+            return np.vectorize(function, otypes=[float])(given)
+
+    answer.library = law
+    return answer

@@ -1,17 +1,16 @@
 """The page of `mbma explore` in a headless Chromium: its curves are the library's, its controls do what they say."""
 
 import csv
-import ctypes
 import dataclasses
+import functools
 import importlib.util
 import re
 import shutil
-import subprocess
 import urllib.parse
 
 import numpy as np
 import pytest
-from helpers import random_map, refused, run
+from helpers import compiled_law, random_map, refused, run
 
 from generate.explorer import c_sources, digest_of, law_sources
 from mbma_tables import InputError, Surface, contact
@@ -116,8 +115,8 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
         assert answered.size > 3
         options = {"mean_separation": known["gap"][answered], "E_star": state["E_star"], "theory": theory}
         expected = contact(surface, **options, **({"variant": state["variant"]} if theory == "mbma" else {}))
-        np.testing.assert_allclose(found[f"{theory} scatter of ln pressure"][answered], expected.scatter, rtol=1e-6)
-        np.testing.assert_allclose(found[f"{theory} scatter of ln area"][answered], expected.area_scatter, rtol=1e-6)
+        for name, scatter in {"pressure": expected.scatter, "area": expected.area_scatter}.items():
+            np.testing.assert_allclose(found[f"{theory} scatter of ln {name}"][answered], scatter, rtol=1e-6)
         force, area, stiffness = expected.pressure, expected.area, expected.stiffness
         if theory == "mbma":
             # islands summed gap by gap, as the page does it
@@ -161,22 +160,16 @@ def test_one_file_of_at_most_four_megabytes_that_asks_for_nothing():
     assert "The MIT License" in page
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--surface", "concrete", "--theory", "greenwood_williamson"], "the page has the theories"),
-        (["--surface", "concrete", "--variant", "mine"], "'mine' is not one of"),
-        (["--hurst", "0.8"], "h_max"),
-        ([], "one surface is needed"),
-    ],
-)
-def test_bad_requests_are_refused(arguments, said, tmp_path):
+def test_bad_requests_are_refused(tmp_path):
     out = tmp_path / "page.html"
-    assert said in refused("explore", *arguments, "--out", str(out))
+    for words, said in (
+        ("--surface concrete --theory greenwood_williamson", "the page has the theories"),
+        ("--surface concrete --variant mine", "'mine' is not one of"),
+        ("--hurst 0.8", "h_max"),
+        ("", "one surface is needed"),
+    ):
+        assert said in refused("explore", *words.split(), "--out", str(out))
     assert not out.exists()
-
-
-def test_batches_and_long_spectra_are_refused():
     with pytest.raises(InputError, match="one surface"):
         explorer_page(Surface(0.8, 1.0, [10.0, 20.0], 1.0, 3.0))
     q = np.geomspace(1, 100, 501)
@@ -303,17 +296,6 @@ def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
         explorer_page(surface, theory="mbma")
 
 
-def compiled_law(path):
-    strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-shared", "-fPIC")
-    library = path.with_suffix(".so")
-    subprocess.run(["gcc", *strict, str(path), "-lm", "-o", str(library)], check=True)
-    law = ctypes.CDLL(str(library))
-    functions = {name: law[f"law_{name}"] for name in ("pressure", "tangent", "area")}
-    for function in functions.values():
-        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
-    return lambda name, c: np.array([functions[name](float(value)) for value in c])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
 def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tmp_path):
@@ -321,7 +303,8 @@ def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tm
         pytest.skip("not installed: gcc")
     path, own = tmp_path / "page.c", tmp_path / "own.c"
     path.write_text(download(visit(f"theory={theory}&h_rms=0.25"), "#law"), encoding="ascii")
-    law, surface = compiled_law(path), dataclasses.replace(Surface.named("concrete"), h_rms=0.25)
+    compiled = functools.partial(compiled_law, name="law")
+    law, surface = compiled(path, "-std=c99"), dataclasses.replace(Surface.named("concrete"), h_rms=0.25)
     c = float(surface.h_max) * np.exp(np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 300))
     known = contact(surface, mean_separation=surface.h_max - c, E_star=13.3, theory=theory)
     np.testing.assert_allclose(law("pressure", c), known.pressure, rtol=3e-8)
@@ -331,7 +314,7 @@ def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tm
     # the command in its header writes a law of the same functions
     command = re.search(r"mbma export (c-law .* --out) law.c", path.read_text())
     run("export", *command[1].split(), str(own))
-    np.testing.assert_allclose(compiled_law(own)("pressure", c[c > 1e-3]), law("pressure", c[c > 1e-3]), rtol=1e-6)
+    np.testing.assert_allclose(compiled(own)("pressure", c[c > 1e-3]), law("pressure", c[c > 1e-3]), rtol=1e-6)
     assert law("pressure", [-0.1, 0.0]).tolist() == [0.0, 0.0]
 
 

@@ -153,10 +153,7 @@ def _beyond_metals(
     return {f"{pair.softer.name} yields here: give hardness={needed}": elastic & (yields | (mean > soft * unit))}
 
 
-_Point = collections.namedtuple("_Point", ("separation", "mean_separation", "area", "stiffness", "pressure"))
-
-
-class LawPoint(_Point):
+class LawPoint(collections.namedtuple("LawPoint", ("separation", "mean_separation", "area", "stiffness", "pressure"))):
     """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape."""
 
     units = Units()  #: the law's
@@ -164,12 +161,6 @@ class LawPoint(_Point):
     def __repr__(self) -> str:
         fields = self._asdict().items()
         return f"LawPoint({', '.join(f'{name} {shown(value, unit_of(name, self.units))}' for name, value in fields)})"
-
-    @property
-    def mean_pressure(self) -> Any:
-        """Mean pressure in the contact, F/A; NaN where there is none."""
-        with np.errstate(invalid="ignore"):
-            return self.pressure / self.area
 
 
 #: results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape

@@ -1,6 +1,7 @@
 """Laws as source code: equal to the library's law in each language, down to first contact."""
 
 import ctypes
+import functools
 import importlib.util
 import math
 import re
@@ -12,19 +13,20 @@ import types
 import law_points
 import numpy as np
 import pytest
-from helpers import refusals
+from helpers import compiled_law, refusals
 from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 
 from mbma_tables import Surface, contact_law
 from mbma_tables.core import core
 from mbma_tables.export import LAWS
-from mbma_tables.export.law_code import core_text, law_text
+from mbma_tables.export.law_code import core_text, law_files, law_text
 from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.text import core_file
 
 QUANTITIES = ("pressure", "tangent", "area", "energy", "leakage")
 FIELDS = {"pressure": "p"}  # of points, where they have another name
-WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wfloat-conversion", "-Wshadow")
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
+STRICT = ("-std=c99", "-Wconversion", "-Wfloat-conversion", "-Wshadow")
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 
 
@@ -34,68 +36,53 @@ def run(*command, folder, last_words=""):
     return done.stdout
 
 
-def c_function(library, name):
-    function = library[f"road_{name}"]
-    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
-
-    def answer(given):
-        with np.errstate(invalid="ignore"):
-            return np.vectorize(function, otypes=[float])(given)
-
-    return answer
-
-
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory):
     folder, found = tmp_path_factory.mktemp("laws"), {}
     for name in ASKED:
-        asked = HEAT | {"kappa": KAPPA, "leakage": True}
-        (folder / f"{name}.c").write_text(law_points.text("c-law", name, name="road", **asked))
-        strict = ("-std=c99", "-Wmissing-prototypes", "-Wstrict-prototypes", *WARNINGS)
+        path, asked = folder / f"{name}.c", HEAT | {"kappa": KAPPA, "leakage": True}
+        path.write_text(law_points.text("c-law", name, name="road", **asked))
         for level in ("-O3", "-O2"):
-            run("gcc", *strict, level, "-shared", "-fPIC", f"{name}.c", "-lm", "-o", f"{name}.so", folder=folder)
-        found[name] = ctypes.CDLL(str(folder / f"{name}.so"))
+            found[name] = compiled_law(path, *STRICT, "-Wmissing-prototypes", "-Wstrict-prototypes", level)
     return found
 
 
 @needs("gcc")
 @pytest.mark.parametrize("name", ASKED)
 def test_c(name, compiled):
-    known, library = points(name), compiled[name]
-    found = [c_function(library, quantity)(known.c) for quantity in QUANTITIES]
+    known, law = points(name), compiled[name]
+    found = [law(quantity, known.c) for quantity in QUANTITIES]
     known.assert_equal(*found)
-    known.assert_inverse(c_function(library, "overclosure")(known.pressures()))
-    both = library.road_with_tangent
+    known.assert_inverse(law("overclosure", known.pressures()))
+    both = law.library.road_with_tangent
     both.restype, both.argtypes = ctypes.c_double, [ctypes.c_double, ctypes.POINTER(ctypes.c_double)]
     slope = ctypes.c_double()
     assert (both(float(known.c[0]), ctypes.byref(slope)), slope.value) == (found[0][0], found[1][0])
-    known.assert_slopes(*(c_function(library, what)(known.c) for what in ("conductance", "tangential_stiffness")))
+    known.assert_slopes(*(law(what, known.c) for what in ("conductance", "tangential_stiffness")))
 
 
 @needs("gcc")
 @pytest.mark.parametrize("name", ASKED)
 def test_c_outside_its_range(name, compiled):
-    library, law = compiled[name], points(name).law
+    answer, law = compiled[name], points(name).law
     beyond = [math.nan, math.inf, 0.5 * (law.h_max - law.lowest) * (1 + 1e-9)]
     before = [] if math.isinf(law.highest) else [-math.inf, 0.5 * (law.h_max - law.highest) * (1 + 1e-9)]
-    for quantity in QUANTITIES:
-        assert np.isnan(c_function(library, quantity)(beyond + before)).all()
-        if not before and quantity != "leakage":
-            assert (c_function(library, quantity)([0.0, -0.0, -1.0, -math.inf]) == 0).all()
-    most = float(law.pressure(separation=law.lowest if law.turning_point is None else law.turning_point))
-    assert np.isnan(c_function(library, "overclosure")([-1.0, math.nan, math.inf, 1.01 * most])).all()
-    if not before:
-        assert c_function(library, "overclosure")([0.0]) == 0
     for quantity in (*QUANTITIES, "curvature"):
-        found = c_function(library, quantity)([5e-324, 1e-320, 1e-310, 2.3e-308])
+        found = answer(quantity, [5e-324, 1e-320, 1e-310, 2.3e-308])
         assert np.isfinite(found).all(), quantity
         assert (found >= 0).all() or quantity == "curvature" or before, quantity
+        assert np.isnan(answer(quantity, beyond + before)).all()
+        if not before and quantity not in ("leakage", "curvature"):
+            assert (answer(quantity, [0.0, -0.0, -1.0, -math.inf]) == 0).all()
+    most = float(law.pressure(separation=law.lowest if law.turning_point is None else law.turning_point))
+    assert np.isnan(answer("overclosure", [-1.0, math.nan, math.inf, 1.01 * most])).all()
+    assert before or answer("overclosure", [0.0]) == 0
 
 
 @needs("gcc")
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
 def test_leakage_apart_and_where_gaps_close(name, compiled):
-    law, leakage = points(name).law, c_function(compiled[name], "leakage")
+    law, leakage = points(name).law, functools.partial(compiled[name], "leakage")
     apart = np.geomspace(1e-9, 1e3 if math.isinf(law.highest) else 26, 200)
     np.testing.assert_allclose(leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES)
     if name != "mbma":
@@ -115,7 +102,11 @@ def test_headers_say_what_is_there():
     facts += f"c = {(3 - leakage.blocked_at) / 2:.10g} on", "leakage: A/A0 is above 0.3"
     assert all(fact in text for fact in facts)
     assert "import { pressure, withTangent, area" in law_points.text("javascript-law", "mbma")
-    assert "overclosure(" not in law_points.text("modelica-law", "mbma").partition("package")[0]
+    text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)
+    assert "overclosure(" not in text.partition("package")[0]
+    for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
+        assert f'type {kind} = Real(unit = "{unit}");' in text
+    assert 'output Real y(unit = "mm3");' in text
 
 
 test_requests_that_are_refused = refusals(
@@ -144,44 +135,42 @@ def test_c_is_the_library(name, tmp_path):
     (tmp_path / "road.c").write_text(text)
     level = core.__name__.partition("._")[2].replace("x86_64_", "-march=x86-64-").replace("plain", "-O3")
     flags = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", level)
-    run("gcc", *flags, "-shared", "-fPIC", "road.c", "-lm", "-o", "road.so", folder=tmp_path)
-    library, known = ctypes.CDLL(str(tmp_path / "road.so")), points(name)
+    answer, known = compiled_law(tmp_path / "road.c", *flags), points(name)
     for quantity in QUANTITIES:
-        np.testing.assert_array_equal(
-            c_function(library, quantity)(known.c), getattr(known, FIELDS.get(quantity, quantity))
-        )
+        np.testing.assert_array_equal(answer(quantity, known.c), getattr(known, FIELDS.get(quantity, quantity)))
 
 
 @needs("gcc")
 def test_digits_next_to_first_contact(compiled):
     """An overclosure keeps its digits where a separation has none left: there pressure is a power of it."""
-    pressure, tangent, inverse = (c_function(compiled["mbma"], q) for q in ("pressure", "tangent", "overclosure"))
+    functions = ("pressure", "tangent", "overclosure")
+    pressure, tangent, inverse = (functools.partial(compiled["mbma"], what) for what in functions)
     c = np.geomspace(1e-70, 1e-14, 100)
     np.testing.assert_allclose(c * tangent(c) / pressure(c), 3.5, rtol=1e-6)
     np.testing.assert_allclose(inverse(pressure(c)), c, rtol=1e-14)
     assert (inverse(np.array([5e-324, 1e-310, 1e-200])) > 0).all()
 
 
-@needs("gcc")
-def test_two_laws_in_one_program(tmp_path):
-    laws = {"road": "mbma", "seal": "persson"}
-    for name, law in laws.items():
-        (tmp_path / f"{name}.c").write_text(law_points.text("c-law", law, name=name, leakage=True))
-    asks = "".join(f'printf("%.17g\\n", {name}_pressure(0.5));' for name in laws)
-    declared = "".join(f"double {name}_pressure(double c);" for name in laws)
-    (tmp_path / "ask.c").write_text(f"#include <stdio.h>\n{declared}\nint main(void) {{ {asks} return 0; }}\n")
-    run("gcc", "-O1", "road.c", "seal.c", "ask.c", "-lm", "-o", "ask", folder=tmp_path)
-    known = [float(points(law).law.pressure(separation=2.0)) for law in laws.values()]
-    np.testing.assert_allclose(np.array(run("./ask", folder=tmp_path).split(), dtype=float), known, rtol=VALUES)
-
-
-@needs("g++")
-def test_the_same_file_is_cpp(tmp_path):
-    (tmp_path / "road.c").write_text(law_points.text("c-law", "mbma", leakage=True, **HEAT))
+@needs("gcc", "g++")
+def test_two_laws_with_headers_in_c_and_cpp(tmp_path):
+    for name, law in {"road": "mbma", "seal": "persson"}.items():
+        surface, asked = ASKED[law]
+        files = law_files("c-law", surface, "13.3 MPa", name=name, leakage=True, **HEAT, **asked)
+        (tmp_path / f"{name}.c").write_text(files[""])
+        (tmp_path / f"{name}.h").write_text(files[".h"])
     (tmp_path / "uinter.c").write_text(law_points.text("abaqus-uinter", "mbma", **HEAT))
-    for file in ("road.c", "uinter.c"):
-        strict = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
-        run("g++", "-x", "c++", "-std=c++11", *strict, "-c", file, folder=tmp_path)
+    asks = (
+        "road_with_tangent(1.0, &k), road_leakage(1.0), road_conductance(1.0), road_overclosure(0.01), seal_area(0.5)"
+    )
+    text = '#include "road.h"\n#include "seal.h"\n#include "road.h"\n#include <stdio.h>\nint main(void) { double k; '
+    (tmp_path / "ask.c").write_text(f'{text}printf("%.17g %.17g %.17g %.17g %.17g", {asks}); return 0; }}\n')
+    law, seal = points("mbma").law, points("persson").law
+    known = [law.pressure(2.0), law.leakage(2.0), CONDUCTIVITY / 13.3 * law.stiffness(2.0)]
+    known += [3 - law.at_pressure(0.01).mean_separation, seal.area(2.5)]
+    for compiler in (("gcc", "-std=c99"), ("g++", "-x", "c++", "-std=c++11")):
+        run(*compiler, *WARNINGS, "-c", "road.c", "seal.c", "uinter.c", "ask.c", folder=tmp_path)
+        run(compiler[0], "road.o", "seal.o", "ask.o", "-lm", "-o", "ask", folder=tmp_path)
+        np.testing.assert_allclose(np.array(run("./ask", folder=tmp_path).split(), float), known, rtol=1e-11)
 
 
 FORTRAN = """program ask
@@ -235,6 +224,10 @@ def test_python(name, tmp_path):
     exec(compile((tmp_path / "road.py").read_text(), "road.py", "exec"), road.__dict__)
     known.assert_equal(*(getattr(road, what)(known.c) for what in QUANTITIES))
     known.assert_inverse(road.overclosure(known.pressures()))
+    turns = known.law.turning_point is not None and known.law.turning_point > known.law.lowest + 1e-9 * known.law.h_max
+    assert (
+        "where pressure turns down" in " ".join((tmp_path / "road.py").read_text().replace("#", "").split())
+    ) == turns
     if heat:
         np.testing.assert_allclose(road.conductance(known.c), CONDUCTIVITY / 13.3 * road.tangent(known.c), rtol=1e-15)
     assert road.pressure(known.c[:6].reshape(2, 3)).shape == (2, 3)
@@ -263,7 +256,11 @@ assert jax.tree.structure(by_law) == jax.tree.structure(road.LAW)
 inverse = jax.vmap(jax.grad(road.overclosure))(p[:100])
 assert jnp.abs(inverse * road.tangent(road.overclosure(p[:100])) - 1).max() < 1e-9
 assert jnp.abs(jax.vmap(jax.grad(road.energy))(c[:100]) / road.pressure(c[:100]) - 1).max() < 1e-9
-print(bool(jnp.isnan(road.pressure(1e9))))
+asked = [road.pressure, road.tangent, road.energy, road.area, road.leakage]
+beyond = [jax.value_and_grad(f)(x) for f in asked for x in (1e9, float("nan"))]
+print(bool(jnp.isnan(jnp.array([*beyond, jax.value_and_grad(road.overclosure)(1e9)])).all()))
+below, at, above = (float(jax.grad(road.leakage)(c)) for c in (-1e-9, 0.0, 1e-9))
+assert abs(above / at - 1) < 1e-6 and abs(below / at - 1) < 0.2
 """
 
 
@@ -354,7 +351,6 @@ GAPCON = PROGRAM.format(
     call gapcon(ak, d, flowm, temp, predef, time, ciname, slname, msname, coords, 1, 2, 1, 1, 1AREA)
     write (11, "(5es25.16e3)") ak""",
 )
-SOLVER_WARNINGS = ("-std=f2008", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 
 
 def called(target, program, name, folder, asked):
@@ -362,8 +358,9 @@ def called(target, program, name, folder, asked):
     (folder / "road.c").write_text(law_points.text(target, name, name="road", **HEAT))
     (folder / "ask.f90").write_text(program)
     np.savetxt(folder / "c.txt", asked, "%.17g")
-    run("gcc", "-std=c99", *WARNINGS, "-O1", "-c", "road.c", folder=folder)
-    run("gfortran", *SOLVER_WARNINGS, "-fcheck=all", "-O1", "ask.f90", "road.o", "-lm", "-o", "ask", folder=folder)
+    run("gcc", *WARNINGS, *STRICT, "-O1", "-c", "road.c", folder=folder)
+    fortran = ("gfortran", *WARNINGS, "-std=f2008", "-fcheck=all", "-O1")
+    run(*fortran, "ask.f90", "road.o", "-lm", "-o", "ask", folder=folder)
     done = subprocess.run("./ask", cwd=folder, capture_output=True, text=True, check=True)
     return *np.loadtxt(folder / "values.txt").T, done.stderr
 
@@ -471,9 +468,8 @@ def test_modelica(name, tmp_path):
 def test_c_of_a_polynomial_over_many_decades(tmp_path):
     surface, asked = Surface(0.3, 1.0, 3.5, 0.125, 0.125, unit="mm"), {"theory": "mbma", "hardness": "0.06 MPa"}
     (tmp_path / "law.c").write_text(law_text("c-law", surface, "1 MPa", name="road", **asked))
-    run("gcc", "-std=c99", *WARNINGS, "-shared", "-fPIC", "law.c", "-lm", "-o", "law.so", folder=tmp_path)
     u = 0.125 * (1 - np.geomspace(1e-12, 1, 500)[:-1])
-    found = c_function(ctypes.CDLL(str(tmp_path / "law.so")), "pressure")(0.125 - u)
+    found = compiled_law(tmp_path / "law.c", *STRICT)("pressure", 0.125 - u)
     np.testing.assert_allclose(found, contact_law(surface, E_star="1 MPa", **asked).pressure(u), rtol=1e-10)
 
 
@@ -489,3 +485,24 @@ def test_a_unit_never_becomes_code(target):
     ]
     assert live[0] == live[1]
     assert len(live[0]) > 40
+
+
+@pytest.mark.parametrize("more", [{}, {"leakage": True, **HEAT}])
+def test_types_of_a_law_in_javascript(more):
+    files = law_files("javascript-law", ASKED["mbma"][0], "13.3 MPa", name="road", **more)
+    exported = re.findall(r"^export (?:const|function) (\w+)", files[""], flags=re.M)
+    typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)
+    assert sorted(typed) == sorted(exported)
+
+
+@pytest.mark.parametrize(
+    "target", ["c-law", "javascript-law", "python-law", "matlab-law", "modelica-law", "fortran-law"]
+)
+def test_headers_name_functions_that_are_there(target):
+    head, _, text = law_points.text(target, "calibrated", name="road", **HEAT).partition("Example: ")
+    lines = " ".join(line.strip("*/!#%; ") for line in text.splitlines()[:4])
+    called = re.findall(r"(?:road[._]|law\.)?(\w+)\([\d.]", lines)
+    assert len(called) >= 2
+    for name in called:
+        assert re.search(rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text)
+    assert "{{" not in head

@@ -1,24 +1,18 @@
-"""What running exports in their programs found, each as a test of its own."""
+"""Rows of laws in CalculiX, Octave and R, and laws continued for Newton's method."""
 
 import importlib.util
-import io
-import json
 import pathlib
 import re
 import subprocess
 import sys
-import zipfile
 
-import law_points
 import numpy as np
 import pytest
-from law_points import needs, points
+from law_points import needs
 
 from mbma_tables import InputError, Surface, contact, contact_law
 from mbma_tables.export import solvers
 from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
-from mbma_tables.export.fmu import fmu
-from mbma_tables.export.law_code import law_files
 from mbma_tables.export.law_rows import describe_law
 
 CONDUCTIVITY = 50.0  # mW/(mm K)
@@ -27,11 +21,6 @@ ROUGH = Surface.named("challenge").to("mm")
 PRESSURES = np.geomspace(0.012, 1.9, 6)  # MPa
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 LOW, BETWEEN, TOP = range(1, 5), range(5, 13), range(13, 17)  # nodes
-
-
-def heat_law(**options):
-    asked = {"quantity": "conductance", "pressures": ("10 kPa", "2 MPa"), "rows": 20, **HEAT}
-    return describe_law(ROUGH, "25 MPa", **(asked | options))
 
 
 def each(nodes, words):
@@ -75,10 +64,6 @@ def heated(card, loads, side, stiff):
     return blocks(card, steps, side, stiff, f"*CONDUCTIVITY\n{CONDUCTIVITY!r}\n*EXPANSION\n0.\n", "SURFACE TO SURFACE")
 
 
-def heated_and_moved(card, c, p):
-    return heated(card, (each(TOP, f"3, 3, {-down:.9e}") for down in c + 20 * p / 1e6), 10.0, 1e6)
-
-
 def calculix(deck, folder, side=10.0):
     """What CalculiX says of a deck, and the pressures and heat fluxes at the ends of its steps."""
     (folder / "joint.inp").write_text(deck)
@@ -98,136 +83,18 @@ def conductance(flux, side=10.0):
 @needs("ccx")
 def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     law = contact_law(ROUGH, E_star="25 MPa")
-    card, c = solvers.calculix(heat_law()), law.h_max - law.at_pressure(PRESSURES).mean_separation
-    said, p, flux = calculix(heated_and_moved(card, c, PRESSURES), tmp_path)
+    rows = describe_law(ROUGH, "25 MPa", quantity="conductance", pressures=("10 kPa", "2 MPa"), rows=20, **HEAT)
+    card, c = solvers.calculix(rows), law.h_max - law.at_pressure(PRESSURES).mean_separation
+    moved = (each(TOP, f"3, 3, {-down:.9e}") for down in c + 20 * PRESSURES / 1e6)
+    said, p, flux = calculix(heated(card, moved, 10.0, 1e6), tmp_path)
     assert len(p) == len(flux) == PRESSURES.size, said.stdout[-1000:]
     # the pressure is the law's to what the card says of its closure, and the conductance is of that pressure
     stated = float(re.search(r"within (\d+)% of the law", card.replace("\n**", ""))[1]) / 100
     assert 0.1 < np.abs(np.log(p / PRESSURES)).max() < np.log1p(stated) + 0.06
     expected = CONDUCTIVITY / 25 * law.at_pressure(p).stiffness
     np.testing.assert_allclose(conductance(flux)[:-1], expected[:-1], rtol=1e-2)
-    assert p[-1] > heat_law().x[-1]
-    assert conductance(flux)[-1] == pytest.approx(heat_law().y[-1], rel=1e-2)
-
-
-JAX = """
-import json
-import jax
-jax.config.update("jax_enable_x64", True)
-import road
-asked = [road.pressure, road.tangent, road.energy, road.area, road.leakage]
-beyond = [jax.value_and_grad(f)(x) for f in asked for x in (9.0, float("nan"))]
-beyond.append(jax.value_and_grad(road.overclosure)(100.0))
-slopes = [jax.grad(road.leakage)(c) for c in (-1e-9, 0.0, 1e-9)]
-print(json.dumps([[float(v) for pair in beyond for v in pair], [float(v) for v in slopes]]))
-"""
-
-
-@pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="not installed: jax")
-def test_jax_has_no_derivative_where_it_has_no_value(tmp_path):
-    (tmp_path / "road.py").write_text(law_points.text("jax-law", "calibrated", leakage=True))
-    said = subprocess.run([sys.executable, "-c", JAX], cwd=tmp_path, capture_output=True, text=True, check=True)
-    beyond, (below, at, above) = json.loads(said.stdout)
-    assert np.isnan(beyond).all()
-    assert at == pytest.approx(above, rel=1e-6)
-    assert at == pytest.approx(below, rel=0.2)
-
-
-@needs("gcc", "g++")
-def test_the_header_of_a_law_in_c_and_cpp(tmp_path):
-    files = law_files("c-law", law_points.ROAD, "13.3 MPa", name="road", leakage=True, **HEAT)
-    (tmp_path / "road.c").write_text(files[""])
-    (tmp_path / "road.h").write_text(files[".h"])
-    program = '#include "road.h"\n#include "road.h"\n#include <stdio.h>\nint main(void) { double k; printf("%.17g", '
-    program += "road_with_tangent(1.0, &k) + road_leakage(1.0) + road_conductance(1.0) + road_overclosure(0.01)); }\n"
-    said = []
-    subprocess.run(["gcc", "-c", "road.c"], cwd=tmp_path, check=True)
-    for compiler, end in (("gcc", "c"), ("g++", "cpp")):
-        (tmp_path / f"ask.{end}").write_text(program)
-        strict = [compiler, "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
-        subprocess.run([*strict, f"ask.{end}", "road.o", "-lm", "-o", "ask"], cwd=tmp_path, check=True)
-        said.append(subprocess.run(["./ask"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout)
-    law = points("mbma").law
-    expected = law.pressure(2.0) + law.leakage(2.0) + CONDUCTIVITY / 13.3 * law.stiffness(2.0) + 3
-    assert [float(one) for one in said] == pytest.approx(2 * [expected - float(law.at_pressure(0.01).mean_separation)])
-
-
-@pytest.mark.parametrize("more", [{}, {"leakage": True, **HEAT}])
-def test_types_of_a_law_in_javascript(more):
-    files = law_files("javascript-law", law_points.ROAD, "13.3 MPa", name="road", **more)
-    exported = re.findall(r"^export (?:const|function) (\w+)", files[""], flags=re.M)
-    typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)
-    assert sorted(typed) == sorted(exported)
-
-
-@pytest.mark.parametrize(
-    "target", ["c-law", "javascript-law", "python-law", "matlab-law", "modelica-law", "fortran-law"]
-)
-def test_headers_name_functions_that_are_there(target):
-    head, _, text = law_points.text(target, "calibrated", name="road", **HEAT).partition("Example: ")
-    lines = " ".join(line.strip("*/!#%; ") for line in text.splitlines()[:4])
-    called = re.findall(r"(?:road[._]|law\.)?(\w+)\([\d.]", lines)
-    assert len(called) >= 2
-    for name in called:
-        assert re.search(rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text)
-    assert "{{" not in head
-
-
-@pytest.mark.parametrize("name", law_points.ASKED)
-def test_a_turn_is_told_of_where_there_is_one(name):
-    text, law = law_points.text("c-law", name), points(name).law
-    turns = law.turning_point is not None and law.turning_point > law.lowest + 1e-9 * law.h_max
-    assert ("where pressure turns down" in text) == turns
-
-
-def test_units_of_modelica(tmp_path):
-    text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)
-    for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
-        assert f'type {kind} = Real(unit = "{unit}");' in text
-    assert 'output Real y(unit = "mm3");' in text
-
-
-@needs("cc")
-def test_an_fmu_runs_as_it_is(tmp_path):
-    fmpy = pytest.importorskip("fmpy")
-    file = fmu(law_points.ROAD, "13.3 MPa", name="road", leakage=True)
-    (tmp_path / "road.fmu").write_bytes(file)
-    law = points("mbma").law
-    for c in (0.5, 2.0):
-        asked = {"start_values": {"overclosure": c}, "output": ["pressure", "tangent", "area", "energy", "leakage"]}
-        found = fmpy.simulate_fmu(str(tmp_path / "road.fmu"), stop_time=1.0, **asked)[-1]
-        known = law.values(3 - c)
-        expected = [known.pressure, known.stiffness, known.area, known.energy, law.leakage(3 - c)]
-        np.testing.assert_allclose(list(found)[1:], expected, rtol=1e-12)
-    said = fmpy.read_model_description(str(tmp_path / "road.fmu")).description
-    folders = {name.split("/")[1] for name in zipfile.ZipFile(tmp_path / "road.fmu").namelist() if "binaries/" in name}
-    assert f"binaries: {', '.join(sorted(folders))}" in said
-    assert len(folders) == 1
-    assert fmu(law_points.ROAD, "13.3 MPa", name="road", leakage=True) == file
-
-
-@pytest.mark.parametrize("fails", [False, True])
-def test_an_fmu_without_a_compiler(fails, tmp_path, monkeypatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    (tmp_path / "cc").write_text("#!/bin/sh\nexit 1\n")
-    (tmp_path / "cc").chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path / ("" if fails else "none")))
-    file = fmu(law_points.ROAD, "13.3 MPa")
-    archive = zipfile.ZipFile(io.BytesIO(file))
-    assert archive.namelist() == ["modelDescription.xml", "sources/law.c"]
-    assert "binaries: none, sources only" in archive.read("modelDescription.xml").decode()
-    with pytest.raises(InputError, match="compiled by ziglang: pip install"):
-        fmu(law_points.ROAD, "13.3 MPa", binaries="all")
-    with pytest.raises(InputError, match="binaries must be one of"):
-        fmu(law_points.ROAD, "13.3 MPa", binaries="linux")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang")
-def test_an_fmu_for_all_platforms():
-    archive = zipfile.ZipFile(io.BytesIO(fmu(law_points.ROAD, "13.3 MPa", binaries="all")))
-    begins = {name.split("/")[1]: archive.read(name)[:2] for name in archive.namelist() if "binaries/" in name}
-    assert begins == {"linux64": b"\x7fE", "darwin64": b"\xcf\xfa", "win64": b"MZ"}
+    assert p[-1] > rows.x[-1]
+    assert conductance(flux)[-1] == pytest.approx(rows.y[-1], rel=1e-2)
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
@@ -255,11 +122,11 @@ def test_a_law_continued_by_its_tangents(theory, pressures):
         assert law.pressure([trial.light, trial.heavy]) == pytest.approx([1e-3, 0.5])
 
 
-@pytest.mark.parametrize("pressures", [("2 kPa", "1 kPa"), (0.0, 0.1), "12", (1, 2, 3)])
-def test_pressures_that_do_not_rise(pressures):
+def test_a_law_is_not_continued_beyond_pressures_that_do_not_rise():
     law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")
-    with pytest.raises(InputError, match="two rising numbers"):
-        law.continued(pressures)
+    for pressures in (("2 kPa", "1 kPa"), (0.0, 0.1), "12", (1, 2, 3)):
+        with pytest.raises(InputError, match="two rising numbers"):
+            law.continued(pressures)
     with pytest.raises(InputError, match="must be finite"):
         law.continued().pressure(np.nan)
 
@@ -267,14 +134,12 @@ def test_pressures_that_do_not_rise(pressures):
 @pytest.mark.skipif(importlib.util.find_spec("skfem") is None, reason="not installed: scikit-fem")
 def test_newton_in_scikit_fem_from_zero_load():
     example = pathlib.Path(__file__).parents[2] / "examples" / "newton.py"
-    said = subprocess.run(
-        [sys.executable, str(example)], capture_output=True, text=True, check=True
-    ).stdout.splitlines()
-    residuals = [float(line.split()[1]) for line in said[:-1]]
+    *steps, last = subprocess.run([sys.executable, str(example)], stdout=-1, text=True, check=True).stdout.splitlines()
+    residuals = [float(line.split()[1]) for line in steps]
     assert residuals[-1] < 1e-12
     assert len(residuals) <= 14
     assert residuals[-2] < 1e-4 * residuals[-3]  # quadratic
-    assert "force 8.000000" in said[-1]
+    assert "force 8.000000" in last
 
 
 @needs("ccx")
@@ -298,18 +163,17 @@ def test_octave_looks_up(tmp_path):
     (tmp_path / "law.m").write_bytes(matlab_reader(law, "law"))
     x = np.random.default_rng(1).uniform(0, law.x[-1], 200)
     np.savetxt(tmp_path / "x.txt", x, fmt="%.17g")
-    script = "x = load('x.txt'); printf('%.17g\\n', law(x)); s = load('law.mat'); printf('%.17g\\n', s.x, s.y);"
-    said = subprocess.run(
-        ["octave-cli", "--no-init-file", "--eval", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    script = (
+        "x = load('x.txt'); printf('%.17g\\n', law(x)); s = load('law.mat'); printf('%.17g\\n', s.x, s.y); law(1e3)"
     )
+    said = subprocess.run(
+        ["octave-cli", "--no-init-file", "--eval", script], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert said.returncode != 0
+    assert "x must be in" in said.stderr
     numbers = np.array(said.stdout.split(), dtype=float)
     np.testing.assert_allclose(numbers[:200], np.interp(x, law.x, law.y), rtol=1e-12)
     np.testing.assert_array_equal(numbers[200:], np.concatenate([law.x, law.y]))
-    beyond = subprocess.run(
-        ["octave-cli", "--no-init-file", "--eval", "law(1e3)"], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert beyond.returncode != 0
-    assert "x must be in" in beyond.stderr
 
 
 @needs("ccx")
