@@ -14,9 +14,8 @@ from mbma_tables.common.errors import MbmaError
 # imported when asked for: each needs packages of the extra "generate"
 COMMANDS = {
     **{name: f"generate.{name}" for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")},
-    **dict.fromkeys(("gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.studies"),
-    **dict.fromkeys(("edges", "film", "tangential"), "generate.machined.studies"),
-    "boundary_elements": "generate.boundary_elements.run",
+    **dict.fromkeys(("boundary_elements", "gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.run"),
+    **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
     "rough_spheres": "generate.rough_spheres",

@@ -34,9 +34,8 @@ LEAST = 1e-6  # ratio of forces that a law above its h_max counts as
 # errors that count alike: model noise plus the scatter of surfaces at light contact
 NOISE = {"area": (0.015, 0.15), "force": (0.02, 0.25), "map": (0.03, 0.1)}
 LIGHT = 0.01
-CLOSE = 1e-4  # relative changes of cost or constants that end a fit
-STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
-OPTIONS = {"x_scale": "jac", "diff_step": STEP, "ftol": CLOSE, "xtol": CLOSE}
+# a relative step of 1%, since laws of maps are interpolated
+OPTIONS = {"x_scale": "jac", "diff_step": 0.01, "ftol": 1e-4, "xtol": 1e-4}
 LABELS = ("1 wave", "2-3 waves", "4 waves", "stretched", "transformed")
 LARGE = 512  # points a side from which on surfaces are told apart
 Make = Callable[[Case], Any]
@@ -56,12 +55,9 @@ class Parts:
     """u_P of a spectrum on a grid of ln F, linear in the coefficients of W: of P^16, and what P and P^3 add."""
 
     def __init__(self, spectrum: Spectrum) -> None:
-        plain, first, cubic = (
-            Law(spectrum, None, dataclasses.replace(CONSTANTS, weight=a, cubic=b, weight_slope=0.0)).separation_persson(
-                np.exp(GRID)
-            )[0]
-            for a, b in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
-        )
+        flat, parts = dataclasses.replace(CONSTANTS, weight_slope=0.0), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+        laws = (Law(spectrum, None, dataclasses.replace(flat, weight=a, cubic=b)) for a, b in parts)
+        plain, first, cubic = (law.separation_persson(np.exp(GRID))[0] for law in laws)
         self.spectrum, self.plain, self.first, self.cubic = spectrum, plain, first - plain, cubic - plain
 
     def errors(self, one: Case, trial: Constants) -> FloatArray:
@@ -127,14 +123,8 @@ def told(seen: Sequence[Case], make: Make) -> pd.DataFrame:
         if one.kind in GAUSSIAN:
             label = "1 wave" if one.waves < MIN_WAVES else "2-3 waves" if one.waves < 4 else "4 waves"
         known = {name: getattr(one, name) for name in ("kind", "split", "waves", "points", "gaussian")}
-        known |= {
-            "contact": one.area,
-            "node": str(one.node),
-            "load": np.arange(one.area.size),
-            "label": label,
-            "surface": id(one),
-        }
-        law = make(one)
+        known |= {"contact": one.area, "load": np.arange(one.area.size), "node": str(one.node)}
+        law, known = make(one), known | {"label": label, "surface": id(one)}
         parts.append(pd.DataFrame(known | {quantity: errors(one, law, quantity) for quantity in QUANTITIES}))
     return pd.concat(parts, ignore_index=True)
 
@@ -204,16 +194,15 @@ def others(found: Sequence[Case]) -> dict[str, FloatArray]:
     plain, summed = [one for one in found if one.kind == "self_affine" and one.gaussian], {}
     variants = [Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")]
     for theory in (*variants, Persson(), Persson("simplified"), GreenwoodWilliamson()):
-        reached, curves = [], dict[int, TheoryCurve]()
+        curves = dict[Case, TheoryCurve]()
         for one in plain:
             curve = TheoryCurve(theory, one.surface)
             kept = np.isfinite(curve.separation(one.force))
             if kept.sum() > 3:
-                reached.append(one.at(kept))
-                curves[id(reached[-1])] = curve
+                curves[one.at(kept)] = curve
         # theories' scatter has one name on all surfaces of this kind
         name = theory.scatter_name(Surface(0.8, 1.0, 100.0, 1.0, 3.0))
-        summed[name] = summary(told(reached, lambda one, curves=curves: curves[id(one)]))  # type: ignore[misc]
+        summed[name] = summary(told([*curves], curves.__getitem__))
     return summed
 
 
@@ -239,10 +228,8 @@ def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, tail: bool, h
         "map": told(found, lambda one: one.map_law(constants, map_constants)),
     }
     by_map = forms["map"][forms["map"]["gaussian"]]
-    stated = {
-        "calibrated": cross_validate(training),
-        "calibrated_map": summary(by_map[by_map["split"] == TRAINING]),
-    }
+    of_map = summary(by_map[by_map["split"] == TRAINING])
+    stated = {"calibrated": cross_validate(training), "calibrated_map": of_map}
     covered = dict[str, list[float]]()
     for frame, scatter, suffix in zip(forms.values(), stated.values(), ("", " (map)"), strict=True):
         held_out = frame[frame["gaussian"] & (frame["split"] != TRAINING)]

@@ -45,6 +45,7 @@ MIN_ERRORS = 5  # that state a scatter
 TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("laws.toml").read_text(encoding="utf-8"))
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass of constants
 Variable = tuple[Any, Any, dict[str, Any]]
+Stated = dict[str, FloatArray]  # statistics of errors by theory, or by set
 
 
 def fitted(
@@ -94,19 +95,29 @@ def variable(dimensions: str | Sequence[str], values: Any, meaning: str, **attri
     return dimensions, values, {"long_name": meaning, "units": "1", **attributes}
 
 
+def attributes(texts: dict[str, Any], made_by: dict[str, str]) -> dict[str, Any]:
+    """Attributes of a group, by its texts in a TOML file and the programs that made it."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": texts["title"],
+        "institution": "mbma_tables contributors",
+        "source": texts["source"].format_map(made_by),
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {texts['command']}",
+        "versions": json.dumps(versions() | made_by),
+        "code_sha256": source_digest(tuple(texts["modules"])),
+    } | {name: texts[name] for name in ("comment", "references") if name in texts}
+
+
 def law_group(
     kind: str, arrays: dict[str, tuple[Any, Any]], constants: dict[str, Any], facts: dict[str, Any]
 ) -> xr.Dataset:
     """A group of the file: arrays with their dimensions, dataclasses of constants by prefix, and further attributes."""
     texts = TEXTS[kind]
     found = xr.Dataset({name: variable(*array, texts["variables"][name]) for name, array in arrays.items()})
-    found.attrs = {"Conventions": "CF-1.11", "institution": "mbma_tables contributors"}
-    found.attrs |= {name: text for name, text in texts.items() if name not in ("command", "modules", "variables")}
-    found.attrs["history"] = f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {texts['command']}"
+    found.attrs = attributes(texts, {}) | texts["facts"] | facts
     for prefix, own in constants.items():
         found.attrs |= {f"{prefix}_{name}": value for name, value in dataclasses.asdict(own).items()}
-    modules = {"source_sha256": source_digest(tuple(texts["modules"])), "source_modules": " ".join(texts["modules"])}
-    return found.assign_attrs(facts, versions=json.dumps(versions(), sort_keys=True), **modules)
+    return found
 
 
 def law_table(
@@ -120,7 +131,6 @@ def law_table(
 
 
 def bins(edges: Sequence[float], middles: Any) -> dict[str, tuple[Any, Any]]:
-    """Bins of contact."""
     ends = np.array(edges)
     return {
         "contact": ("contact", middles),
@@ -139,10 +149,9 @@ def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "/")
         with HDF5_LOCK:
             for k, (own, part) in enumerate(sorted(parts.items())):
                 # of a variable's encoding, how its numbers are stored
-                kinds = {
-                    n: v.encoding.get("dtype", v.dtype) for n, v in part.variables.items() if v.dtype.kind in "fiu"
-                }
-                encoding = {n: packed | ({"dtype": kinds[n]} if n in kinds else {}) for n in part.variables}
+                kinds = {n: {"dtype": v.encoding.get("dtype", v.dtype)} for n, v in part.variables.items()}
+                numbers = [n for n, v in part.variables.items() if v.dtype.kind in "fiu"]
+                encoding = {n: packed | (kinds[n] if n in numbers else {}) for n in part.variables}
                 part.to_netcdf(name, "a" if k else "w", engine="netcdf4", group=own, encoding=encoding)
 
     body = written_bytes(path.name, store)
@@ -188,13 +197,7 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
 
 
 def write(
-    path: os.PathLike[str] | str,
-    constants: Constants,
-    map_constants: Any,
-    edges: Sequence[float],
-    stated: dict[str, FloatArray],
-    sets: dict[str, FloatArray],
-    facts: dict[str, Any],
+    path: pathlib.Path, constants: Constants, map_constants: Any, edges: Any, stated: Stated, sets: Stated, facts: Any
 ) -> dict[str, float]:
     """Write the root of the file, with statistics of errors by theory and by set; the table's certificate."""
     values = np.array([*results("table", _row, [(constants, hurst) for hurst in NODES["hurst"]], PROCESSES)])
@@ -214,7 +217,7 @@ def write(
     data.spline.encoding["dtype"] = "f4"
     # read again to be certified
     write_part(path, data)
-    found = certificate(pathlib.Path(path))
+    found = certificate(path)
     data.attrs |= found | {"certificate_points": CERTIFICATE[0] * CERTIFICATE[1]}
     write_part(path, data)
     return found

@@ -60,7 +60,6 @@ def fitted_to(one: Capped) -> Any:
 
 
 def fit(seen: Sequence[Capped]) -> cap.Constants:
-    """Constants from these surfaces, one part after the other."""
 
     def residuals(part: str, noise: float, trial: cap.Constants) -> list[FloatArray]:
         return [errors(one, part, trial)[fitted_to(one)] / noise for one in seen]
@@ -92,7 +91,8 @@ def errors_of(one: Capped, name: str, constants: cap.Constants) -> dict[str, Flo
     if name in OTHERS:
         return errors_of_other(one, name, constants)
     by_map = name == "calibrated_map"
-    area, yielded = (cap.area(one.force, one.elastic_areas[name], one.eta, constants, own) for own in (False, True))
+    elastic = (one.map_curve if by_map else one.law).area(one.force)
+    area, yielded = (cap.area(one.force, elastic, one.eta, constants, own) for own in (False, True))
     at_gap = one.map_curve.answer(one.u)[0] if by_map else one.by_law[0]
     force = cap.force(at_gap, 0.0, one.shares[0 if by_map else 1], 0.0, one.eta, constants)[0]
     return {
@@ -113,17 +113,10 @@ def errors_of_other(one: Capped, name: str, constants: cap.Constants) -> dict[st
     held = (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < most)
     force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).pressure / gradient
     area[held] = cap.area(one.force[held], theory.area_at(surface, loads[held]), one.eta, constants)
-    frozen = frozen_errors(one, elastic_curve(one.node, one.zeta_1, one.h_max, name), constants)
+    u = one.h_max * LEVELS[:-1]
+    curve, share = theory.answer(surface, u), cap.bearing_share(u, theory.heights(surface))[0]
+    frozen = frozen_errors(one, (curve.pressure / gradient, curve.stiffness / gradient, share), constants)
     return {"force": np.log(force / one.force), "area": np.log(area / one.area), "stiffness": frozen}
-
-
-@functools.cache
-def elastic_curve(node: tuple[float | str, ...], zeta_1: float, h_max: float, name: str) -> tuple[FloatArray, ...]:
-    """Force, stiffness and Q of a theory at `LEVELS` of a self-affine surface."""
-    surface, u = Surface(node[1], 1.0, zeta_1, 1.0, h_max), h_max * LEVELS[:-1]
-    theory, g = get_theory(name), float(surface.rms_gradient)
-    found = theory.answer(surface, u)
-    return found.pressure / g, found.stiffness / g, cap.bearing_share(u, theory.heights(surface))[0]
 
 
 def told(seen: Sequence[Capped], name: str, constants: Callable[[Capped], cap.Constants]) -> pd.DataFrame:

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import math
 import platform
 import subprocess
 import sys
@@ -12,10 +13,10 @@ from typing import Any
 import click
 import numpy as np
 import pandas as pd
+from scipy.special import ellipkm1
 from scipy.stats import qmc
 
 from generate import cost_distances
-from generate.classical import iterated, ring_matrix
 from generate.files import ROOT, to_csv
 from generate.tables.certificate import phi
 from generate.timing import measure
@@ -23,6 +24,7 @@ from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
+from mbma_tables.core import core
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import ISLAND_MODELS, answer_islands
@@ -134,7 +136,6 @@ def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
 
 @functools.cache
 def reference() -> tuple[dict[str, FloatArray], ...]:
-    """Force and area of every surface at every fifth of its gaps."""
     found = gap_batch(GAPS, EVERY, island_model="exact", rtol=REFERENCE_RTOL)
     return tuple({"pressure": np.asarray(one.pressure), "area": np.asarray(one.area)} for one in found)
 
@@ -222,7 +223,6 @@ def first_use_rows() -> Iterator[Row]:
 
 
 def study() -> bytes:
-    """Every measurement of tables/cost.csv, in a few minutes."""
     seconds, rows = [measure(lambda: None)[1]], list[Row]()
     for part in (island_rows, scene_rows, gap_rows, law_rows, theory_rows, first_use_rows):
         rows += part()
@@ -239,3 +239,40 @@ def cost() -> None:
     for name, content in {"cost": study, "distance": cost_distances.study}.items():
         write_file(ROOT / "tables" / f"{name}.csv", content(), make_folders=True)
         click.echo(f"tables/{name}.csv")
+
+
+DAMPING, MAX_STEPS, MAX_DEFORMATION = 0.1, 5000, 1e12  # a larger deformation is divergence
+
+
+def ring_matrix(rings: int) -> FloatArray:
+    """w at the rings' middles per unit radius a, from pressures on `rings` rings of equal width (Eq. 37)."""
+    r = (np.arange(rings) + 0.5) / rings
+    t, rho = r[None, :], r[:, None]
+    complement = ((t - rho) / (t + rho)) ** 2
+    np.fill_diagonal(complement, 1.0)
+    matrix: FloatArray = 4 / np.pi * t / (t + rho) * ellipkm1(complement) / rings
+    # the midpoint rule across ln|t - rho| is of second order with ln(h/2 pi) in the ring itself
+    np.fill_diagonal(matrix, 2 / np.pi * np.log(16 * np.pi * r * rings) / rings)
+    return matrix
+
+
+@np.errstate(all="ignore")
+def iterated(X: float, mu: float, matrix: FloatArray, tolerance: float) -> tuple[int, bool, float, float]:
+    """Iterations from w = 0, whether they converged, Phi_F and Phi_A, NaN where they diverged."""
+    squared, w = np.empty(1), np.zeros(len(matrix))
+    core.island_extents(np.array([X]), np.array([mu]), 0.03 * tolerance, squared)
+    a, loads = math.sqrt(squared[0]), np.empty(w.size)
+    rho, steps, converged = a * (np.arange(w.size) + 0.5) / w.size, 0, False
+    while not converged and steps < MAX_STEPS:
+        core.height_integrals(3, rho**2 - X + w, loads)
+        change = DAMPING * (a * (matrix @ (mu / 2 * loads)) - w)
+        w += change
+        steps, scale = steps + 1, np.abs(w).max()
+        if not scale < MAX_DEFORMATION:
+            return steps, False, math.nan, math.nan
+        converged = bool(np.abs(change).max() <= tolerance * DAMPING * scale)
+    sums = []
+    for twice_n, strength in ((3, mu / 2), (2, 1.0)):
+        core.height_integrals(twice_n, rho**2 - X + w, loads)
+        sums.append(float(2 * np.pi * a / w.size * strength * (rho @ loads)))
+    return steps, converged, sums[0], sums[1]

@@ -45,12 +45,12 @@ OLDER = {
 }
 
 
-def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[Case], Any]:
-    return _theory(theories.Mbma(island_model, variant, 1e-6, "nan" if island_model == "universal" else "raise"))
-
-
 def _theory(theory: Any) -> Callable[[Case], Any]:
     return lambda one: TheoryCurve(theory, one.surface)
+
+
+def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[Case], Any]:
+    return _theory(theories.Mbma(island_model, variant, 1e-6, "nan" if island_model == "universal" else "raise"))
 
 
 def _map(one: Case) -> Any:
@@ -139,7 +139,6 @@ def older(name: str, top: float | None = None) -> Case:
 
 
 def rolloff(number: int) -> Case:
-    """A surface with a plateau by its map's own spectrum."""
     force, area, _, u = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",").T[:4]
     own = read_csv("rolloff_spectra.csv").query("map == @number")
     spectrum, h_rms = Spectrum.from_shares(*own[["q", "variance"]].to_numpy().T), np.sqrt(own["variance"].sum())
@@ -149,7 +148,6 @@ def rolloff(number: int) -> Case:
 
 
 def measured(name: str, path: pathlib.Path = FILE) -> Case:
-    """A measured map as `python -m generate measured_maps` kept it."""
     one = dataset("measured", path).sel(surface=name)
     seen = (one.area.values > 0) & (one.area.values < MAX_AREA)
     spectrum = Spectrum.from_shares(one.band_q.values, one.band_variance.values)

@@ -53,7 +53,6 @@ def c_sources() -> tuple[dict[str, str], dict[str, Any]]:
 
 
 def law_sources() -> dict[str, str]:
-    """The C of laws in JavaScript."""
     return {name: core_file(name) for name in ("mbma.h", "elementary.h", "law.c")}
 
 
@@ -66,7 +65,6 @@ def compiled(texts: dict[str, str], names: Iterable[str]) -> bytes:
 
 
 def digest_of(texts: dict[str, str]) -> bytes:
-    """Of what the module is compiled from."""
     return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).digest()
 
 
@@ -81,13 +79,11 @@ def explorer() -> None:
 
 
 def program() -> str | None:
-    """A Chromium on this machine."""
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 @contextlib.contextmanager
 def browser() -> Iterator[Any]:
-    """A headless Chromium."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

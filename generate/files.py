@@ -28,7 +28,6 @@ MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 
 def to_csv(head: str, frame: Any, form: str | None = None) -> bytes:
-    """A data frame as a CSV file with a head of comments."""
     text: str = head + frame.to_csv(index=False, float_format=form, lineterminator="\n")
     return text.encode()
 

@@ -1,8 +1,7 @@
 """`python -m generate formulas`: fit the coefficients of the closed forms again, certify them on other samples.
 
-`models/closed_forms.h` is the one place where the forms are kept: the library reads its expressions as Python, exports
-hold its text, and the equations of docs/formula.md are made from it. docs/formula.md says how the
-terms were chosen. Samples are rounded to `DATA_DIGITS`, so that the same coefficients come out on all processors.
+`models/closed_forms.h` is the one place where the forms are kept; its expressions are read as Python. docs/formula.md
+says how the terms were chosen. Samples are rounded, so that the same coefficients come out on all processors.
 
 With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X, mu)), right as
 mu -> 0 whatever Q is. Log Q is its own limit at large X, which is the smooth sphere of Hertz, and a sum of terms that
@@ -67,7 +66,6 @@ Samples = tuple[dict[str, FloatArray], dict[str, FloatArray]]  # arguments and r
 
 
 def header_text(header: str, functions: Mapping[str, Function]) -> str:
-    """A header with the titles and steps of these functions."""
 
     def written(match: re.Match[str]) -> str:
         function = functions[match[2]]
@@ -120,14 +118,7 @@ def terms(text: str) -> list[tuple[str, str]]:
 
 
 def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS) -> tuple[float, FloatArray]:
-    """Coefficients whose largest error ``|A c - target|`` is least, by Lawson's reweighting; that error and they.
-
-    Examples
-    --------
-    >>> error, (mean,) = least_largest(np.ones((3, 1)), np.array([0.0, 1.0, 4.0]), 500)
-    >>> round(error, 2), round(float(mean), 2)
-    (2.0, 2.0)
-    """
+    """Coefficients whose largest error ``|A c - target|`` is least, by Lawson's reweighting; that error and they."""
     weight: Any = np.ones(target.size)
     best, found = math.inf, np.zeros(A.shape[1])
     for _ in range(rounds):
@@ -214,7 +205,7 @@ def log_Q(which: int, X: FloatArray, mu: FloatArray, phi: FloatArray) -> tuple[F
 def coefficients(function: Function, name: str, text: str) -> FloatArray:
     """Coefficients of the terms of one sum of a function, of least largest error."""
     start = " ".join(rest for number, rest in terms(text) if not number)
-    products = [powers(rest) for number, rest in terms(text) if number]
+    products = [collections.Counter(re.findall(r"[a-z]\w*", rest)) for number, rest in terms(text) if number]
     if name == "log_Q":
         given, truth = islands(function.form, POINTS, FIT_SEED)
         which = ("phi_F", "phi_A").index(function.result)
@@ -228,23 +219,20 @@ def coefficients(function: Function, name: str, text: str) -> FloatArray:
         target = rounded((np.log(truth[function.result]) - named["start"])[mine])
         used = set[str]().union(*products)
         named, weight = {letter: rounded(named[letter][mine]) for letter in used}, np.ones(target.size)
-    ones, columns = np.ones_like(target), []
+    columns = []
     for product in products:
         factors = (named[letter] ** power for letter, power in product.items())
-        columns.append(functools.reduce(np.multiply, factors, ones) * weight)
+        columns.append(functools.reduce(np.multiply, factors, np.ones_like(target)) * weight)
+
+    def place_of(k: int) -> tuple[Any, ...]:
+        own = products[k]
+        return "v" in own, "z" in own and "u" in own, "z" not in own, own["u"], own.total()
+
     # the last digits of a fit depend on the order of its terms
-    order = sorted(range(len(products)), key=lambda k: _order(products[k]))
+    order = sorted(range(len(products)), key=place_of)
     found = np.empty(len(products))
     found[order] = least_largest(np.stack(columns, axis=1)[:, order], target * weight)[1]
     return found
-
-
-def powers(product: str) -> collections.Counter[str]:
-    return collections.Counter(re.findall(r"[a-z]\w*", product))
-
-
-def _order(product: collections.Counter[str]) -> tuple[Any, ...]:
-    return "v" in product, "z" in product and "u" in product, "z" not in product, product["u"], product.total()
 
 
 def refitted(function: Function, fits: Mapping[str, FloatArray], digits: int) -> Steps:

@@ -5,18 +5,17 @@ the convolution of DC-FFT), E* = 1, lengths in sampling steps. Their rows are a 
 """
 
 import itertools
-import os
 from collections.abc import Iterator
 
 import click
 import numpy as np
 
 from generate.boundary_elements.run import of_contacts
+from generate.boundary_elements.solve import Contact
 from generate.calibrated_file import write_part
 from generate.machined.makers import rough
-from mbma_tables.common.arguments import FloatArray, needed
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
-from mbma_tables.laws.boundary_elements import CORRECTION
 
 POINTS, SHORTEST, RADIUS, TOLERANCE = 320, 6.0, 3000.0, 1e-5
 HURSTS, LONGEST, HEIGHTS, EACH, FIRST_SEED = (0.5, 0.8), (24.0, 48.0), (0.1, 0.3, 1.0), 2, 71
@@ -30,29 +29,13 @@ def heights(hurst: float, longest: float, h_rms: float, seed: int) -> FloatArray
 
 def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
     """Force over E*, approach, real area, and the mean distance from the axis, weighted by pressure."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    tamaas = needed("tamaas")
-    tamaas.set_log_level(tamaas.LogLevel.error)
     x = np.arange(POINTS) - (POINTS - 1) / 2
     r = np.hypot(x[:, None], x)
-    body = np.ascontiguousarray(z - r**2 / (2 * RADIUS))
-    model = tamaas.ModelFactory.createModel(tamaas.model_type.basic_2d, [float(POINTS)] * 2, [POINTS] * 2)
-    model.E, model.nu = 1.0, 0.0
-    tamaas.ModelFactory.registerNonPeriodic(model, "dcfft")
-    solver = tamaas.PolonskyKeerRey(model, body, TOLERANCE)
-    solver.setIntegralOperator("dcfft")
-    solver.max_iter = 5000
-    moved = np.zeros_like(body)
+    contact = Contact(z - r**2 / (2 * RADIUS), (POINTS, POINTS), TOLERANCE, "dcfft")
     for a in SMOOTH_RADII:
         force = 4 / 3 * a**3 / RADIUS
-        if not solver.solve(force / body.size) <= TOLERANCE:
-            raise RuntimeError(f"boundary elements of h_rms = {z.std():g} do not converge at the force {force:g}")
-        pressure = np.asarray(model.traction)
-        model.operators["dcfft"](pressure, moved)
-        touching = pressure > 0
-        edges = sum(np.count_nonzero(touching != np.roll(touching, 1, axis)) for axis in (0, 1))
-        approach, area = (moved - body)[touching].mean(), touching.sum() - CORRECTION * edges
-        yield force, float(approach), float(area), float(np.mean(pressure * r) / pressure.mean())
+        found, pressure = contact.press(force / r.size), contact.traction
+        yield force, found["approach"], found["area"] * r.size, float(np.mean(pressure * r) / pressure.mean())
 
 
 @click.command()

@@ -1,4 +1,4 @@
-"""Times of the processor as ratios to one fixed piece of work."""
+"""Times of the processor as ratios to one fixed piece of work: the sum of erfcx at 32768 points, by scipy."""
 
 import math
 import statistics
@@ -15,18 +15,13 @@ ROUNDS = (2, 25)  # of a measurement, at least and at most
 BUDGET = 0.5  # seconds after which no further round begins, but for the second
 
 
-def fixed_work() -> float:
-    """The piece of work that costs 1: the sum of erfcx at 32768 points between -5 and 5, by scipy."""
-    return float(erfcx(WORK_POINTS).sum())
-
-
 def seconds_of(function: Callable[[], Any], calls: int = 1) -> float:
     return timeit.timeit(function, timer=time.process_time, number=calls) / calls
 
 
 def seconds_of_work() -> float:
     """Seconds of the fixed work: the least of three, since what else the machine does can only add."""
-    return min(seconds_of(fixed_work) for _ in range(3))
+    return min(seconds_of(lambda: erfcx(WORK_POINTS).sum()) for _ in range(3))
 
 
 def measure(run: Callable[[], Any]) -> tuple[float, float]:
@@ -36,7 +31,7 @@ def measure(run: Callable[[], Any]) -> tuple[float, float]:
     machine that slows down for a while slows both.
     """
     run()
-    fixed_work()
+    seconds_of_work()
     # short runs are repeated until the clock and its calls no longer count
     calls = max(1, math.ceil(2e-3 / max(seconds_of(run), 1e-7)))
     works, ratios, started = [seconds_of_work()], list[float](), time.process_time()

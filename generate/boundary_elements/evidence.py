@@ -71,11 +71,6 @@ class TheoryCurve:
     """A theory on a surface: forces over A0 E* g, lengths over h_rms; NaN where the theory does not reach.
 
     A theory has an ``answer`` at mean separations, or an ``at_pressure``, which returns A/A0 and the mean separation.
-
-    Raises
-    ------
-    MbmaError
-        Where the theory does not take the surface.
     """
 
     def __init__(self, theory: Any, surface: AnySurface) -> None:
@@ -91,31 +86,24 @@ class TheoryCurve:
         falls = (np.diff(pressure) <= 0) | (np.diff(u) >= 0) | (u[1:] <= 0)
         end = np.flatnonzero(np.append(falls, True))[0] + 1
         kept = slice(int(np.argmax(pressure[:end] > 0)), end)
-        self._log_force, self._log_area = np.log(pressure[kept] / self._g), np.log(area[kept])
-        self._u = u[kept] / self._h_rms
-
-    def _at(self, values: FloatArray, force: FloatArray) -> FloatArray:
-        return np.asarray(PchipInterpolator(self._log_force, values, extrapolate=False)(np.log(force)))
+        self._log_force, self._u = np.log(pressure[kept] / self._g), u[kept] / self._h_rms
+        self._log_area = np.log(area[kept])
 
     def area(self, force: FloatArray) -> FloatArray:
-        return np.exp(self._at(self._log_area, force))
+        return np.asarray(np.exp(PchipInterpolator(self._log_force, self._log_area, extrapolate=False)(np.log(force))))
 
     def separation(self, force: FloatArray) -> FloatArray:
-        return self._at(self._u, force)
+        return np.asarray(PchipInterpolator(self._log_force, self._u, extrapolate=False)(np.log(force)))
 
     def force(self, u: FloatArray) -> FloatArray:
-        if not hasattr(self._theory, "answer"):
-            known = PchipInterpolator(self._u[::-1], self._log_force[::-1], extrapolate=False)
-            return np.asarray(np.exp(known(u)))
-        return np.asarray(
-            self._theory.answer(self._surface, np.minimum(u * self._h_rms, self._surface.h_max))[0] / self._g
-        )
+        if hasattr(self._theory, "answer"):
+            gap = np.minimum(u * self._h_rms, self._surface.h_max)
+            return np.asarray(self._theory.answer(self._surface, gap)[0] / self._g)
+        return np.asarray(np.exp(PchipInterpolator(self._u[::-1], self._log_force[::-1], extrapolate=False)(u)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Case(Simulated):
-    """With what else is known of its map, and what was found."""
-
     curves: dict[str, Any]
     force: FloatArray
     area: FloatArray
@@ -175,11 +163,6 @@ class Capped(Simulated):
         return self.law.contact(self.u)[::2]
 
     @functools.cached_property
-    def elastic_areas(self) -> dict[str, FloatArray]:
-        """At these forces, by each form of the law."""
-        return {"calibrated": self.law.area(self.force), "calibrated_map": self.map_curve.area(self.force)}
-
-    @functools.cached_property
     def shares(self) -> tuple[FloatArray, FloatArray]:
         """Q at these gaps, of the surface's heights and of Gaussian ones up to h_max."""
         return self.heights(self.u)[0], hardness.bearing_share(self.u, self.h_max)[0]
@@ -209,16 +192,13 @@ def cases(data: xr.Dataset) -> list[Case]:
     found = []
     for one, known in simulated(data):
         seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < MAX_AREA)
-        loads = [one[name].values[seen] for name in ("force", "area", "mean_separation")]
-        found.append(
-            Case(**vars(known), curves=curves_of(one), **dict(zip(("force", "area", "u"), loads, strict=True)))
-        )
+        force, area, u = (one[name].values[seen] for name in ("force", "area", "mean_separation"))
+        found.append(Case(**vars(known), curves=curves_of(one), force=force, area=area, u=u))
     return found
 
 
 @functools.cache
 def evidence() -> tuple[Case, ...]:
-    """The simulated surfaces of the data set."""
     return tuple(cases(dataset("elastic")))
 
 

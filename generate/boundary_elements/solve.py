@@ -44,17 +44,21 @@ OF_FLOW = ("area", "area_raw", "mean_separation", "residual", "seconds")
 LENGTHS = ("mean_separation", "plane_separation", "energy", "pressure_weighted_height")  # in h_rms
 
 MAX_ITERATIONS = 50_000  # surfaces stretched 1:16 take 4,000
+Solve = Callable[[Any], dict[str, Any]]  # of a recipe, what is kept of its simulation
 
 
 class Contact:
-    """A periodic map against a rigid plane: Polonsky and Keer's conjugate gradients as Tamaas has them, E* = 1.
+    """A map against a rigid plane: Polonsky and Keer's conjugate gradients as Tamaas has them, E* = 1.
 
-    Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact.
+    Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact. The map is
+    not periodic if "dcfft", a convolution, is its `operator`.
     """
 
     gap: FloatArray
 
-    def __init__(self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE) -> None:
+    def __init__(
+        self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE, operator: str = ""
+    ) -> None:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
         tamaas = needed("tamaas")
         tamaas.set_log_level(tamaas.LogLevel.error)
@@ -64,7 +68,10 @@ class Contact:
         )
         self.model.E, self.model.nu = 1.0, 0.0
         self._solver = tamaas.PolonskyKeerRey(self.model, self.surface, tolerance)
-        self._solver.max_iter = MAX_ITERATIONS
+        self._solver.max_iter, self._operator = MAX_ITERATIONS, operator
+        if operator:
+            tamaas.ModelFactory.registerNonPeriodic(self.model, operator)
+            self._solver.setIntegralOperator(operator)
         self._tolerance = tolerance
 
     @property
@@ -83,6 +90,8 @@ class Contact:
             raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
         seconds = time.process_time() - started
         pressure, moved = self.traction, np.asarray(self.model.displacement)
+        if self._operator:
+            self.model.operators[self._operator](pressure, moved)
         touching = pressure > 0
         edges = sum(int(np.count_nonzero(touching != np.roll(touching, 1, axis))) for axis in (0, 1))
         raw = float(touching.mean())
@@ -92,6 +101,7 @@ class Contact:
         return {
             "area": raw - CORRECTION * edges / touching.size,
             "area_raw": raw,
+            "approach": float(gap[touching].mean()),
             "mean_separation": float(gap.mean() - gap[touching].mean()),
             "energy": float(np.mean(pressure * (moved - moved.mean())) / 2),
             "pressure_weighted_height": float(np.mean(pressure * self.surface) / force),
@@ -113,29 +123,27 @@ def prepared(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> tup
     """A map at rms gradient 1, so that mean pressure is F/(A0 E* g), its spectrum, and what laws may know, in h_rms."""
     surface = unscaled / bearing(unscaled, sizes).gradient
     known, (power, q, band) = bearing(surface, sizes), radial_bands(surface, sizes)
-    sums = [band_sums(power * np.where(q > 0, q, 1) ** n, band) for n in (0, -2, 2, 4)]
-    variance, inverse, gradient, curvature = sums
-    per_variance = 1 / np.where(variance > 0, variance, np.nan)
-    h_rms = known.h_rms
-    curves = {
-        "q0_h_rms": q0 * h_rms,
-        "h_max": known.h_max / h_rms,
-        "quantiles": known.quantiles / h_rms,
-        "mean_height": known.mean_height / h_rms,
-        "top_gradient": known.top_gradient,
-        "tension_force": known.tension_force,
-        "tension": known.tension,
-        "anisotropy": known.anisotropy,
-        "slope_kurtosis": known.slope_kurtosis,
-        "band_q": np.sqrt(gradient * per_variance) / q0,
-        "band_variance": variance / h_rms**2,
-        "band_inverse_q2": inverse * per_variance * q0**2,
-        "band_gradient": gradient,
-        # in units of 1/h_rms^2: m0 m4/m2^2 is 4 times its sum at g = 1
-        "band_curvature": 0.375 * curvature * h_rms**2,
-        "numpy": np.__version__,
-    }
-    return surface, band, curves
+    powers = (band_sums(power * np.where(q > 0, q, 1) ** n, band) for n in (0, -2, 2, 4))
+    variance, inverse, gradient, curvature = powers
+    per_variance, h_rms = 1 / np.where(variance > 0, variance, np.nan), known.h_rms
+    plain = ("top_gradient", "tension_force", "tension", "anisotropy", "slope_kurtosis")
+    curves: dict[str, Any] = {name: getattr(known, name) for name in plain}
+    curves |= {name: getattr(known, name) / h_rms for name in ("h_max", "quantiles", "mean_height")}
+    return (
+        surface,
+        band,
+        curves
+        | {
+            "q0_h_rms": q0 * h_rms,
+            "band_q": np.sqrt(gradient * per_variance) / q0,
+            "band_variance": variance / h_rms**2,
+            "band_inverse_q2": inverse * per_variance * q0**2,
+            "band_gradient": gradient,
+            # in units of 1/h_rms^2: m0 m4/m2^2 is 4 times its sum at g = 1
+            "band_curvature": 0.375 * curvature * h_rms**2,
+            "numpy": np.__version__,
+        },
+    )
 
 
 def simulate(recipe: Recipe) -> dict[str, Any]:
@@ -198,15 +206,14 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
         flows.append(flow_conductance(contact.gap / h_rms, recipe.sizes))
         if not flows[-1].any():
             break
-    return (
-        known
-        | {"engine": engine()}
-        | kept(rows, OF_FLOW, h_rms)
-        | {"force": np.array(loads[: len(flows)]), "flow": np.array(flows)}
-    )
+    found = {"engine": engine(), "force": np.array(loads[: len(flows)]), "flow": np.array(flows)}
+    return known | kept(rows, OF_FLOW, h_rms) | found
 
 
-def simulate_to(recipe: Recipe, solve: Callable[[Recipe], dict[str, Any]], folder: pathlib.Path) -> str | None:
+SOLVERS: dict[str, Solve] = {"elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow}
+
+
+def simulate_to(recipe: Recipe, solve: Solve, folder: pathlib.Path) -> str | None:
     """Simulate one surface into a file of its own, which stands only when it is whole; what failed, or None."""
     try:
         found = solve(recipe)

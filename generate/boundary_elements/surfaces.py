@@ -116,10 +116,8 @@ def heights(recipe: Recipe) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True)
 class Task:
-    """A surface to solve and the set that it belongs to."""
-
     recipe: Recipe
-    split: str
+    split: str  # the set that it belongs to
 
 
 def cost(recipe: Recipe) -> float:

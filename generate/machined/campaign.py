@@ -7,7 +7,6 @@ also contact with a hardness, at a tolerance of 1e-6. Stiffness is -dF/du by a s
 import functools
 import importlib.metadata
 import pathlib
-from collections.abc import Callable
 from typing import Any, cast
 
 import click
@@ -15,9 +14,9 @@ import numpy as np
 import xarray as xr
 
 from generate.boundary_elements import run as campaigns
-from generate.boundary_elements.solve import Contact
+from generate.boundary_elements.solve import Contact, Solve
 from generate.boundary_elements.surfaces import Task
-from generate.calibrated_file import variable, write_part
+from generate.calibrated_file import attributes, variable, write_part
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
@@ -54,7 +53,6 @@ def parts() -> list[Part]:
 
 
 def yielding_parts() -> list[Part]:
-    """Those that are pressed with a hardness."""
     return parts()[: NUMBERS * len(FAMILIES) : EVERY]
 
 
@@ -128,7 +126,6 @@ def yielded(part: Part) -> dict[str, Any]:
 
 
 def gathered(folder: pathlib.Path) -> xr.Dataset:
-    """All parts that are solved and answered."""
     have = [p for p in parts() if all((folder / form / f"{p.name}.npz").exists() for form in FORMS)]
     hard = {p.name: dict(np.load(folder / "hardness" / f"{p.name}.npz")) for p in yielding_parts() if p in have}
     names: dict[str, Any] = {"surface": [part.name for part in have], "family": [part.family for part in have]}
@@ -137,7 +134,7 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
     data = xr.Dataset(coords={n: variable(over[n], values, TEXTS["names"][n]) for n, values in names.items()})
     for form in ("", *FORMS):
         read = [dict(np.load(folder / form / f"{part.name}.npz")) for part in have]
-        data.attrs |= {} if form else campaigns.attributes(TEXTS, {"engine": str(read[0]["engine"])})
+        data.attrs |= {} if form else attributes(TEXTS, {"engine": str(read[0]["engine"])})
         for name in (name for name in TEXTS["columns"] if name in read[0]):
             values: Any = np.array([one[name] for one in read], "f4")
             data[f"{form}_{name}" if form else name] = variable(("surface", "load"), values, TEXTS["columns"][name])
@@ -164,7 +161,7 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     Stopped and called again, it goes on where it was. Answers of theories are kept in folders of their own: remove
     these to ask a changed library again.
     """
-    solvers: dict[str, Callable[[Part], dict[str, Any]]] = {"hardness": yielded, "": solved}
+    solvers: dict[str, Solve] = {"hardness": yielded, "": solved}
     solvers |= {form: functools.partial(answered, theory=form, folder=folder) for form in FORMS}
     for name, solve in solvers.items():
         tasks = [Task(cast(Any, part), "") for part in (yielding_parts() if solve is yielded else parts())]

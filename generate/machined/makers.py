@@ -26,17 +26,14 @@ class Part:
 
     @property
     def name(self) -> str:
-        """Name of its file."""
         return f"{self.family}_{self.number}_n{self.points}"
 
     @property
     def shortest(self) -> float:
-        """Its shortest wavelength."""
         return SHORTEST[self.number % len(SHORTEST)]
 
 
 def heights(part: Part) -> FloatArray:
-    """The map of a part."""
     rng = np.random.default_rng(zlib.crc32(part.family.encode()) % 10_000_000 * 100 + part.number)
     return finished(FAMILIES[part.family](rng, part.points, part.shortest), part.shortest)
 
@@ -73,7 +70,6 @@ def _fine(rng: Rng, points: int, shortest: float, low: float = 0.03, high: float
 
 
 def gaussian(rng: Rng, points: int, shortest: float) -> FloatArray:
-    """Isotropic and Gaussian."""
     return rough(rng, points, _log(rng, 32, points), shortest, rng.uniform(0.3, 1))
 
 
@@ -96,7 +92,6 @@ def milled(rng: Rng, points: int, shortest: float) -> FloatArray:
 
 
 def ground(rng: Rng, points: int, shortest: float) -> FloatArray:
-    """Gaussian, stretched along the lay."""
     return rough(rng, points, _log(rng, 32, 96), shortest, rng.uniform(0.5, 0.9), _log(rng, 2, 16))
 
 
@@ -131,12 +126,10 @@ def worn(rng: Rng, points: int, shortest: float) -> FloatArray:
 
 
 def sprayed(rng: Rng, points: int, shortest: float) -> FloatArray:
-    """Lognormal peaks."""
     return np.exp(rng.uniform(0.25, 0.75) * rough(rng, points, 64, shortest, 0.8))
 
 
 def pitted(rng: Rng, points: int, shortest: float) -> FloatArray:
-    """Lognormal pits."""
     return -sprayed(rng, points, shortest)
 
 
@@ -162,13 +155,11 @@ def eroded(rng: Rng, points: int, shortest: float) -> FloatArray:
 
 
 def patchy(rng: Rng, points: int, shortest: float) -> FloatArray:
-    """Roughness that differs from place to place."""
     where = np.exp(rng.uniform(0.3, 0.9) * rough(rng, points, points, points / 4, 1))
     return where * rough(rng, points, _log(rng, 24, 64), shortest, 0.8)
 
 
 def dimpled(rng: Rng, points: int, shortest: float) -> FloatArray:
-    """A flat with a lattice of dimples."""
     x, y = np.meshgrid(*2 * [np.arange(points)], indexing="ij")
     pitch = points / rng.choice([4, 8, 16])
     row = np.floor(y / pitch)

@@ -1,8 +1,6 @@
-"""Further commands on maps with a lay or of a family: `tangential`, `film` and `edges`."""
+"""Further commands on maps with a lay: `tangential` and `film`."""
 
-import os
-import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import click
@@ -13,17 +11,15 @@ from scipy.sparse.linalg import LinearOperator, cg
 from generate.boundary_elements.run import of_contacts
 from generate.boundary_elements.solve import Contact
 from generate.calibrated_file import rms, write_part
-from generate.machined.makers import FAMILIES, GRADIENT, Part, finished, heights, rough
+from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables import Surface, flow_factors
 from mbma_tables.answers.leakage import shipped_flow
-from mbma_tables.common import cache
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 from mbma_tables.laws.bearing_curve import bearing
 from mbma_tables.laws.effective_medium import wide_gap
 from mbma_tables.laws.lay import CONSTANTS, factors, stress_shares
 from mbma_tables.laws.reynolds import flow_and_couette
-from mbma_tables.theories import BoundaryElements
 
 POINTS, SHORTEST, LONGEST = 256, 8.0, 64.0
 # F/(A0 E* g) at 2% to 40% contact; surfaces by lay, Hurst exponent and seed
@@ -36,8 +32,6 @@ LAYS, FILM_HURSTS, FILM_SEEDS = (1.0, 1.5, 3.0, 4.0, 8.0), (0.5, 0.8), (41, 42)
 FILM_LOADS = (0.0015, 0.008, 0.03, 0.08, 0.14)  # 0.4% to 30% contact
 ABOVE = (1.02, 1.15, 1.5, 2.0, 3.0)  # mean gaps over the highest point
 FILM_AREAS = ((0.0, 0.0), (1e-9, 0.01), (0.01, 0.03), (0.05, 0.1), (0.15, 0.22))
-AREAS = np.array([0.01, 0.03, 0.1, 0.3, 0.6])
-PATCH, CORNER, NUMBERS = 128, (40, 70), (0, 2)
 
 
 def pressed(recipes: Iterable[tuple[float, float, int]]) -> Iterator[tuple[Any, FloatArray, Contact]]:
@@ -175,57 +169,3 @@ def film() -> None:
         told = ", ".join(f"{name} {rms(each):.3f} {np.abs(each).max():.3f}" for name, each in known.items())
         near = f"u {u[mine].min():.2f} to {u[mine].max():.2f}, phi near {np.exp(np.mean(np.log(alike + 1e-300))):.2f}"
         click.echo(f"A {low:g} to {high:g}, lay {stretch:g}: {told}, {near}")
-
-
-def blended(values: FloatArray, width: int) -> FloatArray:
-    """A patch whose last rows and columns fade into the first, squares of both weights adding to one."""
-    for axis in (0, 1):
-        rows = np.moveaxis(values, axis, 0)
-        turn = ((np.arange(width) + 0.5) / width * np.pi / 2)[:, None]
-        joined = rows[: len(rows) - width].copy()
-        joined[:width] = np.cos(turn) * rows[len(rows) - width :] + np.sin(turn) * rows[:width]
-        values = np.moveaxis(joined, 0, axis)
-    return np.asarray(values - values.mean())
-
-
-WAYS: dict[str, Callable[[FloatArray], Any]] = {
-    "mirror images": lambda patch: Surface.from_map(patch, 1.0, detrend="mean"),
-    "edges joined": lambda patch: Surface.from_map(patch, 1.0, periodic=True),
-    "blended over 1/8": lambda patch: Surface.from_map(blended(patch, PATCH // 8), 1.0, periodic=True),
-    "blended over 1/4": lambda patch: Surface.from_map(blended(patch, PATCH // 4), 1.0, periodic=True),
-}
-
-
-def edge_errors(part: Part) -> tuple[FloatArray, FloatArray]:
-    """Of ln A at equal F, of ln F at equal u, and of ln of the stiffness, by way, quantity and area; seconds by way."""
-    whole = heights(part)
-    truth = BoundaryElements.of(Surface.from_map(whole, 1.0, periodic=True)).fit
-    x = truth.log_force_at(AREAS)
-    u, stiffness = truth.separation(x), truth.stiffness(x)
-    patch = whole[tuple(slice(start, start + PATCH) for start in CORNER)]
-    found, seconds = [], []
-    for way in WAYS.values():
-        start = time.process_time()
-        curve = BoundaryElements.of(way(patch - patch.mean())).fit
-        seconds.append(time.process_time() - start)
-        of_force = (curve.separation(x) - u) * stiffness / np.exp(x)
-        found.append([np.log(curve.area(x) / AREAS), of_force, np.log(curve.stiffness(x) / stiffness)])
-    return np.array(found), np.array(seconds)
-
-
-@click.command()
-def edges() -> None:
-    """How a map that is not periodic is best continued, for docs/machined.md: patches of periodic maps, simulated.
-
-    Errors against the simulation of the whole map at 1, 3, 10, 30 and 60% contact, by way of continuation; the time of
-    a map; on how many maps each way is the nearest.
-    """
-    os.environ[cache.VARIABLE] = "off"  # times are those of simulations
-    found = [edge_errors(Part(family, number)) for number in NUMBERS for family in FAMILIES]
-    missed, seconds = (np.array(each) for each in zip(*found, strict=True))
-    nearest = np.sqrt(np.mean(missed**2, axis=-1)).argmin(axis=1)
-    for k, way in enumerate(WAYS):
-        off = np.sqrt(np.mean(missed[:, k] ** 2, axis=(0, 2))).round(3)
-        median = np.median(np.abs(missed[:, k]), axis=(0, 2)).round(3)
-        best = f"nearest on {np.count_nonzero(nearest == k, axis=0)} of {len(found)}"
-        click.echo(f"{way}: rms {off}, median {median}, {seconds[:, k].mean():.2f} s, {best}")

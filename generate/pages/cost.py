@@ -39,7 +39,6 @@ def groups(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def draw(costs: pd.DataFrame) -> Any:
-    """Error against cost, of islands and of totals."""
     figure, axes = panels(1, 2, (9, 4.8), sharey=True)
     own, handles = groups(costs), dict[str, Any]()
     marks = dict(zip(pd.concat(own.values())["method"].unique(), "osD^vP*Xh<>d", strict=False))
@@ -90,7 +89,6 @@ def draw_gauge(rows: pd.DataFrame) -> Any:
 
 
 def measure() -> Measured:
-    """What `mbma cost` prints, and the figures."""
     costs, distances = (read_csv(ROOT / "tables" / f"{name}.csv") for name in ("cost", "distance"))
     figures = {"docs/figures/cost.svg": draw(costs), "docs/figures/gauge.svg": draw_gauge(gauge_rows(distances))}
     return {"costs": printed("mbma cost"), "distances": printed("mbma cost --distance")}, figures

@@ -51,7 +51,6 @@ RATIOS = ("elastic area over true", "elastic force over true")
 
 
 def calibrated() -> Measured:
-    """Accuracy and constants that `python -m generate calibrated` stored."""
     data = xr.load_dataset(shipped_file("calibrated.nc"))
     edges, sets = (*data.contact_low.values, data.contact_high.values[-1]), data.attrs["sets"].split("; ")
     words = [functools.reduce(lambda text, pair: text.replace(*pair), WORDS.items(), name) for name in SETS]
@@ -64,7 +63,6 @@ def calibrated() -> Measured:
 
 
 def numbers(facts: dict[str, Any]) -> str:
-    """Constants, the table's certificate, and the coverage of the stated scatter."""
     rows = [(f"`{name}`", f"{facts[f'law_{name}']:.4g}") for name in vars(CONSTANTS)]
     rows += [(f"`{name[4:]}` (map)", f"{value:.4g}") for name, value in facts.items() if name.startswith("map_")]
     evidence = json.loads(facts["evidence"])
@@ -110,7 +108,6 @@ def refinement() -> str:
 
 
 def leakage() -> Measured:
-    """Deviations of leakage laws from simulation, and their curves."""
     seen = cases(dataset("leakage"))
     parts = {"accuracy": leakage_accuracy(), "cells": of_cells(seen), "floor": floor()}
     return parts, {"docs/figures/leakage.svg": draw_leakage(seen)}
@@ -169,7 +166,6 @@ def of_cells(seen: Sequence[Any]) -> str:
 
 
 def draw_leakage(seen: Sequence[Any]) -> Any:
-    """k against contact of simulated surfaces, and the laws."""
     figure, axes_of = panels(1, 2, (10, 4.5), sharey=True)
     area, flow = np.linspace(0.004, 0.405, 200), shipped_flow().constants
     for axes, hurst in zip(axes_of, (0.4, 0.8), strict=True):
@@ -196,7 +192,6 @@ def draw_leakage(seen: Sequence[Any]) -> Any:
 
 
 def yielding() -> Measured:
-    """When a contact is elastic, how accurate the law with a hardness is, metals."""
     seen, (_, attributes) = capped(dataset("hardness")), shipped_part("hardness")
     ratios = simulated(seen)
     rows = [[psi, *((v.mean(), v.std()) for v in ratios[1:, ratios[0] == psi])] for psi in np.unique(ratios[0])]
@@ -229,7 +224,6 @@ def simulated(seen: list[Capped]) -> FloatArray:
 
 
 def held_out() -> str:
-    """Errors of the law with a hardness on held-out surfaces."""
     variables, attributes = shipped_part("hardness")
     sets, rows = attributes["sets"].split(), list[list[Any]]()
     forms = enumerate(("`h_max`", "the map's heights"))

@@ -175,7 +175,6 @@ def picture() -> Any:
 
 
 def readme() -> Measured:
-    """Theories with their deviation from simulations and their cost, the first picture."""
 
     def off(*deviations: float) -> str:
         return " / ".join(f"{100 * math.expm1(d):.2g}%" if d < 0.5 else f"factor {math.exp(d):.2g}" for d in deviations)
@@ -189,7 +188,6 @@ def readme() -> Measured:
 
 
 def theories() -> Measured:
-    """Separation, area and stiffness at a few pressures by every theory."""
     road, rows = Surface.named("concrete"), []
     for pressure, name in itertools.product(PRESSURES, THEORIES):
         found = contact(road, pressure=pressure, theory=name)

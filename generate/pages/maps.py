@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import resample
 
-from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, Recipe, heights
+from generate.boundary_elements.evidence import simulated as simulated_surfaces
+from generate.boundary_elements.surfaces import TRAINING, Recipe, heights
 from generate.files import ROOT, dataset, read_csv, to_csv
 from generate.machined import makers
 from generate.machined.campaign import FORMS
@@ -125,21 +126,18 @@ def ratios(
 
 def simulated() -> Iterator[Seen]:
     """Held-out surfaces by name, as maps, with F/(A0 E*), A/A0 and u of boundary elements."""
-    data = dataset("elastic")
-    kinds = data.kind.attrs["flag_meanings"].split()
-    order = [KINDS.index(kinds[k]) if kinds[k] in KINDS else -1 for k in data.kind.values]
-    for one in (data.isel(surface=number) for number in np.lexsort((data["shape"].values, np.array(order)))):
-        kind, shape, points = kinds[int(one.kind)], float(one["shape"]), int(one.points)
-        if kind not in KINDS or SPLITS[int(one.split)] not in (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM):
+    pairs = ((one, known) for one, known in simulated_surfaces(dataset("elastic")) if known.kind in KINDS)
+    for one, known in sorted(pairs, key=lambda pair: (KINDS.index(pair[1].kind), pair[1].node[-1])):
+        if known.split == TRAINING:
             continue
-        recipe = Recipe(kind, float(one.hurst), float(one.zeta_1), int(one.waves), int(one.seed), points, shape)
+        shape, points = float(one["shape"]), known.points
+        recipe = Recipe(known.kind, float(one.hurst), known.zeta_1, known.waves, int(one.seed), points, shape)
         # of the map as it is, whose h_rms is 1
         scale = GRADIENT * float(one.q0_h_rms) / recipe.q0
-        steps = [side / points for side in recipe.sizes]
-        surface = Surface.from_map(scale * heights(recipe), *steps, periodic=True)
+        surface = Surface.from_map(scale * heights(recipe), *(side / points for side in recipe.sizes), periodic=True)
         assert isinstance(surface, MeasuredSurface)
         rows = np.stack([one.force * GRADIENT, one.area, one.mean_separation * scale])
-        name = f"stretched 1:{shape:g}" if kind == "stretched" else f"{kind} {shape:g}"
+        name = f"stretched 1:{shape:g}" if known.kind == "stretched" else f"{known.kind} {shape:g}"
         yield name, surface, rows[:, np.isfinite(rows).all(axis=0) & (one.area.values > 0)]
 
 
@@ -190,7 +188,6 @@ def maps() -> Measured:
 
 
 def draw_families() -> Any:
-    """One map of each family."""
     figure, axes = panels(2, 7, (14, 4.4))
     for axis, family in itertools.zip_longest(axes.ravel(), makers.FAMILIES):
         axis.set_axis_off()
@@ -201,7 +198,6 @@ def draw_families() -> Any:
 
 
 def machined() -> Measured:
-    """Errors of answers on maps of machined surfaces by family, and how many their scatter covers."""
     data = dataset("machined")
     parts = {form: by_family(data, form) for form in FORMS} | {"yielding": yielding(data), "coverage": covered(data)}
     parts |= {f"left_out_{form}": families_left_out(data, form) for form in FORMS}

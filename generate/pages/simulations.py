@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from generate import distances
-from generate.boundary_elements.run import surfaces
-from generate.boundary_elements.studies import LIGHT_BINS, compared
+from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import dataset
 from generate.page import Measured, panels, percent, table
@@ -68,13 +67,11 @@ def joints() -> Measured:
 
 
 def published(gamma: float, H: FloatArray) -> FloatArray:
-    """Patir and Cheng's fit of phi_x at gaps over h_rms."""
     C, r = PATIR_CHENG[gamma]
     return 1 + C * H**-r if gamma > 1 else 1 - C * np.exp(-r * H)
 
 
 def lubrication() -> Measured:
-    """Largest distance from the published fits, and the curves of both."""
     H, rows = np.linspace(FIRST, LAST, 61), []
     figure, (left, right) = panels(1, 2, (10, 4))
     u = np.geomspace(0.5, 10, 120)
@@ -195,7 +192,6 @@ def fidelity() -> Measured:
 
 
 def data() -> Measured:
-    """Groups of the data set."""
     rows = []
     for name, group in boundary_elements().children.items():
         own = group.to_dataset()

@@ -97,15 +97,7 @@ def counted(
     return found
 
 
-def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
-    """(pi/5) F_{5/2}(-X) and (pi/2) F_2(-X) by mpmath: parabolic cylinder functions."""
-    with mp.workdps(40):
-        force, area = (height_integral(mp.mpf(n), -mp.mpf(float(X))) for n in (2.5, 2))
-        return mp.pi / 5 * force, mp.pi / 2 * area
-
-
 def islands() -> dict[str, list[Outcome]]:
-    """Every island model at every corner of (X, mu)."""
 
     def ask(name: str, X: float, mu: float) -> tuple[Sequence[Any], float]:
         model = get_model(name, 10 * SOLVED, get_variant("reported"))
@@ -113,11 +105,13 @@ def islands() -> dict[str, list[Outcome]]:
         return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
 
     def truth(X: float, mu: float) -> Sequence[Any]:
-        if mu <= RIGID_MU:
-            force, area = rigid_truth(X)
-            return force * mp.mpf(float(mu)), area
-        solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
-        return solved.phi_F, solved.phi_A
+        if mu > RIGID_MU:
+            solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
+            return solved.phi_F, solved.phi_A
+        with mp.workdps(40):
+            # of a rigid sphere, by parabolic cylinder functions
+            force, area = (height_integral(mp.mpf(n), -mp.mpf(float(X))) for n in (2.5, 2))
+            return mp.pi / 5 * force * mp.mpf(float(mu)), mp.pi / 2 * area
 
     ways = {f"islands by {name}": functools.partial(ask, name) for name in ISLAND_MODELS}
     return counted(ways, itertools.product(X_CORNERS, MU_CORNERS), truth)

@@ -103,7 +103,6 @@ class Kind:
         raise NotImplementedError
 
     def checked(self, content: TableContent) -> TableContent:
-        """The content, or UncertifiedError where it breaks the schema or a physical rule."""
         try:
             check_content(content)
         except ValueError as fault:

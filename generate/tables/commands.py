@@ -18,20 +18,6 @@ TABLES = ROOT / "tables"
 KINDS: dict[str, type[Universal | Island4d]] = {UNIVERSAL: Universal, ISLAND4D: Island4d}
 
 
-def destination(what: str, configuration: Configuration, out: pathlib.Path | None) -> pathlib.Path:
-    """Where a table goes; the shipped folder takes only what is certified on enough points."""
-    own = f"{configuration.kind}.nc"
-    path = TABLES / own if out is None else out / own if what == "all" else out
-    if path.resolve().parent == TABLES.resolve() and configuration.certificate_points < MIN_SHIPPED_POINTS:
-        raise InputError(
-            f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in {TABLES}, "
-            f"got {configuration.certificate_points}; give another place with --out"
-        )
-    if path.is_dir():
-        raise InputError(f"--out must name a file for one table, {path} is a folder")
-    return path
-
-
 @click.command()
 @click.argument("what", type=click.Choice([*KINDS, "heights", "all"]))
 @click.option(
@@ -41,20 +27,26 @@ def destination(what: str, configuration: Configuration, out: pathlib.Path | Non
 @click.option("--out", type=click.Path(path_type=pathlib.Path), help="File (for all: folder); default tables/.")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
 def tables(
-    what: str,
-    config: pathlib.Path | None,
-    target: float | None,
-    out: pathlib.Path | None,
-    workers: int,
+    what: str, config: pathlib.Path | None, target: float | None, out: pathlib.Path | None, workers: int
 ) -> None:
     """Make a table, the coefficients of the height integrals (heights), or all of them in order."""
     if what in ("all", "heights") and (config is not None or target is not None):
         raise InputError("--config and --target belong to one table")
-    configurations = [load(kind, config, target) for kind in KINDS if what in (kind, "all")]
-    paths = [destination(what, configuration, out) for configuration in configurations]
+    chosen = dict[pathlib.Path, Configuration]()
+    for own in (load(kind, config, target) for kind in KINDS if what in (kind, "all")):
+        path = out if out and what != "all" else (out or TABLES) / f"{own.kind}.nc"
+        # the shipped folder takes only what is certified on enough points
+        if path.resolve().parent == TABLES.resolve() and own.certificate_points < MIN_SHIPPED_POINTS:
+            raise InputError(
+                f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in {TABLES}, "
+                f"got {own.certificate_points}; give another place with --out"
+            )
+        if path.is_dir():
+            raise InputError(f"--out must name a file for one table, {path} is a folder")
+        chosen[path] = own
     if what in ("all", "heights"):
         height_coefficients.main()
-    for configuration, path in zip(configurations, paths, strict=True):
+    for path, configuration in chosen.items():
         content = KINDS[configuration.kind](configuration, workers).build()
         path.parent.mkdir(parents=True, exist_ok=True)
         write_table(path, content)

@@ -18,45 +18,30 @@ from mbma_tables.tablefiles.schema import AXES, DEGREE, ISLAND4D, Axis
 HERE = pathlib.Path(__file__).parent
 # ranges within which the solver reaches its tightest tolerance, whatever the other axes
 SCHEMAS = json.loads((HERE / "configuration.schema.json").read_text(encoding="utf-8"))
+RANGE = {"low": 0.0, "high": 0.0, "offset": 0.0, "nodes": 2}  # of an axis; the universal table has cells, no nodes
 MIN_NODES = 8  # of an axis
 MIN_SHIPPED_POINTS = 5000  # of the certificate of a table in the shipped folder
 
 
 @dataclasses.dataclass(frozen=True)
-class AxisRange:
-    """Range of an axis; the universal table has cells in place of nodes."""
-
-    low: float = 0.0
-    high: float = 0.0
-    offset: float = 0.0
-    nodes: int = 2
-
-
-@dataclasses.dataclass(frozen=True)
 class Configuration:
-    """What a table is to cover, and how well."""
-
     kind: str  # universal or island4d
     target: float  # largest relative error allowed on held-out points
     max_nodes: int  # of the whole table
     variant: str  # of an island4d table; a universal one serves all
     certificate_points: int  # held-out ones
     seed: int  # of the low-discrepancy sequences
-    axes: dict[str, AxisRange]
-
-    def digest(self) -> str:
-        """SHA-256 of the configuration, the variant's numbers included."""
-        numbers = get_variant(self.variant).recorded if self.kind == ISLAND4D else []
-        return digest_json([dataclasses.asdict(self), numbers])
+    axes: dict[str, Axis]
 
     def attributes(self) -> dict[str, Any]:
-        """Attributes of a table's file on what was wanted."""
-        text = json.dumps(dataclasses.asdict(self), sort_keys=True)
-        return {"target": self.target, "configuration": text, "configuration_sha256": self.digest()}
-
-    def axis(self, name: str) -> Axis:
-        own = self.axes[name]
-        return Axis(name, TEXTS["axes"][name], dict(AXES[self.kind])[name], own.offset, own.low, own.high, own.nodes)  # type: ignore[arg-type]
+        """Attributes of a table's file on what was wanted; the digest has the variant's numbers, too."""
+        ranges = {name: {key: getattr(axis, key) for key in RANGE} for name, axis in self.axes.items()}
+        own, numbers = (
+            vars(self) | {"axes": ranges},
+            get_variant(self.variant).recorded if self.kind == ISLAND4D else [],
+        )
+        text, digest = json.dumps(own, sort_keys=True), digest_json([own, numbers])
+        return {"target": self.target, "configuration": text, "configuration_sha256": digest}
 
 
 def load(kind: str, path: pathlib.Path | None = None, target: float | None = None) -> Configuration:
@@ -71,21 +56,22 @@ def load(kind: str, path: pathlib.Path | None = None, target: float | None = Non
     try:
         json.dumps(own, allow_nan=False, default=str)
         check(own, SCHEMAS[kind])
-        merged, axes = given | own, dict[str, AxisRange]()
+        merged, axes = given | own, dict[str, Axis]()
         finer = (given["target"] / merged["target"]) ** (1 / (DEGREE + 1))
         for name, entry in given["axes"].items():
             nodes = {"nodes": max(MIN_NODES, math.ceil(finer * entry["nodes"]))} if kind == ISLAND4D else {}
-            axes[name] = AxisRange(**entry | nodes | own.get("axes", {}).get(name, {}))
+            chosen: dict[str, Any] = RANGE | entry | nodes | own.get("axes", {}).get(name, {})
+            axes[name] = Axis(name, TEXTS["axes"][name], dict(AXES[kind])[name], **chosen)  # type: ignore[arg-type]
         found = Configuration(**merged | {"axes": axes})
         count = math.prod(axis.nodes for axis in axes.values())
         if count > found.max_nodes:
             raise InputError(f"the axes have {count} nodes, max_nodes allows {found.max_nodes}; raise it or the target")
         for name, axis in axes.items():
             with np.errstate(all="ignore"):
-                if not (np.diff(found.axis(name).values) > 0).all():
+                if not (np.diff(axis.values) > 0).all():
                     raise InputError(
                         f"axes.{name}: its nodes must increase from low to high, and low + offset be above 0 on a "
-                        f"logarithmic axis, got {axis}"
+                        f"logarithmic axis, got {axis.low:g} to {axis.high:g}"
                     )
     except ValueError as fault:
         raise InputError(f"{kind if path is None else path}: {fault}") from None

@@ -50,22 +50,10 @@ def exact_island(
         h_u = mp.sqrt(zeta_u ** (-2 * h) - e)  # (B.12)
         # (39), phi = 0.05
         eta = mp.mpf(3) / 4 * mp.cbrt(mp.pi * D_top) * mp.cbrt(1.5 * R_top) ** 2 * mp.cbrt(20 * h_u / R_u)
-        return {
-            "zeta_d": zeta_d,
-            "zeta_u": zeta_u,
-            "R_d": R_d,
-            "R_u": R_u,
-            "D": D,
-            "sigma": sigma,
-            "h_d": h_d,
-            "h_u": h_u,
-            "eta": eta,
-            "X": (delta / s - h_d) / sigma,
-            "mu": mp.mpf(8) / 3 * D * sigma * mp.sqrt(2 * R_u * R_d),
-            "D_d": D_d,
-            "sigma_d": sigma_d,
-            "width": mp.log(zeta_u / zeta_d),
-        }
+        X, mu = (delta / s - h_d) / sigma, mp.mpf(8) / 3 * D * sigma * mp.sqrt(2 * R_u * R_d)
+        found = {"zeta_d": zeta_d, "zeta_u": zeta_u, "R_d": R_d, "R_u": R_u, "D": D, "sigma": sigma, "h_d": h_d}
+        found |= {"h_u": h_u, "eta": eta, "X": X, "mu": mu, "D_d": D_d, "sigma_d": sigma_d}
+        return found | {"width": mp.log(zeta_u / zeta_d)}
 
 
 def divisor(variant: str) -> mpmath.mpf:

@@ -62,7 +62,7 @@ class Island4d(Kind):
     @threadpool_limits.wrap(limits=BLAS_THREADS)
     def build(self) -> TableContent:
         own = self.configuration
-        axes = tuple(own.axis(name) for name in own.axes)
+        axes = tuple(own.axes.values())
         grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
         values = self.log_ratio("island4d table", *self.arguments(*grid), rtol=self.rtol)
         coefs = coefficients(values, DEGREE, len(axes))
@@ -190,7 +190,6 @@ class Island4d(Kind):
         return conformance(raw, found.X, found.mu, table, scales, 1e-4 * (1 + found.X) / found.sigma)
 
     def check(self, content: TableContent) -> None:
-        """Force and area finite and positive, below the rigid sphere's, increasing in X, force increasing in mu."""
         places = [np.arange(2 * (axis.nodes - 1) + 1) / 2 for axis in content.axes[:2]]
         places += [np.minimum(np.arange(axis.nodes - 0.5), axis.nodes - 1) for axis in content.axes[2:]]
         grid = np.meshgrid(*places, indexing="ij")

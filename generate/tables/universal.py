@@ -38,14 +38,12 @@ AT_TESTS: FloatArray = np.asarray(chebyshev.chebvander(TESTS, TERMS - 1), dtype=
 def mu_at(y: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """mu at places in [-1, 1] of cells."""
     a, b, c, d = fractions_of_mu(low, high)
-    mu: FloatArray = np.clip((b - d * y) / (c * y - a), low, high)
-    return mu
+    return np.asarray(np.clip((b - d * y) / (c * y - a), low, high))
 
 
 def X_at(x: FloatArray, low: Any, high: Any) -> FloatArray:
     """X at places in [-1, 1] of cells."""
-    X: FloatArray = 0.5 * (low + high) + 0.5 * (high - low) * x
-    return X
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * x)
 
 
 def values(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
@@ -58,8 +56,6 @@ def values(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True)
 class Strip:
-    """A range of X, and what its cells are to meet."""
-
     low: float
     high: float
     mu_high: float
@@ -155,7 +151,7 @@ class Universal(Kind):
         series = np.moveaxis(rows[:, 6:].reshape(-1, 2, TERMS, TERMS), 1, -1)
         content = TableContent(
             kind=UNIVERSAL,
-            axes=tuple(own.axis(name) for name in own.axes),
+            axes=tuple(own.axes.values()),
             coefficients=np.ascontiguousarray(series),
             local_error=LOCAL_FACTOR * rows[:, 4:6] + self.rtol,
             auxiliary={n: (("cell",), r, label(t)) for (n, t), r in zip(CELL_EDGES.items(), rows.T, strict=False)},
@@ -200,7 +196,6 @@ class Universal(Kind):
         return [X[chosen], mu[chosen]]
 
     def check(self, content: TableContent) -> None:
-        """Force and area positive and increasing in X, force increasing in mu, the rigid limit met."""
         X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1][:, None] for name in CELL_EDGES)
         x, y = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(-0.99, 0.99, 5)]))
         X, mu = X_at(x, X_low, X_high).ravel(), mu_at(y, mu_low, mu_high).ravel()

@@ -126,37 +126,29 @@ def reasons_against(
     steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
     measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.pressure), dtype=bool))
-    beyond = _beyond_metals(source, theory, surface, E_star, answer)
-    return {text: steep, **measured, **theory.reasons(surface, answer, u), **beyond}
-
-
-def _beyond_metals(
-    source: Source, theory: Theory, surface: AnySurface, E_star: FloatArray, answer: TheoryAnswer
-) -> dict[str, Any]:
-    """Elastic contacts with pressures that the named metals (without names: any metal) do not support."""
+    found = {text: steep, **measured, **theory.reasons(surface, answer, u)}
+    # elastic contacts with pressures that the named metals (without names: any metal) do not support
     stress, pair = source.units.stress, source.materials
     if stress in (None, "1") or (pair is None and source.stated):
-        return {}
+        return found
     unit = factor("GPa", stress, "stress")
     with np.errstate(invalid="ignore"):
         mean = E_star * answer.pressure / answer.area
     elastic = np.isinf(getattr(theory, "hardness", np.inf)) & (answer.pressure > 0)
     if pair is None:
         text = (
-            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, that of the hardest metal"
+            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, that of the hardest metal "
+            "in materials.METALS: give hardness= of the softer body, or infinity where it does not yield"
         )
-        mend = "give hardness= of the softer body, or infinity where it does not yield"
-        return {f"{text} in materials.METALS: {mend}": elastic & (mean > HARDEST * unit)}
+        return found | {text: elastic & (mean > HARDEST * unit)}
     soft, hard = pair.softer.hardness
     needed = f"'{soft:g} GPa'" if soft == hard else f" of its temper, '{soft:g} GPa' to '{hard:g} GPa'"
     yields = E_star * np.asarray(surface.rms_gradient) > ELASTIC_PSI * soft * unit
-    return {f"{pair.softer.name} yields here: give hardness={needed}": elastic & (yields | (mean > soft * unit))}
+    text = f"{pair.softer.name} yields here: give hardness={needed}"
+    return found | {text: elastic & (yields | (mean > soft * unit))}
 
 
-_Point = collections.namedtuple("_Point", ("separation", "mean_separation", "area", "stiffness", "pressure"))
-
-
-class LawPoint(_Point):
+class LawPoint(collections.namedtuple("LawPoint", ("separation", "mean_separation", "area", "stiffness", "pressure"))):
     """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape."""
 
     units = Units()  #: the law's
@@ -164,12 +156,6 @@ class LawPoint(_Point):
     def __repr__(self) -> str:
         fields = self._asdict().items()
         return f"LawPoint({', '.join(f'{name} {shown(value, unit_of(name, self.units))}' for name, value in fields)})"
-
-    @property
-    def mean_pressure(self) -> Any:
-        """Mean pressure in the contact, F/A; NaN where there is none."""
-        with np.errstate(invalid="ignore"):
-            return self.pressure / self.area
 
 
 #: results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape

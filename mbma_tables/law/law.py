@@ -142,10 +142,6 @@ class ContactLaw(Law, Derived, Displayed):
         """Arguments that a method of `Law` does not evaluate itself."""
         return self._values((QUANTITIES[what],), mean_separation, separation)[0]
 
-    def __call__(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Numbers:
-        """Same as `pressure`."""
-        return self.pressure(mean_separation, separation=separation)
-
     def pressure_and_stiffness(
         self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
     ) -> tuple[Numbers, Numbers]:

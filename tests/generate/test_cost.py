@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from generate import cost, cost_distances, distances
-from generate.boundary_elements import studies
+from generate.boundary_elements.run import GRIDS
 from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
 from mbma_tables import contact
@@ -107,7 +107,7 @@ def test_points_of_theories_are_priced(monkeypatch):
 
 def test_grids_converge_and_are_told_by_contact():
     rows = {row.way: row for row in cost_distances.grid_rows()}
-    by_grid = [rows[f"{grid} x {grid}, cold"] for grid in studies.GRIDS]
+    by_grid = [rows[f"{grid} x {grid}, cold"] for grid in GRIDS]
     for name in ("force_light", "force_deep"):
         values = [getattr(row, name) for row in by_grid]
         assert values == sorted(values, reverse=True), name

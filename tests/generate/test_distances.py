@@ -12,7 +12,7 @@ from scipy.special import erf
 
 from generate import distances
 from generate.__main__ import main
-from generate.boundary_elements.studies import measured_maps
+from generate.boundary_elements.run import measured_maps
 from generate.files import ROOT
 from generate.pages import simulations
 from generate.theories_of_others import FORCES, Corrected

@@ -13,7 +13,7 @@ import scipy.special
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generate.classical import iterated, ring_matrix
+from generate.cost import iterated, ring_matrix
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, greenwood_tripp, height_integral
 
 PUBLISHED = pathlib.Path(__file__).parent.parent / "data" / "greenwood_tripp.csv"

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from scipy.special import erf
 
 from generate.boundary_elements.evidence import cases, evidence
-from generate.boundary_elements.run import surfaces
-from generate.boundary_elements.studies import LIGHT_BINS, compared
+from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.calibrated import errors
 from generate.files import dataset

@@ -1,8 +1,5 @@
 """Laws of machined maps, maps from files and spoilt maps, against boundary elements on the maps themselves."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from helpers import topographies
@@ -117,35 +114,19 @@ class TestDefaultTheory:
 topographies()
 
 
-def reference(name):
-    """A map that is too large to be shipped, and its boundary elements, which are."""
-    named = os.environ.get("MBMA_REFERENCE_MAPS")
-    places = [Path(named)] if named else [p / "shared/reference/maps" for p in Path(__file__).parents]
-    path = next((place / name for place in places if (place / name).is_file()), None)
-    if path is None:
-        pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
-    return path, read_rows()[name]
-
-
-def errors(name):
-    """Contact, ln of the law's area over the simulated one at equal force, and of force at equal separation."""
-    path, (force, area, u, _) = reference(name)
-    surface = Surface.from_map(path, **BARS[name])
-    by_force = contact(surface, pressure=force, theory="calibrated")
-    by_gap = contact(surface, mean_separation=u, theory="calibrated")
-    return area, by_force.area / area - 1, by_gap.pressure / force - 1
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BARS)
 def test_laws_of_maps_from_files(name):
-    area, by_force, by_gap = errors(name)
+    path, (force, area, u, _) = maps.path_of(name), read_rows()[name]
+    if path is None:
+        pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
+    by_force, by_gap = np.subtract(ratios(Calibrated(), Surface.from_map(path, **BARS[name]), force, area, u), 1)
     assert np.abs(by_gap[area >= 0.1]).max() < 0.10
     assert np.abs(by_gap[area >= 0.01]).max() < 0.30
     # of the force microscope's map 12% is not met below 0.9% contact
     assert np.abs(by_force[area >= (0.002 if name == "al3d-1.al3d" else 0.009)]).max() < 0.12
     assert np.abs(by_force[area >= 0.002]).max() < 0.21
-    surface = Surface.from_map(reference(name)[0])
+    surface = Surface.from_map(path)
     for theory in ("calibrated", "mbma"):
         found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)
         assert found.pressure > 0
@@ -194,16 +175,6 @@ POINTS, STEP = 256, 50.0
 LOADS = (0.0105, 0.02, 0.06, 0.15, 0.35)  # from 2% to 60% contact
 
 
-def clean(seed):
-    """A periodic map with a roll-off at four waves a side; eight points along its shortest wave."""
-    rng = np.random.default_rng(seed)
-    hurst = (0.5, 0.8, 0.6, 0.9, 0.7)[seed % 5]
-    k = np.hypot(np.fft.fftfreq(POINTS, 1 / POINTS)[:, None], np.arange(POINTS // 2 + 1))
-    amplitude = np.where((k > 0) & (k <= 32), np.maximum(k, 4) ** (-1 - hurst), 0)
-    heights = np.fft.irfft2(amplitude * np.fft.rfft2(rng.standard_normal((POINTS, POINTS))))
-    return heights / heights.std()
-
-
 def spoilt(heights, seed):
     """The same blurred, with noise, tilted, with holes and a bad pixel; no longer periodic."""
     rng = np.random.default_rng(1000 + seed)
@@ -221,7 +192,12 @@ def spoilt(heights, seed):
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.parametrize("seed", range(10))
 def test_a_spoilt_map_answers_as_the_clean_one(seed):
-    heights = clean(seed)
+    # a periodic map with a roll-off at four waves a side, eight points along its shortest wave
+    k = np.hypot(np.fft.fftfreq(POINTS, 1 / POINTS)[:, None], np.arange(POINTS // 2 + 1))
+    amplitude = np.where((k > 0) & (k <= 32), np.maximum(k, 4) ** (-1 - (0.5, 0.8, 0.6, 0.9, 0.7)[seed % 5]), 0)
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((POINTS, POINTS)))
+    heights = np.fft.irfft2(amplitude * noise)
+    heights /= heights.std()
     gradient = Surface.from_map(heights, STEP, periodic=True).rms_gradient
     force, (area, u, _) = Press(heights, (POINTS * STEP, POINTS * STEP), gradient).loads(
         gradient * np.array(LOADS), False
