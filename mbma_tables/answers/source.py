@@ -126,31 +126,26 @@ def reasons_against(
     steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
     measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.pressure), dtype=bool))
-    beyond = _beyond_metals(source, theory, surface, E_star, answer)
-    return {text: steep, **measured, **theory.reasons(surface, answer, u), **beyond}
-
-
-def _beyond_metals(
-    source: Source, theory: Theory, surface: AnySurface, E_star: FloatArray, answer: TheoryAnswer
-) -> dict[str, Any]:
-    """Elastic contacts with pressures that the named metals (without names: any metal) do not support."""
+    found = {text: steep, **measured, **theory.reasons(surface, answer, u)}
+    # elastic contacts with pressures that the named metals (without names: any metal) do not support
     stress, pair = source.units.stress, source.materials
     if stress in (None, "1") or (pair is None and source.stated):
-        return {}
+        return found
     unit = factor("GPa", stress, "stress")
     with np.errstate(invalid="ignore"):
         mean = E_star * answer.pressure / answer.area
     elastic = np.isinf(getattr(theory, "hardness", np.inf)) & (answer.pressure > 0)
     if pair is None:
         text = (
-            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, that of the hardest metal"
+            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, that of the hardest metal "
+            "in materials.METALS: give hardness= of the softer body, or infinity where it does not yield"
         )
-        mend = "give hardness= of the softer body, or infinity where it does not yield"
-        return {f"{text} in materials.METALS: {mend}": elastic & (mean > HARDEST * unit)}
+        return found | {text: elastic & (mean > HARDEST * unit)}
     soft, hard = pair.softer.hardness
     needed = f"'{soft:g} GPa'" if soft == hard else f" of its temper, '{soft:g} GPa' to '{hard:g} GPa'"
     yields = E_star * np.asarray(surface.rms_gradient) > ELASTIC_PSI * soft * unit
-    return {f"{pair.softer.name} yields here: give hardness={needed}": elastic & (yields | (mean > soft * unit))}
+    text = f"{pair.softer.name} yields here: give hardness={needed}"
+    return found | {text: elastic & (yields | (mean > soft * unit))}
 
 
 class LawPoint(collections.namedtuple("LawPoint", ("separation", "mean_separation", "area", "stiffness", "pressure"))):

@@ -7,20 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbma_tables import models
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import (
-    ISLAND_MODELS,
-    MAX_RTOL,
-    MIN_RTOL,
-    AnyModel,
-    GeometryModel,
-    IslandModel,
-    RigidModel,
-    exact_model,
-)
+from mbma_tables.models import AnyModel
 from mbma_tables.models.island4d import Island4dModel, to_axes
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.variants import Variant
@@ -74,19 +66,19 @@ def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> An
 
     A model made for one variant has the attribute `variant`.
     """
-    asked, model = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL), island_model
-    if isinstance(model, str) and model in ISLAND_MODELS:
+    asked, model = number_in("rtol", rtol, models.MIN_RTOL, models.MAX_RTOL), island_model
+    if isinstance(model, str) and model in models.ISLAND_MODELS:
         if model == "formula":
             from mbma_tables.models.closed_forms import FormulaModel
 
             return FormulaModel()
         if model in ("exact", "rigid"):
-            return RigidModel() if model == "rigid" else exact_model(asked)
+            return models.RigidModel() if model == "rigid" else models.exact_model(asked)
         model = open_table(model)
     if isinstance(model, type) or not (
-        isinstance(model, IslandModel | GeometryModel) and isinstance(getattr(model, "name", None), str)
+        isinstance(model, models.IslandModel | models.GeometryModel) and isinstance(getattr(model, "name", None), str)
     ):
-        known = f"one of {ISLAND_MODELS} or an object with a name and answer(X, mu)"
+        known = f"one of {models.ISLAND_MODELS} or an object with a name and answer(X, mu)"
         raise InputError(f"island_model must be {known}, got {island_model!r}")
     made_for = getattr(model, "variant", variant)
     if isinstance(made_for, Variant) and (made_for.density_divisor, made_for.summit_sigma) != (

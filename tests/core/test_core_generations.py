@@ -16,7 +16,6 @@ ROOT = pathlib.Path(__file__).parents[2]
 QUICK = [
     "core/test_calibrated_core.py",
     "islands/test_core_islands.py",
-    "tablefiles/test_splines.py",
 ]
 QUICK += [f"totals/test_{name}.py" for name in ("kernel", "law", "island_models")]
 MORE = ["islands/test_geometry.py", "models", "totals/test_contact.py"]
