@@ -223,10 +223,8 @@ def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, tail: bool, h
     training = [one for one in found if one.split == TRAINING]
     constants = _rounded(fit(training, tail))
     map_constants = MAP_CONSTANTS if tail else _rounded(fit_map(training, constants))
-    forms = {
-        "spectrum": told(found, lambda one: one.law(constants)),
-        "map": told(found, lambda one: one.map_law(constants, map_constants)),
-    }
+    forms = {"spectrum": told(found, lambda one: one.law(constants))}
+    forms["map"] = told(found, lambda one: one.map_law(constants, map_constants))
     by_map = forms["map"][forms["map"]["gaussian"]]
     of_map = summary(by_map[by_map["split"] == TRAINING])
     stated = {"calibrated": cross_validate(training), "calibrated_map": of_map}

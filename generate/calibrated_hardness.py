@@ -233,11 +233,9 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
     sets = {split: gaussian & (frames[0]["split"] == split) for split in SPLITS[:3]}
     sets |= {"three_waves": gaussian & late & (frames[0]["waves"] >= WAVES)}
     sets |= {"stretched": frames[0]["kind"] == "stretched"}
+    accuracy = np.array([[statistics(frame[kept]) for frame in frames] for kept in sets.values()])
     arrays = {
-        "accuracy": (
-            ("set", "form", "quantity", "statistic"),
-            np.array([[statistics(frame[kept]) for frame in frames] for kept in sets.values()]),
-        ),
+        "accuracy": (("set", "form", "quantity", "statistic"), accuracy),
         "stated_scatter": (("theory", "quantity", "hardness", "contact"), np.array([*scatter.rms.values()])),
         "elastic_weight": (("force_or_area", "hardness", "contact"), np.array([*scatter.weight.values()])),
         "eta": ("hardness", scatter.eta),

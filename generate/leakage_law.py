@@ -311,9 +311,7 @@ def write(path: pathlib.Path, evidence: pathlib.Path = FILE) -> xr.Dataset:
 
 @click.command()
 @click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE)
-@click.option(
-    "--table", type=click.Path(path_type=pathlib.Path, exists=True), default=TABLE, help="The library's file."
-)
+@click.option("--table", type=click.Path(path_type=pathlib.Path), default=TABLE, help="The library's file.")
 def leakage_law(evidence: pathlib.Path, table: pathlib.Path) -> None:
     """Fit the law of leakage to the training set of EVIDENCE, write it beside the calibrated law."""
     made = write(table, evidence)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -149,12 +149,7 @@ def sensitivity(
     here = np.exp(logarithms(np.zeros((len(varied), 1))))[:, 0]
     if not (here > 0).all():
         raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
-    # cut-offs only remove wavelengths; other parameters may be near a limit
-    ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": numbers.get("hardness", np.inf)}
-    ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
-    ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
-    sides = np.array([ways.get(name, 0.0) for name in varied])
-    how = {"order": 4, "maxiter": 3 if batches else 2, "initial_step": STEP, "step_direction": sides}
+    how = {"order": 4, "maxiter": 3 if batches else 2, "initial_step": STEP, "step_direction": _sides(varied, numbers)}
     with np.errstate(all="ignore"):
         steep = jacobian(logarithms, np.zeros(len(varied)), **how)
         # a discontinuous result has no slope
@@ -165,6 +160,14 @@ def sensitivity(
     )
     answers = dict(zip(wanted, here.tolist(), strict=True))
     return Sensitivity(by, {name: numbers[name] for name in varied}, answers, by_name, off, units)
+
+
+def _sides(varied: Sequence[str], numbers: Mapping[str, float]) -> FloatArray:
+    """Signs of one-sided steps, 0 for central ones: cut-offs only remove wavelengths, others may be near a limit."""
+    ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": numbers.get("hardness", np.inf)}
+    ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
+    ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
+    return np.array([ways.get(name, 0.0) for name in varied])
 
 
 def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
