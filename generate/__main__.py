@@ -16,6 +16,7 @@ COMMANDS = {
     **{name: f"generate.{name}" for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")},
     **dict.fromkeys(("boundary_elements", "gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.run"),
     **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
+    "edges": "generate.machined.edges",
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
     "rough_spheres": "generate.rough_spheres",

@@ -3,7 +3,6 @@
 import ast
 import collections
 import dataclasses
-import graphlib
 import itertools
 import math
 import re
@@ -30,6 +29,8 @@ from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.theories import THEORIES
 
+BOX = {"boxstyle": "square,pad=0.4", "facecolor": "#e8eef7", "edgecolor": "#4a6fa5"}
+RIGHT, SHARED = 0.83, {"common", "core"}  # edge of the boxes; what every room uses: no arrows
 SHOWN = ("self_affine", 0.7, 24.0, 5, 0.0)  # a held-out spectrum: kind, H, zeta_1, wavelengths a side, shape
 LOADS = np.geomspace(1e-4, 0.6, 60)  # F/(A0 E* g), g the rms gradient
 ROWS = {
@@ -51,8 +52,8 @@ LATEX = {
 }
 
 
-def rooms() -> tuple[dict[str, set[str]], dict[str, list[Any]]]:
-    """What each folder, or module at the top, imports of the others; and its title and lines."""
+def rooms() -> tuple[dict[str, set[str]], dict[str, str]]:
+    """What each folder, or module at the top, imports of the others, and what is written in its box."""
     graph: dict[str, set[str]] = collections.defaultdict(set)
     lines, titles = collections.Counter[str](), {}
     imports, files = import_graph(ROOT / "mbma_tables")
@@ -62,23 +63,30 @@ def rooms() -> tuple[dict[str, set[str]], dict[str, list[Any]]]:
         lines[room] += len(text.splitlines())
         graph[room] |= {other.split(".")[1] for other in others} - {room}
         if name.count(".") == 1:
-            titles[room] = (ast.get_docstring(ast.parse(text)) or "").split("\n")[0].rstrip(".")
+            titles[room] = (ast.get_docstring(ast.parse(text)) or "").split("\n")[0].rstrip(".").replace("`", "")
     del graph["__main__"]
     lines["core"] += sum(len(path.read_text().splitlines()) for path in (ROOT / "mbma_tables/core").glob("*.[ch]"))
-    return graph, {room: [titles[room], lines[room]] for room in graph}
+    return graph, {room: f"{room:<11}{titles[room]:<72}{lines[room]:>6,}" for room in graph}
 
 
 def architecture() -> Measured:
-    """The layers, from above, with what each imports but for what follows from others."""
+    """The rooms as boxes, with arrows to those that are imported, less those that follow from others."""
     graph, texts = rooms()
-    order, rows = list(graphlib.TopologicalSorter(graph).static_order()), []
-    below: dict[str, set[str]] = {}
-    for room in order:
-        implied = set[str]().union(*(below[other] for other in graph[room]))
-        below[room] = implied | graph[room]
-        direct = (other for other in reversed(order) if other in graph[room] - implied - {"common", "core"})
-        rows.append([f"`{room}`", *texts[room], ", ".join(f"`{other}`" for other in direct)])
-    return {"layers": table("layer | subject | lines | imports", reversed(rows), "{} | {} | {:,} | {}")}, {}
+    below = {room: set(others) for room, others in graph.items()}
+    for middle, room in itertools.product(graph, graph):
+        if middle in below[room]:
+            below[room] |= below[middle]
+    order = sorted(graph, key=lambda room: (len(below[room]), room))
+    figure, axes = panels(1, 1, (7.4, 7.2))
+    axes.set(xlim=(0, 1), ylim=(-0.6, len(order) - 0.4), position=(0, 0, 1, 1))
+    axes.axis("off")
+    for y, room in enumerate(order):
+        axes.text(0.01, y, texts[room], va="center", family="monospace", fontsize=8, bbox=BOX)
+        direct = graph[room] - set().union(*(below[other] for other in graph[room])) - SHARED
+        for down in map(order.index, sorted(direct)):
+            style = {"arrowstyle": "-|>", "color": "#555555", "connectionstyle": f"arc3,rad={-0.15 - 0.4 / (y - down)}"}
+            axes.annotate("", (RIGHT, down + 0.12), (RIGHT, y - 0.12), arrowprops=style)
+    return {}, {"docs/figures/architecture.svg": figure}
 
 
 def tables() -> Measured:

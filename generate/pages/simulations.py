@@ -191,11 +191,26 @@ def fidelity() -> Measured:
     return parts, {"docs/figures/fidelity.svg": by_contact()}
 
 
+def draw_data(tree: Any) -> Any:
+    figure, (left, middle, right) = panels(1, 3, (11, 3.6))
+    hard, elastic, leaky = (tree[name].to_dataset() for name in ("hardness", "elastic", "leakage"))
+    style: dict[str, Any] = {"ms": 1.5, "alpha": 0.5, "rasterized": True}
+    for row in range(hard.sizes["hardness"]):
+        of = hard.isel(hardness=row)
+        left.loglog(of.force.values.ravel(), of.area.values.ravel(), ".", color=str(0.8 - 0.13 * row), **style)
+    middle.semilogy(elastic.mean_separation.values.ravel(), elastic.force.values.ravel(), ".", color="C0", **style)
+    right.semilogy(leaky.area.values.ravel(), leaky.flow.max("axis").values.ravel(), ".", color="C2", **style)
+    left.set(xlabel="pressure F/(A0 E* g)", ylabel="contact area A/A0")
+    middle.set(xlabel="mean gap u/h_rms", ylabel="pressure F/(A0 E* g)", xlim=(0, 5))
+    right.set(xlabel="contact area A/A0", ylabel="flow coefficient/h_rms³", ylim=(1e-6, 100), xlim=(0, 0.5))
+    return figure
+
+
 def data() -> Measured:
-    rows = []
-    for name, group in boundary_elements().children.items():
+    tree, rows = boundary_elements(), []
+    for name, group in tree.children.items():
         own = group.to_dataset()
         of = own.to_dataframe() if "contact" in own.dims else None
         count = own.sizes["surface"] if of is None else of.groupby([*of.columns[: of.columns.get_loc("force")]]).ngroups
         rows.append([f"`{name}`", own.attrs["title"], count, int(np.isfinite(own.area).sum())])
-    return {"groups": table("group | content | surfaces | contacts", rows)}, {}
+    return {"groups": table("group | content | surfaces | contacts", rows)}, {"docs/figures/data.svg": draw_data(tree)}

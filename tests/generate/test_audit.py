@@ -1,5 +1,9 @@
-"""The audit finds what is wrong, and nothing in what it was run on."""
+"""The audit finds what is wrong, and nothing in what it was run on; workers of a generator end with it."""
 
+import os
+import signal
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -30,3 +34,23 @@ def test_untested_answers_and_bad_failures_are_found(monkeypatch):
     warning, error, hang = audit.failures(1, 1e-3)
     assert all("1 / 0" not in each.where and each.beyond == 2 for each in (warning, error, hang))
     assert audit.validity(3, 0.02)[0].beyond == 0
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc"), reason="needs /proc")
+def test_workers_end_with_a_killed_parent():
+    code = (
+        "import os, time\n"
+        "from generate.workers import results\n"
+        "if __name__ == '__main__':\n"
+        "    for found in results('', os.getpid, [(), ()], 2):\n"
+        "        print(found, flush=True)\n"
+        "        time.sleep(60)\n"
+    )
+    command = [sys.executable, "-W", "ignore", "-c", code]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as parent:
+        worker = int(parent.stdout.readline())
+        parent.send_signal(signal.SIGKILL)
+    end = time.monotonic() + 20
+    while os.path.isdir(f"/proc/{worker}") and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not os.path.isdir(f"/proc/{worker}")
