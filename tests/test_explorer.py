@@ -123,6 +123,7 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
             by_table(surface, depth / surface.h_rms, np.arange(answered.size), how.model, how, sums)
             stress = state["E_star"] * surface.q0 * surface.s
             force, area, stiffness = stress * sums[0], sums[1], 2 * stress / surface.h_rms * sums[2]
+            area = -np.expm1(-area) if state["variant"] == "fitted" else area  # the cover of its islands
         for name, values in {"pressure": force, "area": area, "stiffness": stiffness}.items():
             worst = max(worst, np.abs(known[name][answered] / values - 1).max())
         conductance = 50 / 1e-3 / state["E_star"] * found[f"{theory} stiffness"]  # of 50 W/(m K), lengths in mm
