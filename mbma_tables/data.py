@@ -1,4 +1,4 @@
-"""The boundary-element (BEM) simulations that the laws were fitted to and tested on."""
+"""The boundary-element (BEM) simulations that laws were fitted to and tested on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The compiled core: all loops of the library, in C; exports contain the same files.
+"""The compiled core: all loops of the library, in C, as exports contain it.
 
 `core` is the module of the newest generation of processor that this machine supports; the environment variable
 MBMA_TABLES_CORE names another one, such as "x86_64_v3". `mbma.h` describes the functions; arguments of the wrappers are

@@ -1,4 +1,4 @@
-"""Island models: force, area and error of an island at (X, mu); totals accept any, by name or as an object."""
+"""Island models: force, area and error of an island at (X, mu), by name or as an object."""
 
 import dataclasses
 from collections.abc import Mapping
