@@ -47,7 +47,7 @@ def exported(rng: np.random.Generator) -> None:
     taken = rounds(
         {
             "islands": lambda: model.answer(X, mu),
-            "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, 0, at(islands), None),
+            "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, at(islands), None),
             "totals": lambda: contact(surfaces, separation=apart, rtol=RTOL),
             "C totals": lambda: library.mbma_totals(
                 many, *map(at, known), share, variant, table, at(sums), at(bound), at(status), ctypes.byref(seen)
