@@ -46,7 +46,7 @@ held = basis.get_dofs(lambda x: (x[0] == WIDTH / 2) & (x[1] == HEIGHT)).all("u^1
 
 moved = basis.zeros()
 for turn in range(40):
-    separation = law.h_max + bottom.interpolate(moved).value[1]
+    separation = law.h_max + bottom.interpolate(moved)[1]
     pressure, stiffness = trial.pressure_and_stiffness(separation)
     residual = load + contact_force.assemble(bottom, pressure=pressure) - elastic @ moved
     residual[held] = 0.0
