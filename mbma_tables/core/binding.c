@@ -1,7 +1,7 @@
 /* The core as a Python module (stable ABI of CPython 3.11): buffers in, numbers out, the interpreter lock released.
  *
  * The same sources are compiled for each generation of processor, as modules of different names; `core/__init__.py`
- * imports the best one that the processor can run. Sizes are checked here, values in the core.
+ * imports the best one that the processor can run. Sizes are checked as `calls.h` states, values in the core.
  */
 #if defined(__x86_64__) || defined(_M_X64)
 #include <cpuid.h>

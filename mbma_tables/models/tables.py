@@ -1,4 +1,4 @@
-"""Opening tables: the shipped ones by kind, once per process, others from their file; verification of their results."""
+"""Island models by name; the shipped tables by kind, others from their file; verification of their results."""
 
 import functools
 import os
