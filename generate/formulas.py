@@ -1,6 +1,6 @@
 """`python -m generate formulas`: fit the coefficients of the closed forms again, certify them on other samples.
 
-`models/closed_forms.h` is the one place where the forms are kept; its expressions are read as Python. docs/formula.md
+`models/closed_forms.toml` is the one place where the forms are kept; its expressions are Python and C. docs/formula.md
 says how the terms were chosen. Samples are rounded, so that the same coefficients come out on all processors.
 
 With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X, mu)), right as
@@ -18,7 +18,7 @@ import itertools
 import math
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import click
@@ -31,9 +31,9 @@ from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import Certificate
 from mbma_tables.models.closed_form_certificates import RANGES
-from mbma_tables.models.closed_forms import DEFINITION, Function, Steps, evaluate, read_functions
+from mbma_tables.models.closed_forms import FUNCTIONS, Function, Steps, evaluate
 
-HEADER = ROOT / "mbma_tables" / "models" / "closed_forms.h"
+FORMS = ROOT / "mbma_tables" / "models" / "closed_forms.toml"
 MODULE = ROOT / "mbma_tables" / "models" / "closed_form_certificates.py"
 NUMBER = re.compile(r"\d[\d.]*(?:e-?\d+)?")
 WIDTH = 120
@@ -65,17 +65,24 @@ TOTAL_SEED, TOTAL_HELD_OUT_SEED = 41, 42
 Samples = tuple[dict[str, FloatArray], dict[str, FloatArray]]  # arguments and results
 
 
-def header_text(header: str, functions: Mapping[str, Function]) -> str:
+def forms_text(text: str, functions: Mapping[str, Mapping[str, Function]]) -> str:
+    """The file of the closed forms, below its opening comment."""
 
-    def written(match: re.Match[str]) -> str:
-        function = functions[match[2]]
-        lines = [f"/* {function.title} */", f"double mbma_{function.name}({match[5]}) {{"]
-        for name, text in function.steps.items():
-            left = "return" if name == function.result else f"const double {name} ="
-            lines += textwrap.wrap(f"{left} {text};", WIDTH, initial_indent="    ", subsequent_indent="        ")
-        return "\n".join([*lines, "}\n"])
+    def block(name: str, steps: Iterable[tuple[str, str]]) -> list[str]:
+        lines = (textwrap.wrap(f"{step} = {value}", WIDTH, subsequent_indent="    ") for step, value in steps)
+        return [f'{name} = """', *itertools.chain.from_iterable(lines), '"""']
 
-    return DEFINITION.sub(written, header)
+    lines = [text.partition("\n\n")[0]]
+    for form, results in functions.items():
+        # steps with which all functions of a form begin are written once
+        every = zip(*(one.steps.items() for one in results.values()), strict=False)
+        shared = [first for first, *others in itertools.takewhile(lambda row: len({*row}) == 1, every)]
+        arguments = ", ".join(f'"{name}"' for name in next(iter(results.values())).arguments)
+        lines += ["", f"[{form}]", f"arguments = [{arguments}]", *block("shared", shared)]
+        for result, one in results.items():
+            own = [*one.steps.items()][len(shared) :]
+            lines += ["", f"[{form}.{result}]", f'title = "{one.title}"', *block("steps", own)]
+    return "\n".join([*lines, ""])
 
 
 def module_text(certificates: Mapping[str, Mapping[str, Certificate]]) -> str:
@@ -290,13 +297,12 @@ def certified(function: Function) -> tuple[Function, Certificate]:
 
 @click.command()
 def formulas() -> None:
-    """Fit and certify the closed forms; write their C and the Python module of their certificates (a minute)."""
-    header, fitted = HEADER.read_text(encoding="utf-8"), dict[str, Function]()
+    """Fit and certify the closed forms; write them and the Python module of their certificates (a minute)."""
+    fitted: dict[str, dict[str, Function]] = {form: {} for form in RANGES}
     certificates: dict[str, dict[str, Certificate]] = {form: {} for form in RANGES}
-    for name, function in read_functions(header).items():
-        fitted[name], one = certified(function)
-        certificates[function.form][function.result] = one
-        click.echo(f"{name}: largest held-out error {one.largest:.2e}")
-    write_file(HEADER, header_text(header, fitted).encode())
+    for form, result in ((form, result) for form, results in FUNCTIONS.items() for result in results):
+        fitted[form][result], certificates[form][result] = certified(FUNCTIONS[form][result])
+        click.echo(f"{form} {result}: largest held-out error {certificates[form][result].largest:.2e}")
+    write_file(FORMS, forms_text(FORMS.read_text(encoding="utf-8"), fitted).encode())
     write_file(MODULE, module_text(certificates).encode())
     click.echo(MODULE)

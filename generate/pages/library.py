@@ -17,12 +17,11 @@ from benchmarks.import_circles import import_graph
 from generate.boundary_elements.evidence import evidence
 from generate.distances import pocket_errors
 from generate.files import ROOT
-from generate.formulas import HEADER
 from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
-from mbma_tables.models.closed_forms import Function, read_functions
+from mbma_tables.models.closed_forms import FUNCTIONS, Function
 from mbma_tables.models.tables import shipped
 from mbma_tables.scenes.plan import shipped_costs, shipped_distances
 from mbma_tables.tablefiles.netcdf import read_table
@@ -152,10 +151,9 @@ def formula() -> Measured:
         f"- {form}: {', '.join(f'`{low:g} <= {name} <= {high:g}`' for name, (low, high) in limits.items())}"
         for form, limits in RANGES.items()
     )
-    functions = read_functions(HEADER.read_text(encoding="utf-8")).values()
     for form in ("pocket", "standard", "totals"):
         # steps that functions of a form share are printed once
-        steps = dict.fromkeys(line for function in functions if function.form == form for line in latex_steps(function))
+        steps = dict.fromkeys(line for function in FUNCTIONS[form].values() for line in latex_steps(function))
         parts[form] = "\n\n".join(f"$${line}$$" for line in steps)
     return parts, {}
 

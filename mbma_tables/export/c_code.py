@@ -26,7 +26,7 @@ from mbma_tables.export.targets import Target
 from mbma_tables.export.text import braces, core_file, filled, numerals, opening, written_by
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
-from mbma_tables.models.closed_forms import SOURCE
+from mbma_tables.models.closed_forms import FUNCTIONS
 from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
@@ -85,10 +85,10 @@ def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
     """The calls of one surface, under the opening comments of their files."""
     form, certificates = RANGES[FORM], CERTIFICATES[FORM]
-    _, prototypes, _, forms = SOURCE.split("\n\n", 3)
+    prototypes, forms = closed_forms()
     parts = {
-        "PROTOTYPES": f"{prototypes}\n",
-        "CLOSED_FORMS": re.sub(r"(\d)e0\b", r"\1.0", forms),
+        "PROTOTYPES": prototypes,
+        "CLOSED_FORMS": forms,
         "FORM_X_LOW": repr(form["X"][0]),
         "FORM_X_HIGH": repr(form["X"][1]),
         "FORM_MU_HIGH": repr(form["mu"][1]),
@@ -101,6 +101,20 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
         "PERSSON_ERROR": repr(persson.INVERSE_RTOL),
     }
     return {name: filled(name, **parts, HEADER=heads[name]) for name in ("mbma_model.h", "mbma_model.c")}
+
+
+def closed_forms() -> tuple[str, str]:
+    """Prototypes and definitions of the closed forms."""
+    prototypes, lines = "", list[str]()
+    for one in (one for results in FUNCTIONS.values() for one in results.values()):
+        head = f"double mbma_{one.form}_{one.result}({', '.join(f'double {name}' for name in one.arguments)})"
+        prototypes += f"{head};\n"
+        lines += [f"/* {one.title} */", f"{head} {{"]
+        for name, text in one.steps.items():
+            left = "return" if name == one.result else f"const double {name} ="
+            lines += textwrap.wrap(f"{left} {text};", 120, initial_indent="    ", subsequent_indent="        ")
+        lines += ["}", ""]
+    return prototypes, re.sub(r"(\d)e0\b", r"\1.0", "\n".join(lines))
 
 
 def tables(model: UniversalModel) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Ranges of the closed forms, and their certificates; the forms are in `closed_forms.h`.
+"""Ranges of the closed forms, and their certificates; the forms are in `closed_forms.toml`.
 
 Made by `python -m generate formulas`; do not edit.
 """

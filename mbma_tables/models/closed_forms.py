@@ -1,9 +1,10 @@
-"""Closed forms of `closed_forms.h` (docs/formula.md): the island model "formula", and total force and area."""
+"""Closed forms of `closed_forms.toml` (docs/formula.md): the island model "formula", and total force and area."""
 
 import dataclasses
 import functools
 import pathlib
 import re
+import tomllib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -19,8 +20,6 @@ from mbma_tables.surfaces.surface import Surface
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
-SOURCE = pathlib.Path(__file__).with_suffix(".h").read_text(encoding="utf-8")
-DEFINITION = re.compile(r"/\* ([^\n]*) \*/\ndouble mbma_((\w+?)_(\w+))\(([^\n]*)\) \{\n(.*?)\n\}\n", re.DOTALL)
 NAMES = {"exp": np.exp, "log": np.log, "sqrt": np.sqrt, "where": np.where, "pow": lambda a, b: a**b}
 Steps = Mapping[str, str]
 
@@ -35,27 +34,29 @@ class Function:
     title: str
     steps: Steps
 
-    @property
-    def name(self) -> str:
-        """Of the function in C, without its prefix."""
-        return f"{self.form}_{self.result}"
-
     def __call__(self, *given: Any) -> Any:
         """Of arrays, which broadcast."""
         return evaluate(self.steps, dict(zip(self.arguments, given, strict=True)))[self.result]
 
 
-def read_functions(header: str) -> dict[str, Function]:
-    """The functions of a header's text by name."""
-    found = {}
-    for title, name, form, result, given, body in DEFINITION.findall(header):
-        lines = (line.split() for line in body.replace("return", f"const double {result} =").split(";"))
-        steps = {words[2]: " ".join(words[4:]) for words in lines if words}
-        found[name] = Function(form, result, tuple(given.replace("double ", "").split(", ")), title, steps)
+def read_functions(text: str) -> dict[str, dict[str, Function]]:
+    """The functions of a file's text by form and result."""
+
+    def steps(lines: str) -> dict[str, str]:
+        """Of lines, of which indented ones continue the one before."""
+        return dict(line.split(" = ", 1) for line in re.sub(r"\n +", " ", lines).splitlines())
+
+    found: dict[str, dict[str, Function]] = {}
+    for form, own in tomllib.loads(text).items():
+        arguments, shared = tuple(own.pop("arguments")), steps(own.pop("shared"))
+        found[form] = {
+            result: Function(form, result, arguments, one["title"], shared | steps(one["steps"]))
+            for result, one in own.items()
+        }
     return found
 
 
-_compiled = functools.cache(lambda text: compile(text, "closed_forms.h", "eval"))
+_compiled = functools.cache(lambda text: compile(text, "closed_forms.toml", "eval"))
 
 
 def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
@@ -73,9 +74,7 @@ def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
     return names
 
 
-FUNCTIONS: dict[str, dict[str, Function]] = {form: {} for form in CERTIFICATES}
-for _one in read_functions(SOURCE).values():
-    FUNCTIONS[_one.form][_one.result] = _one
+FUNCTIONS = read_functions(pathlib.Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
 class FormulaModel(Ranged):
