@@ -4,13 +4,18 @@ python benchmarks/request.py
 """
 
 import itertools
+import os
 import sys
 from collections import Counter
 from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
+import mbma_tables
 from mbma_tables import Surface, contact, contact_law
+
+# with the separator at its end; the folder around it, or an environment in that, may have the library's name too
+PACKAGE = os.path.join(os.path.dirname(os.path.abspath(mbma_tables.__file__)), "")
 
 
 def traced(request: Callable[[], Any]) -> tuple[int, int, Counter[str]]:
@@ -19,8 +24,8 @@ def traced(request: Callable[[], Any]) -> tuple[int, int, Counter[str]]:
 
     def note(frame: FrameType, event: str, _: object) -> None:
         name = frame.f_code.co_filename
-        if event == "call" and "mbma_tables" in name:
-            places.append(f"{name.rpartition('mbma_tables/')[2]}:{frame.f_code.co_qualname}")
+        if event == "call" and name.startswith(PACKAGE):
+            places.append(f"{name.removeprefix(PACKAGE)}:{frame.f_code.co_qualname}")
 
     request()
     request()

@@ -14,6 +14,27 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # simulations are not kept between tests
 os.environ["MBMA_TABLES_CACHE"] = "off"
 
+# tests and files that skipped, for want of a package or a program; CI runs them again where these are installed
+skipped = []
+
+
+def pytest_runtest_logreport(report):
+    if report.skipped:
+        skipped.append(report.nodeid)
+
+
+def pytest_collectreport(report):
+    if report.skipped:
+        skipped.append(report.nodeid)
+
+
+def pytest_sessionfinish(session):
+    path = os.environ.get("MBMA_SKIPPED")
+    # a parallel worker has a part of them
+    if path and not hasattr(session.config, "workerinput"):
+        with open(path, "w", encoding="utf-8") as file:
+            file.writelines(f"{name}\n" for name in sorted(set(skipped)))
+
 
 @pytest.fixture(scope="session")
 def generations():

@@ -219,6 +219,8 @@ def test_getdp_interpolates(options, tmp_path):
 
 @pytest.mark.parametrize("name", DATA)
 def test_data_of_a_film_come_back(name, tmp_path):
+    if name == "parquet":
+        pytest.importorskip("pyarrow")
     film = rows_of(**FILM)
     path = tmp_path / "film"
     path.write_bytes(getattr(data, f"to_{name}")(film))

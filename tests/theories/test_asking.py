@@ -3,6 +3,7 @@
 import dataclasses
 import pathlib
 import re
+import runpy
 import subprocess
 import sys
 
@@ -15,6 +16,7 @@ import xarray as xr
 from dask.callbacks import Callback
 from helpers import fresh, refusals
 
+import mbma_tables
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law, island
 from mbma_tables.common.files import shipped_file
 from mbma_tables.theories import THEORIES, Mbma, get_theory
@@ -188,6 +190,17 @@ def test_a_request_takes_few_calls_in_few_files():
         calls, files = re.search(r"(\d+) calls .* (\d+) files", row).groups()
         assert int(calls) <= 90
         assert int(files) <= 9
+
+
+def test_calls_of_other_packages_do_not_count_wherever_they_lie():
+    """A clone in a folder of the library's name has numpy below a path with that name too."""
+    source = "def average():\n    return sum(map(float, (1, 2)))\n"
+    beside = pathlib.Path(mbma_tables.__file__).parent.with_name("mbma_tables.venv")
+    names = {}
+    exec(compile(source, str(beside / "mbma_tables" / "numpy.py"), "exec"), names)
+    traced = runpy.run_path(str(ROOT / "benchmarks" / "request.py"))["traced"]
+    assert traced(names["average"])[0] == 0
+    assert traced(SURFACE.__repr__)[0] > 0
 
 
 @each
