@@ -1,5 +1,6 @@
 """The documentation: its code runs, its measured parts are the generator's, and what it names exists."""
 
+import ast
 import doctest
 import importlib
 import math
@@ -88,13 +89,32 @@ def test_links_and_figures_of_pages_exist():
     assert links > 100
 
 
+def functions_of(path):
+    """Names of tests of a file: functions, and rows that a function of helpers.py made a test of."""
+    names = set()
+    for node in ast.parse((ROOT / path).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Assign):
+            names |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+    return names
+
+
 def test_every_named_test_exists():
-    named = set(re.findall(r"`(tests/[a-z0-9_/]+(?:\.py)?)`", "".join(PAGES.values())))
-    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+    named = set(re.findall(r"`(tests/[a-z0-9_/]+(?:\.py)?)(?:::(\w+))?`", "".join(PAGES.values())))
+    assert [path for path, _ in sorted(named) if not (ROOT / path).exists()] == []
+    with_function = sorted(pair for pair in named if pair[1])
+    assert len(with_function) > 40
+    assert [pair for pair in with_function if pair[1] not in functions_of(pair[0])] == []
+
+
+def test_each_guarantee_names_the_tests_that_would_fail_without_it():
     promises = MARKED.sub("", PAGES["guarantees.md"])
     rows = [row for row in promises.splitlines() if re.match(r"\| (?!---|promise)", row)]
     assert len(rows) > 15
-    assert [row for row in rows if "`tests/" not in row] == []
+    test_of_a_file = r"`tests/[a-z0-9_/]+\.py::test_\w+`"
+    tests = rf"{test_of_a_file}(, {test_of_a_file})*"
+    assert [row for row in rows if not re.fullmatch(rf"\| .+ \| {tests} \|", row)] == []
 
 
 def test_every_module_of_the_architecture_exists():
