@@ -28,6 +28,7 @@ from mbma_tables.law.leakage import LeakageLaw
 
 # steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep
 VALUES, SLOPES, FLAT = 2e-14, 4e-13, 1e-4
+MOST_DECIMALS = 400  # more than any double has: coefficients stay as they are
 
 
 def flow_numbers(leakage: LeakageLaw) -> dict[str, Any]:
@@ -104,19 +105,30 @@ def _lines(rows: FloatArray, begin: str, end: str) -> str:
     return "\n".join(f"{begin}{', '.join(map(repr, row))}{end}" for row in rows.tolist())
 
 
-def _step(row: FloatArray) -> float:
-    """The step in which coefficients are written: values are then right to 1e-13, slopes to about 1e-11."""
-    values, slopes = (polyval([-1, 0, 1], a) for a in (row, polyder(row)))
-    value = float(np.abs(values).min())
+def _decimal_places(row: FloatArray) -> int:
+    """Decimals with which coefficients are written: values are then right to 1e-13, slopes to about 1e-11."""
+    values = polyval([-1, 0, 1], row)
+    slopes = polyval([-1, 0, 1], polyder(row))
+    least_value = float(np.abs(values).min())
+    if least_value == 0:
+        return MOST_DECIMALS
+    # by logarithms: a pressure may be so small that the step itself is below the smallest double
+    log_value = math.log10(least_value)
+    log_slope = math.log10(FLAT) + log_value
     # about a maximum slopes are small, though not at the ends
-    slope = float(np.abs(slopes).min()) if slopes.min() * slopes.max() > 0 else 0.0
-    return min(VALUES * value, SLOPES * max(slope, FLAT * value))
+    if (slopes > 0).all() or (slopes < 0).all():
+        log_slope = max(math.log10(np.abs(slopes).min()), log_slope)
+    log_step = min(math.log10(VALUES) + log_value, math.log10(SLOPES) + log_slope)
+    return min(-math.floor(log_step), MOST_DECIMALS)
 
 
 def _decimals(rows: FloatArray) -> FloatArray:
     """Coefficients in decimal steps."""
-    places = [-math.floor(math.log10(_step(row))) for row in rows]
-    return np.array([[round(value, k) for value in row.tolist()] for row, k in zip(rows, places, strict=True)])
+    written = []
+    for row in rows:
+        places = _decimal_places(row)
+        written.append([round(coefficient, places) for coefficient in row.tolist()])
+    return np.array(written)
 
 
 class Language(NamedTuple):

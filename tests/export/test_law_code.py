@@ -16,10 +16,10 @@ import pytest
 from helpers import compiled_law, refusals
 from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 
-from mbma_tables import Surface, contact_law
+from mbma_tables import Surface, contact, contact_law
 from mbma_tables.core import core
 from mbma_tables.export import LAWS
-from mbma_tables.export.law_code import core_text, law_files, law_text
+from mbma_tables.export.law_code import asked_law, core_text, law_files, law_text, text_of
 from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.text import core_file
 
@@ -237,6 +237,39 @@ def test_python(name, tmp_path):
     if name == "calibrated":  # numpy is all that it needs
         code = "import sys, road; print(sorted({'scipy', 'numba', 'mbma_tables'} & sys.modules.keys()))"
         assert run(sys.executable, "-c", code, folder=tmp_path) == "[]\n"
+
+
+def random_faces(count, seed):
+    """Surfaces of any size, whose h_max is a dyadic number times h_rms."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        q0, h_rms = 10.0 ** rng.uniform(-4, 4), 2.0 ** rng.integers(-8, 8)
+        q1, h_max = q0 * 10 ** rng.uniform(0.6, 6), h_rms * rng.integers(20, 48) / 8
+        yield Surface(rng.uniform(0.1, 1.0), q0, q1, h_rms, h_max, unit="um")
+
+
+OF_POLYNOMIALS = ("python-law", "jax-law", "matlab-law", "modelica-law")
+
+
+@pytest.mark.slow
+def test_laws_of_any_modulus_are_written():
+    """A pressure near the smallest double is a number like any other, in each of the languages of polynomials."""
+    rng = np.random.default_rng(53)
+    for surface in random_faces(5, 53):
+        modulus = 10.0 ** rng.uniform(-300, 3)
+        made = asked_law(surface, modulus, theory="greenwood_williamson", stress_unit="GPa")
+        texts = {target: text_of(target, made) for target in OF_POLYNOMIALS}
+        road = types.ModuleType("road")
+        exec(texts["python-law"], road.__dict__)
+        c = surface.h_max * np.arange(1, 64) / 64
+        known = contact(
+            surface,
+            mean_separation=surface.h_max - c,
+            E_star=modulus,
+            theory="greenwood_williamson",
+        )
+        # doubles near the smallest one have fewer digits, in the polynomials too
+        np.testing.assert_allclose(road.pressure(c), known.pressure, rtol=1e-7, atol=1e-290)
 
 
 JAX = """
