@@ -30,7 +30,7 @@ TEMPERS = ("soft", "hard")
 # mikipulley.co.jp/EN/Services/Tech_data/tech20.html
 HRC = (20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 68.0)
 HV_OF_HRC = (238.0, 266.0, 302.0, 345.0, 392.0, 446.0, 513.0, 595.0, 697.0, 832.0, 940.0)
-_SCALE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC)\s*")
+_SCALE = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(HV|HRC)\s*", re.ASCII)
 
 
 def _poisson(name: str, value: ArrayLike) -> FloatArray:
@@ -215,7 +215,7 @@ def hardness(given: str) -> str:
     """
     text = str(given)
     if found := _SCALE.fullmatch(text):
-        number, scale = np.asarray(float(found[1])), found[2]
+        number, scale = finite_array("hardness", float(found[1])), found[2]
         if scale == "HRC":
             good = (number >= HRC[0]) & (number <= HRC[-1])
             require("hardness [HRC]", number, good, f"from {HRC[0]:g} to {HRC[-1]:g}, where the scale is converted")

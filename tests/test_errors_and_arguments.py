@@ -196,3 +196,28 @@ def test_public_names_are_there_and_others_are_not():
         _ = mbma_tables.contacts
     with pytest.raises(TypeError, match="takes 1 positional argument"):
         contact(ROAD, 1.0)
+
+
+ROAD = Surface.named("concrete")
+test_odd_input_has_a_typed_error = refusals(
+    lambda ask: ask(),
+    (
+        lambda: contact(ROAD, pressure=0.1, E_star=13.0, theory="calibrated", hardness=[[1, 2], [3]]),
+        "hardness must be real numbers",
+    ),
+    (lambda: mbma_tables.Scene(3), "surface must be a Surface, got 3"),
+    (lambda: mbma_tables.Scene("concrete"), r"a named one is Surface\.named"),
+    (lambda: mbma_tables.Scene(None), "surface must be a Surface, got None"),
+    (lambda: open_table(np.zeros(3)), "a table must be 'universal', 'island4d' or the path of a file"),
+    (lambda: open_table(3), "the path of a file, got 3"),
+)
+test_a_number_too_large_for_a_double_is_not_infinity = refusals(
+    lambda hardness: contact(
+        ROAD, pressure="1 kPa", E_star="13 MPa", theory="calibrated", hardness=hardness
+    ),
+    ("1e400", "hardness = '1e400' is above the largest number"),
+    ("1e400 GPa", "hardness = '1e400 GPa' is above the largest number"),
+    ("1e306 GPa", "above the largest number of 64 bits in MPa"),
+    ("1e400 HV", "hardness must be finite"),
+    ("1.2.3 HV", "no known unit of stress"),
+)

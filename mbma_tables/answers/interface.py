@@ -22,6 +22,63 @@ DIRECTIONS = ("along", "across")
 ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
 
 
+def _pressure_at(theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray) -> tuple[Any]:
+    return (E_star * theory.answer(surface, u).pressure,)
+
+
+def _energy_at(theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray) -> tuple[Any]:
+    return (E_star * theory.energy(surface, u),)
+
+
+def _separation_at(
+    theory: Any, surface: AnySurface, _: FloatArray, E_star: FloatArray, pressure: FloatArray
+) -> tuple[Any]:
+    return (theory.mean_separation_at(surface, "pressure", pressure / E_star),)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class NormalOfContact:
+    """Normal contact of the bodies of a `Contact` at other gaps, from which its partial slip follows."""
+
+    source: Any  # of the contact
+    contact: Any
+
+    def pressure(self, mean_separation: Any) -> Any:
+        """Pressure at mean separations."""
+        return self._at(_pressure_at, mean_separation)
+
+    def energy(self, mean_separation: Any) -> Any:
+        """Elastic energy per nominal area at mean separations."""
+        return self._at(_energy_at, mean_separation)
+
+    def separation(self, pressure: Any) -> Any:
+        """Mean separation at pressures."""
+        return self.source.map(_separation_at, self.contact, 1, {"pressure": pressure})[0]
+
+    def _at(self, function: Callable[..., tuple[Any]], mean_separation: Any) -> Any:
+        moved = dataclasses.replace(self.contact, mean_separation=mean_separation)
+        return self.source.map(function, moved, 1)[0]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class NormalOfLaw:
+    """The same of a `ContactLaw`."""
+
+    law: Any
+
+    def pressure(self, mean_separation: Any) -> Any:
+        """Pressure at mean separations."""
+        return self.law.pressure(mean_separation)
+
+    def energy(self, mean_separation: Any) -> Any:
+        """Elastic energy per nominal area at mean separations."""
+        return self.law.energy(mean_separation)
+
+    def separation(self, pressure: Any) -> Any:
+        """Mean separation at pressures."""
+        return self.law.at_pressure(pressure).mean_separation
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tangential:
     """A contact under shear at constant normal pressure, made by `tangential` of contacts and laws, in their units.
@@ -45,8 +102,8 @@ class Tangential:
     stiffness: Numbers  #: k_t of full stick, d(tau)/d(delta) [stress/length]
     last: Any  # mean separation of last contact, infinite where the theory has none
     units: Units
-    # pressure and energy at mean separations, these at pressures; or why slip is not known
-    _normal: tuple[Callable[[Any], Any], Callable[[Any], Any], Callable[[Any], Any]] | str
+    # or why slip is not known
+    _normal: NormalOfContact | NormalOfLaw | str = dataclasses.field(repr=False)
 
     def __post_init__(self) -> None:
         if self.friction is not None:
@@ -55,8 +112,9 @@ class Tangential:
     @property
     def gross_slip(self) -> Numbers:
         """Tangential displacement at which the whole contact slips [length], f kappa (h_max - u)."""
-        found: Numbers = self._known()[3] * (self.last - self.mean_separation)
-        return found
+        _, friction = self._slipping()
+        displacement: Numbers = friction * self.ratio * (self.last - self.mean_separation)
+        return displacement
 
     def shear(self, displacement: ArrayLike | str) -> Numbers:
         """Shear stress F_t/A0 at a tangential displacement from rest [stress]; f p from `gross_slip` on.
@@ -66,29 +124,32 @@ class Tangential:
         InputError, OutOfRangeError
             Without a friction, with a hardness, and for negative displacements.
         """
-        normal, _, _, scale = self._known()
+        normal, friction = self._slipping()
         delta = self._checked("displacement", displacement)
-        found: Numbers = self.friction * (self.pressure - normal(self._moved(delta / scale)))
-        return found
+        apart = self._moved(delta / (friction * self.ratio))
+        shear: Numbers = friction * (self.pressure - normal.pressure(apart))
+        return shear
 
     def displacement(self, shear: ArrayLike | str) -> Numbers:
         """Tangential displacement at a shear stress of at most f p [length]; `gross_slip` at f p."""
-        _, _, inverse, scale = self._known()
+        normal, friction = self._slipping()
         tau = self._checked("shear", shear)
-        left = self.pressure - tau / self.friction
+        left = self.pressure - tau / friction
         if not is_labelled(left):
             left = np.where(np.abs(left) <= 4 * np.finfo(float).eps * np.asarray(self.pressure), 0.0, left)
             require("shear", np.broadcast_to(tau, np.shape(left)), left >= 0, "at most the friction times the pressure")
-        found: Numbers = scale * (inverse(left) - self.mean_separation)
-        return found
+        displacement: Numbers = friction * self.ratio * (normal.separation(left) - self.mean_separation)
+        return displacement
 
     def energy_loss(self, shear: ArrayLike | str) -> Numbers:
         """Energy per nominal area that a cycle between -shear and shear dissipates [stress length]."""
-        _, energy, _, scale = self._known()
-        tau, delta = self._checked("shear", shear), self.displacement(shear)
-        released = energy(self.mean_separation) - energy(self._moved(delta / scale))
-        found: Numbers = 8 * (self.friction or 0.0) * (self.pressure * delta - scale * released) - 4 * tau * delta
-        return found
+        normal, friction = self._slipping()
+        tau = self._checked("shear", shear)
+        delta = self.displacement(shear)
+        scale = friction * self.ratio
+        released = normal.energy(self.mean_separation) - normal.energy(self._moved(delta / scale))
+        loss: Numbers = 8 * friction * (self.pressure * delta - scale * released) - 4 * tau * delta
+        return loss
 
     def _moved(self, approach: Any) -> Any:
         """Mean separation of the contact whose pressure is subtracted."""
@@ -102,13 +163,13 @@ class Tangential:
         require(name, array, array >= 0, "at least 0")
         return array
 
-    def _known(self) -> tuple[Any, ...]:
-        """The normal law, and f kappa."""
+    def _slipping(self) -> tuple[NormalOfContact | NormalOfLaw, float]:
+        """The normal contact, and the coefficient of friction; an error where slip is not known."""
         if isinstance(self._normal, str):
             raise InputError(self._normal)
         if self.friction is None:
             raise InputError("slip needs friction, the coefficient of friction: tangential(friction=...)")
-        return *self._normal, self.friction * self.ratio
+        return self._normal, self.friction
 
 
 def ratio_of(nu: Any, E: Any, pair: Pair | None, direction: str | None, surface: Any, area: Any) -> Any:
@@ -247,19 +308,18 @@ class Interface:
         """
         source = self._source
         ratio = ratio_of(nu, E, source.materials, direction, source.surface, self.area)
-        last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
-
-        def at(function: Any) -> Any:
-            return lambda u: source.map(function, dataclasses.replace(self, mean_separation=u), 1)[0]
-
-        def find(theory: Any, s: Any, u: Any, E: Any, p: Any) -> tuple[Any]:
-            return (theory.mean_separation_at(s, "pressure", p / E),)
-
-        normal = at(lambda theory, s, u, E: (E * theory.answer(s, u).pressure,))
-        energy = at(lambda theory, s, u, E: (E * theory.energy(s, u),))
-        inverse = lambda p: source.map(find, self, 1, {"pressure": p})[0]  # noqa: E731
+        normal: NormalOfContact | str = NormalOfContact(source, self)
+        if source.yields:
+            normal = OF_YIELDING
+        elif direction:
+            normal = OF_LAY
         return Tangential(
-            ratio, friction, self.pressure,
-            self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
-            OF_YIELDING if source.yields else OF_LAY if direction else (normal, energy, inverse),
-        )  # fmt: skip
+            ratio,
+            friction,
+            self.pressure,
+            self.mean_separation,
+            stiffness=self.unloading_stiffness / ratio,
+            last=source.surface.h_max if source.theory.ends_at_h_max else np.inf,
+            units=source.units,
+            _normal=normal,
+        )

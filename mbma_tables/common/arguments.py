@@ -206,7 +206,10 @@ def checked_hardness(hardness: ArrayLike) -> FloatArray:
     """Hardnesses as positive numbers; infinity means that nothing yields."""
     if isinstance(hardness, float) and hardness > 0:
         return np.asarray(hardness, dtype=np.float64)
-    values = np.asarray(hardness)
+    try:
+        values = np.asarray(hardness)
+    except ValueError as fault:  # rows of different lengths
+        raise InputError(f"hardness must be real numbers: {fault}") from None
     infinite = np.isposinf(values) if values.dtype.kind in "fiu" else False
     given = finite_array("hardness", np.where(infinite, 1.0, values) if np.any(infinite) else hardness)
     require("hardness", given, given > 0, "positive, or infinite where nothing yields")

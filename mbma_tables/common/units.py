@@ -8,6 +8,7 @@ known yet. An error is raised for values that cannot be converted.
 import dataclasses
 import difflib
 import functools
+import math
 import re
 import reprlib
 from collections.abc import Iterator, Mapping
@@ -83,6 +84,8 @@ def read(name: str, text: str) -> tuple[float, str | None]:
     if found is None:
         raise InputError(f"{name} must be a number, or one with its unit, got {text[:60]!r}")
     number, rest = float(found[1]), found[2].strip()
+    if math.isinf(number):
+        raise InputError(f"{name} = {text[:60]!r} is above the largest number of 64 bits, 1.8e308")
     if not rest:
         return number, None
     length, stress = DIMENSIONS.get(name, (0, 0))
@@ -140,7 +143,10 @@ class Units:
         if own is None:
             mend = "give the surface its unit" if length else "give E* with its unit, such as '100 GPa'"
             raise InputError(f"{name} = {value!r} beside numbers whose unit of {kind} is not known: {mend}")
-        return number * factor(unit, own, kind, length or power)
+        converted = number * factor(unit, own, kind, length or power)
+        if math.isinf(converted):
+            raise InputError(f"{name} = {value!r} is above the largest number of 64 bits in {own}")
+        return converted
 
     def conductivities(self, *given: Any) -> tuple[list[Any], str]:
         """Conductivities and the unit that they have over this unit of length, which is an SI unit of texts."""
@@ -191,11 +197,16 @@ def _named(name: str, value: Any, kind: str) -> str | None:
     return stated if stated in SIZES[kind] else None
 
 
-def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tuple[Any, Units]:
-    """A modulus as a number, and the units of results: the surface's, and the one asked for or named by "100 GPa"."""
+def require_surface(surface: Any) -> None:
+    """Reject what is no surface, with a hint for the name of one."""
     if not hasattr(surface, "unit"):
         hint = "; a named one is Surface.named(...)" if isinstance(surface, str) else ""
         raise InputError(f"surface must be a Surface, got {reprlib.repr(surface)}{hint}")
+
+
+def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tuple[Any, Units]:
+    """A modulus as a number, and the units of results: the surface's, and the one asked for or named by "100 GPa"."""
+    require_surface(surface)
     stress = known(asked, "stress") if asked else _named("E_star", E_star, "stress")
     # without a modulus, stresses are over it
     absent = stress is None and isinstance(E_star, int | float) and E_star == 1.0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.interface import OF_LAY, OF_YIELDING, Tangential, ratio_of
+from mbma_tables.answers.interface import OF_LAY, OF_YIELDING, NormalOfLaw, Tangential, ratio_of
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
@@ -103,12 +103,21 @@ class Derived:
         else:
             u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
         ratio = ratio_of(nu, E, self.materials, direction, self.surface, self.area(u))
-        reason = OF_YIELDING if self.hardness < math.inf else OF_LAY if direction else None
+        normal: NormalOfLaw | str = NormalOfLaw(self)
+        if self.hardness < math.inf:
+            normal = OF_YIELDING
+        elif direction:
+            normal = OF_LAY
         return Tangential(
-            ratio, friction, held, u, self.unloading_stiffness(u) / ratio,
-            self.h_max if math.isinf(self.highest) else math.inf, self.units,
-            reason or (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
-        )  # fmt: skip
+            ratio,
+            friction,
+            held,
+            u,
+            stiffness=self.unloading_stiffness(u) / ratio,
+            last=self.h_max if math.isinf(self.highest) else math.inf,
+            units=self.units,
+            _normal=normal,
+        )
 
     def continued(self: Any, pressures: tuple[Any, Any] | None = None) -> ContinuedLaw:
         """The law continued by its tangents beyond two pressures, for the trial steps of Newton's method.

@@ -3,6 +3,7 @@
 import functools
 import os
 import pathlib
+import reprlib
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,8 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     ------
     TableFileError
         If the file cannot be used; the message has the reason and the remedy.
+    InputError
+        For what is neither a name nor a path.
 
     Examples
     --------
@@ -55,6 +58,10 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     >>> float(contact(Surface(0.8, 1.0, 200.0, 0.1, 0.3), separation=0.1, island_model=table).error) < 1e-8
     True
     """
+    if not isinstance(table, str | os.PathLike):
+        raise InputError(
+            f"a table must be {UNIVERSAL!r}, {ISLAND4D!r} or the path of a file, got {reprlib.repr(table)}"
+        )
     if table in (UNIVERSAL, ISLAND4D):
         with HDF5_LOCK:
             return _opened(str(table))

@@ -8,7 +8,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import finite_array, number_in, require, require_name, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import Units, modulus_and_units
+from mbma_tables.common.units import Units, modulus_and_units, require_surface
 from mbma_tables.materials import hardness_in
 from mbma_tables.models import ISLAND_MODELS, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -69,6 +69,7 @@ class Problem:
                 raise InputError(f"{name} must be a list of names: write [{getattr(self, name)!r}]")
         self._choose_effects()
         outputs, dropped = self.outputs, self.dropped
+        require_surface(self.surface)
         if self.surface.labelled or self.surface.shape != ():
             raise InputError("a scene has one surface, not a batch: make a scene for each")
         E_star, units = modulus_and_units(self.E_star, self.surface)

@@ -71,6 +71,19 @@ def test_laws_answer_as_contacts_do(theory):
     assert 0 < one.energy_loss("1 MPa") < 4e-3 * one.displacement("1 MPa")
 
 
+@pytest.mark.parametrize("of_law", [False, True])
+def test_a_sheared_contact_is_the_same_after_pickling(of_law):
+    given = {"E_star": "100 GPa", "theory": "calibrated"}
+    if of_law:
+        sheared = contact_law(FACE, **given).tangential(pressure="10 MPa", friction=0.2, nu=0.3)
+    else:
+        sheared = contact(FACE, pressure="10 MPa", **given).tangential(0.2, 0.3)
+    copy = pickle.loads(pickle.dumps(sheared))
+    assert copy.gross_slip == sheared.gross_slip
+    for ask, value in (("shear", "50 nm"), ("displacement", "1 MPa"), ("energy_loss", "1 MPa")):
+        assert getattr(copy, ask)(value) == getattr(sheared, ask)(value)
+
+
 @pytest.mark.parametrize("theory", ["calibrated", "mbma", "persson"])
 def test_with_a_hardness_full_stick_alone(theory):
     given = {"E_star": "100 GPa", "theory": theory, "hardness": "1.5 GPa"}
