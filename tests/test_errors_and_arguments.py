@@ -212,9 +212,7 @@ test_odd_input_has_a_typed_error = refusals(
     (lambda: open_table(3), "the path of a file, got 3"),
 )
 test_a_number_too_large_for_a_double_is_not_infinity = refusals(
-    lambda hardness: contact(
-        ROAD, pressure="1 kPa", E_star="13 MPa", theory="calibrated", hardness=hardness
-    ),
+    lambda hardness: contact(ROAD, pressure="1 kPa", E_star="13 MPa", theory="calibrated", hardness=hardness),
     ("1e400", "hardness = '1e400' is above the largest number"),
     ("1e400 GPa", "hardness = '1e400 GPa' is above the largest number"),
     ("1e306 GPa", "above the largest number of 64 bits in MPa"),

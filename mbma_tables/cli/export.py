@@ -111,6 +111,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         files = kind.files(_rows(kind, joint | given), **name)
     else:
         files = kind.files(**joint, **given)
+    if out.suffix and any(out.name == f"{out.stem}{end}" for end in files):
+        raise InputError(f"--out {out.name}: a file beside the first one has this name, take another")
     # files that the first one needs are written before it
     for end in sorted(files, reverse=True) if str(out) != "-" else [""]:
         path = out.with_name(f"{out.stem}{end}") if end else out

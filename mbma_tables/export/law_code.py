@@ -10,7 +10,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import ExportedLaw, exported_law
-from mbma_tables.export.law_languages import LANGUAGES, Language, flow_numbers, law_numbers
+from mbma_tables.export.law_languages import LANGUAGES, Beside, Language, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import braces, checked_name, core_file, filled, numerals, opening, page_file, wrapped
 from mbma_tables.law import block as at
@@ -83,12 +83,11 @@ def law_files(target: str, surface: AnySurface | ForceLaw, E_star: float | str =
         raise InputError(f"{target} has no place for leakage, nor for the force of a body: leave it out")
     if language.subroutine == "gapcon.c":  # which is of conductance alone
         asked.setdefault("conductivity_unit", "")
-    found = asked_law(surface, E_star, **asked)
-    beside = (
-        (end, text_of(other, found) if other in LANGUAGES else text_of(target, found, other))
-        for end, other in language.beside
-    )
-    return {"": text_of(target, found), **dict(beside)}
+    made = asked_law(surface, E_star, **asked)
+    files = {"": text_of(target, made)}
+    for file in language.beside:
+        files[file.end] = text_of(file.target or target, made, file)
+    return files
 
 
 class AskedLaw(NamedTuple):
@@ -142,8 +141,8 @@ def asked_law(
     return AskedLaw(name, exported, slopes, sloped, more, said)
 
 
-def text_of(target: str, asked: AskedLaw, template: str = "") -> str:
-    """The text of a target's own file, or of another template of it."""
+def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
+    """The text of a target's own file, or of one beside it."""
     language, name, exported = LANGUAGES[target], asked.name, asked.exported
     yields, nested = asked.sloped is not exported.law, target == "modelica-law"
     if yields and language.array is not None and not nested:
@@ -169,9 +168,9 @@ def text_of(target: str, asked: AskedLaw, template: str = "") -> str:
         "SLOPED": "ELASTIC" if yields else "LAW",
         **{place: language.number(value) for place, value in numbers.items()},
         **dict(language.parts),
+        **dict(file.parts if file else ()),
     }
-    if template:
-        return filled(template, each, **parts)
+    template = file.template if file and file.template else language.template
     if target == "fortran-law":  # all functions are alike, but for the one of two answers
         public = [what for what in FUNCTIONS if what in asked.more or what not in MORE]
         parts["PUBLIC"], each = ", ".join(public), dict.fromkeys(public, "")
@@ -192,7 +191,7 @@ def text_of(target: str, asked: AskedLaw, template: str = "") -> str:
             parts["ELASTIC"] = re.sub(rf"\b({names})\b", r"elastic_\1", text)
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts)
-    return filled(language.template, each, **parts)
+    return filled(template, each, **parts)
 
 
 def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[str, str]:

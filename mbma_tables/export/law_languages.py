@@ -131,6 +131,15 @@ def _decimals(rows: FloatArray) -> FloatArray:
     return np.array(written)
 
 
+class Beside(NamedTuple):
+    """A file beside the first one of a target."""
+
+    end: str  # of its name
+    template: str = ""
+    target: str = ""  # whose first file it is, in place of a template
+    parts: tuple[tuple[str, str], ...] = ()  # filled in as those of its language
+
+
 class Language(NamedTuple):
     """Format of a law in one language."""
 
@@ -142,7 +151,7 @@ class Language(NamedTuple):
     array: Callable[[FloatArray], str] | None = None  # None where the core's C reads the law
     subroutine: str = ""  # template of a solver's user subroutine that calls the law
     parts: tuple[tuple[str, str], ...] = ()  # what else is filled in
-    beside: tuple[tuple[str, str], ...] = ()  # a target or a template of other files by the ends of their names
+    beside: tuple["Beside", ...] = ()  # other files of the target
 
 
 def _number(infinity: str, value: float) -> str:
@@ -161,7 +170,7 @@ C = Language(
     "C99, also C++11: cc -O2 -c {name}.c, link with -lm; {name}.h beside it declares the functions. The C of the "
     f"library itself, and the law's own numbers. {NAN}",
     "{name}_{what}({x})",
-    beside=((".h", "law.h"),),
+    beside=(Beside(".h", "law.h"),),
 )
 CALLED = (
     "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
@@ -179,17 +188,23 @@ LANGUAGES = {
         f"gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(c_double). {NAN}",
         "{what}({x})",
         _fortran_number,
-        beside=(("_c.c", "c-law"),),
+        beside=(Beside("_c.c", target="c-law"),),
     ),
     "javascript-law": Language(
         "law.mjs",
         "/*",
-        "An ECMAScript module: import {{ pressure, withTangent, area, energy, overclosure }} from './{name}.mjs'. "
-        "The C of the library itself as WebAssembly; {name}.d.mts beside it has the types for TypeScript. Outside the "
-        "range a RangeError is thrown, of what is no number a TypeError.",
+        "import {{ pressure, with_tangent, curvature, area, energy, overclosure }} from './{name}.mjs', an ECMAScript "
+        "module, or require('./{name}.cjs'), the same as a CommonJS module. The C of the library itself as "
+        "WebAssembly; {name}.d.mts and {name}.d.cts have the types for TypeScript. Outside the range a RangeError is "
+        "thrown, of what is no number a TypeError.",
         "{what}({x})",
         functools.partial(_number, "-Infinity"),
-        beside=((".d.mts", "law.d.mts"),),
+        parts=(("EXPORT", "export"),),
+        beside=(
+            Beside(".cjs", "law.mjs", parts=(("EXPORT", "module.exports ="),)),
+            Beside(".d.mts", "law.d.mts"),
+            Beside(".d.cts", "law.d.mts"),
+        ),
     ),
     "python-law": Language(
         "law.py",

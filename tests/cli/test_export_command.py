@@ -50,6 +50,14 @@ def test_fortran_writes_its_c_too(tmp_path):
     assert beside == own
 
 
+@pytest.mark.parametrize(("target", "name"), [("c-law", "own.h"), ("javascript-law", "own.cjs")])
+def test_a_file_does_not_replace_one_beside_it(target, name, tmp_path):
+    result = run(target, *LAW[:-2], "--theory", "calibrated", "--out", tmp_path / name)
+    assert result.exit_code == 2
+    assert "a file beside the first one has this name" in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.skipif(shutil.which("cc") is None, reason="cc is not installed")
 def test_code_is_written_and_replayed(tmp_path):
     result = run("c", "--out", tmp_path / "code", "--check")

@@ -3,6 +3,7 @@
 import ctypes
 import functools
 import importlib.util
+import json
 import math
 import re
 import shutil
@@ -102,7 +103,7 @@ def test_headers_say_what_is_there():
     facts = f"K is within {leakage.error:.1e} of that at the law's area", "one standard deviation of ln K: 0.1"
     facts += f"c = {(3 - leakage.blocked_at) / 2:.10g} on", "leakage: A/A0 is above 0.3"
     assert all(fact in text for fact in facts)
-    assert "import { pressure, withTangent, area" in law_points.text("javascript-law", "mbma")
+    assert "import { pressure, with_tangent, curvature" in law_points.text("javascript-law", "mbma")
     text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)
     assert "overclosure(" not in text.partition("package")[0]
     for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
@@ -202,9 +203,9 @@ end program
 
 NODE = """
 import { readFileSync, writeFileSync } from "node:fs";
-import { pressure, tangent, withTangent, area, energy, overclosure, leakage } from "./road.mjs";
+import { pressure, tangent, with_tangent, area, energy, overclosure, leakage } from "./road.mjs";
 const lines = (name) => readFileSync(name, "utf8").trim().split("\\n").map(Number);
-const both = (c) => withTangent(c).join() === `${pressure(c)},${tangent(c)}`;
+const both = (c) => with_tangent(c).join() === `${pressure(c)},${tangent(c)}`;
 const values = lines("c.txt").map((c) => [pressure(c), tangent(c), area(c), energy(c), leakage(c)].join(" "));
 writeFileSync("values.txt", values.join("\\n"));
 writeFileSync("inverse.txt", lines("p.txt").map(overclosure).join("\\n"));
@@ -513,9 +514,79 @@ def test_a_unit_never_becomes_code(target):
 @pytest.mark.parametrize("more", [{}, {"leakage": True, **HEAT}])
 def test_types_of_a_law_in_javascript(more):
     files = law_files("javascript-law", ASKED["mbma"][0], "13.3 MPa", name="road", **more)
-    exported = re.findall(r"^export (?:const|function) (\w+)", files[""], flags=re.M)
-    typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[".d.mts"], flags=re.M)
-    assert sorted(typed) == sorted(exported)
+    assert sorted(files) == ["", ".cjs", ".d.cts", ".d.mts"]
+    for module, types_, begin in (
+        ("", ".d.mts", "export"),
+        (".cjs", ".d.cts", "module.exports ="),
+    ):
+        exported = files[module].partition(f"\n{begin} {{")[2].rpartition("}")[0]
+        typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[types_], flags=re.M)
+        assert sorted(typed) == sorted(re.findall(r"\w+", exported))
+
+
+def javascript_files(folder):
+    """A law as modules of both kinds, and the overclosures at which it is asked."""
+    surface, asked = ASKED["calibrated"]
+    files = law_files("javascript-law", surface, "13.3 MPa", name="road", **HEAT, **asked)
+    for end, text in files.items():
+        (folder / f"road{end or '.mjs'}").write_text(text)
+    return [0.01, 0.5, 1.0, 2.5]
+
+
+ASK_BOTH = """
+const answers = (road, c) => [
+  road.pressure(c), ...road.with_tangent(c), road.tangent(c), road.curvature(c), road.conductance(c),
+];
+console.log(JSON.stringify(%s.map((c) => answers(road, c))));
+"""
+
+
+@needs("node")
+@pytest.mark.parametrize(
+    ("program", "opens"),
+    [
+        ("ask.mjs", 'import * as road from "./road.mjs";'),
+        ("ask.mjs", 'import road from "./road.cjs";'),
+        ("ask.mjs", 'const road = await import("./road.mjs");'),
+        ("ask.cjs", 'const road = require("./road.cjs");'),
+        ("ask.js", 'const road = require("./road");'),
+    ],
+)
+def test_node_opens_a_law_by_import_and_by_require(program, opens, tmp_path):
+    c = javascript_files(tmp_path)
+    (tmp_path / "package.json").write_text("{}")
+    (tmp_path / "road.js").write_text('module.exports = require("./road.cjs");')
+    (tmp_path / program).write_text(opens + ASK_BOTH % c)
+    answers = np.array(json.loads(run("node", program, folder=tmp_path)))
+    law = points("calibrated").law
+    gaps = law.h_max - np.array(c)
+    pressure, tangent = law.pressure_and_stiffness(gaps)
+    curvature = (law.stiffness(gaps - 1e-5) - law.stiffness(gaps + 1e-5)) / 2e-5
+    known = [pressure, pressure, tangent, tangent, curvature, CONDUCTIVITY / 13.3 * tangent]
+    np.testing.assert_allclose(answers.T, known, rtol=1e-6)
+    assert "await" not in (tmp_path / "road.mjs").read_text()
+
+
+TYPED = """
+const pressure: number = road.pressure(0.2);
+const both: [number, number] = road.with_tangent(0.2);
+const more: number[] = [road.curvature(0.2), road.conductance(0.2), road.overclosure(pressure), ...both];
+export { more };
+"""
+
+
+@pytest.mark.slow
+@needs("tsc")
+def test_typescript_compiles_both_modules(tmp_path):
+    javascript_files(tmp_path)
+    (tmp_path / "ask.mts").write_text('import * as road from "./road.mjs";' + TYPED)
+    (tmp_path / "ask.cts").write_text('import * as road from "./road.cjs";' + TYPED)
+    options = "--strict --noEmit --module node16 --moduleResolution node16 --target es2020"
+    run("tsc", *options.split(), "ask.mts", "ask.cts", folder=tmp_path)
+    # types are checked: an answer is no text
+    (tmp_path / "wrong.mts").write_text('import { tangent } from "./road.mjs";\nconst text: string = tangent(0.2);\n')
+    wrong = subprocess.run(["tsc", *options.split(), "wrong.mts"], cwd=tmp_path, capture_output=True, text=True)
+    assert "'number' is not assignable to type 'string'" in wrong.stdout
 
 
 @pytest.mark.parametrize(
