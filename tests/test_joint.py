@@ -104,7 +104,7 @@ def test_cards_hold_the_joint(joint):
     # mW/(mm^2 K) is 1000 W/(m^2 K)
     found = joint.at_pressure((p[1:] / 1000).tolist())
     np.testing.assert_allclose(1000 * k[1:], found.conductance(), rtol=2e-3)  # of the rows
-    assert "hardness = 950 MPa" in card
+    assert "hardness = 950.0 MPa" in card
     closure = joint.export("abaqus", ("1 MPa", "50 MPa"), heat=False)
     assert "GAP CONDUCTANCE" not in closure
     with pytest.raises(InputError, match="calculix"):

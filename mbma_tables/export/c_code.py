@@ -23,7 +23,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.export.conformance import FORM, POINTS_FILE, points_text
 from mbma_tables.export.targets import Target
-from mbma_tables.export.text import braces, core_file, filled, numerals, opening, written_by
+from mbma_tables.export.text import about, braces, core_file, filled, number, numerals, opening, written_by
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.closed_forms import FUNCTIONS
@@ -89,16 +89,16 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
     parts = {
         "PROTOTYPES": prototypes,
         "CLOSED_FORMS": forms,
-        "FORM_X_LOW": repr(form["X"][0]),
-        "FORM_X_HIGH": repr(form["X"][1]),
-        "FORM_MU_HIGH": repr(form["mu"][1]),
-        "FORM_ERROR": repr(max(certificate.largest for certificate in certificates.values())),
+        "FORM_X_LOW": number(form["X"][0]),
+        "FORM_X_HIGH": number(form["X"][1]),
+        "FORM_MU_HIGH": number(form["mu"][1]),
+        "FORM_ERROR": number(max(certificate.largest for certificate in certificates.values())),
         "MIN_RTOL": "1e-11",  # as `contact` allows
         "MAX_RTOL": "0.1",
-        "QUADRATURE_SHARE": repr(QUADRATURE_SHARE),
-        "CALIBRATED_ERROR": repr(calibrated_table.shipped().error),
-        "LAW_ERROR": repr(LAW_ERROR),
-        "PERSSON_ERROR": repr(persson.INVERSE_RTOL),
+        "QUADRATURE_SHARE": number(QUADRATURE_SHARE),
+        "CALIBRATED_ERROR": number(calibrated_table.shipped().error),
+        "LAW_ERROR": number(LAW_ERROR),
+        "PERSSON_ERROR": number(persson.INVERSE_RTOL),
     }
     return {name: filled(name, **parts, HEADER=heads[name]) for name in ("mbma_model.h", "mbma_model.c")}
 
@@ -177,7 +177,7 @@ def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     )
     form, certificates = RANGES[FORM], CERTIFICATES[FORM]
     ranges = [
-        f"{axis} in [{math.exp(low) if k else low:.4g}, {math.exp(high) if k else high:.4g}]"
+        f"{axis} in [{about(math.exp(low) if k else low)}, {about(math.exp(high) if k else high)}]"
         for k, (axis, (low, high)) in enumerate(zip(("H", "zeta_1", "u/h_rms"), law.covered, strict=True))
     ]
     return [
@@ -185,21 +185,25 @@ def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
         f"Written by mbma_tables {__version__}. {USAGE}",
         "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
         "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
-        f"Variant: {variant.name} (density divisor {variant.density_divisor:.17g}, beta {variant.beta:.17g}, phi "
-        f"{variant.phi:g}, floors {variant.floor_d:g} and {variant.floor_u:g}, Jacobian {variant.jacobian}, offset "
+        f"Variant: {variant.name} (density divisor {number(variant.density_divisor)}, beta {number(variant.beta)}, "
+        f"phi {number(variant.phi)}, floors {number(variant.floor_d)} and {number(variant.floor_u)}, "
+        f"Jacobian {variant.jacobian}, offset "
         f"{'on' if variant.offset else 'off'}, sigma of {'summits' if variant.summit_sigma else 'all heights'}).",
         f"Table: data {found['values_sha256']}",
-        f"Range: {X.low:g} <= X <= {X.high:g}, 0 <= mu <= {mu.high:g}; H in (0, 1], zeta_1 up to {MAX_ZETA_1:g}.",
-        f"Largest relative error of the table against the solved model: {worst:.2g} on {found['certificate_points']} "
-        f"held-out points, {visited:.2g} at islands of random surfaces; each answer carries its own bound.",
-        f"Closed form, {FORM}: for {form['X'][0]:g} <= X <= {form['X'][1]:g} and mu <= {form['mu'][1]:g}; largest "
-        f"relative error {certificates['phi_F'].largest:.2g} of Phi_F, {certificates['phi_A'].largest:.2g} of Phi_A.",
+        f"Range: {about(X.low, 6)} <= X <= {about(X.high, 6)}, 0 <= mu <= {about(mu.high, 6)}; "
+        f"H in (0, 1], zeta_1 up to {number(MAX_ZETA_1)}.",
+        f"Largest relative error of the table against the solved model: {about(worst, 2)} on "
+        f"{found['certificate_points']} held-out points, {about(visited, 2)} at islands of random surfaces; "
+        "each answer carries its own bound.",
+        f"Closed form, {FORM}: for {about(form['X'][0], 6)} <= X <= {about(form['X'][1], 6)} and "
+        f"mu <= {about(form['mu'][1], 6)}; largest relative error {about(certificates['phi_F'].largest, 2)} of "
+        f"Phi_F, {about(certificates['phi_A'].largest, 2)} of Phi_A.",
         "Outside the table there is no answer, only a status: nothing is clamped or extrapolated.",
         "Law calibrated on boundary elements, by a table of force over Hurst exponent, q1/q0 and mean separation, in C "
         f"also of any spectrum, as Persson's theory, by a sum over wavelengths. Table: {', '.join(ranges)}; other "
         "separations continue by the law's limits.",
-        f"Largest relative error of the table against the law: {law.error:.2g}. Simulations scatter about the law by "
-        "percents to tens of percents, which the documentation lists.",
+        f"Largest relative error of the table against the law: {about(law.error, 2)}. Simulations scatter about the "
+        "law by percents to tens of percents, which the documentation lists.",
         written_by(["c", "--variant", variant.name, "--out", "."]),
         CONVENTIONS,
         *LICENCE,

@@ -12,7 +12,7 @@ import numpy as np
 
 from mbma_tables.answers.contact import contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.export.text import comment
+from mbma_tables.export.text import comment, number
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.tables import universal_model
@@ -55,7 +55,8 @@ def rows(kind: str, arguments: Iterable[Any], answers: Any, scales: Any = None, 
     # results that are exactly 0 must be exactly 0
     pairs = np.stack([expected, np.where(units == 0, 1.0, units)], axis=1).reshape(-1, given[0].size)
     for *own, most, numbers in zip(*(column.ravel().tolist() for column in given), pairs.T.tolist(), strict=True):
-        yield ",".join((kind, *map(repr, (most, len(own), *own, *numbers))))
+        cells = [number(value, infinity="inf", missing="nan") for value in (*own, *numbers)]
+        yield ",".join((kind, number(most), str(len(own)), *cells))
 
 
 def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import needed
+from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import Target
-from mbma_tables.export.text import checked_name, comment, csv_cell
+from mbma_tables.export.text import checked_name, comment, csv_cell, number
 
 MAX_MATLAB_NAME = 63
 READER = """function y = {name}(x)
@@ -41,13 +41,19 @@ def _header(law: LawTable) -> dict[str, Any]:
     }
 
 
+def _cells(values: FloatArray) -> list[str]:
+    """Numbers of a column as text; what is not known as "nan"."""
+    return [number(value, infinity="inf", missing="nan") for value in values]
+
+
 def to_csv(law: LawTable) -> bytes:
     """Columns with a header of comments."""
     stream = io.StringIO()
     stream.write(comment(law.comments, "#"))
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([csv_cell(f"{name} [{unit}]") for name, (_, unit) in law.columns.items()])
-    writer.writerows(zip(*(values.tolist() for values, _ in law.columns.values()), strict=True))
+    columns = (_cells(values) for values, _ in law.columns.values())
+    writer.writerows(zip(*columns, strict=True))
     return stream.getvalue().encode()
 
 

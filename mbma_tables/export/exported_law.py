@@ -15,6 +15,7 @@ from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import factor, in_unit, modulus_and_units
+from mbma_tables.export.text import about, number
 from mbma_tables.law import block as at
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
@@ -119,24 +120,25 @@ class ExportedLaw:
             title = f"Force law of a rough {body.name} on a flat, theory {law.theory!r}"
             meaning = (
                 f"here pressure is the force [{self.stress}], and A/A0 the real area [{body.units['area']}]",
-                f"overclosure c = approach - ({self.force.first:.10g}), zero at first contact; approach is zero where",
+                f"overclosure c = approach - ({number(self.force.first)}), zero at first contact; approach is zero "
+                "where",
                 "the mean planes of the faces touch",
             )
         gradient = self.modulus * float(self.surface.rms_gradient)
-        plastic = f"elastic: within 5% in area for hardnesses from {gradient / ELASTIC_PSI:.4g} {stress} on"
+        plastic = f"elastic: within 5% in area for hardnesses from {about(gradient / ELASTIC_PSI)} {stress} on"
         if self.hardness < np.inf:
             plastic = (
-                f"hardness = {self.hardness:.10g} {stress}, plasticity index {gradient / self.hardness:.3g}: "
+                f"hardness = {number(self.hardness)} {stress}, plasticity index {about(gradient / self.hardness, 3)}: "
                 "loading only, not for unloading, which is stiffer"
             )
         names = self.surface.parameters or OWN_NUMBERS
-        numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
+        numbers = ", ".join(f"{name} = {number(getattr(self.surface, name))}" for name in names)
         return (
             f"{title}; mbma_tables {__version__}",
             what,
             f"surface: {numbers}; lengths in {self.length}",
             *filter(None, [self.surface.resolution, self.theory.origin]),
-            f"E* = {self.modulus:.10g} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
+            f"E* = {number(self.modulus)} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
             *meaning,
             f"range: {range_}",
             *more,
@@ -164,11 +166,11 @@ class ExportedLaw:
                 yield f"not valid {f'{where} {unit}' if low or high else 'at any pressure of the range'}: {reason}"
         if law.softening is not None:
             yield (
-                f"softening: stiffness falls with compression from c = {law.h_max - law.softening:.4g}, "
-                f"p = {float(law.pressure(law.softening)):.4g} {unit} on, which no simulation shows"
+                f"softening: stiffness falls with compression from c = {about(law.h_max - law.softening)}, "
+                f"p = {about(law.pressure(law.softening))} {unit} on, which no simulation shows"
             )
         if not self.ends:
-            yield f"no last contact: pressure is {float(law.pressure(law.h_max)):.4g} {unit} at c = 0"
+            yield f"no last contact: pressure is {about(law.pressure(law.h_max))} {unit} at c = 0"
         spread = self._spread("one standard deviation of ln p at a given c", found.scatter, pressure)
         yield f"scatter of simulations about the theory, {spread}"
         if leakage:
@@ -184,7 +186,7 @@ class ExportedLaw:
             k = 1 + int(np.argmax(np.append(mask, True)))
             good, bad = u[k - 1], u[k]
         four_digits = Context(prec=4, rounding=rounding)
-        return f"{float(four_digits.create_decimal(float(self.law.pressure(good)))):.4g}"
+        return about(four_digits.create_decimal(float(self.law.pressure(good))))
 
     def _hashes(self) -> Iterator[str]:
         """Lines on the table that the theory uses, and on a surface not given by five numbers."""
@@ -203,7 +205,7 @@ class ExportedLaw:
         sizes, pressure = np.asarray(scatter)[SMALL:], pressure[SMALL:]
         known = np.flatnonzero(np.isfinite(sizes))
         places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
-        listed = ", ".join(f"{sizes[k]:.2g} at {pressure[k]:.3g}" for k in places)
+        listed = ", ".join(f"{about(sizes[k], 2)} at {about(pressure[k], 3)}" for k in places)
         return f"{what}: {listed} {self.stress}" if listed else "not known"
 
     def _of_leakage(self, scatter: str) -> Iterator[str]:
@@ -213,11 +215,11 @@ class ExportedLaw:
         yield (
             f"leakage is the flow coefficient K [{self.length}^3] of the gaps{way}: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {stress} s: 1e-3 Pa s, as water's, is "
-            f"{1e-3 * factor('Pa', stress, 'stress'):.4g} {stress} s"
+            f"{about(1e-3 * factor('Pa', stress, 'stress'))} {stress} s"
         )
         if blocked > -np.inf:
             load, c = float(self.law.pressure(separation=blocked)), (self.law.h_max - blocked) / 2
-            yield f"blocked, K = 0, from p = {load:.10g} {stress}, c = {c:.10g} on"
+            yield f"blocked, K = 0, from p = {number(load)} {stress}, c = {number(c)} on"
         else:
             yield "never blocked"
         yield f"K is within {self.leakage.error:.1e} of that at the law's area"

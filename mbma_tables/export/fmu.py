@@ -18,7 +18,7 @@ from mbma_tables.export.c_code import BuildError, built_by
 from mbma_tables.export.exported_law import ExportedLaw
 from mbma_tables.export.law_code import AskedLaw, asked_law, text_of
 from mbma_tables.export.targets import CODE, Target
-from mbma_tables.export.text import filled
+from mbma_tables.export.text import filled, number
 from mbma_tables.surfaces.any_surface import AnySurface
 
 SAID = {
@@ -75,10 +75,10 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
         "START": variables[1]["start"],
         "LEAKAGE": found.more.get("leakage", ""),
         "SLOPED": "LAW" if found.sloped is exported.law else "ELASTIC",
-        "LEAST": "-INFINITY" if exported.ends else repr(exported.c_least),
-        "MOST": repr(exported.c_most),
+        "LEAST": number(exported.c_least, infinity="INFINITY"),
+        "MOST": number(exported.c_most),
     }
-    source = filled("fmu.c", {what: repr(ratio) for what, ratio in found.slopes.items()}, **parts)
+    source = filled("fmu.c", {what: number(ratio) for what, ratio in found.slopes.items()}, **parts)
     built = _binaries(name, source, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
     said = "\n".join((*found.said, f"binaries: {listed}"))
@@ -118,8 +118,8 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """XML attributes of each variable, by value reference."""
     exported = found.exported
     length, stress = exported.length, exported.stress
-    asked = {"start": repr(0.0 if exported.ends else max(0.0, exported.c_least)), "max": repr(exported.c_most)}
-    asked |= {} if exported.ends else {"min": repr(exported.c_least)}
+    asked = {"start": number(0.0 if exported.ends else max(0.0, exported.c_least)), "max": number(exported.c_most)}
+    asked |= {} if exported.ends else {"min": number(exported.c_least)}
     outputs = {
         "pressure": (stress, "force over nominal area"),
         "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
@@ -161,7 +161,7 @@ def _description(name: str, token: str, text: str, variables: list[dict[str, str
         named = ET.SubElement(units, "Unit", {"name": unit})
         if unit in bases:
             powers, size = bases[unit]
-            base = {key: str(power) for key, power in powers.items()} | {"factor": repr(size)}
+            base = {key: str(power) for key, power in powers.items()} | {"factor": number(size)}
             ET.SubElement(named, "BaseUnit", base)
     ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", {"name": "logStatusError"})
     listed, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")

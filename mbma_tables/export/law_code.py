@@ -12,7 +12,18 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import ExportedLaw, exported_law
 from mbma_tables.export.law_languages import LANGUAGES, Beside, Language, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
-from mbma_tables.export.text import braces, checked_name, core_file, filled, numerals, opening, page_file, wrapped
+from mbma_tables.export.text import (
+    about,
+    braces,
+    checked_name,
+    core_file,
+    filled,
+    number,
+    numerals,
+    opening,
+    page_file,
+    wrapped,
+)
 from mbma_tables.law import block as at
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
@@ -128,12 +139,12 @@ def asked_law(
     sloped, factor = law.unloading if slopes else (law, 1.0)
     what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure "
     what += f"[{stress} {length}]{''.join(f', {quantity} [{unit}]' for quantity, unit in more.items())}"
-    begin = "no contact below c = 0" if exported.ends else f"c from {exported.c_least:.10g}"
+    begin = "no contact below c = 0" if exported.ends else f"c from {number(exported.c_least)}"
     turns = "" if law.turning_point is None else ", where pressure turns down"
     said = exported.header(
         f"{what}, against overclosure c [{length}]",
-        f"{begin}, to {exported.c_most:.10g}; there is no answer outside",
-        f"overclosure at a pressure: up to c = {exported.c_turn:.10g}{turns}",
+        f"{begin}, to {number(exported.c_most)}; there is no answer outside",
+        f"overclosure at a pressure: up to c = {number(exported.c_turn)}{turns}",
         end=exported.c_turn,
         leakage=leakage,
     )
@@ -208,7 +219,7 @@ def _core(target: str, asked: AskedLaw) -> dict[str, str]:
     law, leaks, name, parts = asked.exported.law, asked.more.get("leakage", ""), asked.name, dict[str, str]()
     blocks = {"LAW": law.block} | ({"ELASTIC": asked.sloped.block} if asked.sloped is not law else {})
     if leaks:
-        blocks["FLOW"], parts["FLOW_H_RMS"] = asked.exported.leakage.block, repr(float(asked.exported.leakage.h_rms))
+        blocks["FLOW"], parts["FLOW_H_RMS"] = asked.exported.leakage.block, number(asked.exported.leakage.h_rms)
     if target == "javascript-law":
         held = {"WASM": page_file(LAW_MODULE)}
         held |= {f"{own}_BLOCK": block.astype("<f8", copy=False).tobytes() for own, block in blocks.items()}
@@ -227,11 +238,11 @@ def _example(exported: ExportedLaw, language: Language) -> str:
     answers = {"pressure": (c, p), "tangent": (c, k)} | (
         {"overclosure": (p, c)} if language.template != "law.mo" else {}
     )
-    said = ", ".join(
-        f"{language.call.format(name='{name}', what=what, x=language.number(float(f'{x:.7g}')))} = {y:.7g}"
-        for what, (x, y) in answers.items()
-    )
-    return f"Example: {said}"
+    calls = []
+    for what, (x, y) in answers.items():
+        rounded_x = language.number(float(f"{x:.7g}"))
+        calls.append(f"{language.call.format(name='{name}', what=what, x=rounded_x)} = {about(y, 7)}")
+    return f"Example: {', '.join(calls)}"
 
 
 def core_text(prefix: str) -> str:

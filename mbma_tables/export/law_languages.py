@@ -20,7 +20,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.export.text import wrapped
+from mbma_tables.export.text import number, wrapped
 from mbma_tables.law import block as at
 from mbma_tables.law.block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
 from mbma_tables.law.law import ContactLaw
@@ -87,7 +87,7 @@ def _sides(block: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
 def brackets(values: FloatArray) -> str:
     """A column, or rows of polynomials, as Python has them."""
     if values.ndim == 1:
-        return f"[{wrapped(', '.join(map(repr, values.tolist())))}]"
+        return f"[{wrapped(', '.join(map(number, values)))}]"
     return f"[\n{_lines(_decimals(values), '[', '],')}\n]"
 
 
@@ -102,7 +102,7 @@ def matrix(values: FloatArray) -> str:
 
 
 def _lines(rows: FloatArray, begin: str, end: str) -> str:
-    return "\n".join(f"{begin}{', '.join(map(repr, row))}{end}" for row in rows.tolist())
+    return "\n".join(f"{begin}{', '.join(map(number, row))}{end}" for row in rows)
 
 
 def _decimal_places(row: FloatArray) -> int:
@@ -147,20 +147,11 @@ class Language(NamedTuple):
     mark: str  # of comments
     usage: str
     call: str  # of a function, with {name}, {what} and {x}
-    number: Callable[[float], str] = repr
+    number: Callable[[float], str] = number
     array: Callable[[FloatArray], str] | None = None  # None where the core's C reads the law
     subroutine: str = ""  # template of a solver's user subroutine that calls the law
     parts: tuple[tuple[str, str], ...] = ()  # what else is filled in
     beside: tuple["Beside", ...] = ()  # other files of the target
-
-
-def _number(infinity: str, value: float) -> str:
-    return repr(float(value)).replace("-inf", infinity)
-
-
-def _fortran_number(value: float) -> str:
-    text = repr(float(value))
-    return text.replace("e", "d") if "e" in text else f"{text}d0"
 
 
 NAN = "Outside the range: NaN."
@@ -170,6 +161,7 @@ C = Language(
     "C99, also C++11: cc -O2 -c {name}.c, link with -lm; {name}.h beside it declares the functions. The C of the "
     f"library itself, and the law's own numbers. {NAN}",
     "{name}_{what}({x})",
+    functools.partial(number, infinity="INFINITY"),
     beside=(Beside(".h", "law.h"),),
 )
 CALLED = (
@@ -187,7 +179,7 @@ LANGUAGES = {
         "Fortran 2008 on top of {name}_c.c, which is written beside it, by `mbma export c-law`: cc -O2 -c {name}_c.c, "
         f"gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(c_double). {NAN}",
         "{what}({x})",
-        _fortran_number,
+        functools.partial(number, exponent="d", infinity="huge(1d0)"),
         beside=(Beside("_c.c", target="c-law"),),
     ),
     "javascript-law": Language(
@@ -198,7 +190,7 @@ LANGUAGES = {
         "WebAssembly; {name}.d.mts and {name}.d.cts have the types for TypeScript. Outside the range a RangeError is "
         "thrown, of what is no number a TypeError.",
         "{what}({x})",
-        functools.partial(_number, "-Infinity"),
+        functools.partial(number, infinity="Infinity"),
         parts=(("EXPORT", "export"),),
         beside=(
             Beside(".cjs", "law.mjs", parts=(("EXPORT", "module.exports ="),)),
@@ -211,7 +203,7 @@ LANGUAGES = {
         "#",
         "Python with numpy alone: import {name}; arrays of any shape. Outside the range: ValueError.",
         "{name}.{what}({x})",
-        functools.partial(_number, "-np.inf"),
+        functools.partial(number, infinity="np.inf"),
         brackets,
         parts=(("NP", "np"), ("NUMPY", "asked"), ("JAX", "")),
     ),
@@ -221,7 +213,7 @@ LANGUAGES = {
         "Python with jax alone, differentiable by c, p and the pytree LAW. Set jax_enable_x64 before the import, or "
         f"answers are in single precision. {NAN}",
         "{name}.{what}({x})",
-        functools.partial(_number, "-jnp.inf"),
+        functools.partial(number, infinity="jnp.inf"),
         brackets,
         parts=(("NP", "jnp"), ("NUMPY", ""), ("JAX", "asked")),
     ),
@@ -230,7 +222,7 @@ LANGUAGES = {
         "%",
         "MATLAB and Octave: law = {name}(); arrays of any shape. Outside the range: an error.",
         "law.{what}({x})",
-        functools.partial(_number, "-Inf"),
+        functools.partial(number, infinity="Inf"),
         matrix,
     ),
     "modelica-law": Language(
@@ -239,7 +231,7 @@ LANGUAGES = {
         "A Modelica package: p = {name}.pressure(c), with its derivative; where p is known a tool solves this for c. "
         "Outside the range an assertion fails.",
         "{name}.{what}({x})",
-        functools.partial(_number, "-1e300"),
+        functools.partial(number, infinity="1.0e300"),
         braces,
     ),
     "abaqus-uinter": SUBROUTINE._replace(

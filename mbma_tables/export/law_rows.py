@@ -17,6 +17,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import KAPPA, ExportedLaw, exported_law
 from mbma_tables.export.law_table import MAX_ROWS, MIN_ROWS, LawTable, chosen_rows, rounded
 from mbma_tables.export.targets import AGAINST
+from mbma_tables.export.text import about, number
 from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING
 from mbma_tables.laws.calibrated import TESTED_AREA
@@ -187,11 +188,12 @@ def _friction(
 
     stick, unit = stiffness(at), f"{exported.stress}/{exported.length}"
     places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
+    listed = [f"{about(stiffness(p))} at {about(p)}" for p in places]
     facts = {"friction": (number_in("friction", friction, 1e-12, 1e12), "1")}
     return facts | {"stick": (stick, unit), "stick_pressure": (at, exported.stress)}, (
-        f"friction coefficient {friction:.10g}; shear stress over displacement before slip, the stiffness of a small "
-        f"unloading over kappa = {ratio:.4g}: {stick:.4g} {unit} at {at:.4g} {exported.stress}, where the friction "
-        f"card holds; {', '.join(f'{stiffness(p):.4g} at {p:.4g}' for p in places)} {exported.stress}"
+        f"friction coefficient {number(friction)}; shear stress over displacement before slip, the stiffness of a "
+        f"small unloading over kappa = {about(ratio)}: {about(stick)} {unit} at {about(at)} {exported.stress}, where "
+        f"the friction card holds; {', '.join(listed)} {exported.stress}"
     )
 
 
@@ -233,9 +235,9 @@ def _table(
         why = "the largest asked for"
     comments = exported.header(
         f"{y_name} [{y_unit}] against {x_name} [{x_unit}]",
-        f"{x_name} from 0 to {x[-1]:.10g} {x_unit}, {why}",
+        f"{x_name} from 0 to {number(x[-1])} {x_unit}, {why}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
-        f"above {y_name} {floor:.4g} {y_unit}",
+        f"above {y_name} {about(floor)} {y_unit}",
         *([] if exported.ends else ["the first row is zero, whatever the theory has up to the second"]),
         *said,
         end=end,
@@ -263,7 +265,7 @@ def _range(exported: ExportedLaw, pressures: tuple[float | str, float | str] | N
     low, high = ends
     found = (law.h_max - float(law.at_pressure(high).separation)) / 2
     if found <= 0:
-        least = f"{float(law.pressure(law.h_max)):.4g} {units.stress}"
+        least = f"{about(law.pressure(law.h_max))} {units.stress}"
         raise InputError(f"pressures must reach above {least}, that at c = 0, where rows begin, got {high:g}")
     return low, found
 
@@ -291,15 +293,15 @@ def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float
     gaps = {reason: found.mean_separation[bad] for reason, bad in found.reasons.items()}
     comments = exported.header(
         f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
-        f"mean separation u from {u[0]:.10g} to {u[-1]:.10g} {length}",
+        f"mean separation u from {number(u[0])} to {number(u[-1])} {length}",
         f"{rows} rows; largest error of linear interpolation {error:.1e}, relative, of flow factors and of pressures "
-        f"above {floor:.4g} {stress}, where flow factors are valid",
+        f"above {about(floor)} {stress}, where flow factors are valid",
         "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
         "stiffness is that of a small change of the gap, with the contact area as it is",
-        f"peklenik = {found.peklenik:.6g}: length of the roughness along x over that along y",
-        f"scatter: one standard deviation of ln phi; of ln shear_x, ln shear_y: {found.shear_scatter[0]:.2g}",
+        f"peklenik = {about(found.peklenik, 6)}: length of the roughness along x over that along y",
+        f"scatter: one standard deviation of ln phi; of ln shear_x, ln shear_y: {about(found.shear_scatter[0], 2)}",
         *(
-            f"flow factors not valid from u = {bad.min():.4g} to {bad.max():.4g} {length}: {reason}"
+            f"flow factors not valid from u = {about(bad.min())} to {about(bad.max())} {length}: {reason}"
             for reason, bad in gaps.items()
         ),
         end=h_max - min(u[0], h_max * (1 - NEAREST_GAP)),

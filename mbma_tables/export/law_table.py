@@ -19,12 +19,12 @@ from mbma_tables.common.arguments import FloatArray, number_in, whole_number_in
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_line
-from mbma_tables.export.text import DIGITS, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MIN_ROWS, MAX_ROWS = 3, 5000
+DIGITS = 10  # of rows, which are shorter to read; files hold exactly these
 ROUNDS = 40  # rounds of making the errors of chords equal
 LAST = 1.5  # the last chord's error counts so much more, as its last row is not moved
 
@@ -116,7 +116,7 @@ def chosen_rows(
 
 def rounded(values: FloatArray) -> FloatArray:
     """Numbers as written to a file."""
-    return np.array([float(number(value)) for value in values])
+    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
 
 
 def _not_below(value: float) -> float:

@@ -15,9 +15,12 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.targets import AGAINST, SI, Grammar
-from mbma_tables.export.text import DIGITS, comment, number, opening
+from mbma_tables.export.text import about, comment, number, opening
 from mbma_tables.materials import tangential_ratio
 
+# columns of a number: CalculiX reads no more of it, so that a longer one may lose its exponent
+CARD_WIDTH = 20
+LSDYNA_WIDTH, OPTISTRUCT_WIDTH = 20, 16  # columns of a field, of which OptiStruct's are its long ones
 MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
 PAIR = "*CONTACT PAIR, INTERACTION={name}, TYPE="
 CALCULIX_TABULAR = (
@@ -31,8 +34,10 @@ CALCULIX_HEAT = (
     "and no other type: with NODE TO SURFACE 2.20 takes one conductance for all pressures, without a message. Use it "
     "in steps of *COUPLED TEMPERATURE-DISPLACEMENT: with UNCOUPLED an increment has the conductance of the pressure "
     "of the one before it, so that loads must be held for one more. Below the second row conductance is linear from 0.",
-    "2.20 takes no table of pressures beside one of conductances. The closure is exponential here, p = p0 exp(c/c0): "
-    "pressure at a given overclosure is within {by_p:.0%} of the law from p = {low} to {high} {stress}, overclosure at "
+    "2.20 takes no table of pressures beside one of conductances. The closure is exponential here, "
+    "p = p0 exp(ln(100) c/c0) with c0 = {c0} {length}, over which the pressure falls to a hundredth, and "
+    "p0 = {p0} {stress}, the pressure at c = 0: pressure at a given overclosure is within "
+    "{by_p:.0%} of the law from p = {low} to {high} {stress}, overclosure at "
     "a given pressure within {by_c} {length}. Where forces are prescribed, this does not change the conductance.",
     "From an open gap press by displacements at first: by forces alone EXPONENTIAL does not converge. LINEAR does, "
     "with the line {slope} below *SURFACE BEHAVIOR, but its closure is the law's at the largest pressure alone.",
@@ -68,7 +73,13 @@ def _interaction(name: str, *cards: str) -> str:
 
 def _card(head: str, law: LawTable) -> str:
     """A card with the columns swapped: pressure, overclosure, or conductance, pressure."""
-    return f"{head}\n" + "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True))
+    rows = zip(law.x, law.y, strict=True)
+    return f"{head}\n" + "".join(f"{_field(y)}, {_field(x)}\n" for x, y in rows)
+
+
+def _field(value: float) -> str:
+    """A number of a card of CalculiX or Abaqus."""
+    return number(value, width=CARD_WIDTH)
 
 
 def _friction(law: LawTable) -> tuple[float, float, float]:
@@ -78,7 +89,10 @@ def _friction(law: LawTable) -> tuple[float, float, float]:
 
 
 def _stick(law: LawTable) -> str:
-    return "*FRICTION\n{:.10g}, {:.10g}\n".format(*_friction(law)) if "friction" in law.facts else ""
+    if "friction" not in law.facts:
+        return ""
+    friction, slope, _ = _friction(law)
+    return f"*FRICTION\n{_field(friction)}, {_field(slope)}\n"
 
 
 def _calculix(law: LawTable, name: str) -> str:
@@ -101,19 +115,30 @@ def _calculix_heat(law: LawTable, name: str) -> str:
     u0 = (c[-1] - c[0]) / math.log(p[-1] / p[0])
     off = np.log(p) - c / u0
     middle, spread = (off.max() + off.min()) / 2, (off.max() - off.min()) / 2
-    said = {"low": f"{p[0]:.4g}", "high": f"{p[-1]:.4g}", "by_p": math.expm1(spread), "by_c": f"{spread * u0:.2g}"}
-    said |= {"slope": number(p[-1] / c[-1]), "name": name, "stress": rows.y_unit, "length": rows.x_unit}
-    # p = p0 exp(c/u0), by the distance over which the pressure falls to a hundredth
-    closure = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{number(u0 * math.log(100))}, "
-    cards = f"{closure}{number(math.exp(middle))}\n", _stick(law), _card("*GAP CONDUCTANCE", law)
-    return _notes(CALCULIX_HEAT, **said) + _interaction(name, *cards)
+    # p = p0 exp(c/u0): CalculiX takes the distance c0 over which the pressure falls to a hundredth
+    c0, p0 = u0 * math.log(100), math.exp(middle)
+    words = {
+        "name": name,
+        "c0": _field(c0),
+        "p0": _field(p0),
+        "low": about(p[0]),
+        "high": about(p[-1]),
+        "by_p": math.expm1(spread),
+        "by_c": about(spread * u0, 2),
+        "slope": _field(p[-1] / c[-1]),
+        "stress": rows.y_unit,
+        "length": rows.x_unit,
+    }
+    closure = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{_field(c0)}, {_field(p0)}\n"
+    cards = closure, _stick(law), _card("*GAP CONDUCTANCE", law)
+    return _notes(CALCULIX_HEAT, **words) + _interaction(name, *cards)
 
 
 def _abaqus(law: LawTable, name: str) -> str:
     cards = [_card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)]
     if "friction" in law.facts:
         friction, _, slip = _friction(law)
-        cards.append(f"*FRICTION, ELASTIC SLIP={number(slip)}\n{number(friction)}\n")
+        cards.append(f"*FRICTION, ELASTIC SLIP={_field(slip)}\n{_field(friction)}\n")
     if law.behaviour is not None:
         cards.append(_card("*GAP CONDUCTANCE, PRESSURE", law))
     return _interaction(name, *cards)
@@ -122,12 +147,17 @@ def _abaqus(law: LawTable, name: str) -> str:
 def _lsdyna(law: LawTable) -> str:
     """Curve 1, for inclusion: without *END, which would end the including deck."""
     head = f"*DEFINE_CURVE\n{1:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
-    return head + "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
+    rows = (
+        "".join(number(value, width=LSDYNA_WIDTH).rjust(LSDYNA_WIDTH) for value in row)
+        for row in zip(law.x, law.y, strict=True)
+    )
+    return head + "".join(f"{row}\n" for row in rows)
 
 
 def _optistruct(law: LawTable) -> str:
     """PCONT 1 and TABLES1 2, in long fields of 16 columns."""
-    pairs = [f"{value:<16.9E}" for row in zip(law.x, law.y, strict=True) for value in row]
+    values = np.column_stack([law.x, law.y]).ravel()
+    pairs = [number(value, width=OPTISTRUCT_WIDTH).ljust(OPTISTRUCT_WIDTH) for value in values]
     # the keyword stands where a line begins: on the first one that field is the friction coefficient
     lines = ["PCONT,1", "+,STFTAB,2", f"{'TABLES1*':<8}{2:<16d}{'':<16}{'':<16}{'':<16}*", f"{'*':<8}"]
     fields = [*pairs, f"{'ENDT':<16}"]
@@ -172,12 +202,13 @@ def _mbdyn(law: LawTable, name: str) -> str:
     numbers |= {"H0": float(far[0] - delta), "E": E_star, "sigma0": math.exp(np.log(slip).mean())}
     numbers |= {"Rq": sigma / math.sqrt(2), "lambdax": law.facts["peklenik"][0]}
     said = (
-        f"Greenwood-Tripp numbers fitted from p = {pressure[-1]:.4g} to {pressure[0]:.4g} {law.more['pressure'][1]}, u "
-        f"= {u[-1]:.4g} to {u[0]:.4g} {length}: ln(p/p of the law) is {misfit.std():.2g} root mean square, "
-        f"{np.abs(misfit).max():.2g} at most; below these gaps a tangent. MBDyn's h is u; eta beta sigma is "
-        f"{CROWDING:g}, for K alone counts; its asperity curvature is a radius.",
-        f"micro slip stiffness: tangential stiffness over p, from {slip.min():.4g} to {slip.max():.4g} per {length}, "
-        f"of nu = {NU:g}; for another nu times {tangential_ratio(NU):.4g} (2 - 2 nu)/(2 - nu).",
+        f"Greenwood-Tripp numbers fitted from p = {about(pressure[-1])} to {about(pressure[0])} "
+        f"{law.more['pressure'][1]}, u = {about(u[-1])} to {about(u[0])} {length}: ln(p/p of the law) is "
+        f"{about(misfit.std(), 2)} root mean square, {about(np.abs(misfit).max(), 2)} at most; below these gaps a "
+        f"tangent. MBDyn's h is u; eta beta sigma is {CROWDING:g}, for K alone counts; its asperity curvature is a "
+        "radius.",
+        f"micro slip stiffness: tangential stiffness over p, from {about(slip.min())} to {about(slip.max())} per "
+        f"{length}, of nu = {NU:g}; for another nu times {about(tangential_ratio(NU))} (2 - 2 nu)/(2 - nu).",
         "Flow factors are those of Patir and Cheng in MBDyn, of two faces that share h_rms^2; x is around the bearing.",
     )
     sets = "".join(f"set: real {name}_{key} = {number(value)};\n" for key, value in numbers.items())
@@ -206,8 +237,8 @@ def _geos(law: LawTable, name: str) -> str:
         for key, (x, values) in tables.items()
     )
     said = (
-        f"BartonBandis is fitted: ln(w/w of the table) is {misfit.std():.2g} root mean square, "
-        f"{np.abs(misfit).max():.2g} at most. HydraulicApertureTable takes no stress; use one of both."
+        f"BartonBandis is fitted: ln(w/w of the table) is {about(misfit.std(), 2)} root mean square, "
+        f"{about(np.abs(misfit).max(), 2)} at most. HydraulicApertureTable takes no stress; use one of both."
     )
     bandis = f'referenceAperture="{number(math.exp(factor))}" referenceNormalStress="{number(t * stress[-1])}"'
     return comment([said], "<!--") + (
@@ -243,9 +274,9 @@ def _lethe(law: LawTable) -> str:
     logs = np.log(law.x[kept]) - np.log(law.y[kept] * sigma / (YOVANOVICH * k_s * slope)) / EXPONENT
     middle, spread = (logs.max() + logs.min()) / 2, EXPONENT * (logs.max() - logs.min()) / 2
     said = (
-        f"Lethe's conductance 1.25 k m/sigma (p/H)^0.96 is within {math.expm1(spread):.2g} of the law's from p = "
-        f"{law.x[kept][0]:.4g} to {law.x[-1]:.4g} {law.x_unit} with this microhardness H, which is fitted to this "
-        "surface slope m: both depend on the shortest wavelength of the surface. m is the mean of |dz/dx|.",
+        f"Lethe's conductance 1.25 k m/sigma (p/H)^0.96 is within {about(math.expm1(spread), 2)} of the law's from "
+        f"p = {about(law.x[kept][0])} to {about(law.x[-1])} {law.x_unit} with this microhardness H, which is fitted "
+        "to this surface slope m: both depend on the shortest wavelength of the surface. m is the mean of |dz/dx|.",
     )
     numbers = {"microhardness": math.exp(middle), "surface slope": slope / math.sqrt(2)}
     numbers |= {"surface roughness": sigma / math.sqrt(2)}

@@ -1,12 +1,13 @@
 """Writing text and numbers into other codes, so that no text of a user or a table is executed there."""
 
 import functools
+import math
 import pathlib
 import re
 import shlex
 import textwrap
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from mbma_tables import __version__
 from mbma_tables.common.errors import InputError
 
 COMMENT_WIDTH = 108
-DIGITS = 10  # of the numbers in a law's file
 _ROOT = pathlib.Path(__file__).parent
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
 # begin or end of a C comment, end of a script in a page, trigraphs
@@ -96,15 +96,87 @@ def checked_name(name: str, max_length: int) -> str:
     return name
 
 
-def number(value: float) -> str:
-    """A number of a law's file."""
-    return f"{value:.{DIGITS}g}"
+def number(
+    value: SupportsFloat,
+    *,
+    digits: int = 17,
+    width: int | None = None,
+    exponent: str = "",
+    infinity: str | None = None,
+    missing: str | None = None,
+) -> str:
+    """A number for another program or for a header, always with a decimal point: no reader takes it for an integer.
+
+    Programs that read whole numbers as integers of 32 bits turn 3240000000 into -1054967296.
+
+    Parameters
+    ----------
+    value : float
+    digits : int
+        Significant digits. The default reads back as the same double, written as shortly as that allows.
+    width : int, optional
+        Columns of a field. Where the number needs more, it has as many digits as fit: 13 in 20 columns and 9 in
+        16 at least, hence relative errors of at most 5e-13 and 5e-9.
+    exponent : str
+        Letter of an exponent that must be there, such as "d" for double precision in Fortran.
+    infinity, missing : str, optional
+        How the language writes infinity and NaN.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite where the language has no word for it, and for one that no field holds.
+
+    Examples
+    --------
+    >>> number(3.24e9), number(1e22), number(1 / 3), number(2 / 3, digits=3)
+    ('3240000000.0', '1.0e+22', '0.3333333333333333', '0.667')
+    >>> number(-1.2345678901234567e-05, width=20), number(2.0, exponent="d")
+    ('-1.2345678901235e-05', '2.0d0')
+    """
+    double = float(value)
+    if math.isinf(double) and infinity is not None:
+        return infinity if double > 0 else f"-{infinity}"
+    if math.isnan(double) and missing is not None:
+        return missing
+    if not math.isfinite(double):
+        raise InputError(f"a number in a file for another program must be finite, got {double}")
+    text = _pointed(repr(float(f"{double:.{digits}g}")), exponent)
+    if width is None or len(text) <= width:
+        return text
+    # with an exponent, the most digits that fit
+    for decimals in range(digits - 1, 0, -1):
+        mantissa, _, power = f"{double:.{decimals}e}".partition("e")
+        text = _pointed(f"{mantissa.rstrip('0').rstrip('.')}e{power}", exponent)
+        # next to the largest double fewer digits may round beyond it
+        if len(text) <= width and math.isfinite(float(text.replace(exponent or "e", "e"))):
+            return text
+    raise InputError(f"{double!r} does not fit into a field of {width} columns")
+
+
+def about(value: SupportsFloat, digits: int = 4) -> str:
+    """A number of a header, rounded for its reader."""
+    return number(value, digits=digits, infinity="infinity", missing="not known")
+
+
+def _pointed(text: str, exponent: str = "") -> str:
+    """Decimals with a point in the mantissa, and with the letter of an exponent where one is asked for."""
+    mantissa, letter, power = text.partition("e")
+    if "." not in mantissa:
+        mantissa += ".0"
+    if not (letter or exponent):
+        return mantissa
+    return f"{mantissa}{exponent or letter}{power or 0}"
 
 
 def numerals(values: Any) -> list[str]:
-    """Numbers in the shortest decimals of their precision, as C has them."""
+    """Numbers in the shortest decimals of their precision, as C has them; those of an integer type as integers."""
     flat = np.ravel(values)
-    return [f"{text}f" for text in flat.astype(str)] if flat.dtype == np.float32 else flat.astype(str).tolist()
+    texts: list[str] = flat.astype(str).tolist()
+    if not np.issubdtype(flat.dtype, np.floating):
+        return texts
+    suffix = "f" if flat.dtype == np.float32 else ""
+    return [f"{_pointed(text)}{suffix}" for text in texts]
 
 
 def braces(*parts: Any) -> str:

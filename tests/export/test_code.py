@@ -104,7 +104,7 @@ def test_every_file_says_what_it_is(tmp_path):
     largest = max(attributes["largest_error_F"], attributes["largest_error_A"])
     core = pathlib.Path(mbma_tables.core.__file__).parent
     facts = (f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause", "Variant: printed")
-    facts += ("-6.25 <= X <= 41", f"{largest:.2g} on", "zeta_1 in [3, 1e+05]", "of the table against the law")
+    facts += ("-6.25 <= X <= 41.0", f"{largest:.2g} on", "zeta_1 in [3.0, 100000.0]", "of the table against the law")
     for path in written:
         text = path.read_text(encoding="utf-8")
         if (core / path.name).is_file():

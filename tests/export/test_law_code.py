@@ -101,7 +101,7 @@ def test_headers_say_what_is_there():
     text = " ".join(law_points.text("python-law", "calibrated", leakage=True).replace("#", "").split())
     leakage = points("calibrated").law.leakage
     facts = f"K is within {leakage.error:.1e} of that at the law's area", "one standard deviation of ln K: 0.1"
-    facts += f"c = {(3 - leakage.blocked_at) / 2:.10g} on", "leakage: A/A0 is above 0.3"
+    facts += f"c = {float((3 - leakage.blocked_at) / 2)!r} on", "leakage: A/A0 is above 0.3"
     assert all(fact in text for fact in facts)
     assert "import { pressure, with_tangent, curvature" in law_points.text("javascript-law", "mbma")
     text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)

@@ -264,8 +264,8 @@ def test_rows_of_leakage_are_the_contacts_flow_to_the_blocked_pressure():
     text = "\n".join(law.comments)
     for fact in (
         "blocked, K = 0, from p = ",
-        "viscosity in MPa s: 1e-3 Pa s, as water's, is 1e-09 MPa s",
-        f"pressure from 0 to {law.x[-1]:.10g} MPa, where contact blocks the gaps",
+        "viscosity in MPa s: 1e-3 Pa s, as water's, is 1.0e-09 MPa s",
+        f"pressure from 0 to {float(law.x[-1])!r} MPa, where contact blocks the gaps",
         "leakage: A/A0 is above 0.3",
         "one standard deviation of ln K",
     ):
@@ -291,8 +291,8 @@ def test_rows_of_a_law_with_a_hardness():
     # chords lie about the law by as much as they may miss it
     kept = law.y > 1.0
     assert law.y[kept] == pytest.approx(known(mean_separation=3.0 - law.x[kept]).pressure, rel=1e-2)
-    assert "hardness = 1500 MPa, plasticity index 3.61" in " ".join(law.comments)
-    assert "elastic: within 5% in area for hardnesses from 4922 MPa on" in " ".join(elastic.comments)
+    assert "hardness = 1500.0 MPa, plasticity index 3.61" in " ".join(law.comments)
+    assert "elastic: within 5% in area for hardnesses from 4922.0 MPa on" in " ".join(elastic.comments)
     # conductance is not the slope of loading
     heat = joint(**asked, quantity="conductance", conductivity=20.0, conductivity_unit="mW/(mm K)")
     found = known(pressure=heat.x[heat.x > 2.0])

@@ -88,6 +88,12 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     # the pressure is the law's to what the card says of its closure, and the conductance is of that pressure
     stated = float(re.search(r"within (\d+)% of the law", card.replace("\n**", ""))[1]) / 100
     assert 0.1 < np.abs(np.log(p / PRESSURES)).max() < np.log1p(stated) + 0.06
+    # the formula of the comments, with its numbers, is what CalculiX calculates
+    words = " ".join(card.replace("\n**", "").split())
+    assert "p = p0 exp(ln(100) c/c0)" in words
+    c0, p0 = (float(re.search(rf"{name} = (\S+) ", words)[1]) for name in ("with c0", "and p0"))
+    overlap = c + 20 * PRESSURES / 1e6 - 20 * p / 1e6
+    np.testing.assert_allclose(p0 * np.exp(np.log(100) * overlap / c0), p, rtol=1e-3)
     expected = CONDUCTIVITY / 25 * law.at_pressure(p).stiffness
     np.testing.assert_allclose(conductance(flux)[:-1], expected[:-1], rtol=1e-2)
     assert p[-1] > rows.x[-1]
