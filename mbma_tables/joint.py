@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 import pathlib
 from collections.abc import Mapping, Sequence
@@ -11,10 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.contact import contact
+from mbma_tables.answers.contact import chosen_theory, contact
 from mbma_tables.answers.interface import ratio_of
 from mbma_tables.answers.result import Contact
-from mbma_tables.answers.sensitivity import Sensitivity, sensitivity
+from mbma_tables.answers.sensitivity import (
+    OfOneMap,
+    Sensitivity,
+    Unknowns,
+    relative_derivatives,
+    unknowns_of,
+)
 from mbma_tables.common.arguments import hinted, nearest
 from mbma_tables.common.display import Displayed, Variable, dataset_of
 from mbma_tables.common.errors import InputError
@@ -22,9 +29,10 @@ from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import Units
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
-from mbma_tables.materials import Metal, Pair, hardness_in, pair
+from mbma_tables.materials import Metal, Pair, effective_modulus, hardness_in, pair
 from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import Theory
 
@@ -34,7 +42,23 @@ if TYPE_CHECKING:
 
 Part = AnySurface | Mapping[str, Any]
 CONDUCTANCE = "W/(m^2 K)"
+FACES = ("part_a", "part_b")
 RANGE, POINTS = (1e-5, 0.3), 41  # pressures over the hardness, and their number, in pictures
+
+
+def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
+    """The rough surface whose contact with a smooth one is that of one or two faces.
+
+    With a nominal area its highest point is that of Gaussian heights of this area.
+    """
+    surface: AnySurface
+    if len(faces) == 2:
+        surface = faces[0].combined(faces[1], nominal_area)
+    elif nominal_area is None:
+        surface = faces[0]
+    else:
+        surface = dataclasses.replace(faces[0], h_max=None, nominal_area=nominal_area)
+    return surface
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -106,20 +130,26 @@ class Joint(Displayed):
     theory: str | Theory = "calibrated"
     surface: AnySurface = dataclasses.field(init=False)
     pair: Pair = dataclasses.field(init=False)
+    _faces: dict[str, AnySurface] = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
-        parts = [self._part(part) for part in (self.part_a, self.part_b) if part is not None]
-        one: Any = parts[0]
-        if len(parts) == 2:
-            one = one.combined(parts[1], self.nominal_area)
-        elif self.nominal_area is not None and not isinstance(self.part_a, Mapping):
-            one = dataclasses.replace(one, h_max=None, nominal_area=self.nominal_area)
-        if one.shape != ():
-            raise InputError(f"a joint is of one surface, got a batch of shape {one.shape}")
-        object.__setattr__(self, "surface", one)
+        faces = {}
+        for name in FACES:
+            part = getattr(self, name)
+            if part is not None:
+                faces[name] = self._face(name, part)
+        object.__setattr__(self, "_faces", faces)
+        drawn = isinstance(self.part_a, Mapping) and "map" not in self.part_a
+        # a face made of numbers has the highest point of the nominal area already
+        area = None if drawn and len(faces) == 1 else self.nominal_area
+        surface = equivalent(list(faces.values()), area)
+        if surface.shape != ():
+            raise InputError(f"a joint is of one surface, got a batch of shape {surface.shape}")
+        object.__setattr__(self, "surface", surface)
         object.__setattr__(self, "pair", pair(self.materials))
 
-    def _part(self, part: Part) -> AnySurface:
+    def _face(self, name: str, part: Part) -> AnySurface:
+        """The surface of a part."""
         if not isinstance(part, Mapping):
             return part
         if "map" in part:
@@ -169,8 +199,92 @@ class Joint(Displayed):
         return contact_law(self.surface, **self._asked)
 
     def sensitivity(self, pressure: float | str) -> Sensitivity:
-        """Sensitivity to each parameter of the joint at a pressure, from `sensitivity`."""
-        return sensitivity(self.surface, pressure=pressure, **self._asked)
+        """d ln(result)/d ln(number) at a pressure, for the numbers that the joint was described by.
+
+        Parameters
+        ----------
+        pressure : float or str
+            F/A0, held fixed; plain numbers in GPa.
+
+        Returns
+        -------
+        Sensitivity
+            With a row for each number of each face, "part_a.Rq", "part_a.longest"; Young's moduli of both bodies,
+            "part_a.E" and "part_b.E"; the nominal area, the hardness of the softer metal, and the pressure. Of a face
+            given by a spectrum or a map as for `sensitivity`: "part_a.heights", "part_a.lengths", its cut-offs.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            As `sensitivity`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> metal = "copper C11000 hard"
+        >>> joint = Joint(face, materials=metal, nominal_area="4 cm^2", theory="calibrated")
+        >>> slopes = joint.sensitivity("10 MPa").slopes
+        >>> f"conductance goes like Rq^{slopes['part_a.Rq']['conductance']:.2f}"
+        'conductance goes like Rq^-0.67'
+        """
+        units = Units(self.surface.unit, "GPa")
+        chosen = chosen_theory(self.surface, self.theory)
+        bodies = self.pair.metals
+        hardness = self.hardness or self.pair.hardness or np.inf
+
+        def modulus_of(*moduli: Any) -> Any:
+            (E_a, E_b), (nu_a, nu_b) = moduli, (metal.nu for metal in bodies)
+            return effective_modulus(E_a, nu_a, E_b, nu_b)
+
+        return relative_derivatives(
+            self._unknowns(chosen),
+            chosen,
+            units,
+            moduli={f"{name}.E": metal.E for name, metal in zip(FACES, bodies, strict=True)},
+            modulus_of=modulus_of,
+            by="pressure",
+            value=units.number("pressure", pressure),
+            hardness=hardness_in(units, hardness),
+        )
+
+    def _unknowns(self, theory: Theory) -> Unknowns:
+        """The numbers of the faces, each with the name of its part before it, and the nominal area."""
+        unit = self.surface.unit
+        overridden = () if self.nominal_area is None else TOPS
+        alone = len(self._faces) == 1
+        if alone:
+            own = unknowns_of(self.surface, theory, unit)
+            if not overridden or isinstance(own, OfOneMap) or "nominal_area" in own.numbers:
+                labels = {name: f"part_a.{name}" for name in own.numbers}
+                if overridden:
+                    labels["nominal_area"] = "nominal_area"
+                return dataclasses.replace(own, labels=labels)
+        faces = {name: unknowns_of(face, theory if alone else None, unit) for name, face in self._faces.items()}
+        numbers: dict[str, float] = {}
+        one_sided: dict[str, float] = {}
+        fixed: dict[str, dict[str, float]] = {}
+        for part, face in faces.items():
+            # the nominal area determines the highest point of Gaussian heights
+            fixed[part] = {name: number for name, number in face.numbers.items() if name in overridden}
+            for name, number in face.numbers.items():
+                if name not in overridden:
+                    numbers[f"{part}.{name}"] = number
+            one_sided |= {f"{part}.{name}": sign for name, sign in face.one_sided.items()}
+        if overridden:
+            numbers["nominal_area"] = Units(unit).number("nominal_area", self.nominal_area)
+
+        def make(**given: Any) -> AnySurface:
+            surfaces = []
+            for part, face in faces.items():
+                own = {name: given[f"{part}.{name}"] for name in face.numbers if name not in fixed[part]}
+                surfaces.append(face.make(**own, **fixed[part]))
+            return equivalent(surfaces, given.get("nominal_area"))
+
+        if alone and faces["part_a"].batches:
+            return Unknowns(numbers, make, batches=True, one_sided=one_sided)
+        # moduli, pressure and hardness are varied with the same surface
+        return Unknowns(numbers, functools.cache(make), one_sided=one_sided)
 
     def export(
         self,

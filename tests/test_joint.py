@@ -2,6 +2,7 @@
 
 import ctypes
 import dataclasses
+import math
 import pathlib
 import runpy
 import shutil
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from helpers import random_map
 
-from mbma_tables import InputError, Joint, Surface, contact, contact_law
+from mbma_tables import InputError, Joint, Surface, contact, contact_law, materials
 from mbma_tables.cli import main
 from mbma_tables.export import targets
 from mbma_tables.export.law_code import law_text
@@ -44,7 +45,67 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
 def test_its_law_and_sensitivity(joint):
     law, found = joint.law(), joint.at_pressure("10 MPa")
     assert float(law.at_pressure(0.01).mean_separation) == pytest.approx(float(found.mean_separation), rel=1e-5)
-    assert joint.sensitivity("10 MPa").slopes["hardness"]["area"] == pytest.approx(-0.75, abs=0.02)
+    slopes = joint.sensitivity("10 MPa").slopes
+    assert slopes["hardness"]["area"] == pytest.approx(-0.75, abs=0.02)
+    # a longer wavelength of the drawing at the same Rq lowers the gap; one that is cut off takes height away
+    faces = [{**FACE, "Rq": Rq, "longest": "501 um"} for Rq in ("0.4 um", "0.7 um")]
+    longer = Joint(*faces, materials=METALS, nominal_area="4 cm^2", theory=joint.theory).at_pressure("10 MPa")
+    by_both = sum(slopes[f"{part}.longest"]["mean_separation"] for part in ("part_a", "part_b"))
+    by_hand = np.log(longer.mean_separation / found.mean_separation) / np.log(501 / 500)
+    assert by_both == pytest.approx(by_hand, abs=0.01)
+
+
+STEEL = materials.Metal("some steel", 205.0, 0.29, (5.76, 5.76), (42.7, 42.7))
+LIGHT = materials.Metal("some light metal", 69.0, 0.33, (0.95, 0.95), (160.0, 160.0))
+# rows of the sensitivities of a joint of two faces, and a number in other units
+ROWS = {
+    **{f"part_{end}.{name}": 1.0 for end in "ab" for name in ("hurst", "Rq", "longest", "shortest", "E")},
+    "nominal_area": 1.0, "pressure": 1.0, "hardness": 1.0,
+}  # fmt: skip
+
+
+def pressed_again(factors, theory, unit, size, answers):
+    """Logarithms of answers at 50 MPa of the joint described anew, each number times its factor."""
+    factor = {**ROWS, **factors}
+    faces = []
+    for end, Rq in (("a", 0.4), ("b", 0.7)):
+        lengths = {"Rq": Rq, "longest": 500.0, "shortest": 8.0}
+        face = {name: f"{size * factor[f'part_{end}.{name}'] * number!r} {unit}" for name, number in lengths.items()}
+        faces.append(face | {"hurst": 0.8 * factor[f"part_{end}.hurst"]})
+    metals = [
+        dataclasses.replace(metal, E=metal.E * factor[f"part_{end}.E"]) for end, metal in (("a", STEEL), ("b", LIGHT))
+    ]
+    described = Joint(
+        *faces,
+        materials=metals,
+        nominal_area=f"{4 * factor['nominal_area']!r} cm^2",
+        hardness=0.95 * factor["hardness"],
+        theory=theory,
+    )
+    if not answers:
+        return described
+    pressed = described.at_pressure(0.05 * factor["pressure"])
+    values = {name: getattr(pressed, name) for name in answers if name != "conductance"}
+    values["conductance"] = pressed.conductance()
+    return np.log([float(values[name]) for name in answers])
+
+
+@pytest.mark.parametrize(
+    ("theory", "unit", "size"),
+    [("calibrated", "um", 1.0), ("calibrated", "mm", 1e-3), ("persson", "um", 1.0), ("mbma", "um", 1.0)],
+)
+@pytest.mark.slow
+def test_sensitivities_are_differences_of_joints_described_anew(theory, unit, size):
+    """Each row holds for the number that was typed, all others and the pressure unchanged."""
+    answers = ("mean_separation", "area", "stiffness", "conductance")
+    joint = pressed_again({}, theory, unit, size, ())
+    slopes = joint.sensitivity("50 MPa").slopes
+    assert set(slopes) == set(ROWS)
+    step = 0.005
+    for row in ROWS:
+        up, down = (pressed_again({row: math.exp(sign * step)}, theory, unit, size, answers) for sign in (1, -1))
+        known = [slopes[row][name] for name in answers]
+        np.testing.assert_allclose(known, (up - down) / (2 * step), atol=1e-3, err_msg=row)
 
 
 def test_a_smooth_other_face_and_other_metals():
@@ -117,7 +178,7 @@ def test_friction_cards_have_the_stiffness_before_slip(joint):
     card = joint.export("calculix", ("1 MPa", "49 MPa"))  # the geometric mean is 7 MPa
     mu, slope = map(float, card.split("*FRICTION\n")[1].splitlines()[0].split(","))
     assert (mu, slope) == (0.2, pytest.approx(stick[1], rel=1e-6))
-    assert f"{stick[0]:.4g} at 1," in " ".join(card.replace("\n**", "").split())
+    assert f"{stick[0]:.4g}.0 at 1.0," in " ".join(card.replace("\n**", "").split())
     own = joint.export("abaqus", ("1 MPa", "49 MPa"), heat=False, friction_pressure="1 MPa")
     slip, mu = own.split("*FRICTION, ELASTIC SLIP=")[1].splitlines()[:2]
     assert float(mu) * 1.0 / float(slip) == pytest.approx(stick[0], rel=1e-6)

@@ -1,6 +1,7 @@
 """Sensitivity of results to each parameter of a surface: logarithmic derivatives."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.answers.contact import chosen_theory, contact, one_known
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import Units, modulus_and_units, unit_of
+from mbma_tables.common.units import DIMENSIONS, Units, factor, modulus_and_units, unit_of
 from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -20,7 +21,6 @@ from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import OF_MAPS, theory_name
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.protocol import Theory, UserTheory
 
@@ -51,7 +51,8 @@ class Sensitivity:
         lines[1] += "".join(f"{name:>17}" for name in self.answers)
         for name, value in self.parameters.items():
             slopes = "".join(f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}" for answer in self.answers)
-            number = f"{value:.5g} {unit_of(name, self.units)}".removesuffix(" 1")
+            unit = unit_of(name.rpartition(".")[2], self.units)
+            number = f"{value:.5g} {unit}".removesuffix(" 1")
             lines.append(f"{name:{width}}{number:>22}{slopes}")
         return "\n".join(lines)
 
@@ -81,15 +82,15 @@ def sensitivity(
         (`Surface.from_roughness`). Those of one given by a spectrum are "heights" and "lengths", factors of all
         heights and of all lengths along the plane, like an instrument's calibration factors; h_max alone; the
         "shortest" and "longest" wavelengths, cut-offs that only remove wavelengths, and with an extrapolated spectrum
-        its exponent "extrapolate_hurst". Where the calibrated law uses a map's own heights and curves, h_max and
-        cut-offs are left out: they follow from the map.
+        its exponent "extrapolate_hurst". Where the calibrated law uses a map's own heights and curves, and where the
+        map is simulated, h_max and cut-offs are left out: they follow from the map.
     separation, mean_separation, pressure, area : float or str, one of them
         The quantity held fixed, as for `contact`.
     E_star : float or str
         Effective modulus, as for `contact`.
     theory, island_model, variant, rtol, hardness, materials : optional
-        As for `contact`, but for maps "calibrated" by default, since a simulation applies to one surface only; a
-        hardness is one of the parameters.
+        As for `contact`, with the same default theory; a hardness is one of the parameters. The simulation of a map
+        answers for its heights and lengths by similarity, without a hardness.
 
     Returns
     -------
@@ -98,7 +99,7 @@ def sensitivity(
     Raises
     ------
     InputError, OutOfRangeError
-        For a batch, unknown names, and where there is no contact.
+        For a batch, unknown names, where there is no contact, and for the simulation of a map with a hardness.
 
     Examples
     --------
@@ -111,104 +112,273 @@ def sensitivity(
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.68'
     """
-    from scipy.differentiate import jacobian
-
-    named = theory_name(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
-    # a simulation is of one surface only
-    named = "calibrated" if theory is None and named in OF_MAPS else named
-    chosen = chosen_theory(surface, named, island_model=island_model, variant=variant, rtol=rtol)
+    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, hardness, _ = bodies(materials, E_star, hardness)
     modulus, units = modulus_and_units(E_star, surface)
-    cap = hardness_in(units, np.inf if hardness is None else hardness)
-    make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, chosen)
-    given = parameters | {"E_star": modulus, by: units.number(by, value)}
-    given |= {} if np.equal(cap, np.inf).all() else {"hardness": cap}
+    return relative_derivatives(
+        unknowns_of(surface, chosen),
+        chosen,
+        units,
+        moduli={"E_star": modulus},
+        modulus_of=_itself,
+        by=by,
+        value=units.number(by, value),
+        hardness=hardness_in(units, np.inf if hardness is None else hardness),
+    )
+
+
+def _itself(E_star: Any) -> Any:
+    return E_star
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknowns:
+    """Numbers that a surface was made from, and the function that makes it again of others."""
+
+    numbers: Mapping[str, float]
+    make: Callable[..., AnySurface]  # takes the numbers by name
+    batches: bool = False  # whether `make` takes arrays of them
+    #: signs of steps of numbers that can move to one side only
+    one_sided: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    #: names of the numbers in results, where they are not their own
+    labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def answers(
+        self, numbers: Mapping[str, Any], by: str, value: Any, modulus: Any, cap: Any, theory: Theory
+    ) -> dict[str, Any]:
+        """`ANSWERS` of the surface of these numbers."""
+        pressed: Any = contact(self.make(**numbers), **{by: value}, E_star=modulus, hardness=cap, theory=theory)
+        answers = {name: getattr(pressed, name) for name in ANSWERS if name != "conductance"}
+        return answers | {"conductance": pressed.unloading_stiffness / modulus}
+
+
+class OfOneMap(Unknowns):
+    """A map whose theory is a simulation of it: heights and lengths scale what was simulated.
+
+    A map with heights `a` and lengths `l` times as large is pressed as the map itself is by bodies of modulus E* a/l,
+    at gaps 1/a times as large.
+    """
+
+    def answers(
+        self, numbers: Mapping[str, Any], by: str, value: Any, modulus: Any, cap: Any, theory: Theory
+    ) -> dict[str, Any]:
+        """`ANSWERS` of the map with these factors."""
+        heights, lengths = numbers["heights"], numbers["lengths"]
+        equal_modulus = modulus * heights / lengths
+        scale = {"pressure": equal_modulus, "area": 1.0}.get(by, heights)
+        pressed: Any = contact(self.make(), **{by: value / scale}, theory=theory)
+        return {
+            "mean_separation": heights * pressed.mean_separation,
+            "pressure": equal_modulus * pressed.pressure,
+            "area": pressed.area,
+            "stiffness": equal_modulus / heights * pressed.stiffness,
+            "conductance": equal_modulus / (heights * modulus) * pressed.unloading_stiffness,
+        }
+
+
+def relative_derivatives(
+    unknowns: Unknowns,
+    theory: Theory,
+    units: Units,
+    *,
+    moduli: Mapping[str, Any],
+    modulus_of: Callable[..., Any],
+    by: str,
+    value: Any,
+    hardness: Any,
+) -> Sensitivity:
+    """d ln(answer)/d ln(number) for the numbers of a surface, the moduli, the quantity held fixed and the hardness.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+        Of the surface.
+    theory : Theory
+    units : Units
+        Of all numbers.
+    moduli : mapping
+        Of the bodies, by name.
+    modulus_of : callable
+        E* of these moduli, in their order.
+    by, value : str, float
+        The quantity held fixed.
+    hardness : float
+        Of the softer body, infinite where nothing yields.
+    """
+    from scipy.differentiate import jacobian
+
+    yields = not np.equal(hardness, np.inf).all()
+    if yields and isinstance(unknowns, OfOneMap):
+        raise InputError(
+            f"theory {theory.name!r} simulates the map anew for each hardness, too coarsely for derivatives by it: "
+            "give theory='calibrated', or hardness=float('inf') for the elastic contact"
+        )
+    given = {**unknowns.numbers, **moduli, by: value}
+    if yields:
+        given["hardness"] = hardness
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
+    # without a modulus all stresses are over it; the logarithm of zero does not vary
+    fixed = set(moduli) if units.stress == "1" else set()
+    varied = [name for name, number in numbers.items() if number != 0 and name not in fixed]
     same = "mean_separation" if by == "separation" else by
-    wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
-    varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
+    wanted = [name for name in ANSWERS if name != same]
+
+    def logarithms_of(given: dict[str, Any]) -> FloatArray:
+        """Of the answers wanted, for numbers or arrays of them."""
+        modulus = modulus_of(*(given[name] for name in moduli))
+        own = {name: given[name] for name in unknowns.numbers}
+        answers = unknowns.answers(own, by, given[by], modulus, given.get("hardness", np.inf), theory)
+        return np.log([answers[name] for name in wanted])
 
     @np.errstate(all="ignore")
     def logarithms(x: FloatArray) -> FloatArray:
-        """Of the results, as rows, where the logarithms of the varied parameters are moved by rows of x."""
+        """Of the answers, as rows, where the logarithms of the varied numbers are moved by rows of x."""
         moved, back = np.unique(x.reshape(len(varied), -1), axis=1, return_inverse=True)
-        given = {name: np.full(moved.shape[1], number) for name, number in numbers.items()}
-        given |= {name: numbers[name] * np.exp(row) for name, row in zip(varied, moved, strict=True)}
-        # there are no batches of spectra
-        each: Any = [given] if batches else [{n: row[k] for n, row in given.items()} for k in range(moved.shape[1])]
-        rows = []
-        for own in each:
-            modulus, cap, held = own.pop("E_star"), own.pop("hardness", np.inf), {by: own.pop(by)}
-            found: Any = contact(make(**own), **held, E_star=modulus, hardness=cap, theory=chosen)
-            values = {"conductance": found.unloading_stiffness / modulus}
-            rows.append(np.log([values[name] if name in values else getattr(found, name) for name in wanted]))
-        table = np.asarray(rows[0] if batches else np.transpose(rows))
+        count = moved.shape[1]
+        columns = {name: np.full(count, number) for name, number in numbers.items()}
+        for name, row in zip(varied, moved, strict=True):
+            columns[name] = numbers[name] * np.exp(row)
+        if unknowns.batches:
+            table = logarithms_of(columns)
+        else:
+            entries = [{name: column[k] for name, column in columns.items()} for k in range(count)]
+            table = np.transpose([logarithms_of(entry) for entry in entries])
         return table[:, back.ravel()].reshape(-1, *x.shape[1:])
 
     here = np.exp(logarithms(np.zeros((len(varied), 1))))[:, 0]
     if not (here > 0).all():
         raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
-    how = {"order": 4, "maxiter": 3 if batches else 2, "initial_step": STEP, "step_direction": _sides(varied, numbers)}
     with np.errstate(all="ignore"):
-        steep = jacobian(logarithms, np.zeros(len(varied)), **how)
+        derivative = jacobian(
+            logarithms,
+            np.zeros(len(varied)),
+            order=4,
+            maxiter=3 if unknowns.batches else 2,
+            initial_step=STEP,
+            step_direction=_sides(varied, numbers, unknowns.one_sided),
+        )
         # a discontinuous result has no slope
-        slopes = np.where(steep.error <= MAX_ERROR * np.maximum(1, np.abs(steep.df)), steep.df, np.nan)
-    by_name, off = (
-        {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.T.tolist(), strict=True)}
-        for table in (slopes, steep.error)
+        accurate = derivative.error <= MAX_ERROR * np.maximum(1, np.abs(derivative.df))
+        slopes = np.where(accurate, derivative.df, np.nan)
+    labels = [unknowns.labels.get(name, name) for name in varied]
+    return Sensitivity(
+        by,
+        {label: numbers[name] for label, name in zip(labels, varied, strict=True)},
+        dict(zip(wanted, here.tolist(), strict=True)),
+        _by_name(labels, wanted, slopes),
+        _by_name(labels, wanted, derivative.error),
+        units,
     )
-    answers = dict(zip(wanted, here.tolist(), strict=True))
-    return Sensitivity(by, {name: numbers[name] for name in varied}, answers, by_name, off, units)
 
 
-def _sides(varied: Sequence[str], numbers: Mapping[str, float]) -> FloatArray:
-    """Signs of one-sided steps, 0 for central ones: cut-offs only remove wavelengths, others may be near a limit."""
-    ends = {"hurst": 1.0, "extrapolate_hurst": 1.0, "area": 1.0, "pressure": numbers.get("hardness", np.inf)}
-    ways = {name: -1.0 for name, end in ends.items() if numbers.get(name, 0.0) > NEAR * end}
-    ways |= {"shortest": 1.0, "longest": -1.0, "hardness": 1.0 if "pressure" in ways else 0.0}
-    return np.array([ways.get(name, 0.0) for name in varied])
+def _by_name(labels: Sequence[str], wanted: Sequence[str], table: FloatArray) -> dict[str, dict[str, float]]:
+    """A table with a row for each answer and a column for each number, by the names of both."""
+    columns = table.T.tolist()
+    return {name: dict(zip(wanted, column, strict=True)) for name, column in zip(labels, columns, strict=True)}
 
 
-def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
-    """The function that makes the surface, and the parameters it is made from."""
+def _sides(varied: Sequence[str], numbers: Mapping[str, float], one_sided: Mapping[str, float]) -> FloatArray:
+    """Signs of one-sided steps, 0 for central ones, which need room to a number's upper limit."""
+    limits = {"area": 1.0, "pressure": numbers.get("hardness", np.inf)}
+    signs = dict(one_sided)
+    for name in varied:
+        limit = 1.0 if name.endswith("hurst") else limits.get(name, np.inf)
+        if numbers[name] > NEAR * limit:
+            signs[name] = -1.0
+    if signs.get("pressure"):
+        signs["hardness"] = 1.0
+    return np.array([signs.get(name, 0.0) for name in varied])
+
+
+def unknowns_of(surface: AnySurface, theory: Theory | None, unit: str | None = None) -> Unknowns:
+    """The numbers that a surface was made from.
+
+    Parameters
+    ----------
+    surface : AnySurface
+        One surface.
+    theory : Theory or None
+        The theory that is asked about it; None where the surface is combined with another, which leaves the curves and
+        the points of a map out.
+    unit : str, optional
+        Unit of length of the numbers; default: the surface's.
+    """
     if surface.labelled or surface.shape != ():
         raise InputError("sensitivities are of one surface, not of a batch")
-    own = {name: getattr(surface, name) for name in PARAMETERS}
-    first = surface.provenance[0] if surface.provenance else {}
-    if first.get("step") == "from_roughness" and first["unit"] == surface.unit:
-        drawn = Surface.from_roughness(**first["given"])
-        # unless a number was replaced since
-        if all(np.isclose(getattr(drawn, name), number, rtol=1e-9) for name, number in own.items()):
-            return lambda **numbers: Surface.from_roughness(**numbers), dict(first["given"])
-    return Surface, own
+    drawn = _of_drawing(surface, unit)
+    if drawn is not None:
+        return drawn
+    moved: Any = surface if unit in (None, surface.unit) else surface.to(unit or "")
+    if isinstance(moved, Surface):
+        own = {name: getattr(moved, name) for name in PARAMETERS}
+        return Unknowns(own, functools.partial(Surface, unit=moved.unit), batches=True)
+    # what keeps points of a map, or the table of their simulation, has the theory of one map
+    simulated = moved.map is not None or moved.table is not None
+    if simulated and theory is not None:
+        from mbma_tables.theories import BoundaryElements
+
+        if isinstance(theory, BoundaryElements):
+            return OfOneMap({"heights": 1.0, "lengths": 1.0}, lambda: moved)
+    return _of_spectrum(moved, theory)
 
 
-def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurface], dict[str, Any]]:
-    """The same for a surface given by a spectrum."""
+def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
+    """The numbers of the drawing, if the surface was made of these and not changed since."""
+    record = surface.provenance[0] if surface.provenance else {}
+    if record.get("step") != "from_roughness" or record["unit"] != surface.unit:
+        return None
+    drawn: Any = Surface.from_roughness(**record["given"], unit=record["unit"])
+    if type(drawn) is not type(surface):
+        return None
+    names = PARAMETERS if isinstance(surface, Surface) else ("q", "C", "h_max")
+    for name in names:
+        before, now = getattr(drawn, name), getattr(surface, name)
+        if np.shape(before) != np.shape(now) or not np.allclose(before, now, rtol=1e-9, atol=0):
+            return None
+    numbers = dict(record["given"])
+    if unit not in (None, surface.unit):
+        for name in numbers:
+            power = DIMENSIONS.get(name, (0, 0))[0]
+            numbers[name] *= factor(surface.unit, unit, power=power)
+    make = functools.partial(Surface.from_roughness, unit=unit or surface.unit)
+    return Unknowns(numbers, make, batches=isinstance(surface, Surface))
+
+
+def _of_spectrum(surface: MeasuredSurface, theory: Theory | None) -> Unknowns:
+    """Factors of heights and lengths, and what else the spectrum was made from."""
     steps = {record["step"]: record for record in surface.provenance}
-    own: dict[str, Any] = {"heights": 1.0, "lengths": 1.0}
-    known: MeasuredSurface = surface
+    own: dict[str, float] = {"heights": 1.0, "lengths": 1.0}
+    cut_offs: dict[str, float] = {}
+    uncut = surface
     # the calibrated law uses measured heights, which have their own highest point and shortest wavelengths
-    takes_map = getattr(theory, "name", theory) == Calibrated.name
-    if surface.heights.is_gaussian or not takes_map:
+    takes_map = theory is not None and theory.name == Calibrated.name
+    of_its_heights = takes_map or theory is None
+    if surface.heights.is_gaussian or not of_its_heights:
         own["h_max"] = float(surface.h_max)
     if "extrapolated" in steps:
-        known = surface.between(float(surface.q0), 2 * math.pi / steps["resolution"]["shortest"])
+        uncut = surface.between(float(surface.q0), 2 * math.pi / steps["resolution"]["shortest"])
         own["extrapolate_hurst"] = steps["extrapolated"]["hurst"]
     elif surface.bearing is None or not takes_map:
-        own |= {"shortest": 2 * math.pi / float(surface.q1), "longest": 2 * math.pi / float(surface.q0)}
+        cut_offs = {
+            "shortest": 2 * math.pi / float(surface.q1),
+            "longest": 2 * math.pi / float(surface.q0),
+        }
 
     def make(heights: float, lengths: float, **others: float) -> MeasuredSurface:
-        moved: MeasuredSurface = known
-        if "shortest" in others and any(others[name] != own[name] for name in ("shortest", "longest")):
-            moved = known.between(2 * math.pi / others["longest"], 2 * math.pi / others["shortest"])
+        moved = uncut
+        if any(others[name] != wavelength for name, wavelength in cut_offs.items()):
+            moved = uncut.between(2 * math.pi / others["longest"], 2 * math.pi / others["shortest"])
         if "extrapolate_hurst" in others:
-            moved = extrapolated(known, steps["extrapolated"]["shortest"], others["extrapolate_hurst"])
+            shortest = steps["extrapolated"]["shortest"]
+            moved = extrapolated(uncut, shortest, others["extrapolate_hurst"])
         if "h_max" in others:
-            gaussian, h_max = moved.heights.is_gaussian, others["h_max"]
-            kept = Heights.gaussian(float(moved.h_rms), h_max) if gaussian else moved.heights
-            moved = dataclasses.replace(moved, h_max=h_max, heights=kept)
+            h_max = others["h_max"]
+            distribution = moved.heights
+            if distribution.is_gaussian:
+                distribution = Heights.gaussian(float(moved.h_rms), h_max)
+            moved = dataclasses.replace(moved, h_max=h_max, heights=distribution)
         return moved.resized(heights, lengths)
 
-    return make, own
+    # a spectrum is not known beyond its ends: cut-offs only remove wavelengths
+    return Unknowns(own | cut_offs, make, one_sided={"shortest": 1.0, "longest": -1.0})

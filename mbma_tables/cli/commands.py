@@ -142,7 +142,7 @@ def sensitivity_command(loads: dict[str, Any], specimen: Specimen, model: option
     """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
-    and lengths, h_max, cut-offs and the exponent of an extrapolation.
+    and lengths; of a spectrum also h_max, cut-offs and the exponent of an extrapolation.
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """

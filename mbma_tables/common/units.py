@@ -39,7 +39,7 @@ DIMENSIONS = {
             "plane_separation separation_scatter"
         ),
         (0, 1): (
-            "viscosity pressure_drop E_star E1 E2 hardness elastic_hardness pressure pressures shear mean_pressure"
+            "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure pressures shear mean_pressure"
         ),
         (-1, 0): "q0 q1 conductance",
         (-2, 0): "D m4",

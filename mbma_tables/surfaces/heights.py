@@ -70,6 +70,13 @@ class Heights:
         """The distribution of the sum of two independent heights; cumulants add."""
         from scipy.special import ndtr, ndtri
 
+        # logarithms of shares weighted by variance: for two Gaussians the squares of h_max then add
+        squares = np.array([self.h_rms, other.h_rms]) ** 2
+        top = math.exp(float(squares @ np.log([self.top, other.top])) / squares.sum())
+        h_rms = math.sqrt(squares.sum())
+        if self.is_gaussian and other.is_gaussian:
+            sum_of_both = Heights.gaussian(h_rms, math.hypot(self.h_max, other.h_max))
+            return dataclasses.replace(sum_of_both, top=top)
         # as fine in both tails as in the middle
         edges = ndtr(np.linspace(-6.0, 6.0, TAIL_NODES + 1))
         share, weight = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
@@ -83,12 +90,7 @@ class Heights:
             # on normal quantiles, on which a Gaussian is straight
             return np.asarray(np.interp(ndtri(share), deviates, sums[order]))
 
-        # logarithms of shares weighted by variance: for two Gaussians the squares of h_max then add
-        squares = np.array([self.h_rms, other.h_rms]) ** 2
-        top = math.exp(float(squares @ np.log([self.top, other.top])) / squares.sum())
-        h_rms = math.sqrt(squares.sum())
-        gaussian = self.is_gaussian and other.is_gaussian
-        h_max = math.hypot(self.h_max, other.h_max) if gaussian else float(height(top))
+        h_max = float(height(top))
         skewness = (self.skewness * self.h_rms**3 + other.skewness * other.h_rms**3) / h_rms**3
         excess = ((self.kurtosis - 3) * self.h_rms**4 + (other.kurtosis - 3) * other.h_rms**4) / h_rms**4
         quantiles = np.clip(height(np.clip(SHARES, top, 1 - top)), None, h_max)

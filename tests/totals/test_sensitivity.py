@@ -9,7 +9,7 @@ import pytest
 from catalogue import LEVEL, OWN
 from helpers import difference_weights, random_map, refusals, run
 
-from mbma_tables import Surface, contact, sensitivity
+from mbma_tables import InputError, Surface, contact, sensitivity
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import THEORIES, Mbma
@@ -185,3 +185,50 @@ def test_unknowns_of_a_map_and_of_its_extrapolation():
     assert found.slopes["heights"]["area"] == pytest.approx(-found.slopes["pressure"]["area"], abs=1e-3)
     longer = Surface.from_map(heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8)
     assert sensitivity(longer, **given).slopes["extrapolate_hurst"]["area"] > 0
+
+
+def simulated_anew(heights, spacing, **given):
+    """Logarithms of the answers of a map, which is simulated for this call."""
+    pressed = contact(Surface.from_map(heights, spacing, periodic=True, unit="um"), **given)
+    known = (pressed.mean_separation, pressed.area, pressed.stiffness, pressed.unloading_stiffness)
+    return np.log(np.array(known, dtype=float))
+
+
+@pytest.mark.slow
+def test_a_map_answers_by_the_theory_that_contact_takes():
+    """Maps with larger heights and lengths, simulated each, have the differences that the rows give."""
+    heights, step = 0.1 * random_map(64, 0.03, 0.2, power=0), 0.01
+    given = {"pressure": "0.1 GPa", "theory": "simulated", "E_star": "30 GPa"}
+    surface = Surface.from_map(heights, 1.0, periodic=True, unit="um")
+    slopes = sensitivity(surface, **given).slopes
+    rows = {
+        "heights": [simulated_anew(heights * (1 + sign * step), 1.0, **given) for sign in (1, -1)],
+        "lengths": [simulated_anew(heights, 1 + sign * step, **given) for sign in (1, -1)],
+    }
+    for name, change in (("pressure", 0.1), ("E_star", 30.0)):
+        texts = [f"{change * (1 + sign * step)!r} GPa" for sign in (1, -1)]
+        rows[name] = [simulated_anew(heights, 1.0, **given | {name: text}) for text in texts]
+    # conductance is the stiffness over the modulus
+    for row, sign in zip(rows["E_star"], (1, -1), strict=True):
+        row[3] -= np.log(1 + sign * step)
+    assert set(slopes) == set(rows)
+    for name, (up, down) in rows.items():
+        known = [slopes[name][answer] for answer in ("mean_separation", "area", "stiffness", "conductance")]
+        differences_by_hand = (up - down) / np.log((1 + step) / (1 - step))
+        np.testing.assert_allclose(known, differences_by_hand, atol=0.01, err_msg=name)
+    with pytest.raises(InputError, match="theory='calibrated'"):
+        sensitivity(surface, hardness="0.6 GPa", **given)
+
+
+@pytest.mark.slow
+def test_the_command_for_a_map_of_many_points(tmp_path):
+    """By default with the theory, and so the numbers, of `mbma contact`."""
+    np.save(tmp_path / "face.npy", 0.1 * random_map(64, 0.03, 0.2, power=0))
+    asked = ["--map", str(tmp_path / "face.npy"), "--dx", "1um", "--length-unit", "um", "-p", "0.005", "--json"]
+    told = json.loads(run("sensitivity", *asked))
+    pressed = json.loads(run("contact", *asked))
+    assert told["answers"]["area"] == pytest.approx(pressed["columns"]["area"][0], rel=1e-9)
+    assert set(told["slopes"]) == {"heights", "lengths", "pressure"}
+    lighter = json.loads(run("contact", *asked[:-2], "0.00499", "--json"))["columns"]["area"][0]
+    by_hand = np.log(pressed["columns"]["area"][0] / lighter) / np.log(0.005 / 0.00499)
+    assert told["slopes"]["pressure"]["area"] == pytest.approx(by_hand, abs=0.01)
