@@ -78,7 +78,10 @@ def expected(joint: Joint) -> tuple[dict[str, float], list[float], list[float]]:
     """Temperatures of the faces by the law, displacements, and the shear stresses that they need."""
     found = joint.at_pressure(f"{PRESSURE} MPa")
     stick = 1e6 * float(found.tangential().stiffness)  # MPa/mm of GPa/um
-    flux = HOT / (HEIGHT / K[0] + HEIGHT / K[1] + 1e3 / float(found.conductance()))
+    # W/(m^2 K) of solid spots and air, as the card has them
+    gas = found.gap_conductance(joint.gas, joint.temperature, joint.gas_pressure)
+    contact = float(found.conductance() + gas)
+    flux = HOT / (HEIGHT / K[0] + HEIGHT / K[1] + 1e3 / contact)
     faces = {"low": flux * HEIGHT / K[0], "high": HOT - flux * HEIGHT / K[1]}
     # shear moduli are E/2
     compliance = 1 / stick + 2 * HEIGHT / E[0] + 2 * HEIGHT / E[1]

@@ -22,7 +22,7 @@ from mbma_tables.answers.sensitivity import (
     relative_derivatives,
     unknowns_of,
 )
-from mbma_tables.common.arguments import hinted, nearest
+from mbma_tables.common.arguments import hinted
 from mbma_tables.common.display import Displayed, Variable, dataset_of
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
@@ -39,6 +39,8 @@ from mbma_tables.theories.protocol import Theory
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+    from mbma_tables.export.of_joint import ExportedJoint
 
 Part = AnySurface | Mapping[str, Any]
 CONDUCTANCE = "W/(m^2 K)"
@@ -293,8 +295,22 @@ class Joint(Displayed):
         name: str | None = None,
         heat: bool = True,
         friction_pressure: float | str | None = None,
-    ) -> str | bytes:
-        """The joint as input of a solver: pressure, friction, and with `heat` conductance, in N, mm, MPa, mW.
+        *,
+        path: str | os.PathLike[str] | None = None,
+        quantity: str | Sequence[str] | None = None,
+        rows: int | None = None,
+        rtol: float | None = None,
+        length_unit: str | None = None,
+        stress_unit: str | None = None,
+        leakage: bool = False,
+        peklenik: float | None = None,
+        binaries: str | None = None,
+        made_by: tuple[str, ...] = (),
+    ) -> str | bytes | list[pathlib.Path]:
+        """The joint as input of a solver, as data or as code, for every target of laws of `mbma export`.
+
+        Conductance is that of the solid spots and of the gas in the gaps together in rows. Laws as code have that of
+        the solid spots, and their comments state that of the gas at some pressures.
 
         Parameters
         ----------
@@ -302,54 +318,103 @@ class Joint(Displayed):
             A target of `mbma export` that accepts a law: rows such as "calculix", "abaqus", "csv", functions such as
             "c-law", "modelica-law" and "fmu".
         pressures : pair of float or str
-            Smallest and largest pressure of rows; plain numbers in MPa.
+            Smallest and largest pressure of rows; plain numbers in the unit of stress of the file.
         name : str, optional
-            Name of the surface interaction, or prefix of function names.
+            Name of the surface interaction or of the functions, or what names begin with; formats without names have
+            it in their comments.
         heat : bool
-            Whether the conductance of the solid spots is also written.
+            Whether the conductance is also written.
         friction_pressure : float or str, optional
             Pressure at which a friction card's tangential stiffness is computed; default: the geometric mean.
+        path : path-like, optional
+            File to write, and beside it those that belong to it, by the end that the target gives them.
+        quantity : str or sequence of str, optional
+            Of the rows, as for `mbma export --quantity`; several for targets "lsdyna", "getdp" and "moose-function".
+            Default: conductance, with the pressure in solvers that have both; without `heat` pressure.
+        rows, rtol : int and float, optional
+            Number of rows, or their largest error of linear interpolation; by default as few rows as 1e-3 needs, or
+            as many as the program keeps.
+        length_unit, stress_unit : str, optional
+            Of the file: mm and MPa, with conductance in mW/(mm^2 K), or those that the program prescribes.
+        leakage : bool
+            Functions have the flow coefficient of the gaps, too.
+        peklenik : float, optional
+            Of a film, as for `flow_factors`.
+        binaries : {"here", "all", "none"}, optional
+            Of an FMU.
+        made_by : tuple of str
+            Lines of the header on how the file was made.
 
         Returns
         -------
-        str or bytes
-            The first file of the target, bytes for an FMU. Solver input has a friction card if the joint has a
-            coefficient of friction; functions contain the tangential stiffness.
+        str, bytes or list of pathlib.Path
+            Without a path the first file of the target, bytes of a binary format; with a path the paths of all files.
+            Solver input has a friction card if the joint has a coefficient of friction; functions contain the
+            tangential stiffness.
+
+        Raises
+        ------
+        InputError
+            For an option that the target does not take, and for a target that is several files without a path.
 
         Examples
         --------
         >>> from mbma_tables import Joint
         >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
-        >>> joint = Joint(face, materials="copper C11000 hard", nominal_area="4 cm^2")
+        >>> copper = "copper C11000 hard"
+        >>> joint = Joint(face, materials=copper, nominal_area="4 cm^2", theory="calibrated")
         >>> card = joint.export("calculix", ("0.1 MPa", "50 MPa"), name="JOINT")
         >>> [line for line in card.splitlines() if line.startswith("*") and line[1] != "*"][:2]
         ['*SURFACE INTERACTION, NAME=JOINT', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL']
         """
-        from mbma_tables.export.law_rows import describe_law
-        from mbma_tables.export.targets import targets
+        from mbma_tables.export.of_joint import joint_files
+        from mbma_tables.export.targets import write_files
 
-        known = {key: each for key, each in targets().items() if each.rows or "kappa" in each.takes}
-        if target not in known:
-            raise InputError(f"no target of laws is called {target!r}: {nearest(target, known)}")
-        takes, (length, stress) = known[target].takes, known[target].units or ("mm", "MPa")
-        options: dict[str, Any] = {"theory": self.theory, "hardness": self.hardness or self.pair.hardness or np.inf}
-        options |= {"length_unit": length, "stress_unit": stress}
-        if heat := heat and "conductivity" in takes:
-            k1, k2 = (float(text.split()[0]) for text in self.pair.conductivities)  # W/(m K) is mW/(mm K)
-            options |= {"conductivity": 2 * k1 * k2 / (k1 + k2)}
-            options["conductivity_unit"] = "mW/(mm K)" if length == "mm" else "W/(m K)"
-        named = {} if name is None else {"name": name}
-        if not known[target].rows:
-            options["kappa"] = self._kappa(None)
-            file = known[target].files(self.surface, self.pair.E_star, **options, **named)[""]
-            return file if target == "fmu" else file.decode()
-        if pressures is None:
-            raise InputError(f"{target} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')")
-        if self.friction is not None and "friction" in takes:
-            options |= {"friction": self.friction, "kappa": self._kappa, "friction_pressure": friction_pressure}
-        quantity = "conductance" if heat else known[target].quantity
-        law = describe_law(self.surface, self.pair.E_star, quantity=quantity, pressures=pressures, **options)
-        return known[target].files(law, **named)[""].decode()
+        out = None if path is None else pathlib.Path(path)
+        files = joint_files(
+            self._exported(),
+            target,
+            out=out,
+            pressures=pressures,
+            name=name,
+            heat=heat,
+            friction_pressure=friction_pressure,
+            quantity=quantity,
+            length_unit=length_unit,
+            stress_unit=stress_unit,
+            made_by=made_by,
+            rows=rows,
+            rtol=rtol,
+            leakage=leakage,
+            peklenik=peklenik,
+            binaries=binaries,
+        )
+        if out is not None:
+            return write_files(out, files)
+        try:
+            return files[""].decode()
+        except UnicodeDecodeError:
+            return files[""]
+
+    def _exported(self) -> ExportedJoint:
+        """What an export needs of the joint."""
+        from mbma_tables.export.of_joint import ExportedJoint
+
+        k1, k2 = (float(text.split()[0]) for text in self.pair.conductivities)  # W/(m K)
+        isotropic = self.direction is None
+        return ExportedJoint(
+            surface=self.surface,
+            E_star=self.pair.E_star,
+            theory=self.theory,
+            hardness=self.hardness or self.pair.hardness or np.inf,
+            conductivity=2 * k1 * k2 / (k1 + k2),
+            kappa=self._kappa,
+            kappa_varies=not isotropic,
+            friction=self.friction,
+            gas=self.gas,
+            temperature=self.temperature,
+            gas_pressure=self.gas_pressure,
+        )
 
     def _kappa(self, area: Any) -> Any:
         """Normal over tangential stiffness at a contact area, which only matters to surfaces with a lay."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +13,9 @@ import click
 from mbma_tables.cli import options
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import read_file, write_file
+from mbma_tables.common.files import MAX_BYTES, read_file, write_file
 from mbma_tables.common.progress import echo
-from mbma_tables.export.targets import AGAINST, Target, targets
+from mbma_tables.export.targets import AGAINST, Target, targets, write_files
 from mbma_tables.export.text import written_by
 from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
@@ -22,7 +23,6 @@ from mbma_tables.scenes.specimen import Specimen
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
-MAX_BYTES = 1 << 30  # of an input file
 DEFAULTS = {"variant": "reported", "leakage": False, "check": False}
 
 
@@ -111,14 +111,16 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         files = kind.files(_rows(kind, joint | given), **name)
     else:
         files = kind.files(**joint, **given)
-    if out.suffix and any(out.name == f"{out.stem}{end}" for end in files):
-        raise InputError(f"--out {out.name}: a file beside the first one has this name, take another")
-    # files that the first one needs are written before it
-    for end in sorted(files, reverse=True) if str(out) != "-" else [""]:
-        path = out.with_name(f"{out.stem}{end}") if end else out
-        write_file(path, files[end])
-        if str(path) != "-":
-            echo(path)
+    show_written(out, files)
+
+
+def show_written(out: Path, files: Mapping[str, bytes]) -> None:
+    """Write the files of a target and print their paths; to standard output the first one alone."""
+    if str(out) == "-":
+        write_file(out, files[""])
+        return
+    for path in write_files(out, files):
+        echo(path)
 
 
 def _rows(target: Target, asked: dict[str, Any]) -> LawTable:
@@ -127,6 +129,7 @@ def _rows(target: Target, asked: dict[str, Any]) -> LawTable:
 
     heat = "conductance" if asked.keys() & {"conductivity", "conductivity_unit"} else target.quantity
     asked.setdefault("quantity", "leakage" if asked.pop("leakage", False) else heat)
+    asked["most_rows"] = target.most.get(asked["quantity"])
     if target.quantity == "conductance":  # its numbers do not depend on the conductivity
         asked = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} | asked
     if "pressures" not in asked:

@@ -101,7 +101,7 @@ def numbers_option(*names: str, help: str) -> Decorator:
     return click.option(*names, multiple=True, callback=_parse_numbers, metavar="X[UNIT][,X...]", help=help)
 
 
-def _group(argument: str, build: Callable[[dict[str, Any]], Any], *options: Any) -> Decorator:
+def option_group(argument: str, build: Callable[[dict[str, Any]], Any], *options: Any) -> Decorator:
     """Options that reach a command as one argument, built from their values by name."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -121,7 +121,8 @@ def _group(argument: str, build: Callable[[dict[str, Any]], Any], *options: Any)
     return decorate
 
 
-def _given(values: Mapping[str, Any]) -> dict[str, Any]:
+def given_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that were given, by name."""
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -129,8 +130,8 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
     length, stress = given["length_unit"], given["stress_unit"]
     known = (*specimens.NUMBERS, *specimens.MAP_OPTIONS, "map", "model")
-    surface = _given({"name": given["surface"]} | {name: given[name] for name in known})
-    material = _given({name: given[name] for name in specimens.MATERIAL})
+    surface = given_values({"name": given["surface"]} | {name: given[name] for name in known})
+    material = given_values({name: given[name] for name in specimens.MATERIAL})
     if (given["file"] is None) == (not surface):
         got = ", ".join(["file"] * (given["file"] is not None) + list(surface)) or "none"
         raise InputError(f"one surface is needed: --surface NAME, --file TOML, --map MAP, or its numbers; got {got}")
@@ -213,19 +214,19 @@ _SPECIMEN_OPTIONS = (
     length_unit(),
     stress_unit_option,
 )
-map_options = _group("treatment", _given, *_MAP_OPTIONS, length_unit("unit"))
-specimen_options = _group("specimen", _specimen, *_SPECIMEN_OPTIONS)
+map_options = option_group("treatment", given_values, *_MAP_OPTIONS, length_unit("unit"))
+specimen_options = option_group("specimen", _specimen, *_SPECIMEN_OPTIONS)
 # None where none of them is given
-optional_specimen_options = _group(
-    "specimen", lambda given: _specimen(given) if _given(given) else None, *_SPECIMEN_OPTIONS
+optional_specimen_options = option_group(
+    "specimen", lambda given: _specimen(given) if given_values(given) else None, *_SPECIMEN_OPTIONS
 )
 
 
 def load_options(option: Callable[..., Decorator]) -> Decorator:
     """Quantities of which one is given, each an `option` of numbers; the command receives those given as `loads`."""
-    return _group(
+    return option_group(
         "loads",
-        _given,
+        given_values,
         option("--separation", "-d", help="Gap d from the mid-plane [length]."),
         option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length]."),
         option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given."),
@@ -254,7 +255,7 @@ theory_option = _option(
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
 # for islands, which only MBMA has
-model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
+model_options = option_group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
 hardness_option = _option(
     "hardness",
     "Largest pressure that the softer body bears, also '200 HV', '58 HRC' or 'steel 4140 hard'; none: elastic.",
@@ -262,9 +263,11 @@ hardness_option = _option(
     else _parse_number(ctx, param, given),
     metavar="X[UNIT]",
 )  # fmt: skip
-theory_options = _group("model", lambda given: Model(**_given(given)), theory_option, *_MODEL_OPTIONS, hardness_option)
+theory_options = option_group(
+    "model", lambda given: Model(**given_values(given)), theory_option, *_MODEL_OPTIONS, hardness_option
+)
 
-output_options = _group(
+output_options = option_group(
     "output",
     _output,
     json_option("a table"),

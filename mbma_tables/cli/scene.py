@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from mbma_tables.cli.format import Report, to_json
-from mbma_tables.cli.options import Output, check_plot, json_option, numbers_option, output_options, plot_option
+from mbma_tables.cli.options import (
+    Output,
+    check_plot,
+    given_values,
+    json_option,
+    numbers_option,
+    option_group,
+    output_options,
+    plot_option,
+)
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import write_file, written_bytes
+from mbma_tables.common.files import MAX_BYTES, read_file, write_file, written_bytes
 from mbma_tables.common.progress import echo
+from mbma_tables.export.text import written_by
 
 if TYPE_CHECKING:
     pass
@@ -86,18 +97,82 @@ def run_command(file: Path, out: Path | None, as_json: bool) -> None:
         echo(report.to_table(), nl=False)
 
 
+def _flag(name: str) -> str:
+    """The option of an argument of `Joint.export`."""
+    return "--without-heat" if name == "heat" else f"--{name.replace('_', '-')}"
+
+
+def _export_joint(file: Path, out: Path, target: str, **options: Any) -> None:
+    """Write the joint of a file for another program."""
+    from mbma_tables.joint import Joint
+
+    if "pressures" in options:
+        ends = options["pressures"].split(":")
+        if len(ends) != 2:
+            raise InputError(f"--pressures must be like 1MPa:50MPa, got {options['pressures']!r}")
+        options["pressures"] = tuple(ends)
+    if "quantity" in options:
+        options["quantity"] = options["quantity"].split(",")
+    digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
+    command = written_by(click.get_current_context().obj[1:], "joint")
+    made_by = f"input {file}: sha256 {digest}", command
+    joint = Joint.from_toml(file)
+    if str(out) == "-":
+        content = joint.export(target, **options, made_by=made_by)
+        write_file(out, content.encode() if isinstance(content, str) else bytes(content))  # type: ignore[arg-type]
+        return
+    for path in joint.export(target, **options, path=out, made_by=made_by):
+        echo(path)
+
+
+_export_options = option_group(
+    "export",
+    given_values,
+    click.option("--export", "target", metavar="TARGET", help="Write for another program: a target of `mbma export`."),
+    click.option("--pressures", metavar="X:X", help="Of --export: smallest and largest pressure, such as 1MPa:50MPa."),
+    click.option("--name", help="Of the interaction, table, functions or module."),
+    click.option("--quantity", metavar="NAME[,NAME]", help="Of the rows; several for lsdyna, getdp, moose-function."),
+    click.option("--rows", type=int, help="Number of rows; else as few as --rtol needs."),
+    click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default."),
+    click.option("--without-heat", "heat", flag_value=False, default=None, help="Leave conductance out."),
+    click.option("--friction-pressure", metavar="X[UNIT]", help="At which a friction card's stiffness holds."),
+    click.option("--leakage", is_flag=True, default=None, help="Functions with the flow coefficient of the gaps."),
+    click.option("--peklenik", type=float, help="Of a film: length of the roughness along x over that along y."),
+    click.option("--binaries", type=click.Choice(["here", "all", "none"]), help="Of an FMU."),
+    click.option("--length-unit", metavar="UNIT", help="Of the file; mm by default."),
+    click.option("--stress-unit", metavar="UNIT", help="Of the file; MPa by default."),
+)
+
+
 @click.command("joint", short_help="Stiffness, area, gap and conductance of two metal parts.")
 @toml_file
 @numbers_option("--pressure", "-p", help="Force over nominal area; plain numbers are in GPa.")
 @plot_option
+@_export_options
 @output_options
-def joint_command(file: Path, pressure: list[float | str] | None, plot: Path | None, output: Output) -> None:
+def joint_command(
+    file: Path, pressure: list[float | str] | None, plot: Path | None, output: Output, export: dict[str, Any]
+) -> None:
     """Interface laws of the joint in FILE (TOML: materials, nominal_area, part_a, part_b) at pressures.
 
+    With --export the joint is written for another program instead, with conductance of solid spots and gas: any
+    target of `mbma export` that takes a law.
+
     Example: mbma joint examples/joint.toml --pressure 1MPa,10MPa,50MPa
+
+    Example: mbma joint examples/joint.toml --export abaqus --pressures 1MPa:50MPa --name JOINT --out joint.inp
     """
+    if "target" in export:
+        if pressure or plot is not None or output.as_json or output.as_csv:
+            raise InputError("--export writes the joint: leave --pressure, --plot, --json and --csv out")
+        if output.out is None:
+            raise InputError("--export needs --out, the file to write")
+        _export_joint(file, output.out, **export)
+        return
+    if export:
+        raise InputError(f"{', '.join(_flag(name) for name in export)} belong to --export TARGET")
     if not pressure:
-        raise InputError("pressures are needed: --pressure")
+        raise InputError("pressures are needed: --pressure; or --export TARGET")
     check_plot(plot, output.out)
     from mbma_tables.common.plots import to_picture
     from mbma_tables.joint import Joint

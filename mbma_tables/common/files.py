@@ -16,6 +16,7 @@ from collections.abc import Callable
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 
+MAX_BYTES = 1 << 30  # of an input file
 ABANDONED = 3600.0  # s, age from which on a draft is no longer being written
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import Target
+from mbma_tables.export.targets import AGAINST, Target
 from mbma_tables.export.text import checked_name, comment, csv_cell, number
 
 MAX_MATLAB_NAME = 63
@@ -96,7 +96,12 @@ def to_netcdf(law: LawTable) -> bytes:
         "largest_error": law.largest_error,
         "theory": law.theory,
         "interpolation": "linear",
+        # CF 1.11, section 2.6.2; without a time, for identical bytes
+        "history": law.comments[-1],
     }
+    if law.x_name == "pressure":
+        # CF takes a dimension of pressures for heights in the atmosphere: rows are counted, and have their pressures
+        dataset = dataset.rename_dims(pressure="row").drop_indexes("pressure")
     # CF 2.5.1: a coordinate has no missing values, nor has anything here
     whole = {name: {"_FillValue": None} for name in law.columns}
     return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole))
@@ -115,8 +120,12 @@ def to_parquet(law: LawTable) -> bytes:
     return stream.getvalue()
 
 
+def _matlab_files(law: LawTable, name: str) -> dict[str, bytes]:
+    return {"": to_matlab(law), ".m": matlab_reader(law, name)}
+
+
 _WRITE = {"csv": to_csv, "json": to_json, "netcdf": to_netcdf, "hdf5": to_netcdf, "parquet": to_parquet}
 TARGETS = (
-    *(Target(name, write) for name, write in _WRITE.items()),
-    Target("matlab", lambda law, name: {"": to_matlab(law), ".m": matlab_reader(law, name)}, end=".mat"),
+    *(Target(name, write, quantities=tuple(AGAINST)) for name, write in _WRITE.items()),
+    Target("matlab", _matlab_files, end=".mat", quantities=tuple(AGAINST)),
 )

@@ -5,7 +5,7 @@ import functools
 import hashlib
 from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from mbma_tables.answers.contact import chosen_theory, contact
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import factor, in_unit, modulus_and_units
+from mbma_tables.common.units import Units, factor, in_unit, modulus_and_units
 from mbma_tables.export.text import about, number
 from mbma_tables.law import block as at
 from mbma_tables.law.force_law import ForceLaw
@@ -35,7 +35,26 @@ LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
 ROUNDS, PARTS = 4, 32  # rounds and parts of the search for an end of validity between two of them
 KAPPA = 0.5, 2.0  # range of normal over tangential stiffness
+GAS_AT = 5  # pressures at which a header has the conductance of the gas alone
 OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a surface given by a spectrum
+
+
+class GasInGaps(NamedTuple):
+    """Gas that conducts heat beside the solid spots of an exported law, by `Contact.gap_conductance`."""
+
+    name: str  # "air", "helium" or "vacuum"
+    temperature: float  # K
+    pressure: float | str  # Pa, or with its unit
+    unit: float  # one W/(m^2 K) in the unit of the law's conductance
+
+    def __str__(self) -> str:
+        pressure = Units(stress="Pa").number("pressure", self.pressure)
+        return f"{self.name} at {about(self.temperature)} K and {about(pressure, 6)} Pa"
+
+    def conductance(self, found: Any) -> FloatArray:
+        """Of contacts, in the unit of the law's conductance."""
+        of_gas = found.gap_conductance(self.name, self.temperature, self.pressure)
+        return self.unit * np.asarray(of_gas, dtype=float)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,6 +123,23 @@ class ExportedLaw:
         if self.force is not None:
             return pressed(self.force.body, self.law.h_max + self.force.first - u)
         return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
+
+    def of_gas(self, gas: GasInGaps | None, unit: str, end: float, included: bool) -> tuple[str, ...]:
+        """Lines of a header on what conductance is of: solid spots, and gas in gaps up to an overclosure."""
+        if gas is None or gas.name == "vacuum":
+            return ("conductance is that of the solid spots alone, without gas in the gaps",)
+        u = self.law.h_max - end * np.linspace(0, 1, GAS_AT)
+        values, pressures = gas.conductance(self.answer(u)), np.asarray(self.law.pressure(u))
+        alone = ", ".join(
+            f"{about(value)} at {about(pressure, 3)}" for value, pressure in zip(values, pressures, strict=True)
+        )
+        what = f"conductance is that of the solid spots and of the gas in the gaps together, {gas}"
+        if not included:
+            what = (
+                f"conductance is that of the solid spots ALONE: that of the gas in the gaps, {gas}, is to be added, "
+                "as rows of data such as csv have both"
+            )
+        return (f"{what}; the gas has {alone} {self.stress}, in {unit}",)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
         """Lines of a file's header: contents, range, error, validity up to `end`, and with `leakage` those of flow."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.exported_law import ExportedLaw, exported_law
+from mbma_tables.export.exported_law import ExportedLaw, GasInGaps, exported_law
 from mbma_tables.export.law_languages import LANGUAGES, Beside, Language, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import (
@@ -30,6 +30,8 @@ from mbma_tables.law.law import ContactLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 
 LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
+# without functions that follow the unloading stiffness of contact that yields
+LOADING_ALONE = ("python-law", "jax-law", "matlab-law")
 MAX_NAME = 31  # letters, as Fortran and C99 read them
 MORE = ("conductance", "tangential_stiffness", "leakage")  # asked for; all but the last are slopes times a ratio
 FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
@@ -120,6 +122,8 @@ def asked_law(
     conductivity_unit: str | None = None,
     kappa: float | None = None,
     leakage: bool = False,
+    gas: GasInGaps | None = None,
+    notes: tuple[str, ...] = (),
     **options: Any,
 ) -> AskedLaw:
     """The law for a requested file, made once; arguments as for `law_text`."""
@@ -141,10 +145,13 @@ def asked_law(
     what += f"[{stress} {length}]{''.join(f', {quantity} [{unit}]' for quantity, unit in more.items())}"
     begin = "no contact below c = 0" if exported.ends else f"c from {number(exported.c_least)}"
     turns = "" if law.turning_point is None else ", where pressure turns down"
+    if conducts:
+        notes += exported.of_gas(gas, more["conductance"], exported.c_turn, included=False)
     said = exported.header(
         f"{what}, against overclosure c [{length}]",
         f"{begin}, to {number(exported.c_most)}; there is no answer outside",
         f"overclosure at a pressure: up to c = {number(exported.c_turn)}{turns}",
+        *notes,
         end=exported.c_turn,
         leakage=leakage,
     )
@@ -268,6 +275,13 @@ def _data(name: str, block: FloatArray) -> str:
 
 
 TARGETS = tuple(
-    Target(name, functools.partial(law_files, name), CODE - {"leakage"} if language.subroutine else CODE, rows=False)
+    Target(
+        name,
+        functools.partial(law_files, name),
+        CODE - {"leakage"} if language.subroutine else CODE,
+        rows=False,
+        # the C that the module calls is beside it
+        alone=name != "fortran-law",
+    )
     for name, language in LANGUAGES.items()
 )

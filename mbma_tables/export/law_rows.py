@@ -14,7 +14,7 @@ import numpy as np
 from mbma_tables.answers.film import flow_factors
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.exported_law import KAPPA, ExportedLaw, exported_law
+from mbma_tables.export.exported_law import KAPPA, ExportedLaw, GasInGaps, exported_law
 from mbma_tables.export.law_table import MAX_ROWS, MIN_ROWS, LawTable, chosen_rows, rounded
 from mbma_tables.export.targets import AGAINST
 from mbma_tables.export.text import about, number
@@ -60,6 +60,8 @@ def describe_law(
     peklenik: float | None = None,
     made_by: tuple[str, ...] = (),
     direction: str | float | None = None,
+    gas: GasInGaps | None = None,
+    most_rows: int | None = None,
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -100,6 +102,10 @@ def describe_law(
         Lines for the header of a file that say how to write it again.
     direction : str or float, optional
         Of leakage of a simulated map: "x", "y" or degrees from x; else the geometric mean of both axes.
+    gas : GasInGaps, optional
+        In the gaps, parallel to the solid spots: conductance is then that of both.
+    most_rows : int, optional
+        Rows that the program keeps, taken where neither `rows` nor `rtol` is given and fewer miss the usual error.
 
     Raises
     ------
@@ -121,6 +127,7 @@ def describe_law(
         (peklenik is not None, film, "peklenik"),
         (conductivity is not None or conductivity_unit is not None, heat, "conductivity"),
         (film, rtol is None, "rtol"),
+        (gas is not None, heat, "gas"),
     ):
         if given and not needs:
             raise InputError(f"{names} does not belong to quantity={quantity!r}: leave it out")
@@ -136,20 +143,35 @@ def describe_law(
     if heat:
         behaviour = _table(exported, "pressure", unit, least, end, choose, 1.0, facts)
         scale, unit = exported.slope(quantity, conductivity, conductivity_unit)
+        said.extend(exported.of_gas(gas, unit, end, included=True))
         assert conductivity is not None
         facts = facts | {"conductivity": (float(conductivity), str(conductivity_unit))}
     elif quantity == "tangential_stiffness":
-        scale, unit = exported.slope(quantity, kappa=kappa)
+        number_of = 1.0 if callable(kappa) else kappa
+        scale, unit = exported.slope(quantity, kappa=number_of)
     elif quantity != "pressure":
         unit = exported.length if quantity == "hydraulic_aperture" else f"{exported.length}^3"
     if friction is not None:
-        of_friction, *said = _friction(exported, friction, kappa, friction_pressure, pressures)
+        of_friction, *more_said = _friction(exported, friction, kappa, friction_pressure, pressures)
         facts |= of_friction
-    return _table(exported, quantity, unit, least, end, choose, scale, facts, behaviour, *said)
+        said.extend(more_said)
+    choose = functools.partial(choose, most_rows=most_rows)
+    ratio = kappa if quantity == "tangential_stiffness" and callable(kappa) else None
+    return _table(exported, quantity, unit, least, end, choose, scale, facts, behaviour, *said, gas=gas, kappa=ratio)
 
 
-def _curve(exported: ExportedLaw, quantity: str, end: float, scale: float) -> tuple[FloatArray, FloatArray]:
-    """The law on fine points; what follows the unloading stiffness is `scale` times that."""
+def _curve(
+    exported: ExportedLaw,
+    quantity: str,
+    end: float,
+    scale: float,
+    gas: GasInGaps | None = None,
+    kappa: Callable[[Any], Any] | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """The law on fine points; what follows the unloading stiffness is `scale` times that.
+
+    The gas conducts besides; kappa depends on the contact area where the surface has a lay.
+    """
     law = exported.law
     # squares: fine where p is a high power of the overclosure
     c = end * np.linspace(0, 1, FINE) ** (2 if exported.ends else 1)
@@ -169,7 +191,13 @@ def _curve(exported: ExportedLaw, quantity: str, end: float, scale: float) -> tu
         return pressure[open_], flow[open_] ** FLOWS[quantity]
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
-    return pressure[rises], scale * stiffness[rises]
+    values = scale * stiffness
+    if kappa is not None:
+        values[1:] /= np.asarray(kappa(np.asarray(law.area(separation=d[1:]))))
+    if gas is not None:
+        # the gaps of first contact conduct, too
+        values += gas.conductance(exported.answer(law.h_max - c))
+    return pressure[rises], values[rises]
 
 
 def _friction(
@@ -208,10 +236,12 @@ def _table(
     facts: dict[str, tuple[float, str]],
     behaviour: LawTable | None = None,
     *said: str,
+    gas: GasInGaps | None = None,
+    kappa: Callable[[Any], Any] | None = None,
 ) -> LawTable:
     """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
     law, length, stress = exported.law, exported.length, exported.stress
-    fine_x, fine_y = _curve(exported, quantity, end, scale)
+    fine_x, fine_y = _curve(exported, quantity, end, scale, gas, kappa)
     x_name, x_unit = ("overclosure", length) if quantity == "pressure" else ("pressure", stress)
     y_name = quantity if exported.force is None else "force"
     floor = FLOOR * float(fine_y[-1])
@@ -233,24 +263,51 @@ def _table(
         why = "where contact blocks the gaps"
     elif end < exported.c_turn * (1 - ROUNDING):
         why = "the largest asked for"
+    more: dict[str, tuple[FloatArray, str]] = {}
+    of_others: list[str] = []
+    if quantity == "hydraulic_aperture":
+        more, of_others = _of_aperture(exported, x, fine_x, fine_y, floor)
     comments = exported.header(
         f"{y_name} [{y_unit}] against {x_name} [{x_unit}]",
         f"{x_name} from 0 to {number(x[-1])} {x_unit}, {why}",
-        f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
-        f"above {y_name} {about(floor)} {y_unit}",
+        _of_rows(y_name, x.size, error, f"{y_name} {about(floor)} {y_unit}"),
+        *of_others,
         *([] if exported.ends else ["the first row is zero, whatever the theory has up to the second"]),
         *said,
         end=end,
         leakage=quantity in FLOWS,
     )
-    more = {}
-    if quantity == "hydraulic_aperture":
-        found = law.at_pressure(x)
-        u, fine_u = np.asarray(found.mean_separation), np.asarray(law.at_pressure(fine_x).mean_separation)
-        by_u = np.interp(-u, -fine_u, np.gradient(fine_y, fine_u))
-        stiffness = np.asarray(found.stiffness), f"{stress}/{length}"
-        more = {"aperture": (u, length), "derivative": (by_u, "1"), "stiffness": stiffness}
     return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, law.theory, floor, behaviour, more, facts)
+
+
+def _of_rows(name: str, rows: int, error: float, above: str) -> str:
+    """The line of a header on the rows of one quantity."""
+    return f"{name}: {rows} rows; largest error of linear interpolation {error:.1e}, relative, above {above}"
+
+
+def _of_aperture(
+    exported: ExportedLaw, x: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float
+) -> tuple[dict[str, tuple[FloatArray, str]], list[str]]:
+    """Columns beside the hydraulic aperture, at pressures x, and the lines of a header on their rows."""
+    law = exported.law
+    at_rows, at_fine = law.at_pressure(x), law.at_pressure(fine_x)
+    u, fine_u = np.asarray(at_rows.mean_separation), np.asarray(at_fine.mean_separation)
+    fine_derivative = np.gradient(fine_y, fine_u)
+    by_u = np.interp(-u, -fine_u, fine_derivative)
+    columns = {
+        "aperture": (u, exported.length),
+        "derivative": (by_u, "1"),
+        "stiffness": (np.asarray(at_rows.stiffness), f"{exported.stress}/{exported.length}"),
+    }
+    fine = {"aperture": fine_u, "derivative": fine_derivative, "stiffness": np.asarray(at_fine.stiffness)}
+    # where the main column is above its floor, and beyond the first row, below which stiffness is that of no contact
+    inside = (fine_y > floor) & (fine_x >= x[1])
+    lines = []
+    for name, (values, _) in columns.items():
+        error = np.abs(np.interp(fine_x[inside], x, values) / fine[name][inside] - 1).max(initial=0.0)
+        above = f"hydraulic_aperture {about(floor)} {exported.length}, from pressure {about(x[1])} {exported.stress} on"
+        lines.append(_of_rows(name, x.size, float(error), above))
+    return columns, lines
 
 
 def _range(exported: ExportedLaw, pressures: tuple[float | str, float | str] | None) -> tuple[float | None, float]:
@@ -281,12 +338,14 @@ def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float
     found, middle = at(u), at((u[1:] + u[:-1]) / 2)
     tested = found.pressure[found.area >= TESTED_AREA[0]]
     floor = least if least is not None else float(tested.min()) if tested.size else np.inf
-    error = 0.0  # largest of linear interpolation, in the middle of the intervals
+    errors = {}  # largest of linear interpolation, in the middle of the intervals
     for name in FILM_NAMES:
         value, between = getattr(found, name), getattr(middle, name)
         kept = middle.valid & (between > (floor if name == "pressure" else 0))
         off = (value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1
-        error = float(np.abs(off).max(initial=error))
+        errors[name] = float(np.abs(off).max(initial=0.0))
+    error = max(errors.values())
+    listed = ", ".join(f"{name} {value:.1e}" for name, value in errors.items())
     units = dict.fromkeys((*FILM_NAMES, "area", "scatter"), "1") | {"pressure": stress}
     columns = {name: (getattr(found, name), unit) for name, unit in units.items()}
     columns["stiffness"] = (np.asarray(exported.answer(u).unloading_stiffness), f"{stress}/{length}")
@@ -294,8 +353,8 @@ def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float
     comments = exported.header(
         f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
         f"mean separation u from {number(u[0])} to {number(u[-1])} {length}",
-        f"{rows} rows; largest error of linear interpolation {error:.1e}, relative, of flow factors and of pressures "
-        f"above {about(floor)} {stress}, where flow factors are valid",
+        f"{rows} rows; largest errors of linear interpolation, relative, where flow factors are valid: {listed}; of "
+        f"pressures above {about(floor)} {stress}",
         "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
         "stiffness is that of a small change of the gap, with the contact area as it is",
         f"peklenik = {about(found.peklenik, 6)}: length of the roughness along x over that along y",

@@ -80,8 +80,13 @@ def chosen_rows(
     rtol: float | None,
     evenly: bool = False,
     jump: bool = False,
+    most_rows: int | None = None,
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Rows of a curve given on fine points, as written to a file, and their largest relative error above `floor`."""
+    """Rows of a curve given on fine points, as written to a file, and their largest relative error above `floor`.
+
+    Where a program holds `most_rows` alone and neither their number nor their error is asked for, there are that many
+    where fewer do not reach the usual error.
+    """
     # with a jump the first two fine points are rows
     begin = fine_x[:1], fine_y[:1]
     if jump:
@@ -106,6 +111,13 @@ def chosen_rows(
         asked = number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5)
         # the error falls with the number of rows
         fewest = bisect.bisect_left(range(MAX_ROWS + 1), -asked, MIN_ROWS, key=lambda count: -with_rows(count)[2])
+        if most_rows is not None and fewest > most_rows:
+            if rtol is not None:
+                raise InputError(
+                    f"rtol = {asked:g} needs {fewest} rows, and the program keeps {most_rows}: take a larger rtol, a "
+                    f"shorter range of pressures, or rows={most_rows}"
+                )
+            fewest = most_rows
         if fewest > MAX_ROWS:
             raise InputError(f"rtol = {asked:g} needs more than {MAX_ROWS} rows under linear interpolation")
         x, y, error = with_rows(fewest)

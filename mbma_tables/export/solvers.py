@@ -6,7 +6,7 @@ CalculiX 2.20 and GetDP 3.2 were run. The others follow manuals and sources: MBD
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ CALCULIX_HEAT = (
     f"Use this interaction with {PAIR}SURFACE TO SURFACE",
     "and no other type: with NODE TO SURFACE 2.20 takes one conductance for all pressures, without a message. Use it "
     "in steps of *COUPLED TEMPERATURE-DISPLACEMENT: with UNCOUPLED an increment has the conductance of the pressure "
-    "of the one before it, so that loads must be held for one more. Below the second row conductance is linear from 0.",
+    "of the one before it, so that loads must be held for one more. Between the first two rows conductance is linear.",
     "2.20 takes no table of pressures beside one of conductances. The closure is exponential here, "
     "p = p0 exp(ln(100) c/c0) with c0 = {c0} {length}, over which the pressure falls to a hundredth, and "
     "p0 = {p0} {stress}, the pressure at c = 0: pressure at a given overclosure is within "
@@ -144,14 +144,19 @@ def _abaqus(law: LawTable, name: str) -> str:
     return _interaction(name, *cards)
 
 
-def _lsdyna(law: LawTable) -> str:
-    """Curve 1, for inclusion: without *END, which would end the including deck."""
-    head = f"*DEFINE_CURVE\n{1:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
+def _lsdyna(law: LawTable, curve: int = 1) -> str:
+    """A curve, for inclusion: without *END, which would end the including deck."""
+    head = f"*DEFINE_CURVE\n{curve:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
     rows = (
         "".join(number(value, width=LSDYNA_WIDTH).rjust(LSDYNA_WIDTH) for value in row)
         for row in zip(law.x, law.y, strict=True)
     )
     return head + "".join(f"{row}\n" for row in rows)
+
+
+def _lsdyna_curves(laws: Sequence[LawTable]) -> str:
+    titles = [f"$ curve {curve}: {law.y_name} against {law.x_name}\n" for curve, law in enumerate(laws, 1)]
+    return "".join(titles) + "".join(_lsdyna(law, curve) for curve, law in enumerate(laws, 1))
 
 
 def _optistruct(law: LawTable) -> str:
@@ -250,20 +255,40 @@ def _geos(law: LawTable, name: str) -> str:
 
 
 def _moose(law: LawTable, name: str) -> str:
+    return f"[Functions]\n{_moose_blocks(law, name)}[]\n"
+
+
+def _moose_several(laws: Sequence[LawTable], name: str) -> str:
+    return f"[Functions]\n{''.join(_moose_blocks(law, name) for law in laws)}[]\n"
+
+
+def _moose_blocks(law: LawTable, name: str) -> str:
     x, *others = law.columns
     texts = {key: " ".join(map(number, values)) for key, (values, _) in law.columns.items()}
-    blocks = (
+    return "".join(
         f"  [{name}_{key}]\n    type = PiecewiseLinear\n    x = '{texts[x]}'\n    y = '{texts[key]}'\n  []\n"
         for key in others
     )
-    return f"[Functions]\n{''.join(blocks)}[]\n"
 
 
 def _getdp(law: LawTable, name: str) -> str:
-    x, *others = law.columns
-    lines = [f"{name}_{key}() = {{{', '.join(map(number, values))}}};" for key, (values, _) in law.columns.items()]
-    lines += [f"{name}_{key}[] = InterpolationLinear[$1]{{ListAlt[{name}_{x}(), {name}_{key}()]}};" for key in others]
+    return "\n  ".join(["Function {", *_getdp_lines(law, name, name)]) + "\n}\n"
+
+
+def _getdp_several(laws: Sequence[LawTable], name: str) -> str:
+    lines = []
+    for law in laws:
+        # each law has its own abscissas
+        lines += _getdp_lines(law, name, f"{name}_rows_{law.y_name}")
     return "\n  ".join(["Function {", *lines]) + "\n}\n"
+
+
+def _getdp_lines(law: LawTable, name: str, rows: str) -> list[str]:
+    """Lists of columns, whose names begin with `rows`, and functions, whose names begin with `name`."""
+    x, *others = law.columns
+    lines = [f"{rows}_{key}() = {{{', '.join(map(number, values))}}};" for key, (values, _) in law.columns.items()]
+    lines += [f"{name}_{key}[] = InterpolationLinear[$1]{{ListAlt[{rows}_{x}(), {rows}_{key}()]}};" for key in others]
+    return lines
 
 
 def _lethe(law: LawTable) -> str:
@@ -306,10 +331,12 @@ abaqus = Grammar(
     {"pressure": _abaqus, "conductance": _abaqus},
     "Abaqus continues the last slope beyond the last row: stay within the range.",
     named="ROUGH",
+    closure=True,
     friction="Its stiffness before slip is proportional to pressure, the coefficient times that over the elastic slip.",
 )
 STAY = "Stay within the rows: the solver's behaviour beyond them was not tested."
-lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(("pressure", "conductance", "leakage"), _lsdyna), STAY)
+LSDYNA_TAKES = ("pressure", "conductance", "tangential_stiffness", "leakage")
+lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(LSDYNA_TAKES, _lsdyna), STAY, several=_lsdyna_curves)
 optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
 comsol = Grammar(
     "COMSOL",
@@ -351,6 +378,7 @@ moose_function = Grammar(
     "gap_conductivity_function_variable = the contact pressure, and gap_conductivity and min_gap the same length, "
     "above all closed gaps.",
     named="rough",
+    several=_moose_several,
 )
 getdp = Grammar(
     "GetDP",
@@ -358,8 +386,16 @@ getdp = Grammar(
     dict.fromkeys(AGAINST, _getdp),
     "GetDP 3.2 stops below the first row and continues the last chord beyond the last one.",
     named="rough",
+    several=_getdp_several,
 )
-lethe = Grammar("Lethe", "#", {"conductance": _lethe}, "For contacts pressed as hard as in this range.", units=SI)
+lethe = Grammar(
+    "Lethe",
+    "#",
+    {"conductance": _lethe},
+    "For contacts pressed as hard as in this range. Lethe adds the gas in the gaps itself.",
+    units=SI,
+    conducts_gas=False,
+)
 SOLVERS = calculix, abaqus, lsdyna, optistruct, comsol, moose, modelica, mbdyn, geos, moose_function, getdp, lethe
 TARGETS = tuple(
     grammar.target("moose-function" if grammar is moose_function else grammar.program.lower().replace("-", ""))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import functools
 import importlib
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+import pathlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import write_file
+from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.text import checked_name, comment
-
-if TYPE_CHECKING:
-    from mbma_tables.export.law_table import LawTable
 
 LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"})
 ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "direction"}
@@ -45,6 +45,11 @@ class Target:
     end: str = ""  # of the first file's name, where it must be that; functions are then called by the rest of it
     quantity: str = "pressure"  # of the rows, where none is asked for
     units: tuple[str, str] | None = None  # of length and of stress, where the program prescribes them
+    most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that the program keeps, by quantity
+    quantities: tuple[str, ...] = ()  # of rows, which the program takes; several in one file where `several`
+    several: bool = False
+    conducts_gas: bool = True  # whether conductance may be that of solid spots and gas together
+    alone: bool = True  # whether the first file can be used without those beside it
 
     def files(self, *given: Any, **options: Any) -> Mapping[str, bytes]:
         """The files by the ends of their names, that of the first being ""."""
@@ -66,9 +71,32 @@ class Grammar:
     first: str = ""  # line of the file
     units: tuple[str, str] | None = None  # of length and of stress, if they are prescribed
     friction: str = ""  # notes for the user of its friction card; empty without one
+    closure: bool = False  # whether rows of conductance stand beside those of the pressure of the same joint
+    # the text of several laws below the comments, where a file may have them, from the laws and the names
+    several: Callable[..., str] | None = None
+    conducts_gas: bool = True
 
-    def __call__(self, law: LawTable, name: str | None = None) -> str:
-        """The text of a file; a law that the program does not take raises an `InputError`."""
+    def __call__(self, law: LawTable | Sequence[LawTable], name: str | None = None) -> str:
+        """The text of a file of one law, or of several; what the program does not take raises an `InputError`."""
+        laws = [law] if isinstance(law, LawTable) else list(law)
+        if len(laws) > 1 and self.several is None:
+            raise InputError(f"{self.program} takes one quantity a file, got {len(laws)}: write a file for each")
+        named = {} if self.named is None else {"name": checked_name(self.named if name is None else name, MAX_NAME)}
+        for one in laws:
+            self._check(one)
+        # those of the first law, and what else the others have to say
+        comments = list(laws[0].comments)
+        closures = [one.behaviour for one in laws if self.closure and one.behaviour is not None]
+        for other in (*laws[1:], *closures):
+            comments += [line for line in other.comments if line not in comments]
+        comments += [self.friction] if "friction" in laws[0].facts else []
+        head = self.first + comment([*comments, self.beyond], self.mark)
+        if len(laws) > 1 and self.several is not None:
+            return head + self.several(laws, **named)
+        return head + self.body[laws[0].quantity](laws[0], **named)
+
+    def _check(self, law: LawTable) -> None:
+        """Refuse a law that the program does not take."""
         own, most = tuple(law.facts[fact][1] for fact in ("h_rms", "E_star")), self.most.get(law.y_name, law.x.size)
         taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
         for allowed, takes, got in (
@@ -79,17 +107,42 @@ class Grammar:
         ):
             if not allowed:
                 raise InputError(f"{self.program} takes {takes} here, got {got}")
-        named = {} if self.named is None else {"name": checked_name(self.named if name is None else name, MAX_NAME)}
-        said = [self.friction] if "friction" in law.facts else []
-        head = comment([*law.comments, *said, self.beyond], self.mark)
-        return self.first + head + self.body[law.quantity](law, **named)
 
     def target(self, name: str) -> Target:
         """The target of this name."""
         takes = ROWS | ({"name"} if self.named else set()) | (FRICTION if self.friction else set())
         for quantity, options in OPTIONS.items():
             takes -= options if quantity not in self.body and not (self.friction and "kappa" in options) else set()
-        return Target(name, self, takes, quantity=next(iter(self.body)), units=self.units)
+        return Target(
+            name,
+            self,
+            takes,
+            quantity=next(iter(self.body)),
+            units=self.units,
+            most=self.most,
+            quantities=tuple(self.body),
+            several=self.several is not None,
+            conducts_gas=self.conducts_gas,
+        )
+
+
+def write_files(out: pathlib.Path, files: Mapping[str, bytes]) -> list[pathlib.Path]:
+    """Write all files of a target, the first as `out`, those beside it by its name; the paths, the first one last.
+
+    Raises
+    ------
+    InputError
+        Where a file beside the first one would have its name.
+    """
+    if out.suffix and any(out.name == f"{out.stem}{end}" for end in files):
+        raise InputError(f"{out.name}: a file beside the first one has this name, take another")
+    paths = []
+    # files that the first one needs are written before it
+    for end in sorted(files, reverse=True):
+        path = out.with_name(f"{out.stem}{end}") if end else out
+        write_file(path, files[end])
+        paths.append(path)
+    return paths
 
 
 @functools.cache

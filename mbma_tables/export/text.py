@@ -77,9 +77,9 @@ def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
 
-def written_by(words: Iterable[str]) -> str:
-    """The line of a header with the arguments of `mbma export`."""
-    return f"written by mbma_tables {__version__}: mbma export {shlex.join(words)}"
+def written_by(words: Iterable[str], command: str = "export") -> str:
+    """The line of a header with the command and its arguments."""
+    return f"written by mbma_tables {__version__}: mbma {command} {shlex.join(words)}"
 
 
 def csv_cell(text: str) -> str:
