@@ -1,7 +1,9 @@
 /* The core as a Python module (stable ABI of CPython 3.11): buffers in, numbers out, the interpreter lock released.
  *
  * The same sources are compiled for each generation of processor, as modules of different names; `core/__init__.py`
- * imports the best one that the processor can run. Sizes are checked as `calls.h` states, values in the core.
+ * imports the best one that the processor can run. Whatever arguments a function is called with, it reads and writes
+ * inside their arrays or raises an error, as long as no other thread changes an array during the call: types, places in
+ * memory and sizes are checked here, what else loops rely on in `calls.h`.
  */
 #if defined(__x86_64__) || defined(_M_X64)
 #include <cpuid.h>
@@ -11,10 +13,13 @@
 #include "calls.h"
 #include "stable_abi.h"
 
+#define MOST_ITEMS ((size_t)1 << 56) /* more than fit into any memory; a small multiple does not overflow */
+
 /* One argument by its kind: d a double, i a whole number; arrays of D doubles, L int64, J int32, F floats to be read,
  * and w doubles, l int64, b bytes to be written. */
 static bool take(PyObject *given, char kind, argument *a, Py_buffer *view) {
-    static const char KINDS[] = "DLJFwlb", *const FORMATS[] = {"d", "lq", "i", "f", "d", "lq", "B?"};
+    /* which of the letters of 4 and 8 bytes is whose differs between platforms */
+    static const char KINDS[] = "DLJFwlb", *const FORMATS[] = {"d", "lq", "il", "f", "d", "lq", "B?"};
     static const Py_ssize_t SIZES[] = {8, 8, 4, 4, 8, 8, 1};
     memset(a, 0, sizeof *a);
     memset(view, 0, sizeof *view);
@@ -31,8 +36,14 @@ static bool take(PyObject *given, char kind, argument *a, Py_buffer *view) {
     if (PyObject_GetBuffer(given, view, access) != 0)
         return false;
     const char *const format = view->format ? view->format : "B", *const formats = FORMATS[number];
-    if (view->itemsize != SIZES[number] || strchr(formats, format[0]) == NULL || format[1] != '\0') {
+    if (view->itemsize != SIZES[number] || format[0] == '\0' || strchr(formats, format[0]) == NULL ||
+        format[1] != '\0') {
         PyErr_Format(PyExc_TypeError, "core: an array of '%c' was expected, got one of '%s'", formats[0], format);
+        PyBuffer_Release(view);
+        return false;
+    }
+    if ((uintptr_t)view->buf % (uintptr_t)SIZES[number] != 0) {
+        PyErr_Format(PyExc_ValueError, "core: an array of '%c' is not aligned in memory", formats[0]);
         PyBuffer_Release(view);
         return false;
     }
@@ -44,7 +55,7 @@ static bool take(PyObject *given, char kind, argument *a, Py_buffer *view) {
 /* Whether an array has the size given from *kinds on, if there is any: a product of a number and of the letters
  * k, m and n, each the size of the first array that has it; ? allows None. */
 static bool has_size(const argument *a, const char **kinds, size_t letters[4]) {
-    bool any = **kinds == ' ' || **kinds == '\0';
+    bool any = **kinds == ' ' || **kinds == '\0', countable = true;
     size_t number = 0, product = 1;
     for (; **kinds != ' ' && **kinds != '\0'; ++*kinds)
         if (**kinds == '?')
@@ -54,37 +65,63 @@ static bool has_size(const argument *a, const char **kinds, size_t letters[4]) {
         else {
             size_t *const letter = &letters[**kinds - 'k'];
             *letter = *letter == SIZE_MAX ? a->n : *letter;
+            countable = countable && (*letter == 0 || product <= MOST_ITEMS / *letter);
             product *= *letter;
         }
-    return any || a->n == (number ? number : 1) * product;
+    return any || (countable && a->n == (number ? number : 1) * product);
+}
+
+static bool overlap(const Py_buffer *one, const Py_buffer *other) {
+    const char *const first = one->buf, *const second = other->buf;
+    return one->len > 0 && other->len > 0 && first < second + other->len && second < first + one->len;
+}
+
+/* Whether no result is written to what is read, or to another result: loops would use what they wrote as if it had
+ * been checked. */
+static bool are_apart(const char *kinds, const Py_buffer *views, Py_ssize_t count) {
+    bool written[MOST_ARGUMENTS];
+    for (Py_ssize_t k = 0; k < count; k++) {
+        written[k] = strchr("wlb", *kinds) != NULL;
+        kinds += strcspn(kinds, " ");
+        kinds += *kinds == ' ';
+        for (Py_ssize_t before = 0; before < k; before++)
+            if ((written[k] || written[before]) && overlap(&views[k], &views[before]))
+                return false;
+    }
+    return true;
 }
 
 /* A call of a function by the kinds of its arguments: "Dn w3n w?n" are numbers, three results for each, and
  * optionally one more. */
 static PyObject *called(const char *name, const char *kinds, bool (*call)(const argument *, long long *),
                         PyObject *const *given, Py_ssize_t count) {
+    const char *const all_kinds = kinds;
     size_t letters[4] = {SIZE_MAX, SIZE_MAX, SIZE_MAX, SIZE_MAX};
     argument a[MOST_ARGUMENTS];
     Py_buffer views[MOST_ARGUMENTS];
-    long long found = 0;
-    bool taken = true, fit = true;
+    long long answer = 0;
+    bool taken = true, sized = true, good = false;
     Py_ssize_t k = 0;
     for (; k < count && *kinds && taken; k++, kinds += *kinds == ' ') {
         taken = take(given[k], *kinds++, &a[k], &views[k]);
-        fit = taken && has_size(&a[k], &kinds, letters) && fit;
+        sized = taken && has_size(&a[k], &kinds, letters) && sized;
     }
     if (taken && (k < count || *kinds))
         PyErr_Format(PyExc_TypeError, "core: %s does not take %d arguments", name, (int)count);
+    else if (taken && !sized)
+        PyErr_Format(PyExc_ValueError, "core: sizes of the arrays of %s do not match", name);
+    else if (taken && !are_apart(all_kinds, views, count))
+        PyErr_Format(PyExc_ValueError, "core: a result of %s overlaps another of its arrays in memory", name);
     else if (taken) {
-        Py_BEGIN_ALLOW_THREADS fit = fit && call(a, &found);
+        Py_BEGIN_ALLOW_THREADS good = call(a, &answer);
         Py_END_ALLOW_THREADS
-        if (!fit)
-            PyErr_Format(PyExc_ValueError, "core: sizes of the arrays of %s do not match", name);
+        if (!good)
+            PyErr_Format(PyExc_ValueError, "core: sizes of the arrays of %s, or numbers of items in them, do not match",
+                         name);
     }
-    const bool good = taken && fit && k == count && !*kinds;
     for (Py_ssize_t used = taken ? k : k - 1; used-- > 0;)
         PyBuffer_Release(&views[used]); /* no effect without a buffer */
-    return good ? PyLong_FromLongLong(found) : NULL;
+    return good ? PyLong_FromLongLong(answer) : NULL;
 }
 
 #define WRAP(name, kinds, fits, call) \
@@ -108,6 +145,7 @@ typedef struct {
     mbma_law law;   /* its head is NULL before the first use */
 } law_object;
 
+/* Its law, opened when it is first needed: from then on nothing may change the block, which is not checked again. */
 static const mbma_law *law_of(PyObject *self) {
     law_object *const own = (law_object *)self;
     if (own->law.head == NULL) {
@@ -118,17 +156,21 @@ static const mbma_law *law_of(PyObject *self) {
         Py_XDECREF(block);
         if (!taken)
             return NULL;
-        const mbma_law found = mbma_law_open(words.data, words.n);
-        if (found.head == NULL)
+        const bool constant = view.readonly != 0, good = constant && is_law(&words);
+        if (!constant)
+            PyErr_Format(PyExc_ValueError, "core: the block of a law must be read-only");
+        else if (!good)
             PyErr_Format(PyExc_ValueError, "core: the block is not that of a law");
         /* another thread may have set it */
-        if (found.head != NULL && own->law.head == NULL) {
+        if (good && own->law.head == NULL) {
             own->view = view;
-            own->law = found;
+            own->law = mbma_law_open(words.data, words.n);
         } else
             PyBuffer_Release(&view);
+        if (!good)
+            return NULL;
     }
-    return own->law.head != NULL ? &own->law : NULL;
+    return &own->law;
 }
 
 static void law_dealloc(PyObject *self) {

@@ -281,3 +281,9 @@ class ContactLaw(Law, Derived, Displayed):
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # pickle restores arrays as writable
+        for array in (state["block"], state["errors"]):
+            array.setflags(write=False)
+        self.__dict__.update(state)

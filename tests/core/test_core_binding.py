@@ -1,7 +1,10 @@
 """The core as Python calls it: wrong arguments, threads, forks and Ctrl-C."""
 
+import dataclasses
+import itertools
 import os
 import pathlib
+import pickle
 import subprocess
 import sys
 import threading
@@ -9,7 +12,9 @@ import threading
 import numpy as np
 import pytest
 
+from mbma_tables import Surface, contact_law, open_table
 from mbma_tables.core import core
+from mbma_tables.totals.profile import RULES
 
 
 def run(code, timeout=120):
@@ -34,6 +39,78 @@ def test_arrays_of_wrong_sizes_are_refused():
     np.testing.assert_allclose(out, np.exp(x), rtol=1e-15)
     with pytest.raises(ValueError, match="read-only"):
         core.elementary(0, x, locked)
+
+
+def lookup(cells, places, numbers):
+    """An island by a universal table."""
+    answer = np.empty((1, 3))
+    core.phi(np.array([2.0]), np.array([1e-3]), cells, places, numbers, answer, None)
+    return answer[0]
+
+
+def test_a_table_whose_places_are_no_cells_of_it_is_refused():
+    """Looked up once a call: places that begin or lie outside, and ranges with more strips or buckets than places."""
+    cells, places, numbers = open_table("universal").cells
+    assert lookup(cells, places, numbers)[0] == pytest.approx(0.0051784366, abs=1e-10)
+    strips, record = int((numbers[1] - numbers[0]) * numbers[2]) + 1, 136
+    for place, number in (
+        (0, -1),
+        (0, strips - 1),
+        (0, places.size),
+        (strips, -1),
+        (places.size - 1, cells.size // record),
+    ):
+        wrong = places.copy()
+        wrong[place] = number
+        with pytest.raises(ValueError, match="phi, or numbers of items in them"):
+            lookup(cells, wrong, numbers)
+    for place, number in itertools.product(range(6), (-1e300, np.nan, np.inf, -np.inf)):
+        # the largest mu is compared, not counted with
+        if place == 3:
+            continue
+        wrong = numbers.copy()
+        wrong[place] = number
+        with pytest.raises(ValueError, match="phi, or numbers of items in them"):
+            lookup(cells, places, wrong)
+    with pytest.raises(ValueError, match="phi, or numbers of items in them"):
+        lookup(cells[:record], places, numbers)
+
+
+@pytest.mark.parametrize("word", [1, 2])
+@pytest.mark.parametrize("number", [np.nan, -1.0, 0.0, 17.0, 1e300])
+def test_rules_of_panels_with_other_numbers_of_nodes_and_gaps_are_refused(word, number):
+    rules = RULES.copy()
+    rules[word] = number
+    ends, fields, error = np.array([0.1]), np.ones((4, 1, 19)), np.empty(1)
+    given = np.array([1]), ends, 2 * ends, fields, 2, 1.0, error
+    assert core.profile_missed(RULES, *given) == 0
+    with pytest.raises(ValueError, match="profile_missed, or numbers of items in them"):
+        core.profile_missed(rules, *given)
+
+
+def test_arrays_that_are_not_aligned_or_overlap_results_are_refused():
+    x = np.linspace(0.1, 1.0, 10)
+    shifted = memoryview(bytearray(b"\0" + x.tobytes()))[1:].cast("d")
+    with pytest.raises(ValueError, match="not aligned"):
+        core.elementary(0, shifted, np.empty(10))
+    both = np.linspace(0.1, 1.0, 15)
+    for read, written in ((both[:10], both[5:]), (both[5:], both[:10]), (x, x)):
+        with pytest.raises(ValueError, match="a result of elementary overlaps another of its arrays"):
+            core.elementary(0, read, written)
+    assert core.elementary(0, both[:5], both[5:10]) == 0
+
+
+def test_a_law_is_asked_only_of_a_block_that_nothing_changes():
+    """It is checked when it is opened, and not again."""
+    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
+    block = law.block.copy()
+    with pytest.raises(ValueError, match="must be read-only"):
+        dataclasses.replace(law, block=block).pressure(1.0)
+    block.flags.writeable = False
+    assert dataclasses.replace(law, block=block).pressure(1.0) == law.pressure(1.0)
+    restored = pickle.loads(pickle.dumps(law))
+    assert not restored.block.flags.writeable
+    assert restored.pressure(1.0) == law.pressure(1.0)
 
 
 def test_other_threads_go_on_during_a_call():

@@ -1,5 +1,6 @@
 """Tests that matter to the core pass with the module of every generation of processor, and under sanitizers."""
 
+import json
 import os
 import pathlib
 import shutil
@@ -8,6 +9,7 @@ import sys
 import sysconfig
 
 import pytest
+from record import functions
 from test_core_builds import BUILD, CORE, SANITIZERS, SOURCES, found, recording, run
 
 from mbma_tables.core import GENERATIONS, core
@@ -59,4 +61,8 @@ def test_under_sanitizers(tmp_path):
     passed(QUICK, PYTHONPATH=paths, **sanitizer)
     calls, script = recording(tmp_path), ROOT / "tests" / "core" / "mutate.py"
     exact = {"PYTHONMALLOC": "malloc", "PYTHONPATH": paths}
-    assert int(run(sys.executable, script, calls, "100", env=os.environ | sanitizer | exact, cwd=tmp_path)) > 10_000
+    tried = json.loads(run(sys.executable, script, calls, "100", env=os.environ | sanitizer | exact, cwd=tmp_path))
+    assert set(tried) == {name for name, _ in functions()} | {"Law"}
+    # of every function every argument, numbers in at least ten ways, arrays in hundreds
+    assert all(min(counts, default=10) >= 10 for counts in tried.values())
+    assert sum(map(sum, tried.values())) > 40_000

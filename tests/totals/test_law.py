@@ -450,7 +450,9 @@ def test_broken_blocks_are_refused():
     out, d = np.empty(1), np.zeros(1)
 
     def refused(block):
-        with pytest.raises(ValueError, match="sizes of the arrays of law_fill do not match"):
+        with pytest.raises(
+            ValueError, match="sizes of the arrays of law_fill, or numbers of items in them, do not match"
+        ):
             core.law_fill(d, block, out, None, None, None, None)
 
     for words in (0, 1, at.HEAD, int(law.block.view(np.int64)[at.RECORDS]), law.block.size - 1):
