@@ -1,7 +1,6 @@
 """Leakage of a contact: flow coefficient with uncertainty, by a table of `laws.effective_medium`, and leakage rates."""
 
 import dataclasses
-import functools
 import math
 from typing import Any
 
@@ -12,6 +11,7 @@ from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_l
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.common.units import unit_of
 from mbma_tables.core import core, in_blocks
 from mbma_tables.laws.calibrated import Spectrum, self_affine_law, spectrum_of
@@ -103,7 +103,7 @@ class Leakage(Displayed):
     #: K/u^3, Patir and Cheng's pressure flow factor of the mean separation u
     flow_factor = property(lambda self: self.K / self._contact.mean_separation**3)
 
-    @functools.cached_property
+    @shared_property
     def scatter(self) -> Any:
         """Model uncertainty, one standard deviation of ln K, of cells at least four longest wavelengths wide.
 
@@ -124,13 +124,13 @@ class Leakage(Displayed):
 
         return self._contact._source.map(stated, self._contact, 1, {"area": self._contact.area})[0]
 
-    @functools.cached_property
+    @shared_property
     def valid(self) -> Any:
         """Whether flow through such contacts was simulated; if not, `reasons` explains why."""
         contact = self._contact
         return contact.valid & contact._source.valid(contact, reasons_against, {"area": contact.area})
 
-    @functools.cached_property
+    @shared_property
     def reasons(self) -> Any:
         """Reasons why entries are not valid, each with its mask; for plain arrays."""
         contact = self._contact
@@ -260,7 +260,7 @@ class FlowTable(SurfaceSpline):
         return np.where(np.asarray(area) < self.constants.threshold, known_at(self.contact, row, area), np.nan)
 
 
-@functools.cache
+@shared()
 def shipped_flow() -> FlowTable:
     """The shipped table, read once."""
     values, facts = shipped_part(GROUP)
@@ -301,7 +301,7 @@ def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
     return found
 
 
-@functools.lru_cache(KEPT)
+@shared(KEPT)
 def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
     """ln R over the table's odds of one spectrum, as `core.flow` takes it."""
     from scipy.interpolate import PchipInterpolator

@@ -15,6 +15,7 @@ from mbma_tables.answers.source import MEANINGS, LawPoint, LawValues
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.shared import frozen
 from mbma_tables.common.units import UNKNOWN, Units, unit_of
 from mbma_tables.core import core, in_blocks
 from mbma_tables.law import block as at
@@ -204,7 +205,8 @@ class ContactLaw(Law, Derived, Displayed):
         made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
         if name not in made:
             which, turn = (FORCE, self.turning_point) if name == "pressure" else (AREA, self.area_turning_point)
-            made[name] = inverse_block(which, self.block, self.lowest if turn is None else turn)
+            end = self.lowest if turn is None else turn
+            made[name] = frozen(inverse_block(which, self.block, end))
         return made[name]
 
     def slope_error(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Any:
@@ -284,6 +286,5 @@ class ContactLaw(Law, Derived, Displayed):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # pickle restores arrays as writable
-        for array in (state["block"], state["errors"]):
-            array.setflags(write=False)
+        frozen((state["block"], state["errors"]))
         self.__dict__.update(state)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.answers.leakage import along, degrees, flow, shipped_flow
 from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError
+from mbma_tables.common.shared import frozen
 from mbma_tables.core import core
 from mbma_tables.law import block as fit
 from mbma_tables.laws.effective_medium import wide_gap
@@ -107,13 +108,12 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
         pieces = fit.side_pieces(side, max(RTOL, law.error))
     block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[fit.LOWEST], top))
     block.view(np.int64)[fit.ENDS] = blocked
-    block.flags.writeable = False
     error = float(errors[:, 0].max()) + _between_nodes(pieces.records, values)
     if law.gaps is not None:
         # bodies apart: the h_rms of the wide gap that continues it
         missed = 1 - float(values(np.array(1.0))[0]) / ((law.h_max + top) / 2) ** 3
         h_rms = law.h_max / np.sqrt(max(1.5 / max(missed, 1e-6) - 4, 1e-3))
-    return LeakageLaw(law, h_rms, bottom if blocked else -np.inf, error, block)
+    return LeakageLaw(law, h_rms, bottom if blocked else -np.inf, error, frozen(block))
 
 
 def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:

@@ -12,6 +12,7 @@ import numpy as np
 from mbma_tables.answers.contact import chosen_theory
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
+from mbma_tables.common.shared import frozen
 from mbma_tables.common.units import modulus_and_units
 from mbma_tables.law import block as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
@@ -225,11 +226,11 @@ def _finish(
     # forces carry the modulus
     records[:, fit.FORCE_AT : fit.AREA_AT] *= facts["E_star"]
     records[:, fit.ENERGY_AT] *= facts["E_star"]
-    block.flags.writeable = False
     error, own = float(errors[:, 0].max()), float(np.concatenate(own_errors).max())
     ends_at: dict[str, Any] = {"h_max": h_max, "lowest": lowest, "highest": highest, "error": error + own}
     ends_at |= {"turning_point": turns[0], "area_turning_point": turns[1]}
-    return ContactLaw(**facts, **ends_at, block=block, errors=errors + np.array([0.0, leverage * own]))
+    errors = errors + np.array([0.0, leverage * own])
+    return ContactLaw(**facts, **ends_at, block=frozen(block), errors=frozen(errors))
 
 
 def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> float:

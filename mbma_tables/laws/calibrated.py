@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, answered, require
 from mbma_tables.common.errors import ConvergenceError, InputError
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.core import core
 
 POWERS = (1, 3, 16)  # powers of the cover in the weight W
@@ -88,7 +89,7 @@ class Spectrum:
     gradient: float  # g/(q0 h_rms)
     alpha: float  # m0 m4/m2^2
 
-    @functools.cached_property
+    @shared_property
     def narrowness(self) -> float:
         """Harmonic over arithmetic mean wavenumber, weighted by variance: 1 for one wavelength, 0 for a broad band."""
         return float(1 / (np.sum(self.variance * self.x) * np.sum(self.variance / self.x)))
@@ -131,19 +132,19 @@ class Law:
     h_max: float | None = None
     constants: Constants = CONSTANTS
 
-    @functools.cached_property
+    @shared_property
     def tail(self) -> float:
         """c (1 - nu) of the tail factor."""
         return self.constants.tail * (1 - self.spectrum.narrowness)
 
-    @functools.cached_property
+    @shared_property
     def coefficients(self) -> FloatArray:
         """Coefficients of `POWERS` in W."""
         c = self.constants
         a = c.weight + c.weight_slope * (self.spectrum.narrowness - NARROWNESS)
         return np.array([a, c.cubic, 1 - a - c.cubic])
 
-    @functools.cached_property
+    @shared_property
     def _prepared(self) -> FloatArray:
         """The law in the core's format."""
         s, highest = self.spectrum, np.inf if self.h_max is None else self.h_max
@@ -188,13 +189,13 @@ class Law:
         return area(force, self.spectrum.alpha, self.constants)
 
 
-@functools.lru_cache(KEPT)
+@shared(KEPT)
 def self_affine_law(hurst: float, zeta_1: float, h_max: float | None, constants: Constants = CONSTANTS) -> Law:
     """The law of a self-affine surface, cached."""
     return Law(Spectrum.self_affine(hurst, zeta_1), h_max, constants)
 
 
-@functools.lru_cache(KEPT)
+@shared(KEPT)
 def spectrum_of(surface: Any) -> Spectrum:
     """The spectrum of a `MeasuredSurface`."""
     return Spectrum.from_samples(*(np.ascontiguousarray(part, float) for part in (surface.q, surface.C)))

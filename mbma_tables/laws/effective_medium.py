@@ -4,13 +4,13 @@ Lengths are in h_rms: flow per length of seal is k h_rms^3 (p1 - p2)/(12 viscosi
 """
 
 import dataclasses
-import functools
 import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.shared import shared_property
 from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, area, force_at_area, light_factor
 
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
@@ -55,7 +55,7 @@ class Gaps:
     area: FloatArray  # A/A0 at each load,
     separation: FloatArray  # and mean gap [h_rms]
 
-    @functools.cached_property
+    @shared_property
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Shares of the surface and ln h^3 of gaps there [h_rms^3], shape (loads, points)."""
         centre = self.mean / self.spread

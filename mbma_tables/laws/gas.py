@@ -1,6 +1,5 @@
 """Conductance of a gas in the gaps of a contact, by the distribution of gaps; docs/joints.md has the equations."""
 
-import functools
 import math
 from typing import Any, NamedTuple
 
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, finite_array, nearest, require
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.shared import shared
 
 BEND, LIGHT, SOFT, POWER = 0.3, 0.004, 0.3, 1.2  # constants of q
 DEEP, DEEPEST = 2.5, 1.25  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
@@ -74,7 +74,7 @@ def jump_of(
     return k, 2 * (2 - share) / share * 2 * one.gamma / ((one.gamma + 1) * prandtl) * path
 
 
-@functools.cache
+@shared()
 def _rule() -> tuple[Any, Any]:
     """Nodes in [0, 1], denser at 0, and weights."""
     x, weight = np.polynomial.legendre.leggauss(NODES)

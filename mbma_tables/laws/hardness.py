@@ -5,7 +5,6 @@ negative gaps: points that yield are flattened.
 """
 
 import dataclasses
-import functools
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.special import erf, erfc, erfcx, erfinv, ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.shared import shared
 from mbma_tables.laws.bearing_curve import FRACTIONS
 
 IMAGES, TERMS = 0.06, 10  # tau below which images converge faster than a series; its terms, and one
@@ -181,7 +181,7 @@ def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatAr
     return share / whole, np.where(gap >= last, 0.0, slope) / whole
 
 
-@functools.cache
+@shared()
 def _level_spline() -> Any:
     """Levels d of Gaussian heights by ln of the mean gaps d Phi(d) + phi(d) below them, to 1e-15."""
     d = np.linspace(*LEVELS)
@@ -191,7 +191,7 @@ def _level_spline() -> Any:
     return make_interp_spline(np.log(np.maximum(d, 0.0) + deep), d, 7)
 
 
-@functools.lru_cache(64)
+@shared(64)
 def _level_at_end(h_max: float) -> Any:
     """Q(u) for one highest point, cached for inversions."""
     return _levels(np.asarray(h_max))

@@ -6,7 +6,6 @@ Lengths in h_rms, force over A0 E* g as in `calibrated`; docs/calibrated.md has 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import operator
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.optimize import brentq, isotonic_regression
 from scipy.special import ellipe, ellipkm1, erf, expit, ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.laws import calibrated
 from mbma_tables.laws.bearing_curve import FRACTIONS, Bearing, RadialSpectrum
 from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, light_factor
@@ -56,7 +56,7 @@ MAP_CONSTANTS = MapConstants()
 PLATEAU_SHIFT, PLATEAU_ONSET, PLATEAU_AREA = 0.45, 0.8, 0.3
 
 
-@functools.lru_cache(maxsize=256)
+@shared(256)
 def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
     """Area factor k and height factor c_r of an elliptic Hertzian contact, curvatures as anisotropy^2 to 1."""
     if anisotropy < 1 + 1e-6:
@@ -113,7 +113,7 @@ class MapLaw:
             known.anisotropy,
         )
 
-    @functools.cached_property
+    @shared_property
     def height_factor(self) -> float:
         """c of H_p = M(c A)."""
         r, m = self.anisotropy, self.map_constants
@@ -123,7 +123,7 @@ class MapLaw:
         breadth *= (self.spectrum.alpha / 2) ** (m.curvature / 2)
         return float(0.8 * max(1.0, breadth / m.breadth_onset) ** m.breadth * self._ellipse[1])
 
-    @functools.cached_property
+    @shared_property
     def weighted_height(self) -> FloatArray:
         """M_w(a): mean height of the highest share a weighted by its gradient, to which pressures are proportional."""
         steps = np.diff(FRACTIONS, prepend=0.0)
@@ -154,11 +154,11 @@ class MapLaw:
         s0 = light_factor(self.spectrum.alpha, self.constants) / self._ellipse[0] ** 2
         return calibrated.area_of(force, s0, self.constants.area_t0)
 
-    @functools.cached_property
+    @shared_property
     def _ellipse(self) -> tuple[float, float]:
         return hertz_ellipse(round(self.anisotropy, 3))
 
-    @functools.cached_property
+    @shared_property
     def _contact(self) -> FloatArray:
         """A/A0 on the curve's forces."""
         tops, valleys = self._tops_area(), self._valleys_area()
@@ -183,7 +183,7 @@ class MapLaw:
         # at light loads another approximation applies: any positive increasing curve will do
         return np.asarray(np.maximum(found, MIN_RATIO * given))
 
-    @functools.cached_property
+    @shared_property
     def _curve(self) -> tuple[FloatArray, FloatArray]:
         """ln F and u, u falling."""
         law, m = Law(self.spectrum, None, self.constants), self.map_constants

@@ -1,6 +1,5 @@
 """Island models by name; the shipped tables by kind, others from their file; verification of their results."""
 
-import functools
 import os
 import pathlib
 import reprlib
@@ -12,6 +11,7 @@ from mbma_tables import models
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import shipped_file
+from mbma_tables.common.shared import shared
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import AnyModel
 from mbma_tables.models.island4d import Island4dModel, to_axes
@@ -30,7 +30,10 @@ def _model(content: TableContent) -> UniversalModel | Island4dModel:
     return UniversalModel(content) if content.kind == UNIVERSAL else Island4dModel(content)
 
 
-_opened = functools.cache(lambda kind: _model(read_table(shipped(kind), kind)))
+@shared()
+def _opened(kind: str) -> UniversalModel | Island4dModel:
+    """The shipped table of that kind, read once."""
+    return _model(read_table(shipped(kind), kind))
 
 
 def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:

@@ -1,6 +1,5 @@
 """The island model of the universal table: Phi_F and Phi_A over (X, mu)."""
 
-import functools
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.common.errors import TableFileError
+from mbma_tables.common.shared import shared_property
 from mbma_tables.core import core, in_blocks
 from mbma_tables.models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
@@ -88,7 +88,7 @@ class UniversalModel(Ranged):
         in_blocks(lambda block: core.phi(X[block], mu[block], *self.cells, out[block], None), X.size, BLOCK)
         return out.T
 
-    @functools.cached_property
+    @shared_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
         """The table in the core's format, `mbma_cells` of mbma.h: cells, indices and numbers."""
         X_low, X_high, mu_low, mu_high = (self.content.auxiliary[name][1] for name in CELL_EDGES)

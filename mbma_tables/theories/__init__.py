@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 import importlib
 import reprlib
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.shared import shared
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
@@ -85,7 +85,7 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     )
 
 
-@functools.cache
+@shared()
 def default_theory(name: str) -> Theory:
     """One of `THEORIES` with its defaults, made once per process."""
     return get_theory(name)

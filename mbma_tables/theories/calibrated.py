@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, cast
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, grouped, require, spread
+from mbma_tables.common.shared import shared
 from mbma_tables.laws.calibrated import KEPT, TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
 from mbma_tables.laws.calibrated import area as law_area
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -94,7 +94,7 @@ class Batch:
         return out.reshape(3, *shape)
 
 
-@functools.lru_cache(KEPT)
+@shared(KEPT)
 def _single(surface: Surface) -> Batch:
     return Batch(surface, MANY)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.special import erfc, ndtri
 
 from mbma_tables.common.arguments import FloatArray, require
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.laws.bearing_curve import FRACTIONS
 from mbma_tables.laws.calibrated import LAW_ERROR, TESTED_AREA, Law, force_at_area, light_factor, spectrum_of
 from mbma_tables.laws.map_curves import LOG_FORCE, MapLaw, convex
@@ -136,7 +136,7 @@ class OwnLaw:
         self._known = self._map_law(surface)
         self.curve = None if self._known is None else Curve(self._known, self.h_max / self.h_rms)
 
-    @functools.cached_property
+    @shared_property
     def heights(self) -> BearingCurve | None:
         """Its own bearing curve, for a hardness."""
         from mbma_tables.laws.hardness import BearingCurve
@@ -191,4 +191,4 @@ class OwnLaw:
         return np.asarray(u)
 
 
-own_law = functools.lru_cache(maxsize=32)(OwnLaw)
+own_law = shared(32)(OwnLaw)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import FloatArray, filled
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.files import shipped_file
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.core import core
 from mbma_tables.laws.calibrated import Constants
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
@@ -34,7 +35,7 @@ class SurfaceSpline:
     coefficients: FloatArray  # float32
     law_constants: tuple[float, float, float]  # constants of the law other than the spline, for the core
 
-    @functools.cached_property
+    @shared_property
     def cells(self) -> Any:
         """Their number along each axis."""
         return np.array(self.coefficients.shape, np.int64) - 5
@@ -44,7 +45,7 @@ class SurfaceSpline:
         """End of the last axis."""
         return float(self.first[2] + self.cells[2] * self.step[2])
 
-    @functools.cached_property
+    @shared_property
     def core_table(self) -> tuple[Any, FloatArray, Any]:
         """Coefficients, numbers and cells in the core's format."""
         numbers = [*self.first, *(1 / self.step), *self.covered[:2].ravel(), *self.law_constants]
@@ -133,13 +134,13 @@ def load(path: pathlib.Path) -> Table:
     )
 
 
-@functools.cache
+@shared()
 def shipped() -> Table:
     """The shipped table, read once."""
     return load(shipped_file(NAME))
 
 
-@functools.cache
+@shared()
 def shipped_part(group: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     """Variables and attributes of a group of the shipped file, read once."""
     return _read(shipped_file(NAME), group)[:2]

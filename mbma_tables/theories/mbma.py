@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, require
+from mbma_tables.common.shared import shared_property
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.models import QUANTITIES, AnyModel, check_outside, island_model_name
 from mbma_tables.models.tables import get_model
@@ -49,13 +49,13 @@ class Mbma(Theory):
         self.island_model, self.variant, self.rtol, self.outside = island_model, get_variant(variant), rtol, outside
         self.variant_name, self.island_model_name = self.variant.name, island_model_name(island_model)
 
-    @functools.cached_property
+    @shared_property
     def sums(self) -> Sums:
         """The island model as an object, and how its islands are summed."""
         model = get_model(self.island_model, self.rtol, self.variant)
         return Sums(model, self.variant, self.rtol, self.outside)
 
-    @functools.cached_property
+    @shared_property
     def _scanned(self) -> Mbma:
         """The same theory, but with NaN instead of errors for islands that are not covered."""
         if self.outside != "raise":

@@ -1,6 +1,5 @@
 """Persson's theory (Eqs. 18-21); (19) is u_P of `laws.calibrated` with the weight W = gamma P + (1 - gamma) P^3."""
 
-import functools
 import math
 from typing import Any, Literal
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, finite_array, grouped, require
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.shared import shared
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON, Law, area, self_affine_law, spectrum_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
@@ -20,7 +20,7 @@ LEAST = 1e-300  # least force over A0 E* g, a normal number
 INVERSE_RTOL = 1e-10  # error of a load found from its separation
 
 
-@functools.lru_cache(maxsize=32)
+@shared(32)
 def _own_law(surface: MeasuredSurface) -> Law:
     """Persson's theory for a surface's own spectrum, with Yang and Persson's weight."""
     return Law(spectrum_of(surface), None, YANG_PERSSON)

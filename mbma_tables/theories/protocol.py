@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import functools
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
 
@@ -210,7 +210,7 @@ class Theory(abc.ABC):
         return u.reshape(shape), missed.reshape(shape)
 
 
-@functools.cache
+@shared()
 def _shares(count: int) -> FloatArray:
     """Points from 1 to 0, denser at either end."""
     return np.asarray(1 / (1 + np.exp(np.linspace(-LOOKED_AT, LOOKED_AT, count))))

@@ -1,7 +1,6 @@
 """Simulated maps with a hardness, for each hardness anew, and quicker simulations, the default theory of maps."""
 
 import collections
-import functools
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -11,6 +10,7 @@ from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.shared import shared
 from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, TOLERANCE, Press
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -79,7 +79,7 @@ class Plastic(BoundaryElements):
         return np.array([*answer, *more])
 
 
-plastic = functools.lru_cache(KEPT)(Plastic)
+plastic = shared(KEPT)(Plastic)
 
 
 class Saturated(Yielding):
@@ -196,7 +196,7 @@ def applies(surface: AnySurface) -> bool:
     return True
 
 
-@functools.lru_cache(maxsize=8)
+@shared(8)
 def of_map(name: str, surface: AnySurface) -> BoundaryElements:
     """The theory of that name for a surface's map, cached."""
     return {kind.name: kind for kind in (BoundaryElements, Corrected)}[name].of(surface)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import os
 from typing import Any, ClassVar
@@ -13,6 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.common.shared import shared_property
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.laws.pressing import AREA_OF_FLOW, HIGHEST, LOWEST, MIN_POINTS, ROUNDING, TOLERANCE, Press, Table
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -174,7 +174,7 @@ class BoundaryElements(Theory):
         low, high = self.rows[1, [0, -1]]
         return np.where((area < low * (1 - ROUNDING)) | (area > high * (1 + ROUNDING)), np.nan, found)
 
-    @functools.cached_property
+    @shared_property
     def sensitivity(self) -> float:
         """Mean change of ln F at the gap of a load that is left out of the curves."""
         low, high = SENSITIVE
@@ -186,7 +186,7 @@ class BoundaryElements(Theory):
     def gaps(self) -> Any:
         return self
 
-    @functools.cached_property
+    @shared_property
     def flows(self) -> tuple[FloatArray, FloatArray]:
         """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
         return self.pressed.flows(self.fit.x, self.fit.separation)
@@ -217,7 +217,7 @@ class BoundaryElements(Theory):
         found[2] = np.sqrt(found[0] * found[1]) * np.interp(-u, -gaps, turn)
         return found
 
-    @functools.cached_property
+    @shared_property
     def closing(self) -> list[tuple[float, float, float]]:
         """Of both axes, u of the last open load, u1 at which it closes, and u of the first blocked load [length]."""
         gaps, known = self.flows

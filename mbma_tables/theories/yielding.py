@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.common.shared import shared
 from mbma_tables.laws import hardness as law
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import known_at, shipped_part
@@ -59,7 +60,7 @@ class Scatter(NamedTuple):
         return np.where((eta > self.eta[-1]) | np.isnan(elastic), elastic, found)
 
 
-@functools.cache
+@shared()
 def shipped() -> Scatter:
     """The errors in the shipped file, read once."""
     variables, attributes = shipped_part(GROUP)

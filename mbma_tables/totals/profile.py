@@ -8,7 +8,6 @@ panel. Polynomials of ln(F) and ln(A) interpolate these sums; any other gap cost
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 import math
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.core import core, in_blocks
 from mbma_tables.islands.geometry import floors_of, geometry, kinks, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
@@ -182,7 +182,7 @@ class Profile:
     islands: int  # evaluated for it
     nodes: tuple[Any, ...]  # the islands of the panels, of `Panels.series`
 
-    @functools.cached_property
+    @shared_property
     def end(self) -> float:
         """The largest compression covered."""
         return float(self.edges[-1]) * (1 + 1e-14)
@@ -201,7 +201,7 @@ class Profile:
         core.profile_totals(np.ascontiguousarray(compression), self.edges, self.series, rows, int(slopes), out)
         return out
 
-    @functools.cached_property
+    @shared_property
     def leverage(self) -> float:
         """Error of slopes over F/l per relative error of islands: 1.5 times the largest at some panels' ends.
 
@@ -312,7 +312,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
     raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
 
 
-@functools.lru_cache(maxsize=KEPT)
+@shared(KEPT)
 def _profile(
     surface: Shape, model: AnyModel, variant: Variant, rtol: float,
     outside: str = "nan", rows: int = 2, last: float = math.inf,
