@@ -171,14 +171,15 @@ def ask_law(block, gap, gaps):
 
 if __name__ == "__main__":
     recorded, together = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()), int(sys.argv[2])
-    called, counts = {**dict(functions()), "Law": ask_law}, {}
+    called = {**dict(functions()), "Law": ask_law}
+    counts = {name: [] for name in called}
     for call in [call for call in recorded if call.name == "law_fill"]:
         recorded.append(Call("Law", [call.given[1], 0.5, call.given[0]], 0, []))
     for name, function in called.items():
         for call, alone in chosen([call for call in recorded if call.name == name]):
             tables = [exact(one.tobytes(), one.dtype) if isinstance(one, np.ndarray) else one for one in call.given]
             call = call._replace(given=tables)
-            spoilt = counts.setdefault(name, [0] * len(call.given))
+            counts[name] = spoilt = counts[name] or [0] * len(call.given)
             for places, arguments in spoilt_calls(call.given, together, alone):
                 for place in places:
                     spoilt[place] += 1
