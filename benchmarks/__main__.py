@@ -145,7 +145,7 @@ def totals(rng: np.random.Generator) -> None:
 def laws(rng: np.random.Generator) -> None:
     """A frozen surface against numpy and scipy."""
     surface = Surface.named("asphalt")
-    law = contact_law(surface)
+    law = contact_law(surface, "mbma")
     gaps = rng.uniform(0, 0.99995 * surface.h_max, MANY_GAPS)
     nodes = np.linspace(0, surface.h_max, 1000)
     values = law.pressure(nodes)
@@ -158,14 +158,16 @@ def laws(rng: np.random.Generator) -> None:
             "energy": lambda: law.energy(gaps),
             "inverse": lambda: law.at_pressure(forces),
             # a surface that nothing is kept of
-            "making": lambda: contact_law(dataclasses.replace(surface, h_max=surface.h_max * (1 + 1e-9 * next(fresh)))),
+            "making": lambda: contact_law(
+                dataclasses.replace(surface, h_max=surface.h_max * (1 + 1e-9 * next(fresh))), "mbma"
+            ),
             "numpy": lambda: np.interp(gaps, nodes, values),
             "scalar law": lambda: [law.pressure(one) for _ in range(CALLS)],
             "scalar scipy": lambda: [linear(point) for _ in range(CALLS)],
         }
     )
     some = gaps[:2000]
-    truth = contact(surface, mean_separation=some, rtol=1e-10).pressure
+    truth = contact(surface, mean_separation=some, rtol=1e-10, theory="mbma").pressure
     click.echo("\ncontact_law of one surface, asphalt")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
     report("law.pressure, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns")
@@ -220,7 +222,11 @@ def kernels(rng: np.random.Generator) -> None:
 def few_numbers(rng: np.random.Generator) -> None:
     """Calls of single numbers and of ten."""
     surface = Surface.named("asphalt")
-    law, ten, yielding = contact_law(surface), np.linspace(0.1, 1.0, 10), {"theory": "calibrated", "hardness": 0.1}
+    law, ten, yielding = (
+        contact_law(surface, "mbma"),
+        np.linspace(0.1, 1.0, 10),
+        {"theory": "calibrated", "hardness": 0.1},
+    )
     u = np.linspace(0.05, 0.9, 100) * surface.h_max
     law.at_pressure(1e-4)
     calls: dict[str, tuple[Callable[[], Any], int, float]] = {
@@ -242,7 +248,7 @@ def few_numbers(rng: np.random.Generator) -> None:
 FIRST = {
     "import mbma_tables": "m",
     "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
-    "100,000 gaps of a law": "m.contact_law(S()).pressure(np.linspace(0.05, 2.95, 100_000))",
+    "100,000 gaps of a law": "m.contact_law(S(), 'mbma').pressure(np.linspace(0.05, 2.95, 100_000))",
     "10,000 surfaces": "m.contact(S(10_000), separation=1.0)",
     "an exact total": "m.contact(S(), separation=1.0, island_model='exact')",
 }

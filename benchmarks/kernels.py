@@ -67,7 +67,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         # one that nothing is kept of
         return dataclasses.replace(one, h_max=one.h_max * (1 + 1e-9 * next(fresh)))
 
-    law = contact_law(one)
+    law = contact_law(one, "mbma")
     place = float((one.h_max + many[0]) / 2)
     flat, u = Surface(0.8, 1.0, 64.0, 1.0, 3.3), rng.uniform(0.01, 3.3, MANY)
     mean = (gaps + surfaces.h_max) / 2

@@ -41,10 +41,10 @@ def traced(request: Callable[[], Any]) -> tuple[int, int, Counter[str]]:
 def main() -> None:
     """A line for each request; with `-v` the functions that are called most."""
     joint = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-    law = contact_law(joint, E_star="100 GPa")
+    law = contact_law(joint, "mbma", E_star="100 GPa")
     requests: dict[str, Callable[[], Any]] = {
-        "mbma by pressure": lambda: contact(joint, pressure="10 MPa", E_star="100 GPa"),
-        "mbma by gap": lambda: contact(joint, mean_separation=1.9, E_star=1e5),
+        "mbma by pressure": lambda: contact(joint, pressure="10 MPa", E_star="100 GPa", theory="mbma"),
+        "mbma by gap": lambda: contact(joint, mean_separation=1.9, E_star=1e5, theory="mbma"),
         "calibrated with hardness": lambda: contact(
             joint, pressure="10 MPa", E_star="100 GPa", theory="calibrated", hardness="1.5 GPa"
         ),

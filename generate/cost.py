@@ -180,7 +180,7 @@ def gap_rows() -> Iterator[Row]:
 def law_rows() -> Iterator[Row]:
 
     def make(island_model: str, rtol: float, surfaces: Sequence[Surface] = SURFACES) -> list[Any]:
-        return [contact_law(fresh(surface), rtol=rtol, island_model=island_model) for surface in surfaces]
+        return [contact_law(fresh(surface), "mbma", rtol=rtol, island_model=island_model) for surface in surfaces]
 
     for island_model in ISLAND_MODELS:
         timed = SURFACES[:2] if island_model == "exact" else SURFACES
@@ -189,7 +189,7 @@ def law_rows() -> Iterator[Row]:
             answers = [{"pressure": law.pressure(separation=d), "area": law.area(separation=d)} for law, d in pairs]
             cost, _ = measure(functools.partial(make, island_model, rtol, timed))
             yield Row(island_model, at("law", rtol), "both", largest_error(answers), cost / len(timed))
-    law, gaps = contact_law(SURFACES[3]), gaps_of(SURFACES[3], 10_000)
+    law, gaps = contact_law(SURFACES[3], "mbma"), gaps_of(SURFACES[3], 10_000)
     loads = law.pressure(separation=gaps)
     for name, quantity, run in (
         ("lookup", "pressure", lambda: law.pressure(separation=gaps)),

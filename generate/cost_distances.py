@@ -40,7 +40,7 @@ WAYS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("G-W", "law", {"theory": "greenwood_williamson"}),
     *(("MBMA reported", name, MBMA | {"island_model": name}) for name in ("universal", "exact", "island4d")),
     *(("MBMA reported", name, {"rtol": 1e-4, "island_model": name}) for name in ISLAND_MODELS),
-    ("MBMA reported", "law", {}),
+    ("MBMA reported", "law", {"theory": "mbma"}),
     *((f"MBMA {name}", "universal", MBMA | {"variant": name}) for name in ("printed", "fitted")),
     ("MBMA cover", "universal", MBMA | {"variant": COVER}),
 )

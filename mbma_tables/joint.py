@@ -89,7 +89,7 @@ class Joint(Displayed):
         Of the gas [K].
     gas_pressure : float or str
         Of the gas [Pa].
-    theory : str or Theory
+    theory : str or Theory, optional
         As for `contact`.
 
     Attributes
@@ -129,7 +129,7 @@ class Joint(Displayed):
     gas: str = "air"
     temperature: float = 300.0
     gas_pressure: float | str = "1 atm"
-    theory: str | Theory = "calibrated"
+    theory: str | Theory | None = None
     surface: AnySurface = dataclasses.field(init=False)
     pair: Pair = dataclasses.field(init=False)
     _faces: dict[str, AnySurface] = dataclasses.field(init=False)
@@ -460,7 +460,7 @@ class Joint(Displayed):
         """The arguments of the joint, by name."""
         a, b = self.pair.metals
         hardness = self.hardness or self.pair.hardness or f"not known: name the temper of {self.pair.softer.name}"
-        theory = self.theory if isinstance(self.theory, str) else self.theory.name
+        theory = chosen_theory(self.surface, self.theory).name
         facts = {"metals": f"{a.name} on {b.name}", "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa"}
         return facts | {"hardness": str(hardness), "theory": theory, "gas": self.gas, "surface": repr(self.surface)}
 

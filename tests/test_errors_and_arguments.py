@@ -163,8 +163,11 @@ test_natural_mistakes_have_a_message_with_the_remedy = refusals(
     (lambda: flow_factors("concrete", 1.0), "surface must be a Surface, got 'concrete'; a named"),
     (lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))), "rtol, outside take one value each"),
     (lambda: contact(ROAD, separation=1.0, hardness=10**400), "hardness must be real numbers: entries of type obj"),
-    (lambda: contact(ROAD, pressure=1.0, E_star=5e-324), "pressure must be at most what theory .mbma. reaches"),
-    (lambda: contact(ROAD, pressure=1.0, E_star=5e-324, hardness=1.0), "pressure must be at most what theory .mbma."),
+    (
+        lambda: contact(ROAD, pressure=1.0, E_star=5e-324, theory="mbma"),
+        "pressure must be at most what theory .mbma. reaches",
+    ),
+    (lambda: contact(ROAD, pressure=1.0, E_star=5e-324, hardness=1.0), "pressure must be at most what theory .calib"),
     (lambda: island(ROAD, 5e-324), "delta must be at least 1e-250, got 5e-324"),
     (lambda: Surface(0.8, 5e-324, 1.0, 1.0, 3.0), "q0 must be from 1e-50 to 1e\\+50: take another unit"),
     (lambda: Surface(5e-324, 1.0, 10.0, 1.0, 3.0), r"hurst must be in \(0, 1\], got 5e-324"),

@@ -16,7 +16,7 @@ ROUNDS = 4  # of every question by every thread: about a million lookups in all
 
 @pytest.fixture(scope="module")
 def questions():
-    model, law = universal_model(), contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
+    model, law = universal_model(), contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), "mbma")
     X_axis, mu_axis = model.content.axes
 
     def phi(seed):
@@ -59,12 +59,12 @@ def test_sixteen_threads_give_the_bits_of_one(questions):
 
 def test_laws_made_by_many_threads_are_one_law():
     surfaces = [Surface(hurst, 0.2, 60.0, 1.0, 3.0) for hurst in (0.35, 0.6, 0.8, 1.0)]
-    alone = [contact_law(surface, rtol=1e-7) for surface in surfaces]
+    alone = [contact_law(surface, "mbma", rtol=1e-7) for surface in surfaces]
     barrier = Barrier(THREADS)
 
     def make(thread):
         barrier.wait()
-        return contact_law(surfaces[thread % 4], rtol=1e-7)
+        return contact_law(surfaces[thread % 4], "mbma", rtol=1e-7)
 
     with ThreadPoolExecutor(THREADS) as pool:
         made = list(pool.map(make, range(THREADS)))

@@ -68,8 +68,9 @@ def contact(
         A/A0, on the same branch.
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
-        `name` and ``answer(surface, u)``. Default: "mbma" for a surface given by its five numbers, or where an option
-        of MBMA is given; "corrected" for a resolved map of at most 2^18 points, and "calibrated" otherwise.
+        `name` and ``answer(surface, u)``. Default, here and wherever a theory can be given: "mbma" at a `separation`,
+        its coordinate, or where an option of MBMA is given (`island_model`, `variant`, `rtol`, `outside`); otherwise
+        "corrected" for a resolved map of at most 2^18 points, and "calibrated" for any other surface.
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body supports, in the unit of `E_star` (over E* if that is 1), or a text
         that `mbma_tables.materials.hardness` accepts: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
@@ -112,8 +113,8 @@ def contact(
     >>> bool((found.error < 1e-8).all())
     True
     >>> joint = contact(surface, pressure=10.0, E_star=100e3)
-    >>> f"{joint.mean_separation:.3f} um, {joint.stiffness:.1f} MPa/um"
-    '1.942 um, 38.5 MPa/um'
+    >>> f"{joint.mean_separation:.3f} um, {joint.stiffness:.1f} MPa/um by theory {joint.theory!r}"
+    "2.048 um, 29.4 MPa/um by theory 'calibrated'"
     >>> face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
     >>> metals = ("steel 4140 hard", "aluminium 6061 hard")
     >>> joint = contact(face, pressure="10 MPa", theory="calibrated", materials=metals)
@@ -127,7 +128,7 @@ def contact(
     E_star, units = modulus_and_units(E_star, surface)
     value, stated = units.number(by, value), hardness is not None
     hardness = hardness_in(units, hardness) if stated else np.inf
-    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside)
+    chosen = chosen_theory(surface, theory, by, island_model=island_model, variant=variant, rtol=rtol, outside=outside)
     # what is no number is refused where it is checked
     known = np.asarray(hardness) if isinstance(hardness, float | np.ndarray) else None
     yields = stated and (known is None or known.dtype.kind != "f" or not known.size or bool((known != np.inf).any()))
@@ -140,13 +141,18 @@ def contact(
     return Contact(**fields, _source=source)
 
 
-def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
-    """The requested theory, with MBMA's `options`; other theories reject these."""
+def chosen_theory(
+    surface: AnySurface,
+    theory: str | Theory | UserTheory | None,
+    by: str | None = None,
+    **options: Any,
+) -> Theory:
+    """The requested theory, by default that of `theory_name`, with MBMA's `options`; other theories reject these."""
     try:
         given = [] if options == OPTIONS else [name for name, value in options.items() if value != OPTIONS[name]]
     except ValueError:
         raise InputError(f"{', '.join(options)} take one value each, not an array") from None
-    named = theory_name(surface, theory, **options) if theory is None else theory
+    named = theory_name(surface, theory, by, **options) if theory is None else theory
     if isinstance(named, str) and named in THEORIES:
         if not given:
             return default_theory(named)

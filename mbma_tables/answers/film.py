@@ -21,6 +21,7 @@ from mbma_tables.laws.reynolds import flow_and_couette
 from mbma_tables.materials import Metal, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.treatment import mirrored
+from mbma_tables.theories import OF_MAPS
 from mbma_tables.theories.own_map import map_of
 from mbma_tables.theories.protocol import Theory
 
@@ -93,8 +94,9 @@ def flow_factors(
     Before contact the factors are those of an effective medium of Gaussian gaps, in contact those of the leakage law
     (`mbma_tables.laws.lay`). The mean gap u is that of the deformed faces: Patir and Cheng's h_T, not their h.
 
-    With ``theory="simulated"`` they are those of the surface's own map: Reynolds' equation is solved on its gaps, in
-    contact those of a BEM simulation, at several mean gaps (half a minute for 256 x 256 points).
+    With "simulated" or "corrected", the default of a map, they are those of the surface's own map: Reynolds' equation
+    is solved on its gaps, in contact those of a BEM simulation, at several mean gaps (half a minute for 256 x 256
+    points; ``theory="calibrated"`` takes none of it).
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ def flow_factors(
         Length of the roughness along x over that along y, from 1/8.5 to 8.5. Default: that of the map, x being its
         first axis, or of the spectrum, x being along the lay, else 1 (isotropic). Not accepted for a simulated map.
     theory, E_star, hardness, materials : optional
-        As for `contact`; the theory is "calibrated" by default.
+        As for `contact`.
 
     Returns
     -------
@@ -127,17 +129,19 @@ def flow_factors(
     [1.05 1.06 1.02] [0.5 0.7 0.9] [0.84 0.68 0.37]
     """
     bodies = {"E_star": E_star, "hardness": hardness, "materials": materials}
-    found = contact(surface, mean_separation=mean_separation, theory=theory or "calibrated", **bodies)  # type: ignore[arg-type]
+    found = contact(surface, mean_separation=mean_separation, theory=theory, **bodies)  # type: ignore[arg-type]
     if surface.labelled or surface.shape != ():
         raise InputError("flow factors need one surface, not a batch")
-    u, h_rms, own = np.ravel(found.mean_separation), float(surface.h_rms), found.theory == "simulated"
+    u, h_rms = np.ravel(found.mean_separation), float(surface.h_rms)
+    # a surface opened from the table of its simulation has no map for gaps before contact
+    own = found.theory in OF_MAPS and getattr(surface, "map", None) is not None
     low, high = RANGE
     require("mean_separation", u, (u >= low * h_rms) & (u <= high * h_rms), f"from {low:g} to {high:g} h_rms")
     gamma = _peklenik(surface) if peklenik is None else number_in("peklenik", peklenik, 1 / WIDEST_LAY, WIDEST_LAY)
     area, leak = np.ravel(found.area), found.leakage
     if own:
         if peklenik is not None:
-            raise InputError("peklenik is not of a map that is simulated: leave it out")
+            raise InputError("peklenik is not of a map that is simulated: leave it out, or give theory='calibrated'")
         (phi_x, phi_y), shear = _simulated(found, u)
         of_lay, far = 0.0, False
     else:

@@ -166,10 +166,10 @@ def _by_pressure(axes: Any, answers: Mapping[str, Any], simulated: Any, what: st
 
 
 def table_of_loads(
-    surface: MeasuredSurface, E_star: float = 1.0, theory: str = "calibrated"
+    surface: MeasuredSurface, E_star: float = 1.0, theory: str | None = None
 ) -> tuple[dict[str, Any], list[str]]:
     """Columns of a theory's results at a few contact areas, and text lines on those omitted or not valid."""
-    from mbma_tables.answers.contact import contact
+    from mbma_tables.answers.contact import chosen_theory, contact
 
     def contacts(some: FloatArray) -> str:
         return f"contact of {', '.join(f'{area:g}' for area in some)}"
@@ -188,6 +188,6 @@ def table_of_loads(
         told.append(f"{contacts(areas[~reached])} omitted: the map's curve does not reach it")
     names = ("area", "pressure", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
-    reasons, everywhere = found.reasons, get_theory(theory, surface).departures(surface)
+    reasons, everywhere = found.reasons, chosen_theory(surface, theory, "area").departures(surface)
     told += [f"not valid at {contacts(areas[m])}: {text}" for text, m in reasons.items() if text not in everywhere]
     return columns | {"valid": ["yes" if valid else "no" for valid in np.asarray(found.valid)[reached]]}, told

@@ -107,13 +107,13 @@ def sensitivity(
     >>> ground = Surface.from_roughness(Rq=0.5, Rdq=0.1, longest=100, hurst=0.8, h_max=1.8, unit="um")
     >>> found = sensitivity(ground, pressure="10 MPa", E_star="100 GPa")
     >>> print(f"area goes like Rdq^{found.slopes['Rdq']['area']:.2f}")
-    area goes like Rdq^-1.03
+    area goes like Rdq^-1.15
     >>> found = sensitivity(ground, pressure="10 MPa", materials="steel 1020", theory="calibrated")
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.68'
     """
-    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
+    chosen = chosen_theory(surface, theory, by, island_model=island_model, variant=variant, rtol=rtol)
     E_star, hardness, _ = bodies(materials, E_star, hardness)
     modulus, units = modulus_and_units(E_star, surface)
     return relative_derivatives(

@@ -53,10 +53,10 @@ def contact_command(
 
     Example: mbma contact --surface challenge --E-star 25MPa --length-unit mm -p 100kPa
     """
-    model = model.of(specimen.surface)
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
     ((name, numbers),) = loads.items()
+    model = model.of(specimen.surface, name)
     from mbma_tables.answers.contact import contact
 
     known: dict[str, Any] = {name: finite_array(name, specimen.units.number(name, numbers))}
@@ -96,7 +96,7 @@ def curve_command(
     model: options.Model,
     output: options.Output,
 ) -> None:
-    """Pressure and area from first contact (d = h_max) to full compression (d = -h_max).
+    """Pressure and area against the mean separation, from first contact (u = h_max) to full compression (u = 0).
 
     Contact areas are geometric, from 0.01% to the largest, between first contact and full compression. Gaps where a
     theory has no finite force are omitted.
@@ -146,9 +146,10 @@ def sensitivity_command(loads: dict[str, Any], specimen: Specimen, model: option
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
+    from mbma_tables.answers.contact import one_known
     from mbma_tables.answers.sensitivity import sensitivity
 
-    model = model.of(specimen.surface)
+    model = model.of(specimen.surface, one_known(**dict.fromkeys(options.LOADS) | loads)[0])
     found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, **model._asdict())
     units = {name: shown_unit(name, found.units) for name in (*found.parameters, *found.answers)}
     if as_json:
@@ -200,9 +201,9 @@ def fit_command(
 ) -> None:
     """Read a map or line scan; report its properties and treatment, and its contact with a flat.
 
-    The table is by the calibrated law, with its distance from boundary elements (scatter: standard deviation of ln A at
-    a pressure and of ln F at a separation). The picture has the map, its spectrum, its heights, and area and
-    separation against pressure.
+    The table is by the default theory of mbma contact, with its distance from boundary elements (scatter: standard
+    deviation of ln A at a pressure and of ln F at a separation). The picture has the map, its spectrum, its heights,
+    and area and separation against pressure by the calibrated law and MBMA.
 
     Several maps are scans of one surface: spectra, heights and curves are averaged, and the picture shows the first.
 
@@ -217,26 +218,29 @@ def fit_command(
     from mbma_tables.common.units import Units
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
-    from mbma_tables.theories import BoundaryElements
+    from mbma_tables.theories import BoundaryElements, theory_name
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
     scans = [measured(path, treatment) for path in measurements]
     surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
-    columns, told = table_of_loads(surface, scale, "simulated" if simulate else "calibrated")
+    theory = "simulated" if simulate else theory_name(surface, None, "area")
+    columns, told = table_of_loads(surface, scale, theory)
     if simulate and output.out is not None and output.out.suffix == ".nc":
         BoundaryElements.of(surface).to_netcdf(output.out)
         told, output = [*told, f"{output.out} has the simulation"], output._replace(out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
     facts: dict[str, Any] = {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
-    facts |= {"length_unit": surface.unit, "stress_unit": stress_unit, "provenance": surface.provenance, "notes": told}
+    facts |= {"theory": theory, "length_unit": surface.unit, "stress_unit": stress_unit}
+    facts |= {"provenance": surface.provenance, "notes": told}
     title = ", ".join(path.name for path in measurements)
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
     picture = b""
     if plot is not None:
         label = pressure_label(unit_of("pressure", units))
         picture = to_picture(draw(scans[0][0], surface, curves(surface, scale), title, label), plot.suffix[1:])
-    Report("fit", title, [*described(surface), *told], facts, columns, own).write(output, plot, picture)
+    notes = [*described(surface), f"table by theory {theory}", *told]
+    Report("fit", title, notes, facts, columns, own).write(output, plot, picture)
 
 
 @click.command("cost", short_help="Computing time against accuracy.")

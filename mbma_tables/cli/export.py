@@ -163,7 +163,9 @@ def _export_code(folder: Path, variant: str, check: bool) -> None:
 @click.command("explore", short_help="A page to explore a surface in a browser.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
 @options.specimen_options
-@click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")
+@click.option(
+    "--theory", metavar="mbma|calibrated|persson", help="Drawn first; mbma with a --variant, else calibrated."
+)
 @options.variant_option
 @options.hardness_option
 def explore_command(

@@ -45,12 +45,12 @@ class Model(NamedTuple):
         """Whether there is a hardness, and not an infinite one."""
         return self.hardness not in (None, math.inf)
 
-    def of(self, surface: AnySurface) -> Model:
-        """The same options, with a theory by name."""
+    def of(self, surface: AnySurface, by: str | None = None) -> Model:
+        """The same options, with the theory's name for a contact at a given quantity, None for a curve."""
         from mbma_tables.theories import theory_name
 
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
-        return self._replace(theory=theory_name(surface, self.theory, **own))
+        return self._replace(theory=theory_name(surface, self.theory, by, **own))
 
     def keywords(self, specimen: Specimen) -> dict[str, Any]:
         """Keywords for `contact`."""
@@ -250,8 +250,8 @@ _MODEL_OPTIONS = (
 )
 theory_option = _option(
     "theory",
-    "Theory; only mbma has an island model, variant and rtol. Default: mbma for numbers, else calibrated, of maps "
-    "corrected.",
+    "Theory; only mbma has an island model, variant and rtol. Default: mbma for these and at a --separation, else "
+    "corrected for a map, calibrated for other surfaces.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
 )
 # for islands, which only MBMA has

@@ -28,7 +28,7 @@ from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
-from mbma_tables.theories import calibrated, calibrated_table, mbma
+from mbma_tables.theories import OF_MAPS, calibrated, calibrated_table, mbma, theory_name
 
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
@@ -102,7 +102,8 @@ def explorer_page(
 
     Of a measured surface it uses the spectrum, of at most 500 samples, and h_max; heights and maps, which the
     calibrated law uses in Python, are not included. Without a modulus stresses are over E*. Theory, variant and
-    `hardness` are the initial ones; the default is MBMA, for a spectrum the calibrated law.
+    `hardness` are the initial ones; the default theory is that of `contact_law`, but the calibrated law for a map,
+    which the page does not simulate.
 
     Examples
     --------
@@ -112,7 +113,10 @@ def explorer_page(
     (True, True, True)
     """
     measured = isinstance(surface, MeasuredSurface)
-    theory, chosen = theory or ("calibrated" if measured else "mbma"), get_variant(variant)
+    chosen = get_variant(variant)
+    theory = theory_name(surface, theory, variant=chosen.name)
+    # a page has no simulation of a map
+    theory = "calibrated" if theory in OF_MAPS else theory
     if theory == "mbma" and measured:
         raise InputError("MBMA in the page is of five numbers: take another theory, or surface.fit()")
     if theory not in THEORIES:

@@ -56,7 +56,7 @@ class ContactLaw(Law, Derived, Displayed):
     Examples
     --------
     >>> from mbma_tables import Surface, contact_law
-    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), E_star=100e3)  # um, MPa
+    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), "mbma", E_star=100e3)  # um, MPa
     >>> round(float(law.pressure(separation=1.0)), 4), round(float(law.separation(pressure=7.9825)), 4)
     (7.9825, 1.0)
     >>> round(float(law.stiffness(2.0)), 3)  # -dp/du [MPa/um]

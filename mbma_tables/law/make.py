@@ -83,7 +83,7 @@ def contact_law(
     --------
     >>> from mbma_tables import Surface, contact_law
     >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
-    >>> law = contact_law(surface, rtol=1e-6)
+    >>> law = contact_law(surface, "mbma", rtol=1e-6)
     >>> f"{law.pressure(separation=1.0):.4g}"
     '7.982e-05'
     >>> law.error < 2e-6

@@ -82,7 +82,8 @@ class Problem:
             vars(self).update(conductivities=conductivities, conductance_unit=unit)
         if self.theory is None:
             of_mbma = bool(dropped) or bool(outputs.intersection(OF_ISLANDS)) or self.island_model is not None
-            named = "mbma" if of_mbma else theory_name(self.surface, None, variant=self.variant)
+            by = "separation" if self.separations is not None else None
+            named = "mbma" if of_mbma else theory_name(self.surface, None, by, variant=self.variant)
             vars(self).update(theory=named)
         rtol: float | None = DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
         if self.rtol is not None:

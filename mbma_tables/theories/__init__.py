@@ -91,16 +91,46 @@ def default_theory(name: str) -> Theory:
     return get_theory(name)
 
 
-def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The given theory; by default "mbma" for five numbers or its options, the most accurate for measured surfaces.
+def theory_name(
+    surface: AnySurface,
+    theory: str | Theory | UserTheory | None,
+    by: str | None = None,
+    **options: Any,
+) -> Any:
+    """The given theory, or the default one: the rule of `contact`, laws, joints, scenes, exports and commands.
 
-    The latter is "simulated" for a surface opened from a table, "corrected" for suitable maps, otherwise "calibrated".
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch.
+    theory : str, theory or None
+        What the caller gave; anything but None is returned as it is.
+    by : str, optional
+        The quantity at which the contact is asked for, "separation", "mean_separation", "pressure" or "area";
+        None for laws and curves, which are functions of the mean separation.
+    **options
+        Values of `OPTIONS`, MBMA's own.
+
+    Returns
+    -------
+    str or theory
+        By default "mbma" at a given separation d, which is MBMA's coordinate, or where an option of MBMA differs from
+        its default; else "simulated" for a surface opened from the table of its simulation, "corrected" for a map
+        that is resolved and of at most 2^18 points, and "calibrated" for every other surface.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface
+    >>> from mbma_tables.theories import theory_name
+    >>> road = Surface.named("concrete")
+    >>> theory_name(road, None, "pressure"), theory_name(road, None, "separation")
+    ('calibrated', 'mbma')
+    >>> theory_name(road, None, "pressure", island_model="exact"), theory_name(road, "persson")
+    ('mbma', 'persson')
     """
-    from mbma_tables.surfaces.surface import Surface
-
     if theory is not None:
         return theory
-    if isinstance(surface, Surface) or OPTIONS | options != OPTIONS:
+    if by == "separation" or OPTIONS | options != OPTIONS:
         return "mbma"
     if getattr(surface, "table", None) is not None:
         return "simulated"

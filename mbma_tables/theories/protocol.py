@@ -58,6 +58,7 @@ class Theory(abc.ABC):
     advice = origin = ""  # one line of advice; origin of its numbers, if not a shipped file
     looks = LOOKS  # initial gaps of an inversion, for one surface
     reached = 0.0  # relative amount by which a wanted value may exceed the largest
+    bends_in_area = False  # whether at its `bends` only the area is not smooth
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
 
     @abc.abstractmethod

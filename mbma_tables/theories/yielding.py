@@ -205,7 +205,16 @@ class Yielding(Theory):
         return over.shape
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        return self.elastic.bends(surface)  # type: ignore[no-any-return]
+        """The elastic bends; those of the area alone are where the force is that of the elastic bend."""
+        elastic = np.asarray(self.elastic.bends(surface))
+        if not self.elastic.bends_in_area:
+            return elastic
+        # the area is that of the elastic contact at the same force
+        force = self.elastic.answer(surface, elastic).pressure
+        # forces beyond the hardness are not reached
+        reached = (force > 0) & (force < self.hardness)
+        at_force = self.inverted(surface, "pressure", np.where(reached, force, 0.0))[0]
+        return np.where(reached, at_force, elastic)
 
     def gaps(self) -> Any:
         return self.elastic.gaps()

@@ -7,11 +7,13 @@ import pytest
 from helpers import random_map, refused, run, topographies
 
 from mbma_tables import Surface
+from mbma_tables.answers.measurement import table_of_loads
 from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.specimen import read_specimen
 
 library = topographies()
 POINTS, STEP = 64, 0.5
+MAP = "docs/data/maps/top-1.top"
 
 
 @pytest.fixture
@@ -41,9 +43,17 @@ def test_it_tells_what_was_found_and_done(map_file, tmp_path):
         assert text in said
     assert "area depends on resolution" in said
     assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-    found = json.loads(run("fit", "docs/data/maps/top-1.top", "--short-cutoff", "9.4nm", "--json"))
-    assert found["columns"]["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1])
-    assert any(note.startswith("contact of 0.3, 0.6 left out: area must be at most 0.1062") for note in found["notes"])
+    found = json.loads(run("fit", MAP, "--short-cutoff", "9.4nm", "--json"))
+    assert found["theory"] == "corrected"
+    assert found["columns"]["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1, 0.3, 0.6])
+    assert found["columns"]["valid"] == ["no", *5 * ["yes"]]
+    assert any(note.startswith("not valid at contact of 0.002: A/A0 is below 0.003") for note in found["notes"])
+
+
+def test_what_the_calibrated_law_of_a_map_does_not_reach_is_left_out():
+    columns, notes = table_of_loads(Surface.from_map(MAP, short_cutoff="9.4nm"), theory="calibrated")
+    assert columns["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1])
+    assert any(note.startswith("contact of 0.3, 0.6 left out: area must be at most 0.1062") for note in notes)
 
 
 def test_a_line_scan(line_file):

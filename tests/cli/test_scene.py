@@ -26,6 +26,7 @@ def test_run_to_netcdf_and_csv(tmp_path):
     assert run("run", JOINT, "--out", out) == ""
     with xarray.open_dataset(out) as found:
         assert found["conductance"].shape == (4,)
+        assert found.attrs["theory"] == "mbma"
         assert found.attrs["variant"] == "reported"
         assert found.attrs["error"] <= 1e-5
         assert found["nominal_pressure"].attrs["units"] == "Pa"

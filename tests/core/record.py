@@ -89,7 +89,7 @@ def use():
     many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)
     assert contact(one, separation=[0.5, 1.0]).stiffness.all()
     contact(many, separation=np.linspace(-2, 2.9, 40), rtol=1e-6)
-    law, gaps = contact_law(one), np.linspace(-2.9, 2.9, 100)
+    law, gaps = contact_law(one, "mbma"), np.linspace(-2.9, 2.9, 100)
     for quantity in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy):
         quantity(separation=0.5)
         quantity(separation=np.linspace(-2.9, 2.9, 2000))

@@ -132,7 +132,7 @@ n = 1000
 many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3.0)
 
 def answers():
-    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
+    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), "mbma")
     total = contact(many, separation=1.0).pressure
     found = total, law.pressure(0.5), law.at_pressure(1e-3).area
     return b"".join(np.asarray(one).tobytes() for one in found)
@@ -159,7 +159,7 @@ from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_tab
 signal.signal(signal.SIGPROF, signal.default_int_handler)  # as Ctrl-C does, but counted in time of the processor
 one, n = Surface(0.7, 0.2, 60.0, 1.0, 3.0), 100_000
 many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3.0)
-law, four, X = contact_law(one), open_table("island4d"), np.linspace(-5, 40, 1_000_000)
+law, four, X = contact_law(one, "mbma"), open_table("island4d"), np.linspace(-5, 40, 1_000_000)
 u, pressure = np.linspace(0.2, 2.5, 3_000_000), np.geomspace(1e-4, 1e-2, 1_000_000)
 requests = {
     "totals": lambda: contact(many, separation=1.0),

@@ -18,13 +18,13 @@ CONDUCTIVITY, KAPPA = 3.0, 1.25
 # h_max is a dyadic number, so that c = (h_max - d)/2 is exact
 ROAD = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="mm")
 ASKED = {
-    "mbma": (ROAD, {}),
+    "mbma": (ROAD, {"theory": "mbma"}),
     "calibrated": (ROAD, {"theory": "calibrated"}),
     "hardened": (ROAD, {"theory": "calibrated", "hardness": 2.0}),
     "persson": (ROAD, {"theory": "persson"}),
     # its area turns down without blocking, and its slopes are flat where coefficients are rounded
-    "flat": (Surface(0.23, 1.0, 1.5e4, 0.125, 0.1875, unit="mm"), {}),
-    "turning": (Surface(0.35, 1.0, 1e4, 0.125, 0.375, unit="mm"), {}),
+    "flat": (Surface(0.23, 1.0, 1.5e4, 0.125, 0.1875, unit="mm"), {"theory": "mbma"}),
+    "turning": (Surface(0.35, 1.0, 1e4, 0.125, 0.375, unit="mm"), {"theory": "mbma"}),
 }
 
 

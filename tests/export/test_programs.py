@@ -79,8 +79,9 @@ def conductance(flux, side=10.0):
 
 @needs("ccx")
 def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
-    law = contact_law(ROUGH, E_star="25 MPa")
-    rows = describe_law(ROUGH, "25 MPa", quantity="conductance", pressures=("10 kPa", "2 MPa"), rows=20, **HEAT)
+    law = contact_law(ROUGH, "mbma", E_star="25 MPa")
+    asked = HEAT | {"pressures": ("10 kPa", "2 MPa"), "rows": 20, "theory": "mbma"}
+    rows = describe_law(ROUGH, "25 MPa", quantity="conductance", **asked)
     card, c = solvers.calculix(rows), law.h_max - law.at_pressure(PRESSURES).mean_separation
     moved = (each(TOP, f"3, 3, {-down:.9e}") for down in c + 20 * PRESSURES / 1e6)
     said, p, flux = calculix(heated(card, moved, 10.0, 1e6), tmp_path)
@@ -137,7 +138,7 @@ def test_octave_looks_up(tmp_path):
 @needs("ccx")
 @pytest.mark.parametrize(("length", "stress"), [("mm", "MPa"), ("m", "Pa")], ids=["mm", "SI"])
 def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
-    asked = HEAT | {"conductivity_unit": "W/(m K)", "pressures": ("1 kPa", "2 MPa"), "rows": 20}
+    asked = HEAT | {"conductivity_unit": "W/(m K)", "pressures": ("1 kPa", "2 MPa"), "rows": 20, "theory": "mbma"}
     law = describe_law(ROUGH, "25 MPa", length_unit=length, stress_unit=stress, quantity="conductance", **asked)
     side, unit = SIDES[length], {"MPa": 1.0, "Pa": 1e6}[stress]
     pressures, card = unit * np.geomspace(1.1e-3, 1.9, 8), solvers.calculix(law)
@@ -146,7 +147,7 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
     forces = (f"*CLOAD\n{each(TOP, f'3, {-p * side**2 / 4:.9e}')}" for p in pressures)
     said, _, flux = calculix(heated(card, forces, side, 1e6 * unit), tmp_path, side)
     assert len(flux) == 8, said.stdout[-2000:]
-    found = contact(ROUGH.to(length), pressure=pressures, E_star=25 * unit)
+    found = contact(ROUGH.to(length), pressure=pressures, E_star=25 * unit, theory="mbma")
     np.testing.assert_allclose(conductance(flux, side), found.stiffness * CONDUCTIVITY / (25 * unit), rtol=1e-2)
 
 

@@ -90,7 +90,10 @@ def test_what_only_a_plan_or_a_run_can_know(tmp_path):
     for text, words in (
         (scene("[accuracy]\nseconds = 1e-8"), "the cheapest plan takes"),
         (scene("[accuracy]\nrtol = 1e-10", effects='on = ["energy"]'), "at best"),
-        (scene(at="pressures = [1e6]"), "pressure must be at most what theory 'mbma' reaches on this surface"),
+        (
+            'theory = "mbma"\n' + scene(at="pressures = [1e6]"),
+            "pressure must be at most what theory 'mbma' reaches on this surface",
+        ),
     ):
         with pytest.raises(MbmaError, match=words):
             Scene.from_toml(write(tmp_path, text)).run()

@@ -44,7 +44,8 @@ def test_the_four_ways_to_ask_give_one_contact(surface, theory):
 @pytest.mark.parametrize("island_model", ["exact", "formula", "island4d"])
 def test_other_island_models_have_stiffness_and_validity_too(island_model):
     u = [0.0, 0.05, 0.3, 1.0, 2.0, 2.99, 3.0]
-    table, other = (contact(SURFACE, mean_separation=u, island_model=t) for t in ("universal", island_model))
+    models = ("universal", island_model)
+    table, other = (contact(SURFACE, mean_separation=u, island_model=t, theory="mbma") for t in models)
     assert other.stiffness == pytest.approx(table.stiffness, rel={"exact": 1e-6}.get(island_model, 5e-3))
     assert other.valid.tolist() == table.valid.tolist()
     assert set(other.reasons) == set(table.reasons)
@@ -120,7 +121,7 @@ test_what_cannot_be_asked = refusals(
     ({"pressure": np.nan}, "pressure must be finite"),
     ({"pressure": -1.0}, "pressure must be at least 0"),
     ({"mean_separation": -1.0}, "mean_separation must be at least 0, got -1"),
-    ({"area": 0.9}, "area must be at most what theory 'mbma' reaches"),
+    ({"area": 0.9, "theory": "mbma"}, "area must be at most what theory 'mbma' reaches"),
 )
 
 
@@ -149,7 +150,7 @@ def test_ends_validity_and_advice(theory):
 
 
 def test_mbma_says_where_it_is_not_to_be_trusted():
-    found = contact(SURFACE, mean_separation=[2.5, 0.3])
+    found = contact(SURFACE, mean_separation=[2.5, 0.3], theory="mbma")
     assert found.valid.tolist() == [True, False]
     assert [mask.tolist() for mask in found.reasons.values()] == [[False, True]] * 2
     assert any("stiffness falls" in reason for reason in found.reasons)

@@ -6,7 +6,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from helpers import Springs, refusals, with_slopes
+from helpers import Springs, random_map, refusals, with_slopes
 from scipy.integrate import quad
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law, theories
@@ -147,8 +147,7 @@ def test_a_force_that_turns_and_a_stiffness_that_passes_its_maximum():
 
 @pytest.mark.parametrize("surface", [SURFACE, STEEP, FINE, Surface.named("concrete")])
 def test_softening_of_mbma_is_where_its_stiffness_is_largest(surface):
-    law = contact_law(surface)
-    assert law.theory == "mbma"
+    law = contact_law(surface, "mbma")
     assert law.softening == pytest.approx(float(Mbma().softening(surface)), rel=1e-4)
     sides = law.stiffness(law.softening + np.array([-0.05, 0, 0.05]) * law.h_max)
     assert sides[1] > max(sides[0], sides[2])
@@ -180,7 +179,7 @@ test_what_is_no_law = refusals(
 
 def test_mbma_ends_where_its_force_turns():
     batch = Surface(hurst=[0.3, 0.7, 0.9], q0=1.0, q1=[1000.0, 60.0, 216.0], h_rms=1.0, h_max=[3.0, 3.0, 3.5])
-    turn = contact_law(Surface(0.3, 1.0, 1000.0, 1.0, 3.0)).turning_point
+    turn = contact_law(Surface(0.3, 1.0, 1000.0, 1.0, 3.0), "mbma").turning_point
     assert Mbma().interval(batch)[0] == pytest.approx(np.array([(3.0 + turn) / 2, 0, 0]), abs=1e-5)
 
 
@@ -361,3 +360,15 @@ def test_extreme_loads_stay_numbers():
     assert vanishing[0] > 0 == vanishing[-1]
     loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
     assert relative(FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).pressure, loads) < 1e-9
+
+
+@pytest.mark.parametrize("hardness", [0.0264, 0.043, 0.1135])
+def test_a_quick_simulation_with_a_hardness_has_a_law(hardness):
+    """Its area bends where the force is that of the lightest simulated load, not at that load's separation."""
+    heights = random_map(64, 0.03, 0.25, seed=0)
+    surface = Surface.from_map(0.5 * heights / np.std(heights), 1.0, periodic=True)
+    law = contact_law(surface, "corrected", hardness=hardness)
+    u = np.linspace(0.02, 0.99, 300) * surface.h_max
+    found = contact(surface, mean_separation=u, theory="corrected", hardness=hardness)
+    assert np.abs(law.pressure(u) / found.pressure - 1).max() <= law.error
+    assert np.abs(law.area(u) / found.area - 1).max() <= law.error

@@ -170,7 +170,7 @@ class TestLaw:
 
     def test_gaps_that_never_block(self):
         # the model's area stays far below the threshold here, and gaps close as u
-        law = contact_law(Surface(0.3, 0.02, 160.0, 3.0, 9.0))
+        law = contact_law(Surface(0.3, 0.02, 160.0, 3.0, 9.0), "mbma")
         assert law.leakage.blocked_at == -np.inf
         k = law.leakage(separation=-9.0 + np.array([1e-9, 1e-6]))
         assert k[1] / k[0] == pytest.approx(1e9, rel=1e-4)

@@ -43,7 +43,7 @@ def surface_of(hurst, zeta_1, top):
 
 @functools.cache
 def law_of(case, rtol=1e-8):
-    return contact_law(surface_of(*case[:3]), rtol=rtol, variant=case[3])
+    return contact_law(surface_of(*case[:3]), "mbma", rtol=rtol, variant=case[3])
 
 
 def depths(law, seed, least=1e-9):
@@ -77,7 +77,7 @@ def test_within_its_tolerance_and_its_bound(case, rtol):
 @pytest.mark.parametrize("island_model", ["exact", "rigid", "island4d"])
 def test_of_any_island_model(island_model):
     surface = surface_of(*CASES[0][:3])
-    law = contact_law(surface, rtol=1e-5, island_model=island_model)
+    law = contact_law(surface, "mbma", rtol=1e-5, island_model=island_model)
     assert missed(law, surface, law.h_max * (1 - np.array([1e-5, 0.01, 0.3, 0.9, 1.7])), 1e-8) <= 1.1e-5
     assert law.island_model == island_model
 
@@ -117,7 +117,7 @@ def test_energy_is_the_integral_of_force(case):
     ids=["pressure", "area"],
 )
 def test_turning_points(surface, variant, name):
-    law = contact_law(surface, variant=variant)
+    law = contact_law(surface, "mbma", variant=variant)
     value, turn = getattr(law, name), law.turning_point if name == "pressure" else law.area_turning_point
     assert -law.h_max < turn < 0
     assert name == "pressure" or turn < law.turning_point
@@ -162,7 +162,7 @@ def test_as_a_function_of_c():
     with pytest.raises(InputError, match="quantity must be one of"):
         law.compiled("force")
     # it keeps its law
-    law = contact_law(surface_of(*CASES[0][:3]), rtol=1e-3)
+    law = contact_law(surface_of(*CASES[0][:3]), "mbma", rtol=1e-3)
     gone, expected, asked = weakref.ref(law), law.pressure(separation=1.0), law.compiled()
     del law
     gc.collect()
@@ -212,7 +212,7 @@ BOUNDS = [
 @pytest.mark.parametrize(("hurst", "zeta_1", "top", "rtol"), BOUNDS)
 def test_bounds_of_laws_where_they_were_exceeded(hurst, zeta_1, top, rtol):
     surface = Surface(hurst, 1.0, zeta_1, 1.0, top)
-    law = contact_law(surface, rtol=rtol)
+    law = contact_law(surface, "mbma", rtol=rtol)
     assert missed(law, surface, top - 2 * top * np.append(np.geomspace(1e-9, 1, 2000), 0.5), 1e-10) <= law.error + 1e-10
     assert law.error <= 2 * rtol
 
@@ -223,7 +223,7 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
     for _ in range(300):
         top, rtol = rng.uniform(2.0, 5.0), 10 ** rng.uniform(-9, -2)
         surface = Surface(rng.uniform(0.25, 1.0), 1.0, 3 + 10 ** rng.uniform(-6, 5), 1.0, top)
-        law = contact_law(surface, rtol=rtol, variant=("reported", "printed")[rng.integers(2)])
+        law = contact_law(surface, "mbma", rtol=rtol, variant=("reported", "printed")[rng.integers(2)])
         gap = top - 2 * top * np.append(10 ** rng.uniform(-6, 0, 40), rng.uniform(0, 1, 40))
         assert missed(law, surface, gap, 1e-10) <= law.error + 1e-10
         for misses in slope_misses(surface, law, gap, law.variant):
@@ -231,7 +231,7 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
 
 
 test_bad_laws = refusals(
-    lambda asked: contact_law(**({"surface": surface_of(*CASES[0][:3])} | asked)),
+    lambda asked: contact_law(**({"surface": surface_of(*CASES[0][:3]), "theory": "mbma"} | asked)),
     ({"surface": Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0)}, r"one surface, got a batch of shape \(2,\)"),
     ({"surface": Surface(xr.DataArray([0.7, 0.8], dims="s"), 0.3, 30.0, 0.7, 2.1)}, "one surface, got a batch"),
     *(({"rtol": rtol}, "rtol") for rtol in (0.0, 1e-10, 0.2, math.nan, "tight", [1e-8])),
@@ -242,13 +242,13 @@ test_bad_laws = refusals(
 
 
 def test_laws_that_end_early_and_of_too_many_pieces(monkeypatch):
-    assert -3 < contact_law(Surface(0.05, 0.2, 0.2e8, 1.0, 3.0)).lowest < 3
+    assert -3 < contact_law(Surface(0.05, 0.2, 0.2e8, 1.0, 3.0), "mbma").lowest < 3
     surface = surface_of(*CASES[0][:3])
     labelled = Surface(xr.DataArray(0.8), surface.q0, surface.q1, surface.h_rms, surface.h_max)
-    assert contact_law(labelled).pressure(separation=1.0) == law_of(CASES[0]).pressure(separation=1.0)
+    assert contact_law(labelled, "mbma").pressure(separation=1.0) == law_of(CASES[0]).pressure(separation=1.0)
     monkeypatch.setattr(at, "MAX_RECORDS", 3)
     with pytest.raises(ConvergenceError, match="more than 3 pieces") as caught:
-        contact_law(surface)
+        contact_law(surface, "mbma")
     assert caught.value.mask
 
 
@@ -258,7 +258,7 @@ def test_slopes_are_within_their_bound(rtol):
     for _ in range(8):
         top = rng.uniform(2.5, 4.5)
         surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.7, 5), 1.0, top)
-        law = contact_law(surface, rtol=rtol)
+        law = contact_law(surface, "mbma", rtol=rtol)
         # next to the ends of pieces, where slopes are worst, next to first contact, and between
         ends, tiny = pieces_of(law)[0], 10.0 ** np.arange(-15, -3)
         depth = np.concatenate([ends * (1 - 1e-7), ends * (1 + 1e-7), tiny, top * 10 ** rng.uniform(-6, 0, 80)])
@@ -308,14 +308,14 @@ def slope_misses(surface, law, gap, variant="reported"):
 
 def test_inverses_stay_within_the_law():
     # where Newton's method goes to and fro
-    law = contact_law(surface_of(0.3, 4.477099447990553, 4.7), rtol=1e-9)
+    law = contact_law(surface_of(0.3, 4.477099447990553, 4.7), "mbma", rtol=1e-9)
     wanted = law.area(separation=np.linspace(-law.h_max, law.h_max, 4002)[1:-1])
     np.testing.assert_allclose(law.area(separation=law.separation(area=wanted)), wanted, rtol=1e-12)
     rng = np.random.default_rng(4)
     for _ in range(12):
         h_rms = 10 ** rng.uniform(-9, 3)
         surface = Surface(rng.uniform(0.5, 1), 1 / h_rms, 10 ** rng.uniform(0.6, 5) / h_rms, h_rms, 3.1 * h_rms)
-        law = contact_law(surface, rtol=1e-4, E_star=10 ** rng.uniform(-5, 12))
+        law = contact_law(surface, "mbma", rtol=1e-4, E_star=10 ** rng.uniform(-5, 12))
         for name in ("pressure", "area"):
             value = getattr(law, name)
             end = law.turning_point if name == "pressure" else law.area_turning_point
@@ -342,7 +342,7 @@ def test_the_ends_of_the_branch(name):
     # of the smallest numbers one unit in the last place of h_max carries more
     assert law.separation(**{name: [[0.0, 5e-324], [1e-300, 1e-60]]}).tolist() == [[law.h_max] * 2] * 2
     with pytest.raises(OutOfRangeError, match="so high that force or area underflow"):
-        contact_law(Surface(1.0, 1.0, 100.0, 1.0, 60.0), rtol=1e-3, island_model="rigid")
+        contact_law(Surface(1.0, 1.0, 100.0, 1.0, 60.0), "mbma", rtol=1e-3, island_model="rigid")
 
 
 SURFACES = {

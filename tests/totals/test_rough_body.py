@@ -152,7 +152,7 @@ def test_units_validity_and_what_is_refused(tmp_path):
     wide = rough_contact(FACE, 100.0, approach=2.0, E_star="110 GPa", theory="calibrated")
     assert not wide.valid
     assert "tenth of the radius" in "".join(wide.reasons)
-    asked = {"E_star": "110 GPa"}
+    asked = {"E_star": "110 GPa", "theory": "mbma"}
     for wrong, match in (
         ({"approach": -1.75}, "apart"),
         ({"approach": 1.0, "force": 1.0}, "one of them"),
