@@ -17,6 +17,7 @@ from mbma_tables.cli import commands, export, scene, tables
 from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.plain_text import visible
 from mbma_tables.core import core
 
 BAD_INPUT = 2
@@ -33,7 +34,7 @@ SAID = {
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """A warning as one line."""
-    click.echo(f"mbma: warning: {' '.join(str(message).split())}", err=True)
+    click.echo(f"mbma: warning: {visible(' '.join(str(message).split()))}", err=True)
 
 
 class Program(click.Group):
@@ -52,7 +53,7 @@ class Program(click.Group):
             sys.exit(INTERRUPTED)
         except (click.ClickException, MbmaError, OSError) as fault:
             text = fault.format_message() if isinstance(fault, click.ClickException) else str(fault)
-            said = " ".join(text.split())
+            said = visible(" ".join(text.split()))
             if isinstance(fault, click.UsageError) and fault.ctx is not None:
                 said += f"\n(see '{fault.ctx.command_path} --help')"
             for python, shell in SAID.items():

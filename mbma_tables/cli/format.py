@@ -18,8 +18,10 @@ from mbma_tables import __version__
 from mbma_tables.cli.options import Model, Output
 from mbma_tables.common.display import shown
 from mbma_tables.common.files import write_file
+from mbma_tables.common.plain_text import visible
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units, unit_of
+from mbma_tables.export.text import comment
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.roughness import ASSUMED
@@ -64,7 +66,8 @@ class Report:
             width, text = max(map(len, cells)), any(isinstance(value, str) for value in values)
             lines.append([cell.ljust(width) if text else cell.rjust(width) for cell in cells])
         table = ["  ".join(row).rstrip() for row in zip(*lines, strict=True)]
-        return "\n".join([f"mbma {self.command}: {self.title}", *self.notes, "", *table]) + "\n"
+        head = [visible(f"mbma {self.command}: {self.title}"), *map(visible, self.notes)]
+        return "\n".join([*head, "", *table]) + "\n"
 
     def to_json(self) -> str:
         """One JSON object, its numbers with all their digits."""
@@ -74,9 +77,9 @@ class Report:
     def to_csv(self) -> str:
         """Comment lines, the columns' names, then their numbers with all their digits."""
         units = "; ".join(f"{name} [{unit}]" for name, unit in self.all_units.items())
+        head = (f"mbma {__version__} {self.command}: {self.title}", *self.notes, f"columns: {units}")
         content = io.StringIO()
-        for line in (f"mbma {__version__} {self.command}: {self.title}", *self.notes, f"columns: {units}"):
-            content.write(f"# {line}\n")
+        content.write(comment(head, "#"))
         rows = csv.writer(content, lineterminator="\n")
         rows.writerow(self.columns)
         rows.writerows(zip(*self.columns.values(), strict=True))

@@ -20,6 +20,7 @@ import numpy as np
 from mbma_tables.common.arguments import is_labelled, needed
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import write_file
+from mbma_tables.common.plain_text import visible
 from mbma_tables.common.plots import KINDS, to_picture
 
 if TYPE_CHECKING:
@@ -90,7 +91,8 @@ class Displayed:
         raise NotImplementedError
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{name} {text}' for name, text in self._facts().items())})"
+        facts = ", ".join(f"{name} {text}" for name, text in self._facts().items())
+        return visible(f"{type(self).__name__}({facts})")
 
     def _repr_html_(self) -> str:
         rows = "".join(

@@ -2,9 +2,17 @@
 
 from typing import Any
 
+from mbma_tables.common.plain_text import visible
+
 
 class MbmaError(Exception):
-    """Base of every error that this library raises on purpose."""
+    """Base of every error that this library raises on purpose.
+
+    Its message may quote a user's text, such as the name of a file: control characters are escapes in it.
+    """
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(visible(str(message), keep="\n"))
 
 
 class InputError(MbmaError, ValueError):

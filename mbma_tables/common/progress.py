@@ -8,6 +8,8 @@ from collections.abc import Iterator
 
 import click
 
+from mbma_tables.common.plain_text import visible
+
 PATIENCE = 2.0  # seconds before the first display
 WIPE = "\r\x1b[K"
 
@@ -21,9 +23,12 @@ def doing(what: str) -> None:
 
 
 def echo(text: object, nl: bool = True, err: bool = False) -> None:
-    """Print to standard output, or with `err` to standard error, after erasing the progress line."""
+    """Print to standard output, or with `err` to standard error, after erasing the progress line.
+
+    Control characters of the text are escapes, but for tabs and ends of lines.
+    """
     _end()
-    click.echo(text, nl=nl, err=err)
+    click.echo(visible(str(text), keep="\n\t"), nl=nl, err=err)
 
 
 @contextlib.contextmanager
@@ -52,7 +57,7 @@ def _beat(start: float) -> None:
     while not _ended.wait(wait):
         wait = 0.5
         _visible.set()
-        text = f"{WIPE}mbma: {_doing[-1]}, {time.monotonic() - start:.0f} s (Ctrl-C ends it)"
+        text = f"{WIPE}mbma: {visible(_doing[-1])}, {time.monotonic() - start:.0f} s (Ctrl-C ends it)"
         click.echo(text, err=True, nl=False)
 
 

@@ -10,18 +10,19 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.reserved_words import matlab_words
 from mbma_tables.export.targets import AGAINST, Target
 from mbma_tables.export.text import checked_name, comment, csv_cell, number
 
 MAX_MATLAB_NAME = 63
 READER = """function y = {name}(x)
 {title}% Linear interpolation in {name}.mat; x and y in its units. Beyond the range: an error.
-  law = load('{name}.mat');
-  x0 = law.x(:); y0 = law.y(:);
-  if any(x(:) < x0(1)) || any(x(:) > x0(end))
-    error('{name}: x must be in [%g, %g]', x0(1), x0(end));
+  rows = load('{name}.mat');
+  row_x = rows.x(:); row_y = rows.y(:);
+  if any(x(:) < row_x(1)) || any(x(:) > row_x(end))
+    error('{name}: x must be in [%g, %g]', row_x(1), row_x(end));
   end
-  y = interp1(x0, y0, x);
+  y = interp1(row_x, row_y, x);
 end
 """
 
@@ -83,7 +84,8 @@ def to_matlab(law: LawTable) -> bytes:
 
 def matlab_reader(law: LawTable, name: str) -> bytes:
     """The function NAME.m that looks up the MATLAB file NAME.mat."""
-    return READER.format(name=checked_name(name, MAX_MATLAB_NAME), title=comment(law.comments[1:2], "%")).encode()
+    checked_name(name, MAX_MATLAB_NAME, matlab_words(READER), "matlab")
+    return READER.format(name=name, title=comment(law.comments[1:2], "%")).encode()
 
 
 def to_netcdf(law: LawTable) -> bytes:

@@ -16,9 +16,10 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.c_code import BuildError, built_by
 from mbma_tables.export.exported_law import ExportedLaw
-from mbma_tables.export.law_code import AskedLaw, asked_law, text_of
+from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law, text_of
+from mbma_tables.export.reserved_words import windows_words
 from mbma_tables.export.targets import CODE, Target
-from mbma_tables.export.text import filled, number
+from mbma_tables.export.text import checked_name, filled, inert, number
 from mbma_tables.surfaces.any_surface import AnySurface
 
 SAID = {
@@ -64,6 +65,7 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     >>> zipfile.ZipFile(io.BytesIO(file)).namelist()
     ['modelDescription.xml', 'sources/road.c']
     """
+    checked_name(name, MAX_NAME, windows_words(), "Windows, where its files are named so,")
     found = asked_law(surface, E_star, name, **asked)
     law, exported = text_of("c-law", found), found.exported
     variables = _variables(found)
@@ -81,7 +83,7 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     source = filled("fmu.c", {what: number(ratio) for what, ratio in found.slopes.items()}, **parts)
     built = _binaries(name, source, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
-    said = "\n".join((*found.said, f"binaries: {listed}"))
+    said = "\n".join(map(inert, (*found.said, f"binaries: {listed}")))
     files = {
         "modelDescription.xml": _description(name, token, said, variables, exported),
         f"sources/{name}.c": source.encode(),

@@ -10,7 +10,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import ExportedLaw, GasInGaps, exported_law
-from mbma_tables.export.law_languages import LANGUAGES, Beside, Language, flow_numbers, law_numbers
+from mbma_tables.export.law_languages import FUNCTIONS, LANGUAGES, MORE, Beside, Language, flow_numbers, law_numbers
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import (
     about,
@@ -32,9 +32,8 @@ from mbma_tables.surfaces.any_surface import AnySurface
 LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
 # without functions that follow the unloading stiffness of contact that yields
 LOADING_ALONE = ("python-law", "jax-law", "matlab-law")
+NAME = "law"  # where none is given
 MAX_NAME = 31  # letters, as Fortran and C99 read them
-MORE = ("conductance", "tangential_stiffness", "leakage")  # asked for; all but the last are slopes times a ratio
-FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
 DATA = """\
 static const struct {{
     mbma_law_head head;
@@ -96,6 +95,7 @@ def law_files(target: str, surface: AnySurface | ForceLaw, E_star: float | str =
         raise InputError(f"{target} has no place for leakage, nor for the force of a body: leave it out")
     if language.subroutine == "gapcon.c":  # which is of conductance alone
         asked.setdefault("conductivity_unit", "")
+    checked_name(asked.get("name", NAME), MAX_NAME, language.reserved(), target)
     made = asked_law(surface, E_star, **asked)
     files = {"": text_of(target, made)}
     for file in language.beside:
@@ -117,7 +117,7 @@ class AskedLaw(NamedTuple):
 def asked_law(
     surface: AnySurface | ForceLaw,
     E_star: float | str = 1.0,
-    name: str = "law",
+    name: str = NAME,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     kappa: float | None = None,
@@ -127,8 +127,7 @@ def asked_law(
     **options: Any,
 ) -> AskedLaw:
     """The law for a requested file, made once; arguments as for `law_text`."""
-    if checked_name(name, MAX_NAME).lower() in FUNCTIONS:
-        raise InputError(f"name must not be that of a function of the law, {', '.join(FUNCTIONS)}")
+    checked_name(name, MAX_NAME, FUNCTIONS, "a function of the law")
     conducts = conductivity is not None or conductivity_unit is not None
     if isinstance(surface, ForceLaw) and (conducts or leakage):
         raise InputError("a force law has neither conductance nor leakage: leave conductivity and leakage out")

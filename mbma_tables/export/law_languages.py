@@ -20,12 +20,15 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.export.reserved_words import fortran_words, law_in_matlab_words, modelica_words, python_words
 from mbma_tables.export.text import number, wrapped
 from mbma_tables.law import block as at
 from mbma_tables.law.block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.leakage import LeakageLaw
 
+MORE = ("conductance", "tangential_stiffness", "leakage")  # asked for; all but the last are slopes times a ratio
+FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
 # steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep
 VALUES, SLOPES, FLAT = 2e-14, 4e-13, 1e-4
 MOST_DECIMALS = 400  # more than any double has: coefficients stay as they are
@@ -152,6 +155,7 @@ class Language(NamedTuple):
     subroutine: str = ""  # template of a solver's user subroutine that calls the law
     parts: tuple[tuple[str, str], ...] = ()  # what else is filled in
     beside: tuple["Beside", ...] = ()  # other files of the target
+    reserved: Callable[[], frozenset[str]] = frozenset  # names that it cannot have, in small letters
 
 
 NAN = "Outside the range: NaN."
@@ -181,6 +185,7 @@ LANGUAGES = {
         "{what}({x})",
         functools.partial(number, exponent="d", infinity="huge(1d0)"),
         beside=(Beside("_c.c", target="c-law"),),
+        reserved=functools.partial(fortran_words, FUNCTIONS),
     ),
     "javascript-law": Language(
         "law.mjs",
@@ -205,6 +210,7 @@ LANGUAGES = {
         "{name}.{what}({x})",
         functools.partial(number, infinity="np.inf"),
         brackets,
+        reserved=python_words,
         parts=(("NP", "np"), ("NUMPY", "asked"), ("JAX", "")),
     ),
     "jax-law": Language(
@@ -215,6 +221,7 @@ LANGUAGES = {
         "{name}.{what}({x})",
         functools.partial(number, infinity="jnp.inf"),
         brackets,
+        reserved=python_words,
         parts=(("NP", "jnp"), ("NUMPY", ""), ("JAX", "asked")),
     ),
     "matlab-law": Language(
@@ -224,6 +231,7 @@ LANGUAGES = {
         "law.{what}({x})",
         functools.partial(number, infinity="Inf"),
         matrix,
+        reserved=law_in_matlab_words,
     ),
     "modelica-law": Language(
         "law.mo",
@@ -233,6 +241,7 @@ LANGUAGES = {
         "{name}.{what}({x})",
         functools.partial(number, infinity="1.0e300"),
         braces,
+        reserved=modelica_words,
     ),
     "abaqus-uinter": SUBROUTINE._replace(
         usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.c. Place the bodies so that their "

@@ -6,7 +6,7 @@ import pathlib
 import re
 import shlex
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import Any, SupportsFloat
 
 import numpy as np
@@ -17,8 +17,14 @@ from mbma_tables.common.errors import InputError
 COMMENT_WIDTH = 108
 _ROOT = pathlib.Path(__file__).parent
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
-# begin or end of a C comment, end of a script in a page, trigraphs
-_MARKS = re.compile(r"\*(?=/)|/(?=\*)|<(?=[/!])|\?(?=\?)")
+# what some reader takes for more than text, even in a comment
+_ACTIVE = re.compile(
+    r"\*(?=/)|/(?=\*)"  # end and begin of a comment of C
+    r"|<(?=[/!])"  # end of a script in a page
+    r"|\?(?=\?)"  # trigraphs
+    r"|coding(?=[:=])"  # encoding of a file of Python (PEP 263)
+    r"|\b(?:vim?|Vim|ex)(?=[<=>]?\d*:)|-(?=\*-)"  # settings of editors
+)
 # first characters of a formula in a spreadsheet
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
@@ -31,11 +37,18 @@ def printable(text: str) -> str:
     )
 
 
+def inert(line: str) -> str:
+    """Text for a comment of any language: on one line, in ASCII, ending no comment and setting no encoding."""
+    text = _ACTIVE.sub(lambda mark: f"{mark[0]} ", printable(line))
+    # at the end of a line it joins the next one to the comment, or ends the comment's mark
+    return f"{text} ." if text.endswith("\\") else text
+
+
 def comment(lines: Iterable[str], mark: str) -> str:
     """Lines as comments that reach from a mark to the end of the line, "<!--" for comments of XML."""
     if mark == "<!--":
-        return "".join(f"<!-- {printable(line).replace('--', '-%2D')} -->\n" for line in lines)
-    return "".join(f"{mark} {printable(line)}".rstrip() + "\n" for line in lines)
+        return "".join(f"<!-- {inert(line).replace('--', '-%2D')} -->\n" for line in lines)
+    return "".join(f"{mark} {inert(line)}".rstrip() + "\n" for line in lines)
 
 
 def opening(paragraphs: Iterable[str], mark: str) -> str:
@@ -44,7 +57,7 @@ def opening(paragraphs: Iterable[str], mark: str) -> str:
     lines = [line for text in paragraphs for line in wrap(text)]
     if mark != "/*":
         return comment(lines, mark).rstrip()
-    return f"/*\n{comment((_MARKS.sub(lambda mark: mark[0] + ' ', printable(line)) for line in lines), ' *')} */"
+    return f"/*\n{comment(lines, ' *')} */"
 
 
 wrapped = functools.partial(textwrap.fill, width=118, break_on_hyphens=False)
@@ -60,6 +73,11 @@ def page_file(name: str) -> bytes:
     return (_ROOT / "page" / name).read_bytes()
 
 
+def template(name: str) -> str:
+    """The text of a template, with its places."""
+    return (_ROOT / "templates" / f"{name}.in").read_text(encoding="utf-8")
+
+
 def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
     """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty.
 
@@ -71,8 +89,7 @@ def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
         places = ((("@WHAT@", what), ("@PLACE@", what.upper()), ("@RATIO@", ratio)) for what, ratio in each.items())
         return "".join(functools.reduce(lambda part, place: part.replace(*place), own, text) for own in places)
 
-    text = (_ROOT / "templates" / f"{name}.in").read_text(encoding="utf-8")
-    text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), text)
+    text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), template(name))
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
@@ -87,11 +104,18 @@ def csv_cell(text: str) -> str:
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
-def checked_name(name: str, max_length: int) -> str:
-    """A name that every target can use: an ASCII letter, then letters, digits and underscores."""
+def checked_name(name: str, max_length: int, reserved: Container[str] = (), target: str = "this target") -> str:
+    """A name for a target: an ASCII letter, then letters, digits and underscores; none of its reserved words.
+
+    Case does not matter to reserved words, which are in small letters.
+    """
     if not isinstance(name, str) or not re.fullmatch(rf"[A-Za-z][A-Za-z0-9_]{{0,{max_length - 1}}}", name):
         raise InputError(
             f"a name must be a letter, then letters, digits and underscores, {max_length} at most, got {name!r}"
+        )
+    if name.lower() in reserved:
+        raise InputError(
+            f"name must not be {name!r}, which {target} needs for itself: take another, such as '{name}_law'"
         )
     return name
 

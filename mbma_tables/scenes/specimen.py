@@ -14,6 +14,7 @@ from typing import Any
 from mbma_tables.common.arguments import nearest, one_number, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
+from mbma_tables.common.plain_text import visible
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -96,8 +97,8 @@ def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated,
 
 
 def _printable(path: pathlib.Path) -> str:
-    """The file's name, with undecodable bytes replaced."""
-    return os.fsencode(path.name).decode("utf-8", "replace")
+    """The file's name on one line, with undecodable bytes replaced and control characters as escapes."""
+    return visible(os.fsencode(path.name).decode("utf-8", "replace"))
 
 
 def from_numbers(
