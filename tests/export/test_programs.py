@@ -1,5 +1,6 @@
 """Rows of laws read by CalculiX, Octave and R."""
 
+import pathlib
 import re
 import subprocess
 
@@ -13,6 +14,7 @@ from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.law_rows import describe_law
 
 CONDUCTIVITY = 50.0  # mW/(mm K)
+MAPS = pathlib.Path(__file__).parents[2] / "docs" / "data" / "maps"
 SIDES = {"mm": 10.0, "m": 0.01}
 ROUGH = Surface.named("challenge").to("mm")
 PRESSURES = np.geomspace(0.012, 1.9, 6)  # MPa
@@ -113,6 +115,27 @@ def test_calculix_feels_the_law(tmp_path, length, stress, theory):
     said, reached, _ = calculix(deck, tmp_path, SIDES[length])
     assert len(reached) == 30, said.stdout[-2000:]
     np.testing.assert_allclose(reached, pressures, rtol=2e-3)
+
+
+@needs("ccx")
+@pytest.mark.slow
+@pytest.mark.parametrize(("length", "side"), [("mm", 1.0), ("mm", 1e-3), ("um", 1.0)])
+def test_calculix_feels_rows_of_nanometres_in_any_unit(tmp_path, length, side):
+    """Rows 1e-7 mm apart are followed from first touch, over seven decades, as well as the same ones in um.
+
+    The blocks are 1e9 times as stiff as the joint: of stiffer ones CalculiX loses the digits of small overlaps.
+    """
+    surface = Surface.from_map(MAPS / "top-1.top", short_cutoff="9.4 nm").to(length)
+    low, high, E_star = 1e-4, 1000.0, 1e5
+    law = describe_law(surface, E_star, stress_unit="MPa", theory="calibrated", pressures=(low, high), rtol=1e-3)
+    pressures = np.geomspace(1.01 * low, 0.99 * high, 15)
+    found = contact(surface, pressure=pressures, E_star=E_star, theory="calibrated")
+    deck = pressed(solvers.calculix(law), float(surface.h_max) - found.mean_separation, side, 1e9 * E_star)
+    said, reached, _ = calculix(deck, tmp_path, side)
+    assert len(reached) == 15, said.stdout[-2000:]
+    # compliance of the blocks: p 2 side/(1e9 E*) over p/slope
+    soft = 2 * side * np.asarray(found.stiffness) / (1e9 * E_star)
+    assert (np.abs(reached / pressures - 1) <= 1.1e-3 + soft).all()
 
 
 @needs("octave-cli")
