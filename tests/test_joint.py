@@ -2,6 +2,7 @@
 
 import ctypes
 import dataclasses
+import json
 import math
 import pathlib
 import runpy
@@ -246,6 +247,10 @@ def test_parts_with_a_lay_have_a_direction():
     ]
     slopes = [float(card.split("*FRICTION\n")[1].splitlines()[0].split(",")[1]) for card in cards]
     np.testing.assert_allclose(slopes, 1e6 * np.array(stiff), rtol=1e-3)
+    # rows follow the ratio of each contact area; functions, which have one ratio, leave it out
+    rows = json.loads(along.export("json", ("30 MPa", "100 MPa"), quantity="tangential_stiffness"))["columns"]
+    assert np.interp(60, rows["pressure"], rows["tangential_stiffness"]) == pytest.approx(1e6 * stiff[0], rel=1.5e-3)
+    assert "without tangential stiffness" in along.export("c-law")
 
 
 def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):

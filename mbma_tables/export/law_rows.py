@@ -166,12 +166,8 @@ def _curve(
     end: float,
     scale: float,
     gas: GasInGaps | None = None,
-    kappa: Callable[[Any], Any] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """The law on fine points; what follows the unloading stiffness is `scale` times that.
-
-    The gas conducts besides; kappa depends on the contact area where the surface has a lay.
-    """
+    """The law on fine points; what follows the unloading stiffness is `scale` times that, beside the gas."""
     law = exported.law
     # squares: fine where p is a high power of the overclosure
     c = end * np.linspace(0, 1, FINE) ** (2 if exported.ends else 1)
@@ -192,8 +188,6 @@ def _curve(
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     values = scale * stiffness
-    if kappa is not None:
-        values[1:] /= np.asarray(kappa(np.asarray(law.area(separation=d[1:]))))
     if gas is not None:
         # the gaps of first contact conduct, too
         values += gas.conductance(exported.answer(law.h_max - c))
@@ -241,7 +235,7 @@ def _table(
 ) -> LawTable:
     """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
     law, length, stress = exported.law, exported.length, exported.stress
-    fine_x, fine_y = _curve(exported, quantity, end, scale, gas, kappa)
+    fine_x, fine_y = _curve(exported, quantity, end, scale, gas)
     x_name, x_unit = ("overclosure", length) if quantity == "pressure" else ("pressure", stress)
     y_name = quantity if exported.force is None else "force"
     floor = FLOOR * float(fine_y[-1])
@@ -257,6 +251,10 @@ def _table(
         # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x, fine_y = fine_x[used], fine_y[used]
+    if kappa is not None:
+        # of a surface with a lay it depends on the contact area, and is known for some of them
+        fine_y[1:] /= np.asarray(kappa(np.asarray(law.at_pressure(fine_x[1:]).area)))
+        floor = float(fine_y[1:].min()) * (1 - 1e-9)
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or not exported.ends)
     why = "where the law ends" if law.turning_point is None else "where the force of this surface has its maximum"
     if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - 2 * end:

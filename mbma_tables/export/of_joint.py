@@ -27,7 +27,7 @@ class ExportedJoint(NamedTuple):
 
     surface: AnySurface
     E_star: str
-    theory: str | Theory
+    theory: str | Theory | None
     hardness: float | str  # infinite where it is not known
     conductivity: float  # k_s = 2 k1 k2/(k1 + k2) [W/(m K)]
     kappa: Callable[[Any], Any]  # normal over tangential stiffness at a contact area
