@@ -27,9 +27,10 @@ SAID = {
     "tangential_stiffness": "shear stress over displacement before any slip",
     "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
 }
+GLIBC = "2.17"  # of Linux distributions from 2014 on
 # by zig's names of platforms: folders in FMI 2.0, which has none of ARM, and ends of libraries
 PLATFORMS = {
-    "x86_64-linux-gnu.2.17": ("linux64", ".so"),
+    f"x86_64-linux-gnu.{GLIBC}": ("linux64", ".so"),
     "x86_64-macos.10.13": ("darwin64", ".dylib"),
     "x86_64-windows-gnu": ("win64", ".dll"),
 }
@@ -45,7 +46,8 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
         As for `law_text`; a conductivity adds the output conductance, leakage the output leakage.
     binaries : {"here", "all", "none"}
         Beside the sources: a binary for this platform, by the system's C compiler or zig, where one of them is
-        installed; binaries for Linux, macOS and Windows, by zig (the extra "fmu"); or none.
+        installed; binaries for Linux, macOS and Windows on x86-64, by zig (the extra "fmu"); or none. FMI 2.0 names
+        no folder for ARM, where the importing tool compiles the sources.
 
     Returns
     -------
@@ -83,6 +85,8 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     source = filled("fmu.c", {what: number(ratio) for what, ratio in found.slopes.items()}, **parts)
     built = _binaries(name, source, binaries)
     listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
+    if binaries == "all":
+        listed += f" (x86-64; linux64 for glibc {GLIBC} and later); on ARM the importing tool compiles the sources"
     said = "\n".join(map(inert, (*found.said, f"binaries: {listed}")))
     files = {
         "modelDescription.xml": _description(name, token, said, variables, exported),
@@ -106,7 +110,8 @@ def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
     here = {"x86_64 linux": "linux64", "x86_64 darwin": "darwin64", "amd64 win32": "win64"}.get(system)
     found = {}
     for target, (folder, end) in PLATFORMS.items():
-        own_cc = folder == here and shutil.which("cc")
+        # a file for all platforms is for others' machines, whose C library may be older than that of this one
+        own_cc = asked == "here" and folder == here and shutil.which("cc")
         if not (own_cc or zig) or asked == "none" or (asked == "here" and folder != here):
             continue
         command = ["cc"] if own_cc else [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s"]
@@ -165,7 +170,9 @@ def _description(name: str, token: str, text: str, variables: list[dict[str, str
             powers, size = bases[unit]
             base = {key: str(power) for key, power in powers.items()} | {"factor": number(size)}
             ET.SubElement(named, "BaseUnit", base)
-    ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", {"name": "logStatusError"})
+    categories = ET.SubElement(root, "LogCategories")
+    for category in ("logStatusDiscard", "logStatusError"):
+        ET.SubElement(categories, "Category", {"name": category})
     listed, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")
     of_real = ("unit", "start", "min", "max")
     for reference, all_of in enumerate(variables):

@@ -19,6 +19,7 @@ SLOPES = QUANTITIES[4:6]
 MORE = HEAT | {"kappa": KAPPA, "leakage": True}
 KINDS = ("ModelExchange", "CoSimulation")
 REFUSED = r"failed with status 3 \(error\)"  # as FMPy says it
+DISCARDED = r"failed with status 2 \(discard\)"
 
 
 def made(law, **options):
@@ -59,7 +60,7 @@ def test_simulation_and_directional_derivatives(name, tmp_path):
         known.assert_equal(*(answers[quantity] for quantity in QUANTITIES if quantity not in SLOPES))
         known.assert_slopes(*(answers[quantity] for quantity in SLOPES))
         said = []
-        with pytest.raises(Exception, match=REFUSED):
+        with pytest.raises(Exception, match=DISCARDED):
             simulated(path, kind, np.array([0.0, 1e9, 1e9]), lambda *words, said=said: said.append(words[-1]))
         assert re.search(r"overclosure = .* must be from", str(said[-1]))
     if name in ("mbma", "calibrated", "persson"):
@@ -99,7 +100,7 @@ def assert_directional_derivatives(path, known):
         assert np.quantile(error, 0.99) < 1e-5
     with pytest.raises(Exception, match=REFUSED):
         model.getDirectionalDerivative([2], [2], [1.0])
-    with pytest.raises(Exception, match=REFUSED):
+    with pytest.raises(Exception, match=DISCARDED):
         slopes(1e9)
     assert "by overclosure alone" in str(said[0])
     assert "overclosure = 1000000000 must be from" in str(said[1])
@@ -144,6 +145,37 @@ def test_an_fmu_runs_as_it_is(tmp_path):
     assert made("mbma", binaries="here", leakage=True) == file
 
 
+@needs("cc")
+def test_a_step_outside_the_range_is_discarded_and_can_be_repeated(tmp_path):
+    """An implicit tool's trial step beyond the law asks for a smaller one; it does not end the simulation."""
+    fmpy = pytest.importorskip("fmpy")
+    (tmp_path / "road.fmu").write_bytes(made("calibrated", binaries="here"))
+    folder, said = fmpy.extract(str(tmp_path / "road.fmu"), unzipdir=tmp_path / "road"), []
+    description = fmpy.read_model_description(folder)
+    model = fmpy.instantiate_fmu(folder, description, "CoSimulation", logger=lambda *words: said.append(words[2:]))
+    model.setupExperiment(startTime=0.0)
+    model.enterInitializationMode()
+    model.exitInitializationMode()
+    model.setReal([1], [0.5])
+    model.doStep(0.0, 1.0)
+    model.setReal([1], [1e9])
+    with pytest.raises(Exception, match=DISCARDED):
+        model.doStep(1.0, 1.0)
+    with pytest.raises(Exception, match=DISCARDED):
+        model.getReal([2])
+    status, category, text = said[-1]
+    assert (status, category) == (2, b"logStatusDiscard")
+    assert b"overclosure = 1000000000 must be from -inf to" in text
+    assert model.getRealStatus(2) == 1.0
+    assert not model.getBooleanStatus(3)
+    # the same model goes on
+    model.setReal([1], [0.75])
+    model.doStep(1.0, 0.5)
+    assert model.getReal([2])[0] == pytest.approx(float(points("calibrated").law.pressure(3 - 0.75)), rel=1e-12)
+    model.terminate()
+    model.freeInstance()
+
+
 @pytest.mark.parametrize("fails", [False, True])
 def test_an_fmu_without_a_compiler(fails, tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
@@ -165,6 +197,12 @@ def test_an_fmu_for_all_platforms():
     archive = zipfile.ZipFile(io.BytesIO(made("mbma", binaries="all")))
     begins = {name.split("/")[1]: archive.read(name)[:2] for name in archive.namelist() if "binaries/" in name}
     assert begins == {"linux64": b"\x7fE", "darwin64": b"\xcf\xfa", "win64": b"MZ"}
+    said = archive.read("modelDescription.xml").decode()
+    assert "linux64 for glibc 2.17 and later); on ARM the importing tool compiles the sources" in said
+    # the newest version of the C library that a symbol needs, as ELF's version names have it
+    needed = re.findall(rb"GLIBC_(\d+)\.(\d+)", archive.read("binaries/linux64/road.so"))
+    assert needed
+    assert max((int(major), int(minor)) for major, minor in needed) <= (2, 17)
 
 
 test_requests_that_are_refused = refusals(
