@@ -6,15 +6,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, finite_array, nearest, require
+from mbma_tables.common.arguments import FloatArray, finite_array, nearest, require, rows
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.shared import shared
+from mbma_tables.core import in_blocks
 
 BEND, LIGHT, SOFT, POWER = 0.3, 0.004, 0.3, 1.2  # constants of q
 DEEP, DEEPEST = 2.5, 1.25  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
 FIRST = 1e-5  # A/A0 below which gaps go over to those before contact, without a jump
 TAIL, NODES = 8.0, 96  # range of heights in standard deviations, and number of quadrature nodes
 FULLEST = 1 - 1e-12
+BLOCK = 1 << 12  # contacts between two checks for Ctrl-C, each with NODES gaps
 R = 8.314462618  # J/(mol K)
 TEMPERATURES = (200.0, 300.0, 400.0, 500.0, 600.0)  # K
 
@@ -102,8 +104,16 @@ def mean_inverse(
     >>> f"{mean_inverse(2.0, 0.02, 0.3, 1.0):.3f}"  # 1/(u + M) is 0.435
     '0.573'
     """
-    density, g = open_gaps(u, area, h_rms, eta)
-    return np.asarray((density / (g + np.asarray(jump)[..., None])).sum(axis=-1))
+    columns, shape = rows(u, area, jump, h_rms, eta)
+    mean = np.empty(columns.shape[1])
+
+    def fill(some: slice) -> None:
+        gap, share, distance, height, cap = columns[:, some]
+        density, g = open_gaps(gap, share, height, cap)
+        mean[some] = (density / (g + distance[:, None])).sum(axis=-1)
+
+    in_blocks(fill, mean.size, BLOCK)
+    return mean.reshape(shape)
 
 
 def open_gaps(

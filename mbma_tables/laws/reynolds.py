@@ -14,6 +14,7 @@ from scipy.sparse.linalg import splu
 
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError
+from mbma_tables.core import interruptible
 
 
 def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
@@ -136,7 +137,15 @@ def _factors(faces: list[tuple[Any, Any, Any, FloatArray]], more: Any, free: Any
     matrix = coo_array((-np.append(face, face), (np.append(i, j), np.append(j, i))))
     matrix = matrix - diags_array(matrix.sum(axis=1) - more)
     kept = matrix.tocsc() if free is None else matrix.tocsc()[free][:, free]
-    return splu(kept, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    # seconds for a large map
+    return interruptible(
+        lambda: splu(
+            kept,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    )
 
 
 def _solved(gap: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
