@@ -2,9 +2,9 @@
 
 The constants of two bodies are joined into the one modulus that contact needs.
 
-Hardnesses are converted from Brinell, Vickers or Rockwell number to the mean pressure over the projected area, which is
-the pressure that counts here. A ground or polished face is harder than its bulk at depths of micrometres: measure it if
-it matters. The sources of the numbers are in tables/metals.csv.
+Hardnesses are converted from Brinell, Vickers or Rockwell numbers to the mean pressure over the projected
+area, which is the pressure that counts here. A ground or polished face is harder than its bulk at depths of
+micrometres: measure it if it matters. The sources of the numbers are in tables/metals.csv.
 """
 
 import csv
@@ -12,13 +12,21 @@ import dataclasses
 import difflib
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, one_number, positive_array, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    number_in,
+    one_number,
+    positive_array,
+    require,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, resolve
@@ -30,7 +38,17 @@ TEMPERS = ("soft", "hard")
 # mikipulley.co.jp/EN/Services/Tech_data/tech20.html
 HRC = (20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 68.0)
 HV_OF_HRC = (238.0, 266.0, 302.0, 345.0, 392.0, 446.0, 513.0, 595.0, 697.0, 832.0, 940.0)
-_SCALE = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(HV|HRC)\s*", re.ASCII)
+# Vickers number of unalloyed and low-alloy steels at Rockwell B numbers: ISO 18265 table A.1, DIN 50150 before, from
+# where on other prints and ASTM E140 agree within 6%
+HRB = (71.2, 75.0, 78.7, 81.7, 85.0, 87.1, 89.5, 91.5, 93.5, 95.0, 96.7, 98.1, 99.5)
+HV_OF_HRB = (130.0, 140.0, 150.0, 160.0, 170.0, 180.0, 190.0, 200.0, 210.0, 220.0, 230.0, 240.0, 250.0)
+ROCKWELL = {"HRC": (HRC, HV_OF_HRC), "HRB": (HRB, HV_OF_HRB)}
+BRINELL_LOAD = 30.0  # kgf per D^2 [mm^2] of Brinell numbers without one: steels, ISO 6506-1
+BRINELL_DIAMETERS = (0.24, 0.6)  # of indentations over that of the ball, ISO 6506-1
+# number, scale, and of Brinell numbers the ball's diameter [mm] and force [kgf]; other loads do not matter
+_SCALE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*(?:([0-9.]+)/([0-9.]+))?[0-9./]*\s*")
+# ranges of metals' constants: numbers outside are in another unit
+MODULI, HARDNESSES, CONDUCTIVITIES = (0.01, 2000.0), (1e-4, 150.0), (0.01, 5000.0)
 
 
 def _poisson(name: str, value: ArrayLike) -> FloatArray:
@@ -82,42 +100,145 @@ def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, 
 
 @dataclasses.dataclass(frozen=True)
 class Metal:
-    """Ranges of a metal's constants at room temperature."""
+    """Ranges of a metal's constants at room temperature.
+
+    Parameters
+    ----------
+    name : str
+    E : float or str
+        Young's modulus, 0.01 to 2000; plain numbers in GPa, or a text with its unit, "210 GPa".
+    nu : float
+        Poisson's ratio, in (-1, 0.5].
+    hardness : float or str, or pair of these
+        Mean pressure of an indentation, of soft and of hard tempers, or one for both: plain numbers in GPa, or texts
+        as for `hardness`, "200 HV".
+    conductivity : float or str, or pair of these
+        Thermal, lowest and highest, or one for both: plain numbers in W/(m K), or texts, "45 W/(m K)".
+    source : str, optional
+        Titles and addresses of the pages on which the numbers were read.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For constants that no metal has, such as a modulus in MPa; the message has the allowed range.
+
+    Examples
+    --------
+    >>> from mbma_tables.materials import Metal
+    >>> steel = Metal("own steel", "210 GPa", 0.3, hardness="200 HV", conductivity="45 W/(m K)")
+    >>> steel.E, steel.hardness, steel.conductivity
+    (210.0, (2.11536, 2.11536), (45.0, 45.0))
+    """
 
     name: str
-    E: float  # Young's modulus [GPa]
-    nu: float  # Poisson's ratio
-    hardness: tuple[float, float]  # of soft and of hard tempers [GPa], mean pressure of an indentation; may be equal
-    conductivity: tuple[float, float]  # thermal, lowest and highest of what was found [W/(m K)]
-    source: str = ""  # titles and addresses of the pages on which the numbers were read
+    E: Any
+    nu: Any
+    hardness: Any
+    conductivity: Any
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise InputError(f"the name of a metal is a text, got {self.name!r}")
+        whose = f" of {self.name!r}"
+        modulus = one_number("E" + whose, Units(stress="GPa").number("E", self.E))
+        require(
+            f"E{whose} [GPa]", np.asarray(modulus), (modulus >= MODULI[0]) & (modulus <= MODULI[1]),
+            f"from {MODULI[0]:g} to {MODULI[1]:g} GPa, as a number in GPa or as a text such as '210 GPa'",
+        )  # fmt: skip
+        ratio = one_number("nu" + whose, self.nu)
+        _poisson("nu" + whose, ratio)
+        tempers = []
+        for each in _both("hardness" + whose, self.hardness):
+            number = hardness_in(Units(stress="GPa"), each) if isinstance(each, str) else each
+            tempers.append(number_in(f"hardness{whose} in GPa", number, *HARDNESSES))
+        conductivities = []
+        for each in _both("conductivity" + whose, self.conductivity):
+            number = _conductivity("conductivity" + whose, each)
+            conductivities.append(number_in(f"conductivity{whose} in W/(m K)", number, *CONDUCTIVITIES))
+        for name, ends in (("hardness", tempers), ("conductivity", conductivities)):
+            if ends[0] > ends[1]:
+                raise InputError(f"{name}{whose}: the lowest comes first, got {ends[0]:g} and {ends[1]:g}")
+        own = {
+            "E": float(modulus), "nu": float(ratio), "hardness": tuple(tempers), "conductivity": tuple(conductivities)
+        }  # fmt: skip
+        for name, value in own.items():
+            object.__setattr__(self, name, value)
 
 
-def _mean_pressure(scale: str, number: float) -> float:
-    """Force over projected area [GPa] of a Vickers number, or of a Brinell number at 30 or 5 kgf per D^2 [mm^2]."""
-    over_faces = 9.80665e-3 * number
-    if scale == "HV":  # pyramid of 136 degrees between faces
-        return over_faces / math.sin(math.radians(68))
-    return over_faces / (1 - {"HB30": 30, "HB5": 5}[scale] / (math.pi * number))
+def _both(name: str, value: Any) -> tuple[Any, Any]:
+    """Both ends of a range, which one number may stand for."""
+    if not isinstance(value, tuple | list | np.ndarray):
+        return value, value
+    if len(value) != 2:
+        raise InputError(f"{name} is one number, or the ends of a range, got {len(value)} numbers")
+    return value[0], value[1]
 
 
-def _metals() -> dict[str, Metal]:
-    """The metals of tables/metals.csv, by name."""
-    found = {}
+def _conductivity(name: str, value: Any) -> Any:
+    """A thermal conductivity in W/(m K)."""
+    if not isinstance(value, str):
+        return value
+    (number,), unit = Units(length="m").conductivities(value)
+    if unit != "W/(m^2 K)":
+        raise InputError(f"{name} is thermal, such as '45 W/(m K)', got {value!r}")
+    return number
+
+
+def _vickers_pressure(number: float) -> float:
+    """Force over projected area [GPa] of a Vickers number, whose pyramid has 136 degrees between faces."""
+    return 9.80665e-3 * number / math.sin(math.radians(68))
+
+
+def _brinell_pressure(number: float, load: float) -> float:
+    """Force over projected area [GPa] of a Brinell number, with its load in kgf per D^2 [mm^2].
+
+    The number is force over the cap pi D h, the projected area is pi h (D - h).
+    """
+    return 9.80665e-3 * number / (1 - load / (math.pi * number))
+
+
+def _metals() -> tuple[dict[str, Metal], dict[tuple[str, ...], str]]:
+    """The metals of tables/metals.csv by name, and their names by the words of these and of their other names."""
+    metals: dict[str, Metal] = {}
+    names: dict[tuple[str, ...], str] = {}
     lines = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
     for row in csv.DictReader(line for line in lines if not line.startswith("#")):
-        soft, hard = (round(_mean_pressure(row["scale"], float(row[end])), 2) for end in ("soft", "hard"))
-        E, nu, low, high = (float(row[name]) for name in ("E", "nu", "low", "high"))
-        found[row["name"]] = Metal(row["name"], E, nu, (soft, hard), (low, high), row["source"])
-    return found
+        name, scale = row["name"], row["scale"]
+        tempers = []
+        for end in TEMPERS:
+            number = float(row[end])
+            pressure = (
+                _vickers_pressure(number)
+                if scale == "HV"
+                else _brinell_pressure(number, float(scale.removeprefix("HB")))
+            )
+            tempers.append(round(pressure, 2))
+        E, nu, low, high = (float(row[column]) for column in ("E", "nu", "low", "high"))
+        metals[name] = Metal(name, E, nu, tuple(tempers), (low, high), row["source"])
+        names[_words(name)] = name
+        for alias in row["also"].split(";"):
+            other, _, temper = alias.partition(" = ")
+            names[_words(other)] = f"{name} {temper}".strip()
+    return metals, names
 
 
-_METALS = _metals()
+def _words(name: str) -> tuple[str, ...]:
+    """The words of a metal's name in alphabetical order, in one spelling."""
+    plain = name.lower().replace("aluminum", "aluminium").replace("gray", "grey")
+    return tuple(sorted(re.findall(r"[a-z0-9.]+", plain)))
+
+
+_METALS, _NAMES = _metals()
 METALS = tuple(_METALS)
 HARDEST = max(metal.hardness[1] for metal in _METALS.values())
 
 
 def get(name: str) -> Metal:
     """Ranges of a metal's constants; `METALS` lists the names, after which "soft" or "hard" may name a temper.
+
+    Names in other standards, such as "S355J2", "1.4301", "6061-T6" or "GG25", are known too (`also` in
+    tables/metals.csv). Capitals, hyphens and the order of words do not count.
 
     Raises
     ------
@@ -132,15 +253,39 @@ def get(name: str) -> Metal:
     ((2.06, 5.76), 42.7)
     >>> materials.get("steel 4140 hard").hardness
     (5.76, 5.76)
+    >>> materials.get("6061-T6").name, materials.get("Aluminum 6061").name
+    ('aluminium 6061 hard', 'aluminium 6061')
     """
-    plain, _, temper = str(name).rpartition(" ")
-    if temper in TEMPERS and plain in _METALS:
+    words = _words(str(name))
+    known = _NAMES.get(words)
+    if known is None:
+        # the last word may be the temper
+        for temper in TEMPERS:
+            rest = list(words)
+            if temper in rest:
+                rest.remove(temper)
+                plain = _NAMES.get(tuple(rest))
+                known = f"{plain} {temper}" if plain in _METALS else known
+    if known is None:
+        raise InputError(
+            f"no metal is named {name!r}: give {_alike(str(name))}, perhaps with ' soft' or ' hard', or a Metal"
+        )
+    plain, _, temper = known.rpartition(" ")
+    if plain in _METALS and temper in TEMPERS:
         one = _METALS[plain].hardness[TEMPERS.index(temper)]
-        return dataclasses.replace(_METALS[plain], name=name, hardness=(one, one))
-    if str(name) not in _METALS:
-        near = difflib.get_close_matches(str(name), METALS, 3, 0.4) or METALS
-        raise InputError(f"no metal is named {name!r}: give a Metal, or {', '.join(near)}, or with ' soft', ' hard'")
-    return _METALS[name]
+        return dataclasses.replace(_METALS[plain], name=known, hardness=(one, one))
+    return _METALS[known]
+
+
+def _alike(name: str) -> str:
+    """Names of metals that share a word with a name or are spelt like it, or all of them."""
+    words = _words(name)
+    spelt = difflib.get_close_matches(" ".join(words), [" ".join(known) for known in _NAMES], 3, 0.6)
+    alike: dict[str, None] = {}
+    for known, metal in _NAMES.items():
+        if set(words) & set(known) - set(TEMPERS) or " ".join(known) in spelt:
+            alike[metal.removesuffix(" soft").removesuffix(" hard")] = None
+    return ", ".join(alike or METALS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,8 +318,8 @@ class Pair:
         return a, b
 
 
-def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
-    """Two metals in contact: names or `Metal` objects, or one metal for both bodies.
+def pair(materials: str | Metal | Mapping[str, Any] | Pair | Sequence[str | Metal | Mapping[str, Any]]) -> Pair:
+    """Two metals in contact: names, `Metal` objects or their constants by name, or one metal for both bodies.
 
     Examples
     --------
@@ -188,8 +333,23 @@ def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
     given: Sequence[Any] = materials if isinstance(materials, tuple | list) else [materials]
     if len(given) not in (1, 2):
         raise InputError(f"materials are one or two, got {len(given)}")
-    one, other = (each if isinstance(each, Metal) else get(each) for each in (given[0], given[-1]))
-    return Pair((one, other))
+    return Pair((_metal(given[0]), _metal(given[-1])))
+
+
+def _metal(given: Any) -> Metal:
+    """A metal by its name, as it is, or of its constants by name."""
+    if isinstance(given, Metal):
+        return given
+    if not isinstance(given, Mapping):
+        return get(given)
+    fields = {field.name: field.default for field in dataclasses.fields(Metal)}
+    missing = [name for name, default in fields.items() if default is dataclasses.MISSING and name not in given]
+    unknown = [str(name) for name in given if name not in fields]
+    if missing or unknown:
+        wrong = [f"{', '.join(missing)} missing"] if missing else []
+        wrong += [f"{', '.join(unknown)} unknown"] if unknown else []
+        raise InputError(f"a metal has {', '.join(fields)}: {' and '.join(wrong)}")
+    return Metal(**given)
 
 
 def hardness(given: str) -> str:
@@ -198,9 +358,12 @@ def hardness(given: str) -> str:
     Parameters
     ----------
     given : str
-        A Vickers number, "200 HV", force over the faces of the pyramid: p_m = 9.80665 MPa HV/sin(68 deg); a Rockwell C
-        number of steel from 20 to 68, "58 HRC", by table 1 of ASTM E140; a metal by name, with its temper where these
-        differ by more than a factor of 1.3, "aluminium 6061 hard"; or a pressure, "1.5 GPa", which of a metal that does
+        A Vickers number, "200 HV", force over the faces of the pyramid: p_m = 9.80665 MPa HV/sin(68 deg). A
+        Rockwell number of steel, "58 HRC", from 20 to 68 by table 1 of ASTM E140, or "90 HRB", from 71.2 to 99.5
+        by table A.1 of ISO 18265 (other tables differ by up to 6%). A Brinell number, "200 HB" or "200 HBW":
+        force over the cap of the indentation, from 96 to 653 at 3000 kgf and a ball of 10 mm; with other balls
+        and loads [mm/kgf] after it, "95 HBW 10/500". A metal by name, with its temper where these differ by
+        more than a factor of 1.3, "aluminium 6061 hard"; or a pressure, "1.5 GPa", which of a metal that does
         not harden is three times its yield stress (Tabor 1951).
 
     Raises
@@ -212,21 +375,19 @@ def hardness(given: str) -> str:
     >>> from mbma_tables import materials
     >>> materials.hardness("200 HV"), materials.hardness("58 HRC"), materials.hardness("aluminium 6061 hard")
     ('2.11536 GPa', '6.9405 GPa', '0.95 GPa')
+    >>> materials.hardness("200 HB"), materials.hardness("95 HBW 10/500"), materials.hardness("90 HRB")
+    ('2.05967 GPa', '0.947505 GPa', '2.03604 GPa')
     """
     text = str(given)
-    if found := _SCALE.fullmatch(text):
-        number, scale = finite_array("hardness", float(found[1])), found[2]
-        if scale == "HRC":
-            good = (number >= HRC[0]) & (number <= HRC[-1])
-            require("hardness [HRC]", number, good, f"from {HRC[0]:g} to {HRC[-1]:g}, where the scale is converted")
-            number = np.interp(number, HRC, HV_OF_HRC)
-        require("hardness [HV]", number, number > 0, "positive")
-        return f"{_mean_pressure('HV', float(number)):.6g} GPa"
-    if text[:1].isalpha():
+    if match := _SCALE.fullmatch(text):
+        return f"{_pressure_of_number(float(match[1]), match[2], match[3], match[4]):.6g} GPa"
+    # a name such as 6061-T6 begins with a digit
+    named = not text.strip().replace(".", "").isdigit() and _words(text) in _NAMES
+    if named or text[:1].isalpha():
         try:
             known = pair(text).hardness
         except InputError as fault:
-            kinds = "a number, a text such as '1.5 GPa', '200 HV' or '58 HRC', or a metal"
+            kinds = "a number, a text such as '1.5 GPa', '200 HV', '200 HB', '58 HRC' or '90 HRB', or a metal"
             raise InputError(f"hardness must be {kinds}: {fault}") from None
         if known is None:
             soft, hard = get(text).hardness
@@ -236,6 +397,34 @@ def hardness(given: str) -> str:
             )
         return known
     return text
+
+
+def _pressure_of_number(number: float, scale: str, ball: str | None, force: str | None) -> float:
+    """Mean pressure [GPa] of a hardness number, of a Brinell number with diameter [mm] and force [kgf] if given."""
+    value = np.asarray(number)
+    if scale.startswith("HB"):
+        load = BRINELL_LOAD
+        if ball is not None and force is not None:
+            diameter, kilograms = positive_array("ball [mm]", float(ball)), positive_array("force [kgf]", float(force))
+            load = float(kilograms / diameter**2)
+        # depth h of the indentation: (d/D)^2 = 4 (h/D) (1 - h/D), h/D = load/(pi number)
+        shallow, deep = ((1 - math.sqrt(1 - ratio**2)) / 2 for ratio in BRINELL_DIAMETERS)
+        least, most = math.ceil(load / (math.pi * deep)), math.floor(load / (math.pi * shallow))
+        require(
+            f"hardness [{scale}]", value, (value >= least) & (value <= most),
+            f"from {least} to {most} at {load:g} kgf per square millimetre of the ball's diameter (ISO 6506-1); with "
+            "the ball's diameter in mm and another load in kgf it is written '95 HBW 10/500'",
+        )  # fmt: skip
+        return _brinell_pressure(number, load)
+    if scale in ROCKWELL:
+        numbers, vickers = ROCKWELL[scale]
+        require(
+            f"hardness [{scale}]", value, (value >= numbers[0]) & (value <= numbers[-1]),
+            f"from {numbers[0]:g} to {numbers[-1]:g}, where the scale is converted",
+        )  # fmt: skip
+        return _vickers_pressure(float(np.interp(value, numbers, vickers)))
+    require("hardness [HV]", value, value > 0, "positive")
+    return _vickers_pressure(number)
 
 
 def microhardness(surface: Any, c1: float | str, c2: float) -> str:
