@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.answers.contact import chosen_theory, contact
-from mbma_tables.answers.interface import ratio_of
+from mbma_tables.answers.interface import checked_direction, checked_friction, ratio_of
 from mbma_tables.answers.result import Contact
 from mbma_tables.answers.sensitivity import (
     OfOneMap,
@@ -22,18 +22,26 @@ from mbma_tables.answers.sensitivity import (
     relative_derivatives,
     unknowns_of,
 )
-from mbma_tables.common.arguments import hinted
-from mbma_tables.common.display import Displayed, Variable, dataset_of
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.arguments import (
+    checked_hardness,
+    hinted,
+    one_number,
+    positive_array,
+    require_name,
+)
+from mbma_tables.common.display import Displayed, Variable, dataset_of, saved
+from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
-from mbma_tables.common.units import Units
+from mbma_tables.common.units import Units, force_over_area
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
+from mbma_tables.laws.gas import checked_gas
 from mbma_tables.materials import Metal, Pair, effective_modulus, hardness_in, pair
 from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories import OF_MAPS, THEORIES, get_theory
 from mbma_tables.theories.protocol import Theory
 
 if TYPE_CHECKING:
@@ -45,6 +53,7 @@ if TYPE_CHECKING:
 Part = AnySurface | Mapping[str, Any]
 CONDUCTANCE = "W/(m^2 K)"
 FACES = ("part_a", "part_b")
+EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}'
 RANGE, POINTS = (1e-5, 0.3), 41  # pressures over the hardness, and their number, in pictures
 
 
@@ -73,8 +82,9 @@ class Joint(Displayed):
         Roughness of each part: a surface (from a map, a profile, a spectrum or five numbers); the arguments of
         `Surface.from_roughness` without a highest point; or those of `Surface.from_map`, with the file under "map".
         Without `part_b` the other face is smooth.
-    materials : str, Metal, or pair of them
-        Metals of the parts, from `mbma_tables.materials.METALS`; one if both are the same.
+    materials : str, Metal, mapping, or pair of them
+        Metals of the parts, from `mbma_tables.materials.METALS`, or the arguments of `materials.Metal` by name; one if
+        both are the same.
     nominal_area : float or str, optional
         A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`); needed for parts that are
         mappings. Without it, surfaces keep their own highest point.
@@ -84,7 +94,7 @@ class Joint(Displayed):
         Coefficient of friction, for friction cards of solvers.
     direction : {"along", "across"}, optional
         Of the shear relative to the lay, for parts that have one.
-    gas : {"air", "helium", "vacuum"}
+    gas : {"air", "helium", "nitrogen", "argon", "vacuum"}
     temperature : float
         Of the gas [K].
     gas_pressure : float or str
@@ -102,6 +112,8 @@ class Joint(Displayed):
     Raises
     ------
     InputError, OutOfRangeError
+        For any argument that a result would refuse later: the names of gas, theory and metals, the hardness, the
+        numbers of a face, of which all that are missing are named at once.
 
     Examples
     --------
@@ -121,7 +133,7 @@ class Joint(Displayed):
     part_a: Part
     part_b: Part | None = None
     _: dataclasses.KW_ONLY
-    materials: str | Metal | Pair | Sequence[str | Metal]
+    materials: str | Metal | Mapping[str, Any] | Pair | Sequence[str | Metal | Mapping[str, Any]]
     nominal_area: float | str | None = None
     hardness: float | str | None = None
     friction: float | None = None
@@ -138,7 +150,7 @@ class Joint(Displayed):
         faces = {}
         for name in FACES:
             part = getattr(self, name)
-            if part is not None:
+            if part is not None or name == "part_a":
                 faces[name] = self._face(name, part)
         object.__setattr__(self, "_faces", faces)
         drawn = isinstance(self.part_a, Mapping) and "map" not in self.part_a
@@ -149,17 +161,49 @@ class Joint(Displayed):
             raise InputError(f"a joint is of one surface, got a batch of shape {surface.shape}")
         object.__setattr__(self, "surface", surface)
         object.__setattr__(self, "pair", pair(self.materials))
+        self._check()
 
-    def _face(self, name: str, part: Part) -> AnySurface:
+    def _face(self, name: str, part: Any) -> AnySurface:
         """The surface of a part."""
-        if not isinstance(part, Mapping):
+        if isinstance(part, AnySurface):
             return part
-        if "map" in part:
-            return Surface.from_map(part["map"], **{name: value for name, value in part.items() if name != "map"})
-        if self.nominal_area is None:
-            raise InputError("parts by their roughness need nominal_area, from which their highest points follow")
-        made: AnySurface = Surface.from_roughness(**part, nominal_area=self.nominal_area)
+        if not isinstance(part, Mapping):
+            raise InputError(f"{name} is a surface, or its numbers by name, such as {EXAMPLE}; got {part!r}")
+        try:
+            if "map" in part:
+                options = {key: value for key, value in part.items() if key != "map"}
+                return Surface.from_map(part["map"], **options)
+            if "nominal_area" in part:
+                raise InputError("nominal_area is of the joint: give it beside the parts")
+            made: AnySurface = Surface.from_roughness(**part, nominal_area=self.nominal_area)
+        except TypeError as fault:
+            raise InputError(f"{name}: {fault}") from None
+        except OutOfRangeError as fault:
+            raise OutOfRangeError(f"{name}: {fault}", fault.mask) from None
+        except InputError as fault:
+            raise InputError(f"{name}: {fault}") from None
         return made
+
+    def _check(self) -> None:
+        """Refuse at once what single results would refuse."""
+        checked_gas(self.gas, self.temperature, Units(stress="Pa").number("gas_pressure", self.gas_pressure))
+        checked_friction(self.friction)
+        checked_direction(self.direction, self.surface)
+        if self.hardness is not None:
+            number = checked_hardness(hardness_in(Units(stress="GPa"), self.hardness))
+            if number.ndim:
+                raise InputError(f"hardness of a joint is one number, got shape {number.shape}")
+        if isinstance(self.theory, str):
+            require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
+            surface: Any = self.surface
+            points = getattr(surface, "map", None), getattr(surface, "table", None)
+            if self.theory in OF_MAPS and points == (None, None):
+                raise InputError(
+                    f"theory {self.theory!r} is of one map: a joint of two faces, or of numbers, has none; "
+                    "theory='calibrated' applies"
+                )
+        elif self.theory is not None:
+            get_theory(self.theory, self.surface)
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Joint:
@@ -191,6 +235,31 @@ class Joint(Displayed):
     @property
     def _asked(self) -> dict[str, Any]:
         return {"materials": self.pair, "hardness": self.hardness, "theory": self.theory}
+
+    def pressure_of(self, force: float | str) -> str:
+        """F/A0 of a force on the nominal area, with its unit, as every method with a pressure takes it.
+
+        Parameters
+        ----------
+        force : float or str
+            "40 kN"; plain numbers in N.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            Without a nominal area, and for forces that are not positive.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, materials="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> joint.pressure_of("40 kN"), f"{joint.at_pressure(joint.pressure_of('40 kN')).pressure:.2f} GPa"
+        ('100000000 Pa', '0.10 GPa')
+        """
+        if self.nominal_area is None:
+            raise InputError("a force needs nominal_area, over which it is the pressure")
+        return force_over_area(force, self.nominal_area, self.surface.unit)
 
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
         """The contact at pressures F/A0 ("10 MPa"; plain numbers in GPa), as of `contact`."""
@@ -451,6 +520,37 @@ class Joint(Displayed):
             "valid": Variable(found.valid, "1", "whether contacts of this kind were compared with simulations"),
         }
 
+    def plot(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        pressures: tuple[float | str, float | str] | None = None,
+    ) -> Figure:
+        """Plot the quantities against pressure, as `Contact.plot`.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            File to save the figure to: "name.svg", .pdf, .png.
+        pressures : pair of float or str, optional
+            Smallest and largest pressure, plain numbers in GPa; default: 1e-5 and 0.3 of the softer metal's hardness.
+
+        Raises
+        ------
+        InputError
+            For pressures that do not rise, and an unknown kind of file.
+        """
+        if pressures is None:
+            return super().plot(path)
+        if not isinstance(pressures, tuple | list) or len(pressures) != 2:
+            raise InputError(f"pressures are the smallest and the largest, got {pressures!r}")
+        low, high = (
+            float(positive_array("pressures", one_number("pressures", Units(stress="GPa").number("pressure", end))))
+            for end in pressures
+        )
+        if low >= high:
+            raise InputError(f"pressures are the smallest and the largest, got {pressures!r}")
+        return saved(self._drawn(self.at_pressure(np.geomspace(low, high, POINTS))), path)
+
     def _range(self) -> Contact:
         """The contact at pressures from 1e-5 to 0.3 of the softer metal's hardness."""
         hardness = self.hardness or self.pair.hardness or f"{self.pair.softer.hardness[0]} GPa"
@@ -470,7 +570,10 @@ class Joint(Displayed):
         return self.quantities(self._range())
 
     def _figure(self) -> Figure:
-        held = self._variables()
+        return self._drawn(self._range())
+
+    def _drawn(self, pressed: Contact) -> Figure:
+        held = self.quantities(pressed)
         x, values = held["pressure"], {name: one.values for name, one in held.items()}
         scatter = dict.fromkeys(
             ("unloading_stiffness", "tangential_stiffness", "conductance"), values["stiffness_scatter"]

@@ -18,6 +18,7 @@ from mbma_tables.cli import main
 from mbma_tables.export import targets
 from mbma_tables.export.law_code import law_text
 from mbma_tables.export.law_rows import describe_law
+from mbma_tables.laws.gas import GASES
 from mbma_tables.theories.calibrated import Calibrated
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
@@ -273,3 +274,118 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     assert not made
     law_text("c-law", joint.surface, 1.0, kappa=1.2, **given)
     assert made
+
+
+@pytest.mark.parametrize(
+    ("changed", "match"),
+    [
+        ({"gas": "nitrogn"}, "did you mean 'nitrogen'"),
+        ({"gas": 5}, "no gas is named 5"),
+        ({"temperature": 3000}, "temperature must be from 200 to 600 K"),
+        ({"gas_pressure": "-1 atm"}, "gas_pressure must be positive"),
+        ({"theory": "calibratd"}, "did you mean 'calibrated'"),
+        ({"theory": "simulated"}, "is of one map"),
+        ({"theory": 5}, "theory must be one of"),
+        ({"friction": -0.2}, "friction must be a number"),
+        ({"hardness": "60 HRB"}, "from 71.2 to 99.5"),
+        ({"hardness": -1.0}, "hardness must be positive"),
+        ({"direction": "alon"}, "direction must be one of"),
+        ({"direction": "along"}, "direction needs a surface"),
+        ({"materials": "steel 4141"}, "steel 4140"),
+        ({"nominal_area": "-4 cm^2"}, "nominal_area must be positive"),
+        ({"part_b": "face.sur"}, "part_b is a surface, or its numbers by name"),
+        ({"part_b": {"Ra": "1.6 um"}}, r"part_b: roughness has Ra, .*missing: hurst.*two of longest, shortest"),
+        ({"part_b": FACE | {"Rqq": "1.6 um"}}, "part_b: .*no argument 'Rqq'"),
+        ({"part_b": FACE | {"hurst": 2.0}}, "part_b: hurst must be"),
+        ({"part_b": FACE | {"nominal_area": 4}}, "nominal_area is of the joint"),
+    ],
+    ids=str,
+)
+def test_a_joint_is_checked_when_it_is_described(changed, match):
+    described = {"part_a": FACE, "materials": METALS, "nominal_area": "4 cm^2", "theory": "calibrated"}
+    with pytest.raises(InputError, match=match):
+        Joint(**described | changed)
+
+
+def test_all_numbers_that_a_face_lacks_are_named_at_once():
+    with pytest.raises(InputError, match=r"hurst.*two of longest.*one of h_max, Sp, nominal_area"):
+        Joint({"Ra": "1.6 um"}, materials=METALS)
+
+
+def test_a_nominal_area_is_of_a_map_too():
+    """Whether the map is named in a mapping or made before."""
+    heights = random_map(64, 0.03, 0.2)
+    named = {"map": heights / heights.std(), "dx": 1.0, "periodic": True, "unit": "um"}
+    made = Surface.from_map(named["map"], 1.0, periodic=True, unit="um")
+    given = {"materials": "steel 1020", "nominal_area": "4 cm^2", "theory": "calibrated"}
+    one, other = Joint(named, **given), Joint(made, **given)
+    assert one.surface.h_max == other.surface.h_max > made.h_max
+
+
+def test_results_without_units_are_displayed():
+    plain = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5)
+    joint = Joint(plain, materials="steel 1020", theory="calibrated")
+    assert "steel 1020" in repr(joint)
+    pressed = joint.at_pressure([0.01, 0.02])
+    assert "conductance needs the surface's unit" in repr(pressed)
+    assert "conductance" not in pressed.to_dataset()
+    assert "theory" in pressed._repr_html_()
+    with pytest.raises(InputError, match="give the surface its unit"):
+        joint.table(0.01)
+    with pytest.raises(InputError, match="nominal_area"):
+        joint.pressure_of("40 kN")
+
+
+def test_forces_are_pressures_on_the_nominal_area(joint, capsys):
+    table = joint.table([joint.pressure_of("4 kN"), joint.pressure_of(40e3)])
+    np.testing.assert_allclose(table["pressure"], [0.01, 0.1], rtol=1e-12)  # GPa on 4 cm^2
+    assert joint.pressure_of("10 lbf") == joint.pressure_of(44.482216152605)
+    for force, match in (("-4 kN", "force must be positive"), ("4 kg", "unit of force"), ("many", "force must be")):
+        with pytest.raises(InputError, match=match):
+            joint.pressure_of(force)
+    with pytest.raises(SystemExit) as end:
+        main(["joint", str(EXAMPLE), "--force", "4kN", "--csv"])
+    assert end.value.code == 0
+    by_force = capsys.readouterr().out.splitlines()[-1]
+    with pytest.raises(SystemExit):
+        main(["joint", str(EXAMPLE), "--pressure", "10MPa", "--csv"])
+    assert [float(x) for x in by_force.split(",")[:3]] == pytest.approx(
+        [float(x) for x in capsys.readouterr().out.splitlines()[-1].split(",")[:3]], rel=1e-12
+    )
+
+
+def test_a_picture_has_the_pressures_that_were_asked_for(joint, tmp_path):
+    figure = joint.plot(tmp_path / "joint.svg", pressures=("1 MPa", "50 MPa"))
+    x = figure.axes[0].lines[0].get_xdata()
+    assert (x[0], x[-1]) == (pytest.approx(1e-3), pytest.approx(0.05))
+    assert (tmp_path / "joint.svg").stat().st_size > 10_000
+    for wrong in (("50 MPa", "1 MPa"), "1 MPa", (0.0, 1.0)):
+        with pytest.raises(InputError, match="pressures"):
+            joint.plot(pressures=wrong)
+
+
+def test_metals_of_ones_own_in_a_file(tmp_path):
+    text = EXAMPLE.read_text().replace('"steel 4140 hard", "aluminium', '"6061-T6", "aluminium')
+    own = 'name = "own", E = "69 GPa", nu = 0.33, hardness = "0.95 GPa", conductivity = "160 W/(m K)"'
+    (tmp_path / "joint.toml").write_text(text.replace('"aluminium 6061 hard"', f"{{{own}}}"))
+    read = Joint.from_toml(tmp_path / "joint.toml")
+    assert [metal.name for metal in read.pair.metals] == ["aluminium 6061 hard", "own"]
+    assert read.pair.softer.E == 69.0
+
+
+@pytest.mark.parametrize(("gas", "molar_mass"), [("nitrogen", 28.0134), ("argon", 39.948)])
+def test_gases_against_kinetic_theory(gas, molar_mass):
+    """Conductivity over viscosity and heat capacity (Eucken's factor), accommodation by Song and Yovanovich (1987)."""
+    data = GASES[gas]
+    assert 1000 * data.mass == pytest.approx(molar_mass, rel=1e-3)
+    monatomic = gas == "argon"
+    capacity = 8.314462618 / data.mass / (data.gamma - 1)
+    eucken = (9 * data.gamma - 5) / 4
+    ratio = np.array(data.conductivity) / (np.array(data.viscosity) * capacity)
+    np.testing.assert_allclose(ratio, eucken, rtol=0.06)
+    # of engineering surfaces at 300 K, with the molar mass of iron; stated to 25%
+    effective, relative = molar_mass * (1.0 if monatomic else 1.4), molar_mass / 55.85
+    clean = 2.4 * relative / (1 + relative) ** 2
+    cold = np.exp(-0.57 * (300 - 273) / 273)
+    expected = cold * effective / (6.8 + effective) + clean * (1 - cold)
+    assert data.accommodation == pytest.approx(expected, rel=0.25)

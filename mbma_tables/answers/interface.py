@@ -79,6 +79,22 @@ class NormalOfLaw:
         return self.law.at_pressure(pressure).mean_separation
 
 
+def checked_friction(friction: Any) -> None:
+    """Reject coefficients of friction that are given and not positive."""
+    if friction is not None:
+        number_in("friction", friction, 1e-12, 1e12)
+
+
+def checked_direction(direction: Any, surface: AnySurface) -> None:
+    """Reject directions that are given and unknown, or of a surface whose lay is not known."""
+    if direction is None:
+        return
+    if direction not in DIRECTIONS:
+        raise InputError(f"direction must be one of {DIRECTIONS}, relative to the lay, got {direction!r}")
+    if getattr(surface, "anisotropy", None) is None:
+        raise InputError("direction needs a surface whose anisotropy is known, such as that of a map")
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tangential:
     """A contact under shear at constant normal pressure, made by `tangential` of contacts and laws, in their units.
@@ -106,8 +122,7 @@ class Tangential:
     _normal: NormalOfContact | NormalOfLaw | str = dataclasses.field(repr=False)
 
     def __post_init__(self) -> None:
-        if self.friction is not None:
-            number_in("friction", self.friction, 1e-12, 1e12)
+        checked_friction(self.friction)
 
     @property
     def gross_slip(self) -> Numbers:
@@ -178,15 +193,12 @@ def ratio_of(nu: Any, E: Any, pair: Pair | None, direction: str | None, surface:
         raise InputError("tangential stiffness needs nu, Poisson's ratio of the bodies, where no materials are named")
     if nu is None:
         nu, E = zip(*((metal.nu, metal.E) for metal in pair.metals), strict=True)  # type: ignore[union-attr]
-    lay = getattr(surface, "anisotropy", None)
+    lay: Any = getattr(surface, "anisotropy", None)
     if direction is None:
         if lay is not None and lay > ISOTROPIC:
             raise InputError(f"the surface has a lay (anisotropy {lay:.3g}): give direction, 'along' or 'across' it")
         return tangential_ratio(nu, E)
-    if direction not in DIRECTIONS:
-        raise InputError(f"direction must be one of {DIRECTIONS}, relative to the lay, got {direction!r}")
-    if lay is None:
-        raise InputError("direction needs a surface whose anisotropy is known, such as that of a map")
+    checked_direction(direction, surface)
 
     def share(poisson: FloatArray) -> Any:
         return stress_shares(lay, np.asarray(area)[(..., *[None] * poisson.ndim)], poisson)[DIRECTIONS.index(direction)]
@@ -249,7 +261,7 @@ class Interface:
 
         Parameters
         ----------
-        gas : {"air", "helium", "vacuum"}
+        gas : {"air", "helium", "nitrogen", "argon", "vacuum"}
         temperature : array_like
             Of the gas [K], from 200 to 600.
         gas_pressure : array_like or str
@@ -265,15 +277,15 @@ class Interface:
         >>> f"{joint.conductance():.0f} W/(m^2 K) and {joint.gap_conductance('air'):.0f}"
         '3345 W/(m^2 K) and 9921'
         """
-        from mbma_tables.laws.gas import jump_of, mean_inverse
+        from mbma_tables.laws.gas import VACUUM, jump_of, mean_inverse
 
         source = self._source
         if source.units.length is None:
             raise InputError("gap_conductance beside lengths whose unit is not known: give the surface its unit")
-        if gas == "vacuum":
+        if gas == VACUUM:
             return 0.0 * self.mean_separation  # type: ignore[no-any-return]
         metre = factor("m", source.units.length)
-        pressure = Units(stress="Pa").number("pressure", gas_pressure)
+        pressure = Units(stress="Pa").number("gas_pressure", gas_pressure)
         k, jump = jump_of(gas, temperature, pressure, accommodation)
 
         def mean(theory: Any, surface: AnySurface, u: FloatArray, E: FloatArray, area: FloatArray) -> tuple[Any, ...]:

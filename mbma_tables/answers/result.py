@@ -75,6 +75,8 @@ class Contact(Interface, Displayed):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
         facts |= {name: shown(values, unit) for name, (values, unit) in self._stiffness().items()}
+        if source.materials is not None and source.units.length is None:
+            facts["conductance"] = "needs the surface's unit"
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
         if source.yields:
             more |= {"psi": self.psi, "yielded": self.yielded}
@@ -94,7 +96,7 @@ class Contact(Interface, Displayed):
         found = {"stiffness": (self.stiffness, self.units["stiffness"])}
         if self._source.yields:
             found["unloading_stiffness"] = self.unloading_stiffness, self.units["unloading_stiffness"]
-        if self._source.materials is not None:
+        if self._source.materials is not None and self._source.units.length is not None:
             found["conductance"] = self.conductance(), "W/(m^2 K)"
         return found
 

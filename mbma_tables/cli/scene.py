@@ -147,11 +147,17 @@ _export_options = option_group(
 @click.command("joint", short_help="Stiffness, area, gap and conductance of two metal parts.")
 @toml_file
 @numbers_option("--pressure", "-p", help="Force over nominal area; plain numbers are in GPa.")
+@click.option("--force", multiple=True, metavar="X[UNIT]", help="In place of pressures: 40kN, on nominal_area.")
 @plot_option
 @_export_options
 @output_options
 def joint_command(
-    file: Path, pressure: list[float | str] | None, plot: Path | None, output: Output, export: dict[str, Any]
+    file: Path,
+    pressure: list[float | str] | None,
+    force: tuple[str, ...],
+    plot: Path | None,
+    output: Output,
+    export: dict[str, Any],
 ) -> None:
     """Interface laws of the joint in FILE (TOML: materials, nominal_area, part_a, part_b) at pressures.
 
@@ -163,22 +169,22 @@ def joint_command(
     Example: mbma joint examples/joint.toml --export abaqus --pressures 1MPa:50MPa --name JOINT --out joint.inp
     """
     if "target" in export:
-        if pressure or plot is not None or output.as_json or output.as_csv:
-            raise InputError("--export writes the joint: leave --pressure, --plot, --json and --csv out")
+        if pressure or force or plot is not None or output.as_json or output.as_csv:
+            raise InputError("--export writes the joint: leave --pressure, --force, --plot, --json and --csv out")
         if output.out is None:
             raise InputError("--export needs --out, the file to write")
         _export_joint(file, output.out, **export)
         return
     if export:
         raise InputError(f"{', '.join(_flag(name) for name in export)} belong to --export TARGET")
-    if not pressure:
-        raise InputError("pressures are needed: --pressure; or --export TARGET")
+    if bool(pressure) == bool(force):
+        raise InputError("pressures or forces are needed: --pressure or --force; or --export TARGET")
     check_plot(plot, output.out)
     from mbma_tables.common.plots import to_picture
     from mbma_tables.joint import Joint
 
     joint = Joint.from_toml(file)
-    found = joint.at_pressure(pressure)
+    found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
     held, facts = joint.quantities(found), joint.facts()
     values = {name: kept.values for name, kept in held.items()} | {"valid": np.where(found.valid, "yes", "no")}
     notes = [f"{name}: {text}" for name, text in facts.items()]

@@ -118,17 +118,21 @@ class Displayed:
         MbmaError
             If matplotlib is not installed.
         """
-        figure = self._figure()
-        if path is not None:
-            kind = os.fspath(path).rpartition(".")[2]
-            if kind not in KINDS:
-                raise InputError(f"a picture's name must end with one of .{', .'.join(KINDS)}, got {os.fspath(path)!r}")
-            write_file(path, to_picture(figure, kind))
-        return figure
+        return saved(self._figure(), path)
 
     def to_dataset(self) -> xr.Dataset:
         """The quantities as an xarray Dataset, with units and descriptions."""
         return dataset_of(self._variables(), {**self._facts(), **self._origin()})
+
+
+def saved(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
+    """A figure, which is also saved where a path is given."""
+    if path is not None:
+        kind = os.fspath(path).rpartition(".")[2]
+        if kind not in KINDS:
+            raise InputError(f"a picture's name must end with one of .{', .'.join(KINDS)}, got {os.fspath(path)!r}")
+        write_file(path, to_picture(figure, kind))
+    return figure
 
 
 def dataset_of(variables: Mapping[str, Variable], facts: Mapping[str, str]) -> xr.Dataset:

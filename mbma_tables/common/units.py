@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
+from mbma_tables.common.arguments import one_number, positive_array
 from mbma_tables.common.errors import InputError
 
 _POUND_PER_INCH = Fraction("4.4482216152605") / Fraction("0.0254") ** 2
@@ -27,6 +28,10 @@ SIZES: dict[str, dict[str, Fraction]] = {
     for kind, text in {"length": _LENGTHS, "stress": _STRESSES}.items()
 }
 SIZES["stress"] |= {"psi": _POUND_PER_INCH, "ksi": 1000 * _POUND_PER_INCH, "Msi": 10**6 * _POUND_PER_INCH}
+SIZES["force"] = {
+    unit: Fraction(size)
+    for unit, size in (("N", 1), ("mN", "1e-3"), ("kN", 1000), ("MN", 10**6), ("lbf", "4.4482216152605"))
+}
 ALIASES = {"micron": "um", "Å": "angstrom", "inch": "in", "N/mm^2": "MPa", "N/mm2": "MPa", "N/m^2": "Pa", "N/m2": "Pa"}
 # powers of length and of stress of named quantities
 DIMENSIONS = {
@@ -39,7 +44,8 @@ DIMENSIONS = {
             "plane_separation separation_scatter"
         ),
         (0, 1): (
-            "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure pressures shear mean_pressure"
+            "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure pressures shear mean_pressure "
+            "gas_pressure"
         ),
         (-1, 0): "q0 q1 conductance",
         (-2, 0): "D m4",
@@ -221,6 +227,22 @@ def unit_of(name: str, units: Units) -> str:
     parts = [(n, unit if abs(n) == 1 else f"{unit}^{abs(n)}") for unit, n in powers]
     above = " ".join(part for n, part in parts if n > 0 and part != "1")
     return (above or "1") + "".join(f"/{part}" for n, part in parts if n < 0)
+
+
+def force_over_area(force: Any, area: Any, length: str | None) -> str:
+    """The pressure of a force such as "40 kN", plain numbers in N, on an area [length^2], as a text with its unit."""
+    number, unit = force, "N"
+    if isinstance(force, str):
+        match = _NUMBER.fullmatch(force)
+        if match is None:
+            raise InputError(f"force must be a number, or one with its unit, got {force[:60]!r}")
+        number = float(match[1])
+        unit = known(match[2], "force") if match[2].strip() else "N"
+    newtons = float(positive_array("force", one_number("force", number))) * float(SIZES["force"][unit])
+    size = Units(length=length).number("nominal_area", area)
+    if length is None:
+        raise InputError("force needs a nominal area whose unit is known: give the surface its unit")
+    return f"{newtons / (float(size) * factor(length, 'm', power=2)):.17g} Pa"
 
 
 def in_unit(surface: Any, unit: str | None) -> Any:

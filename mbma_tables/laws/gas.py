@@ -32,11 +32,27 @@ class Gas(NamedTuple):
 
 
 # conductivities: engineersedge.com/heat_transfer/thermal-conductivity-gases.htm; viscosities: air by 1.4592e-6
-# T^1.5/(T + 109.1) (cableizer.com/documentation/eta_gas), helium NIST SRD 134; thermal accommodation near 0.85 of
-# nitrogen and 0.45 of helium on most metals: W. M. Trott et al., Sandia National Laboratories, 2010
+# T^1.5/(T + 109.1) (cableizer.com/documentation/eta_gas), helium NIST SRD 134, nitrogen and argon M. L. Huber and A. H.
+# Harvey in the CRC handbook (docslib.org/doc/166791/viscosity-of-gases-references); thermal accommodation near 0.95 of
+# argon, 0.85 of nitrogen and 0.45 of helium on most metals: W. M. Trott et al., Sandia National Laboratories, 2010.
+# Hydrogen is left out: that table ends at 400 K, and its accommodation on machined metals was not found
 AIR = (0.0184, 0.0262, 0.0333, 0.0397, 0.0457), (13.35e-6, 18.53e-6, 22.93e-6, 26.79e-6, 30.25e-6)
 HELIUM = (0.1193, 0.1567, 0.1906, 0.2223, 0.2524), (15.1e-6, 19.9e-6, 24.3e-6, 28.3e-6, 32.2e-6)
-GASES = {"air": Gas(28.97e-3, 1.4, 0.85, *AIR), "helium": Gas(4.0026e-3, 5 / 3, 0.45, *HELIUM)}
+NITROGEN = (0.0187, 0.0260, 0.0323, 0.0383, 0.0440), (12.9e-6, 17.9e-6, 22.2e-6, 26.1e-6, 29.6e-6)
+ARGON = (0.0124, 0.0179, 0.0226, 0.0268, 0.0306), (15.9e-6, 22.7e-6, 28.6e-6, 33.9e-6, 38.8e-6)
+GASES = {
+    "air": Gas(28.97e-3, 1.4, 0.85, *AIR),
+    "helium": Gas(4.0026e-3, 5 / 3, 0.45, *HELIUM),
+    "nitrogen": Gas(28.014e-3, 1.4, 0.85, *NITROGEN),
+    "argon": Gas(39.948e-3, 5 / 3, 0.95, *ARGON),
+}
+VACUUM = "vacuum"
+
+
+def checked_gas(gas: str, temperature: ArrayLike, pressure: ArrayLike) -> None:
+    """Reject an unknown gas, and a temperature [K] or pressure [Pa] at which its properties are not known."""
+    if gas != VACUUM:
+        jump_of(gas, temperature, pressure)
 
 
 def jump_of(
@@ -46,7 +62,7 @@ def jump_of(
 
     Parameters
     ----------
-    gas : {"air", "helium"}
+    gas : {"air", "helium", "nitrogen", "argon"}
     temperature, pressure : array_like
         Of the gas [K], from 200 to 600; [Pa].
     accommodation : array_like, optional
@@ -59,8 +75,8 @@ def jump_of(
     >>> f"{k:.4f} W/(m K), {1e6 * jump:.2f} um"
     '0.0262 W/(m K), 0.30 um'
     """
-    if gas not in GASES:
-        raise InputError(f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, 'vacuum'])}")
+    if not isinstance(gas, str) or gas not in GASES:
+        raise InputError(f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, VACUUM])}")
     one = GASES[gas]
     T, P = finite_array("temperature", temperature), finite_array("gas_pressure", pressure)
     share = finite_array("accommodation", one.accommodation if accommodation is None else accommodation)

@@ -50,32 +50,37 @@ TYPICAL = "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) 
 CORE = 0.4  # share of the material ratio curve that the straight line is fitted to
 
 
-def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str:
+def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str) -> str:
     """The one of the names that is given, "" for none; an error for several."""
-    found = [name for name in names if name in given]
-    if len(found) > 1 or (needed and not found):
-        raise InputError(f"{what}: give one of {', '.join(names)}; got {' and '.join(found) or 'none'}")
-    return found[0] if found else ""
+    several = [name for name in names if name in given]
+    if len(several) > 1:
+        raise InputError(f"{what}: give one of {', '.join(names)}; got {' and '.join(several)}")
+    return several[0] if several else ""
 
 
 def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of `Surface` from numbers of a drawing; see `Surface.from_roughness`."""
     given, unit = resolve({name: value for name, value in numbers.items() if value is not None}, unit)
     height = _one_of(HEIGHTS, given, "the height of roughness")
-    slope = _one_of(SLOPES, given, "the slope of roughness", needed=False)
-    top = _one_of(TOPS, given, f"the highest point, which Rq and Ra do not determine ({TYPICAL})")
-    if "hurst" not in given:
-        raise InputError(
-            "hurst is missing: a drawing does not tell it; 0.8 is common, and `sensitivity` gives its influence"
-        )
+    slope = _one_of(SLOPES, given, "the slope of roughness")
+    top = _one_of(TOPS, given, "the highest point")
     band = [name for name in (slope, *WAVES) if name in given]
-    if len(band) != 2:
+    missing = []
+    if not height:
+        missing.append(f"the height of roughness, one of {', '.join(HEIGHTS)}")
+    if "hurst" not in given:
+        missing.append("hurst, which a drawing does not tell (0.8 is common, and `sensitivity` gives its influence)")
+    if len(band) < 2:
+        others = " and ".join(band) or "none"
+        missing.append(f"the band of wavelengths, two of longest, shortest and Rdq (or Sdq, Rsm); got {others}")
+    if not top:
+        missing.append(f"the highest point, one of {', '.join(TOPS)}, which Rq and Ra do not determine ({TYPICAL})")
+    if missing:
+        raise InputError(f"roughness has {', '.join(given) or 'no numbers'}; missing: {'; '.join(missing)}")
+    if len(band) > 2:
         raise InputError(
-            "the band of wavelengths needs two of longest, shortest and Rdq (or Sdq, Rsm); "
-            f"got {' and '.join(band) or 'none'}"
+            f"the band of wavelengths needs two of longest, shortest and Rdq (or Sdq, Rsm); got {' and '.join(band)}"
         )
-    if "rolloff" in given and slope:
-        raise InputError("rolloff needs longest and shortest: from a slope no band follows")
     arrays = {name: positive_array(name, value) for name, value in given.items()}
     require("hurst", arrays["hurst"], arrays["hurst"] <= 1, "in (0, 1]")
     shape = broadcast_shape(**arrays)
@@ -88,7 +93,10 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         long, short = at["longest"], at["shortest"]
         few = long <= spectrum.MIN_ZETA_1 * short
         require(f"longest{said}", long, ~few, f"more than 3 times shortest, {describe_entries(short, few)}")
-    q0, q1 = _band(at, h_rms, slope)
+    if slope and "rolloff" in at:
+        q0, q1 = _band_with_rolloff(at, h_rms, slope)
+    else:
+        q0, q1 = _band(at, h_rms, slope)
     used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
     record = {"given": shown, "unit": unit, "assumed": [ASSUMED, *(SAID[name] for name in used)]}
@@ -121,8 +129,7 @@ def _band(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> tuple[
     from scipy.optimize.elementwise import find_root
 
     power = 0 if "longest" in at else 2
-    gradient = 2 * math.pi * h_rms / at["Rsm"] if slope == "Rsm" else at[slope]
-    wanted = gradient**2 / (2 if slope == "Sdq" else 1) / (h_rms * end) ** 2
+    wanted = _slope_variance(at, h_rms, slope) / (h_rms * end) ** 2
 
     def ratio(x: Any, h: Any) -> Any:
         zeta = np.exp(x)
@@ -137,6 +144,67 @@ def _band(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> tuple[
     found = find_root(lambda x, h, goal: np.log(ratio(x, h) / goal), ends, args=args, tolerances={"xrtol": 1e-15})
     zeta = np.asarray(np.exp(found.x))
     return (end, end * zeta) if power == 0 else (end / zeta, end)
+
+
+def _slope_variance(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> FloatArray:
+    """m2 of a slope of roughness."""
+    if slope == "Rsm":
+        return np.asarray((2 * math.pi * h_rms / at["Rsm"]) ** 2)
+    return np.asarray(at[slope] ** 2 / (2 if slope == "Sdq" else 1))
+
+
+def _band_with_rolloff(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest wavenumber of a spectrum that is flat down to a wavelength and has a given slope."""
+    if h_rms.ndim:
+        raise InputError(f"rolloff is of one surface, got shape {h_rms.shape}")
+    from scipy.optimize import brentq
+
+    start = 2 * math.pi / float(at["rolloff"])
+    hurst = float(at["hurst"])
+    wanted = float(_slope_variance(at, h_rms, slope) / (h_rms * start) ** 2)
+
+    def excess(longer: float, zeta: float) -> float:
+        """ln of m2/(m0 start^2) over the wanted one, for q0 = start/longer and q1 = zeta start.
+
+        m0 = 2 pi C (flat_0 + law_0) and m2 = pi C (flat_2 + law_2), with the integrals of q dq and q^3 dq.
+        """
+        flat_0 = (1 - longer**-2) / 2
+        flat_2 = (1 - longer**-4) / 4
+        law_0 = -math.expm1(-2 * hurst * math.log(zeta)) / (2 * hurst)
+        law_2 = math.log(zeta)
+        if hurst < 1:
+            law_2 = math.expm1((2 - 2 * hurst) * math.log(zeta)) / (2 - 2 * hurst)
+        return math.log((flat_2 + law_2) / (2 * (flat_0 + law_0)) / wanted)
+
+    # the wavelength that is not given follows from the slope: it rises with q1, and falls with the longest
+    if "longest" in at:
+        longer = float(at["longest"]) * start / (2 * math.pi)
+        if longer < 1:
+            raise InputError("rolloff must be at most longest, from which on the spectrum is flat")
+        ends = spectrum.MIN_ZETA_1 * (1 + 1e-9), spectrum.MAX_ZETA_1
+
+        def residual(x: float) -> float:
+            return excess(longer, math.exp(x))
+    else:
+        zeta = 2 * math.pi / float(at["shortest"]) / start
+        if zeta <= spectrum.MIN_ZETA_1:
+            raise InputError("rolloff must be more than 3 times shortest, between which the spectrum falls")
+        ends = 1 + 1e-9, spectrum.MAX_ZETA_1
+
+        def residual(x: float) -> float:
+            return excess(math.exp(x), zeta)
+
+    low, high = map(math.log, ends)
+    # of m2 over the wanted one at both ends, its root; of Rsm the inverse
+    ratios = sorted(math.exp(residual(x) / 2) for x in (low, high))
+    number = float(at[slope])
+    bounds = sorted(number / ratio if slope == "Rsm" else number * ratio for ratio in ratios)
+    allowed = f"between {bounds[0]:.4g} and {bounds[1]:.4g}, which spectra with this rolloff have"
+    require(slope, at[slope], np.asarray(bounds[0] < number < bounds[1]), allowed)
+    found = math.exp(brentq(residual, low, high, xtol=1e-14, rtol=1e-14))
+    if "longest" in at:
+        return np.asarray(start / longer), np.asarray(start * found)
+    return np.asarray(start / found), np.asarray(start * zeta)
 
 
 def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str, float]:

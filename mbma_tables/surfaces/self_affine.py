@@ -170,7 +170,7 @@ class SelfAffine(AnySurface):
     def from_roughness(
         cls,
         *,
-        hurst: Any,
+        hurst: Any = None,
         h_max: Any = None,
         Sp: Any = None,
         Rq: Any = None,

@@ -81,15 +81,15 @@ GOOD = {"Rq": 0.6, "Rdq": 0.2, "longest": 300.0, "hurst": 0.8, "h_max": 2.0}
 test_numbers_that_are_refused = refusals(
     lambda changed: Surface.from_roughness(**(GOOD | changed)),
     ({"Ra": 0.5}, "the height of roughness: give one of Rq, Ra, Sq, Sa; got Rq and Ra"),
-    ({"hurst": None}, "hurst is missing: a drawing does not tell it"),
-    ({"h_max": None}, r"the highest point, .* 3 to 4.5 times the rms height.*: give one of h_max, Sp"),
+    ({"hurst": None}, "missing: hurst, which a drawing does not tell"),
+    ({"h_max": None}, r"the highest point, one of h_max, Sp, .* 3 to 4.5 times the rms height"),
     ({"h_max": 0.5}, "h_max must be above the rms height"),
     (
         {"Rdq": None, "longest": "2 um", "shortest": "0.1 mm", "Rq": "1 um", "h_max": "3 um"},
         r"longest \[um\] .* 100, got 2",
     ),
     ({"Sdq": 0.3}, "the slope of roughness: give one of"),
-    ({"Rdq": None}, "the band of wavelengths needs two of longest, shortest and Rdq"),
+    ({"Rdq": None}, "the band of wavelengths, two of longest, shortest and Rdq"),
     ({"shortest": 2.0}, "got Rdq and longest and shortest"),
     ({"Rdq": 1e-3}, "Rdq must be between .* for a band of 3 < q1/q0 < 1e8"),
     ({"Rdq": None, "Rsm": 1e4}, "Rsm must be between"),
@@ -221,8 +221,6 @@ def test_a_roll_off_by_name():
     for bad, match in (({"rolloff": "5 um"}, "3 times shortest"), ({"rolloff": "6 mm"}, "longest")):
         with pytest.raises(OutOfRangeError, match=match):
             Surface.from_roughness(**given, **bad)
-    with pytest.raises(InputError, match="rolloff needs longest and shortest"):
-        Surface.from_roughness(**given | {"shortest": None, "Rdq": 0.1}, rolloff="250 um")
 
 
 RATIOS = (np.arange(200_000) + 0.5) / 200_000
@@ -277,3 +275,29 @@ def test_what_is_no_map():
     for wrong in (np.zeros((4, 4)), np.ones(5), [[1.0, np.nan], [0.0, 1.0]]):
         with pytest.raises(InputError):
             areal_parameters(wrong, (1.0, 1.0))
+
+
+@pytest.mark.parametrize("hurst", [0.6, 1.0])
+@pytest.mark.parametrize("wave", [{"longest": 5000.0}, {"shortest": 4.0}], ids=str)
+def test_a_slope_beside_a_roll_off(hurst, wave):
+    """The spectrum is flat down to the roll-off, and has the slope and the height that were given."""
+    both = {"longest": 3000.0, "shortest": 4.0} | wave
+    given = {"Rq": 0.5, "hurst": hurst, "rolloff": 250.0, "h_max": 2.0, "unit": "um"}
+    known = Surface.from_roughness(**given, longest=both["longest"], shortest=both["shortest"])
+    slopes = {
+        "Rdq": np.sqrt(known.m2),
+        "Sdq": known.rms_gradient,
+        "Rsm": 2 * np.pi * known.h_rms / np.sqrt(known.m2),
+    }
+    for name, value in slopes.items():
+        face = Surface.from_roughness(**given, **wave, **{name: float(value)})
+        np.testing.assert_allclose(face.q, known.q, rtol=1e-9)
+        np.testing.assert_allclose(face.C, known.C, rtol=1e-9)
+    with pytest.raises(OutOfRangeError, match="Rdq must be between"):
+        Surface.from_roughness(**given, **wave, Rdq=1e-4)
+
+
+def test_all_that_is_missing_is_named_at_once():
+    missing = r"Ra; missing: hurst.*two of longest, shortest.*one of h_max, Sp, nominal_area"
+    with pytest.raises(InputError, match=missing):
+        Surface.from_roughness(Ra="1.6 um")

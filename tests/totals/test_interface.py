@@ -242,7 +242,7 @@ def test_contacts_have_it_in_watts():
 
 test_gases_that_are_refused = refusals(
     lambda face, given: contact(face, area=0.01, theory="calibrated", E_star="10 GPa").gap_conductance(**given),
-    (FACE, {"gas": "argon"}, "no gas is named 'argon'"),
+    (FACE, {"gas": "xenon"}, "no gas is named 'xenon'"),
     (FACE, {"temperature": 100.0}, "from 200 to 600 K"),
     (FACE, {"temperature": np.nan}, "finite"),
     (FACE, {"gas_pressure": 0.0}, "positive"),
