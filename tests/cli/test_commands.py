@@ -170,7 +170,7 @@ def test_island_is_the_librarys_answer():
         (["--hurst", "0.8"], "(or zeta_1 for q1), or hurst, m0, m2, m4, h_max, or roughness (Rq, ...)"),
         (
             ["--hurst", "1", "--h-max", "1", "--Rq", "1"],
-            "band of wavelengths, two of longest, shortest and Rdq (or Sdq, Rsm)",
+            "two of longest, shortest and Rdq (or Sdq, Rsm)",
         ),
         ([], "one surface is needed"),
         (["--surface", "concrete", *options(CONCRETE)], "name and numbers (hurst, h_max, m0, m2, m4) are given"),
