@@ -262,7 +262,7 @@ class Joint(Displayed):
         return force_over_area(force, self.nominal_area, self.surface.unit)
 
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
-        """The contact at pressures F/A0 ("10 MPa"; plain numbers in GPa), as of `contact`."""
+        """The contact at pressures F/A0 ("10 MPa"; plain numbers in GPa), as of `contact`: each in first loading."""
         return contact(self.surface, pressure=pressure, **self._asked)
 
     def law(self) -> ContactLaw:

@@ -10,6 +10,7 @@ import tomllib
 
 import click
 import netCDF4
+import numpy as np
 import pytest
 from helpers import assert_same_output
 
@@ -205,3 +206,15 @@ def test_pocket_laws_are_printed_as_they_are_computed():
         if name == "A/A0":
             assert abs(names[name] / float(distances.pocket_area(0.04, 30.0)) - 1) < 1e-12
     assert abs(names["p"] / float(distances.pocket_pressure(1.3, 0.6)) - 1) < 1e-12
+
+
+def test_the_mean_gap_of_a_nominal_one_is_its_integral():
+    """Patir and Cheng's h_T is the mean of h + delta where that is positive, delta Gaussian."""
+    text = (ROOT / "docs" / "lubrication.md").read_text(encoding="utf-8")
+    (block,) = (part.split("```")[0] for part in text.split("```python\n") if part.startswith("import math"))
+    names: dict = {}
+    exec(block.split("h = 0.6")[0], names)
+    for h in (0.05, 0.6, 2.0):
+        z = np.linspace(-h / 0.5, 12, 200001)
+        density = np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi)
+        assert names["mean_gap"](h, 0.5) == pytest.approx(np.trapezoid((h + 0.5 * z) * density, z), rel=1e-8)

@@ -247,6 +247,10 @@ def test_a_hardness_is_that_of_the_library(visit, against, hardness):
     for name, values in expected.items():
         np.testing.assert_allclose(found[f"calibrated {name}"][seen], values, rtol=1e-5, err_msg=name)
     assert "Python library" in tab.inner_text("#concerns")
+    # the road's spectrum is within the tested range, and only the hardness is not judged
+    judged = {row.split("\t")[-1] for row in tab.locator("#readout tbody tr").all_inner_texts()}
+    assert "not known" in judged
+    assert "yes" not in judged
     tab.fill("#hardness", "")
     assert "Python library" not in tab.inner_text("#concerns")
 

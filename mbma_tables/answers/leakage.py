@@ -57,7 +57,9 @@ class Leakage(Displayed):
     ``theory="simulated"`` K is the geometric mean of both axes, else that of isotropic roughness on both.
     """
 
-    K: Numbers  #: flow coefficient [length^3], the cube of the `hydraulic_aperture`; exactly 0 where `blocked`
+    #: flow coefficient [length^3], the cube of the `hydraulic_aperture`; exactly 0 where `blocked`, and NaN where the
+    #: elastic contact at this gap would be blocked but the contact yields, so that compact patches leave channels
+    K: Numbers
     x: Numbers  #: that along the first axis of the map [length^3]
     y: Numbers  #: along the second axis
     xy: Numbers  #: flow per width along one axis by a pressure gradient along the other; 0 where isotropic
@@ -186,14 +188,22 @@ def leakage_of(contact: Any) -> Leakage:
 
     def answer(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
         simulated = _simulated(theory)
+        yields = theory.elastic is not theory
         if simulated is not None:
-            own = simulated.flow(surface, u)
+            own = np.asarray(simulated.flow(surface, u))
+            own = unknown_where_blocked(own) if yields and simulated is not theory else own
             return np.sqrt(own[0]) * np.sqrt(own[1]), *own
         K = flow(surface, u, share) * np.asarray(surface.h_rms) ** 3
+        K = unknown_where_blocked(K) if yields else K
         return K, K, K, np.zeros_like(K)
 
     K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact.area})
     return Leakage(K, x, y, xy, contact)
+
+
+def unknown_where_blocked(K: FloatArray) -> FloatArray:
+    """Flow coefficients of a contact that yields, NaN where the elastic contact would be blocked."""
+    return np.where(K == 0, np.nan, K)
 
 
 def _simulated(theory: Theory) -> Any:

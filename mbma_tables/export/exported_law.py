@@ -254,8 +254,12 @@ class ExportedLaw:
             f"{about(1e-3 * factor('Pa', stress, 'stress'))} {stress} s"
         )
         if blocked > -np.inf:
-            load, c = float(self.law.pressure(separation=blocked)), (self.law.h_max - blocked) / 2
-            yield f"blocked, K = 0, from p = {number(load)} {stress}, c = {number(c)} on"
+            load, c = float(self.law.pressure(blocked)), self.law.h_max - blocked
+            where = f"from p = {number(load)} {stress}, c = {number(c)} on"
+            if np.isnan(self.leakage(blocked)):
+                yield f"K = 0 stands for not known {where}: the elastic contact blocks there, and a yielded one leaks"
+            else:
+                yield f"blocked, K = 0, {where}"
         else:
             yield "never blocked"
         yield f"K is within {self.leakage.error:.1e} of that at the law's area"

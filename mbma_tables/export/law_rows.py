@@ -181,7 +181,8 @@ def _curve(
         return c, pressure
     rises = np.append(True, np.diff(pressure) > 0)
     if quantity in FLOWS:
-        flow = np.asarray(exported.leakage(separation=d))
+        # 0 where the flow of a yielded contact is not known, as the header states
+        flow = np.nan_to_num(np.asarray(exported.leakage(separation=d)), nan=0.0)
         # the first row that is blocked is the last
         open_ = rises & np.append(True, flow[:-1] > 0)
         return pressure[open_], flow[open_] ** FLOWS[quantity]
@@ -257,7 +258,7 @@ def _table(
         floor = float(fine_y[1:].min()) * (1 - 1e-9)
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or not exported.ends)
     why = "where the law ends" if law.turning_point is None else "where the force of this surface has its maximum"
-    if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - 2 * end:
+    if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - end:
         why = "where contact blocks the gaps"
     elif end < exported.c_turn * (1 - ROUNDING):
         why = "the largest asked for"

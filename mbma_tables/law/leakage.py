@@ -27,7 +27,9 @@ class LeakageLaw:
 
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
-    blocked_at: float  # gap d at and below which contact percolates and nothing flows; -infinity where it never does
+    #: mean separation u [length] at and below which contact percolates and nothing flows; with a hardness the flow is
+    #: not known there; -infinity where contact never percolates
+    blocked_at: float
     # bound on the polynomials' relative error at the law's area, whose own errors come on top times -d ln k/d ln A
     error: float
     block: FloatArray  # as a law's, with flow in place of force and hydraulic aperture in place of area
@@ -44,7 +46,11 @@ class LeakageLaw:
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
     ) -> Numbers:
-        """Flow coefficient at mean separations, separations or pressures; exactly 0 where blocked."""
+        """Flow coefficient at mean separations, separations or pressures; exactly 0 where blocked.
+
+        With a hardness NaN there: yielded patches are compact and leave channels, which only a simulation of the
+        yielded gaps knows.
+        """
         asked = {"mean_separation": mean_separation, "separation": separation, "pressure": pressure}
         given = {name: known for name, known in asked.items() if known is not None}
         if len(given) != 1:
@@ -60,6 +66,9 @@ class LeakageLaw:
         apart = (flat > self.block[fit.HIGHEST]) & (flat < np.inf)
         gap = (self.law.h_max + flat[apart]) / 2
         found[apart] = gap**3 * wide_gap(gap / self.h_rms)
+        # what percolates in the elastic contact is not known to block the yielded one
+        if self.law.hardness < np.inf and not getattr(self.law.gaps, "of_yielded_gaps", False):
+            found[found == 0] = np.nan
         return found.reshape(np.shape(d))[()]
 
 
@@ -113,7 +122,8 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
         # bodies apart: the h_rms of the wide gap that continues it
         missed = 1 - float(values(np.array(1.0))[0]) / ((law.h_max + top) / 2) ** 3
         h_rms = law.h_max / np.sqrt(max(1.5 / max(missed, 1e-6) - 4, 1e-3))
-    return LeakageLaw(law, h_rms, bottom if blocked else -np.inf, error, frozen(block))
+    blocked_at = (law.h_max + bottom) / 2 if blocked else -np.inf
+    return LeakageLaw(law, h_rms, blocked_at, error, frozen(block))
 
 
 def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:

@@ -31,6 +31,8 @@ Loaded = collections.namedtuple("Loaded", ("answer", "yielded", "unloading_stiff
 class Plastic(BoundaryElements):
     """The map of a simulated theory pressed to the loads of the same contact areas, p_m/E* = `cap`."""
 
+    of_yielded_gaps = True
+
     def __init__(self, theory: BoundaryElements, cap: float) -> None:
         known, surface = theory.pressed, theory.surface
         assert isinstance(known, Press)

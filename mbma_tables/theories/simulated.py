@@ -65,6 +65,7 @@ class BoundaryElements(Theory):
 
     name = "simulated"
     bends_in_area = True
+    of_yielded_gaps = False  # whether its flow is that of gaps that yielded
     areas: tuple[float, ...] = own_map.AREAS  # by the law of the map, at its loads
     tolerance, tested = TOLERANCE, (LOWEST, HIGHEST)  # of boundary elements; A/A0
     # standard deviations against contact on the full grid at tolerance 1e-6, at `TESTED_AREAS`, which lie between the

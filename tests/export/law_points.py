@@ -86,7 +86,8 @@ def points(name):
     assert ((h - d) / 2 == c).all()
     turn = law.lowest if law.turning_point is None else law.turning_point
     found = law.values(separation=d)
-    flow = np.asarray(law.leakage(separation=d))
+    # code has 0 where the flow of a yielded contact is not known, as its header states
+    flow = np.nan_to_num(np.asarray(law.leakage(separation=d)), nan=0.0)
     return Points(law, c, found.pressure, found.stiffness, found.area, found.energy, flow, (h - turn) / 2)
 
 

@@ -88,7 +88,7 @@ def test_leakage_apart_and_where_gaps_close(name, compiled):
     apart = np.geomspace(1e-9, 1e3 if math.isinf(law.highest) else 26, 200)
     np.testing.assert_allclose(leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES)
     if name != "mbma":
-        blocked = (law.h_max - law.leakage.blocked_at) / 2
+        blocked = law.h_max - law.leakage.blocked_at
         assert ((leakage(blocked + np.array([-1e-12, 1e-12, 1e-3])) == 0) == [False, True, True]).all()
 
 
@@ -101,7 +101,7 @@ def test_headers_say_what_is_there():
     text = " ".join(law_points.text("python-law", "calibrated", leakage=True).replace("#", "").split())
     leakage = points("calibrated").law.leakage
     facts = f"K is within {leakage.error:.1e} of that at the law's area", "one standard deviation of ln K: 0.1"
-    facts += f"c = {float((3 - leakage.blocked_at) / 2)!r} on", "leakage: A/A0 is above 0.3"
+    facts += f"c = {float(3 - leakage.blocked_at)!r} on", "leakage: A/A0 is above 0.3"
     assert all(fact in text for fact in facts)
     assert "import { pressure, with_tangent, curvature" in law_points.text("javascript-law", "mbma")
     text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)

@@ -19,7 +19,7 @@ from helpers import fresh, refusals
 import mbma_tables
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law, island
 from mbma_tables.common.files import shipped_file
-from mbma_tables.theories import THEORIES, Mbma, get_theory
+from mbma_tables.theories import THEORIES, Mbma, Theory, TheoryAnswer, get_theory
 
 ROOT = pathlib.Path(__file__).parents[2]
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
@@ -369,3 +369,22 @@ def test_cold_tables_opened_by_many_threads():
 def test_islands_are_of_plain_arrays():
     with pytest.raises(InputError, match="plain arrays"):
         island(SMOOTH, gaps_over(3))
+
+
+class Careful(Theory):
+    """As docs/howto/own_theory.md describes a class: `reasons` states why results are not valid."""
+
+    name = "careful"
+
+    def answer(self, surface, mean_separation):
+        force = np.exp(-3 * mean_separation / surface.h_rms)
+        return TheoryAnswer(force, 0.1 * force, 3 / surface.h_rms * force, np.zeros_like(force))
+
+    def reasons(self, surface, answer, mean_separation):
+        return {"u is below 1": mean_separation < 1}
+
+
+def test_reasons_of_ones_own_theory_are_those_of_its_contacts():
+    found = contact(SURFACE, mean_separation=[0.5, 1.5], theory=Careful())
+    assert found.reasons["u is below 1"].tolist() == [True, False]
+    assert not found.valid[0]

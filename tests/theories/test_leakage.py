@@ -120,7 +120,7 @@ class TestRates:
 
 
 def open_gaps(law, shares):
-    low, high = max(law.leakage.blocked_at, law.lowest), min(law.h_max, law.highest)
+    low, high = max(2 * law.leakage.blocked_at - law.h_max, law.lowest), min(law.h_max, law.highest)
     return low + (high - low) * shares
 
 
@@ -150,14 +150,14 @@ class TestLaw:
 
     def test_blocked_below_its_gap_and_apart_above_h_max(self):
         law = contact_law(SEAL, E_star=10.0, theory="calibrated")
-        at = law.leakage.blocked_at
+        at = 2 * law.leakage.blocked_at - law.h_max
         assert law.area(separation=at) == pytest.approx(shipped_flow().constants.threshold, rel=1e-9)
         assert law.leakage(separation=[law.lowest, at - 0.1, at]).tolist() == [0.0, 0.0, 0.0]
         assert law.leakage(separation=at + 1e-6) > 0
 
     def test_falls_with_pressure_in_units_and_labels(self):
         law = contact_law(SEAL, E_star="10 MPa", theory="calibrated")
-        pressure = np.geomspace(1e-6, law.pressure(separation=law.leakage.blocked_at), 300)
+        pressure = np.geomspace(1e-6, law.pressure(law.leakage.blocked_at), 300)
         found = law.leakage(pressure=pressure)
         assert np.all(np.diff(found) < 0)
         assert law.leakage(pressure="1 kPa") == pytest.approx(law.leakage(pressure=1e-3), rel=1e-14)
@@ -253,3 +253,28 @@ def test_waves_of_a_map_that_are_rounding_alone_do_not_stop_it():
         for one in (Spectrum.from_shares(x, variance), rough)
     ]
     np.testing.assert_allclose(factors[0], factors[1], atol=0.05)
+
+
+@pytest.mark.parametrize("pressure", [0.56, [0.1, 0.56]])
+def test_a_yielded_contact_is_not_called_blocked(pressure):
+    """Simulated yielded contacts leak where the elastic contact of the same area blocks."""
+    face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
+    asked = {"E_star": "58 GPa", "hardness": "0.95 GPa", "theory": "calibrated"}
+    leak = contact(face, pressure=pressure, **asked).leakage
+    heavy = np.ravel(leak.K)[-1]
+    assert np.isnan(heavy)
+    assert not np.any(leak.blocked)
+    assert not np.any(leak.valid)
+    law = contact_law(face, **asked)
+    assert np.isnan(np.ravel(law.leakage(pressure=pressure))[-1])
+    assert np.isnan(law.leakage(0.99 * law.leakage.blocked_at))
+    assert law.leakage(1.01 * law.leakage.blocked_at) > 0
+
+
+def test_the_separation_at_which_gaps_block_is_a_mean_separation():
+    law = contact_law(Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5), "calibrated")
+    u = law.leakage.blocked_at
+    assert law.area(u) == pytest.approx(contact(law.surface, mean_separation=u, theory="calibrated").area, rel=1e-4)
+    assert law.area(u) == pytest.approx(0.41, abs=0.02)
+    assert law.leakage(u * (1 - 1e-9)) == 0
+    assert law.leakage(u * (1 + 1e-3)) > 0

@@ -200,7 +200,10 @@ function read(k) {
     });
     const name = cell("th", NAMES[curve.theory]);
     name.style.borderLeft = `0.6rem solid var(--${curve.theory})`;
-    const made = row(name, ...texts, cell("td", against.length ? "no" : "yes", against.join("; ")));
+    // the page does not judge contacts with a hardness
+    const judged = against.some((text) => text !== OF_HARDNESS);
+    const valid = judged ? "no" : against.length ? "not known" : "yes";
+    const made = row(name, ...texts, cell("td", valid, against.join("; ")));
     made.dataset.theory = curve.theory;
     made.dataset.against = against.join("; ");
     return made;

@@ -119,6 +119,8 @@ function scatterOf(state, curve) {
   return Object.fromEntries(["pressure", "area", "stiffness"].map((name) => [name, curve.area.map(known(name))]));
 }
 
+const OF_HARDNESS = "validity and scatter of a contact with a hardness are in the Python library";
+
 // Reasons against a theory's answers, as `Contact.reasons`: each with whether it holds at a point.
 function concernsOf(state, curve, h_rms, gradient) {
   const always = (holds) => () => holds,
@@ -128,10 +130,7 @@ function concernsOf(state, curve, h_rms, gradient) {
     "the rms gradient is above 1: are heights and wavenumbers in one unit?",
     always(gradient > LIMITS.gradient),
   ]);
-  reasons.push([
-    "validity and scatter of a contact with a hardness are in the Python library",
-    always(Number.isFinite(state.hardness)),
-  ]);
+  reasons.push([OF_HARDNESS, always(Number.isFinite(state.hardness))]);
   if (state.samples && state.spectrum === FIRST.spectrum)
     DATA.departures.forEach((text) => reasons.push([text, always(true)]));
   if (curve.theory === "mbma") {
