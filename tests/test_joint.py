@@ -389,3 +389,12 @@ def test_gases_against_kinetic_theory(gas, molar_mass):
     cold = np.exp(-0.57 * (300 - 273) / 273)
     expected = cold * effective / (6.8 + effective) + clean * (1 - cold)
     assert data.accommodation == pytest.approx(expected, rel=0.25)
+
+
+def test_a_subroutine_without_friction_says_so():
+    face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    given = {"materials": "copper C11000 hard", "nominal_area": "4 cm^2", "theory": "calibrated"}
+    note = "the joint's friction, 0.2, is left out: the faces slide freely"
+    for friction in (0.2, None):
+        text = Joint(face, friction=friction, **given).export("abaqus-uinter", heat=False)
+        assert (note in " ".join(text.replace("\n *", " ").split())) == (friction is not None)

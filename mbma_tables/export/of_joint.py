@@ -80,6 +80,9 @@ def joint_files(
     if not program.rows:
         _refuse(target, [key for key, value in {"pressures": pressures, "quantity": quantity}.items() if value])
         _refuse(target, ["friction_pressure"] if friction_pressure is not None else [])
+        if target == "abaqus-uinter" and joint.friction is not None:
+            note = f"the joint's friction, {joint.friction:g}, is left out: the faces slide freely"
+            shared["made_by"] = (note, *made_by)
         return program.files(joint.surface, joint.E_star, **_of_code(joint, target, units, heat), **shared, **named)
     wanted = [quantity] if isinstance(quantity, str) else list(quantity or [_usual(program, heat)])
     if len(wanted) > 1 and not program.several:
