@@ -185,10 +185,7 @@ def _contact(
     value, E_star = spread(asked, shape), spread(modulus, shape)
     theory: Any = source.theory
     if source.yields:
-        # what it needs of scipy takes long to import
-        from mbma_tables.theories.yielding import with_hardness
-
-        theory = with_hardness(theory, cap, modulus)
+        theory = theory.with_hardness(cap, modulus)
     places, lighter = _places(surface, value, E_star, cap, by, theory, source)
     if isinstance(theory, Mbma):
         found = theory.totals(surface, places["separation"], E_star)

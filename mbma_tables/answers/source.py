@@ -76,10 +76,8 @@ class Source:
         """The theory, with the hardness where there is one."""
         if not self.yields:
             return self.theory
-        from mbma_tables.theories.yielding import with_hardness
-
         broadcast_shape(E_star=E_star, hardness=hardness)
-        return with_hardness(self.theory, checked_hardness(hardness), E_star)
+        return self.theory.with_hardness(checked_hardness(hardness), E_star)
 
     def map(
         self, function: Callable[..., tuple[Any, ...]], contact: Any, outputs: int, more: Any = None

@@ -101,11 +101,9 @@ def contact_law(
     if cap.ndim:
         raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
     if cap < math.inf:
-        from mbma_tables.theories.yielding import with_hardness
-
         elastic = functools.partial(contact_law, surface, chosen, rtol=rtol, E_star=modulus)
         yields = {"hardness": float(cap), "elastic": elastic}
-        chosen = with_hardness(chosen, float(cap), modulus)
+        chosen = chosen.with_hardness(float(cap), modulus)
     one = surface
     if one.labelled:
         one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))

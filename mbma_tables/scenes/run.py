@@ -206,9 +206,7 @@ def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float,
 
     theory, u = get_theory(name, surface), (float(surface.h_max) + gap) / 2
     if hardness < math.inf:
-        from mbma_tables.theories.yielding import with_hardness
-
-        theory = with_hardness(theory, hardness, E_star)
+        theory = theory.with_hardness(hardness, E_star)
     found = answer_where_finite(theory, surface, u)
     scatter = (theory.scatter(surface, quantity, found.area) for quantity in found._fields[:2])
     return Curve(theory_label(name), u / surface.h_rms, E_star * found.pressure, found.area, *scatter)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import abc
+import importlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
@@ -77,6 +78,38 @@ class Theory(abc.ABC):
     def elastic(self) -> Theory:
         """The theory of the elastic contact, if this one includes yielding."""
         return self
+
+    def with_hardness(self, hardness: ArrayLike, E_star: ArrayLike = 1.0) -> Theory:
+        """The theory of bodies whose pressure cannot exceed a hardness.
+
+        Parameters
+        ----------
+        hardness : array_like
+            Largest pressure p_m that the softer body supports, positive, in the unit of `E_star`; where
+            it is infinite, nothing yields.
+        E_star : array_like
+            Effective modulus; if it is 1, the hardness is over E*.
+
+        Returns
+        -------
+        Theory
+            A `Yielding` of this theory, or what a subclass makes that knows more of its contacts.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface
+        >>> from mbma_tables.theories import get_theory
+        >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+        >>> metal = get_theory("calibrated").with_hardness(1500.0, E_star=100e3)
+        >>> f"{metal.area_at(surface, np.array(3e-4)):.4f}"
+        '0.0210'
+        """
+        # it needs scipy, which takes long to import, and it imports this module
+        yielding = importlib.import_module("mbma_tables.theories.yielding")
+        with np.errstate(over="ignore"):  # beyond the largest number nothing yields
+            wrapped: Theory = yielding.Yielding(self, np.asarray(hardness, dtype=float) / E_star)
+        return wrapped
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
         """The theory at flat indices of a broadcast shape, if it contains arrays."""

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -246,14 +246,3 @@ class Yielding(Theory):
         soft = np.broadcast_to(self._eta(surface) < self.tested_eta * (1 - 1e-9), np.shape(answer.area))
         own = {f"the hardness over E* times the rms gradient is below {self.tested_eta:g}": soft}
         return {**self.elastic.reasons(surface, answer, mean_separation), **own}
-
-
-# what makes the theory with a hardness, of theories that have a way of their own
-WITH_HARDNESS: dict[type, Callable[[Any, ArrayLike], Yielding]] = {}
-
-
-def with_hardness(theory: Theory, hardness: ArrayLike, E_star: ArrayLike) -> Yielding:
-    """A theory with a hardness, both stresses in one unit."""
-    with np.errstate(over="ignore"):  # beyond the largest number nothing yields
-        eta = np.asarray(hardness) / E_star
-    return WITH_HARDNESS.get(type(theory), Yielding)(theory, eta)

@@ -1,0 +1,82 @@
+"""A theory with a hardness is a method of the theory, so it is the same in every process."""
+
+import pickle
+
+import numpy as np
+import pytest
+import xarray as xr
+from helpers import fresh, random_map
+
+from mbma_tables import Surface, contact
+from mbma_tables.theories import THEORIES, BoundaryElements, get_theory
+from mbma_tables.theories.yielding import Yielding
+
+MAP = 0.1 * random_map(64, 0.05, 0.25, power=0)
+PRESSURES = np.array([1e-3, 3e-3])
+HARDNESS = 0.02
+
+# reads pickled pairs of a theory and a surface, and prints the bits of their contacts
+OTHER_PROCESS = """
+import json, pickle, sys
+from mbma_tables import contact
+with open(sys.argv[1], "rb") as file:
+    pairs, pressures, hardness = pickle.load(file)
+bits = {}
+for name, (theory, surface) in pairs.items():
+    for cap in (None, hardness):
+        pressed = contact(surface, pressure=pressures, theory=theory, hardness=cap)
+        fields = pressed.area, pressed.mean_separation, pressed.unloading_stiffness
+        bits[f"{name}, hardness {cap}"] = [value.hex() for field in fields for value in field.tolist()]
+print(json.dumps(bits))
+"""
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory):
+    """Every theory with a surface of its own, also those of maps and of a map's table."""
+    rough = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=3.3)
+    measured = Surface.from_map(MAP, dx=1.0, periodic=True)
+    path = tmp_path_factory.mktemp("table") / "map.nc"
+    BoundaryElements.of(measured).to_netcdf(path)
+    opened = BoundaryElements.from_netcdf(path)
+    pairs = {name: (get_theory(name), rough) for name in THEORIES}
+    pairs |= {name: (get_theory(name, measured), measured) for name in ("simulated", "corrected")}
+    return pairs | {"table": (opened, opened.surface)}
+
+
+# the theory of a map alone, since importing others may import what it needs
+@pytest.mark.parametrize(
+    "names",
+    [("simulated",), pytest.param((*THEORIES, "corrected", "table"), marks=pytest.mark.slow)],
+)
+def test_every_theory_has_the_same_bits_in_a_new_process(pairs, tmp_path, names):
+    bits = {}
+    for name in names:
+        theory, surface = pairs[name]
+        for cap in (None, HARDNESS):
+            pressed = contact(surface, pressure=PRESSURES, theory=theory, hardness=cap)
+            fields = pressed.area, pressed.mean_separation, pressed.unloading_stiffness
+            rows = [value.hex() for field in fields for value in field.tolist()]
+            bits[f"{name}, hardness {cap}"] = rows
+    path = tmp_path / "pairs.pickle"
+    path.write_bytes(pickle.dumps(({name: pairs[name] for name in names}, PRESSURES, HARDNESS)))
+    assert fresh(OTHER_PROCESS, str(path)) == bits
+
+
+@pytest.mark.slow
+def test_workers_of_dask_have_the_same_bits(pairs):
+    theory, surface = pairs["simulated"]
+    pressures = xr.DataArray(PRESSURES, dims="load")
+    here = contact(surface, pressure=pressures, theory=theory, hardness=HARDNESS).area
+    chunks = contact(surface, pressure=pressures.chunk(load=1), theory=theory, hardness=HARDNESS).area
+    there = chunks.compute(scheduler="processes", num_workers=1)
+    np.testing.assert_array_equal(there, here)
+
+
+def test_a_theory_with_a_hardness_pickles(pairs):
+    for theory, surface in pairs.values():
+        capped = theory.with_hardness(0.02 * 58.0, E_star=58.0)
+        assert isinstance(capped, Yielding)
+        u = 0.4 * surface.h_max * np.ones(1)
+        again = pickle.loads(pickle.dumps(capped)).answer(surface, u)
+        np.testing.assert_array_equal(again, capped.answer(surface, u))
