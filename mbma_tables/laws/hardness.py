@@ -25,6 +25,10 @@ DEPTH = 30.0  # deepest valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 LEVELS = -37.2, 9.0, 1500  # of Gaussian heights: nodes; above, the mean gap is the level itself
 LEAST_GAP = 1e-300  # mean gap at which all heights lie above the level
+# the shares of heights and of elastic contact join as this power of their odds: by 0.1% where one is half the other
+SHARPNESS = 8.0
+NEGLIGIBLE = 1e-17  # part of the larger one's odds that does not change its last digit
+FULLEST = 1 - 1e-12  # largest share of elastic contact, whose odds are finite
 MOST_ETA, MOST_RATIO = 1e100, 1e300  # larger values give the same force
 ROOT_TWO_PI = np.sqrt(2 * np.pi)
 
@@ -126,8 +130,34 @@ def force(
     eta: ArrayLike,
     constants: Constants = CONSTANTS,
 ) -> tuple[FloatArray, FloatArray]:
-    """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness, and from Q and dQ/du, there."""
-    own, Q, cap, c = np.asarray(elastic_force), np.asarray(share), np.asarray(eta), constants
+    """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness there.
+
+    `share` is Q(u), that of the heights above the level, and `slope` is dQ/du. A theory's own heights
+    need not be those of Q: Persson's force falls as exp(-u), Gaussian heights fall as exp(-u^2/2), and
+    at light loads its elastic contact covers more than all heights that lie above. What it covers
+    without yielding is a lower bound of the share that bears: erf(sqrt(2) F) of the nominal area by
+    Persson's theory, and of that the part 1 - exp(-2 eta^2) whose pressure in a light contact is below
+    the hardness. So a hard contact is the elastic one, and a soft one follows the heights alone.
+    """
+    own, heights, cap, c = np.asarray(elastic_force), np.asarray(share), np.asarray(eta), constants
+    unyielded = -np.expm1(-2 * np.minimum(cap, MOST_ETA) ** 2)
+    covered = np.minimum(unyielded * erf(np.sqrt(2) * own), FULLEST)
+    covered_rate = -unyielded * np.sqrt(8 / np.pi) * np.exp(-2 * own * own) * stiffness
+    covered_rate = covered_rate / (covered * (1 - covered))
+    heights_rate = slope / (heights * (1 - heights))
+    # of the odds of both shares the larger counts, without a kink where they are equal
+    log_odds = np.log(heights / (1 - heights))
+    log_covered_odds = np.log(covered / (1 - covered))
+    excess = np.exp(SHARPNESS * (log_covered_odds - log_odds))
+    joined = np.maximum(log_odds, log_covered_odds)
+    joined = joined + np.log1p(np.minimum(excess, 1 / excess)) / SHARPNESS
+    bearing = 1 / (1 + np.exp(-joined))
+    rate = covered_rate + (heights_rate - covered_rate) / (1 + excess)
+    rate = np.where(excess < np.inf, rate, covered_rate)
+    alone = ~(excess > NEGLIGIBLE) | (heights == 1)
+    Q = np.where(alone, heights, bearing)
+    slope_of_Q = np.where(alone, slope, bearing * (1 - bearing) * rate)
+
     level = np.where(cap < np.inf, cap * Q, np.inf)
     small = np.minimum(own, level)
     exponent = c.force_light + c.force_eta * np.minimum(cap, MOST_ETA) + c.force_share * Q
@@ -139,7 +169,8 @@ def force(
     lower = np.log1p(power) / exponent
     by_elastic = np.where(own <= level, 1 - weight, weight)
     by_level = (1 - by_elastic) / Q + c.force_share * (lower + weight * gain) / exponent
-    rate = np.where(own < np.inf, by_elastic * stiffness / own, 0.0) - np.where(by_level > 0, by_level * slope, 0.0)
+    elastic_rate = np.where(own < np.inf, by_elastic * stiffness / own, 0.0)
+    rate = elastic_rate - np.where(by_level > 0, by_level * slope_of_Q, 0.0)
     # without contact the force is zero
     touching, rest = small > 0, np.where(cap > 0, small, np.nan)
     found = np.where(touching, small * np.exp(-lower), rest)

@@ -52,6 +52,24 @@ function cappedArea(force, elastic, eta) {
   return Math.min(Math.max(share, x), 1);
 }
 
+// Share of heights that bears and its -d/du: that above the level, or what the elastic contact covers without yielding.
+function bearing(heights, slope, force, stiffness, eta) {
+  const unyielded = -Math.expm1(-2 * eta * eta),
+    covered = Math.min(unyielded * (1 - erfc(Math.SQRT2 * force)), 1 - 1e-12),
+    coveredSlope = unyielded * Math.sqrt(8 / Math.PI) * Math.exp(-2 * force * force) * stiffness;
+  const logOdds = Math.log(heights / (1 - heights)),
+    coveredOdds = Math.log(covered / (1 - covered)),
+    excess = Math.exp(8 * (coveredOdds - logOdds));
+  if (!(excess > 1e-17) || heights === 1) return [heights, slope];
+  const joined = Math.max(logOdds, coveredOdds) + Math.log1p(Math.min(excess, 1 / excess)) / 8,
+    share = 1 / (1 + Math.exp(-joined)),
+    weight = 1 / (1 + excess),
+    rate =
+      (weight > 0 ? (weight * slope) / (heights * (1 - heights)) : 0) +
+      ((1 - weight) * coveredSlope) / (covered * (1 - covered));
+  return [share, share * (1 - share) * rate];
+}
+
 // Answers at mean separations: force, area, stiffness of loading, and of a small unloading.
 function yielding(model, theory, state, h_rms, gradient) {
   const scale = state.E_star * gradient,
@@ -63,9 +81,14 @@ function yielding(model, theory, state, h_rms, gradient) {
     const elastic = model[theory](u);
     if (!elastic || !(elastic.force > 0)) return elastic;
     const d = levelOf(u / h_rms),
-      Q = (whole - below(d)) / whole,
-      slope = phi(d) / below(d) / whole / h_rms, // -dQ/du
       own = elastic.force / scale,
+      [Q, slope] = bearing(
+        (whole - below(d)) / whole,
+        phi(d) / below(d) / whole / h_rms,
+        own,
+        elastic.stiffness / scale,
+        eta,
+      ),
       level = eta * Q,
       n = CAP.force_light + CAP.force_eta * eta + CAP.force_share * Q;
     const gain = Math.log(Math.max(own, level) / Math.min(own, level)),
