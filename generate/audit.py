@@ -22,6 +22,7 @@ from generate.page import table
 from generate.page import write as write_page
 from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
 from mbma_tables.laws.calibrated import self_affine_law
+from mbma_tables.theories import THEORIES
 
 LONGEST = 10.0  # seconds of one request
 RANGES = ((0.05, 1.0), (np.log(3.1), np.log(1e5)), (1.0, 32.0), (-7.0, -0.5), (3.0, 9.0))  # of searches
@@ -144,8 +145,10 @@ def validity(seed: int, scale: float) -> list[Found]:
     ends = {"hurst": [float(one.node[1]) for one in tested_ones], "zeta_1": [one.zeta_1 for one in tested_ones]}
     count, beyond, where = 0, 0, ""
     for _ in range(int(1000 * scale)):
-        surface = surface_of(rng.uniform(0.02, 1.0), rng.uniform(np.log(3.1), np.log(1e4)), rng.uniform(1.0, 20.0))
-        theory = ("calibrated", "mbma", "persson")[rng.integers(3)]
+        hurst, log_zeta = rng.uniform(0.02, 1.0), rng.uniform(np.log(3.1), np.log(1e4))
+        # so flat that no rms gradient is above one, which no theory is valid for
+        surface = Surface(hurst, 1e-6, float(1e-6 * np.exp(log_zeta)), 1.0, rng.uniform(1.0, 20.0))
+        theory = THEORIES[rng.integers(len(THEORIES))]
         u = surface.h_max * (1 - np.geomspace(1e-6, 0.99, GAPS))
         try:
             found: Any = contact(surface, mean_separation=u, theory=theory)

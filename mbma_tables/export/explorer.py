@@ -28,7 +28,7 @@ from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
-from mbma_tables.theories import OF_MAPS, calibrated, calibrated_table, mbma, theory_name
+from mbma_tables.theories import OF_MAPS, calibrated_table, mbma, tested, theory_name
 
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
@@ -62,9 +62,11 @@ def _limits() -> dict[str, Any]:
         },
         "gradient": source.MAX_GRADIENT,
         "mbma_area": mbma.MAX_AREA,
-        "hurst": calibrated.TESTED_HURST,
-        "zeta_1": calibrated.TESTED_ZETA_1,
-        "heights": calibrated.TESTED_HEIGHTS,
+        "hurst": tested.HURST,
+        "zeta_1": tested.ZETA_1,
+        "broadest": tested.BROADEST,
+        "heights": tested.HEIGHTS,
+        "compared": calibrated_table.COMPARED,
         "area": TESTED_AREA,
         "max_samples": MAX_SAMPLES,
         "hardness": dataclasses.asdict(hardness_law.CONSTANTS),

@@ -152,5 +152,9 @@ def of_area(surface: Any, nominal_area: Any, h_max: Any) -> tuple[Any, tuple[Map
     area = finite_array("nominal_area", Units(surface.unit).number("nominal_area", nominal_area))
     median, *ends = (highest_point(surface.h_rms, surface.m2, area, chance) for chance in (0.5, *ENDS))
     told = "h_max is the median over Gaussian surfaces of the nominal area; two of three are between from and to"
+    # of which a theory's validity depends; it does not change with the unit of length
+    longest = 2 * np.pi / np.asarray(getattr(surface, "longest", surface.q0))
+    waves = np.sqrt(area) / longest
     record = {"step": "nominal_area", "nominal_area": area.tolist(), "from": ends[0].tolist(), "to": ends[1].tolist()}
+    record["waves_a_side"] = waves.tolist()
     return median[()], (*surface.provenance, record | {"assumed": [told]})

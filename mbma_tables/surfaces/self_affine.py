@@ -276,8 +276,9 @@ class SelfAffine(AnySurface):
         return (self.s * self.q0**2) ** 2 * spectrum.band_moment(4, self.hurst, 1.0, self.zeta_1)
 
     def with_numbers(self, *numbers: Any) -> Self:
-        """Another surface, in the same unit."""
-        return type(self)(*numbers, unit=self.unit)
+        """Another surface, in the same unit; the records of one surface go with it."""
+        records = self.provenance if not self.labelled and self.shape == () else ()
+        return type(self)(*numbers, unit=self.unit, provenance=records)
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; for one surface or broadcasting against it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,15 +15,12 @@ from mbma_tables.laws.calibrated import area as law_area
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
-from mbma_tables.theories import calibrated_table
+from mbma_tables.theories import calibrated_table, tested
 from mbma_tables.theories.protocol import Curve, Theory, TheoryAnswer
 
 if TYPE_CHECKING:
     from mbma_tables.theories.calibrated_curves import OwnLaw
 
-TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
-# h_max/h_rms: simulated up to 5.5, beyond which separation and stiffness change by 0.1% at most from 0.1% contact on
-TESTED_HEIGHTS = (2.5, 8.0)
 NEAREST = 0.95  # share of h_max at which the certificate of the table ends
 TAIL = 3.0, 0.8  # u/h_rms from which the error of the table grows, and its rate: exp(0.8 (u/h_rms - 3))
 # standard deviations added to those of the data that the law was fitted to, for maps without `departures` and for
@@ -148,7 +145,7 @@ class Calibrated(Theory):
         found = _bound(surface, gap).contact(gap)
         x = gap / h_rms
         require("mean_separation", spread(gap, x.shape), x >= 0, "at least 0")
-        stated = calibrated_table.shipped().error * np.exp(rate * np.clip(x - start, 0, TESTED_HEIGHTS[1] - start))
+        stated = calibrated_table.shipped().error * np.exp(rate * np.clip(x - start, 0, tested.HEIGHTS[1] - start))
         pressure, area, stiffness = found
         return TheoryAnswer(pressure, area, stiffness, _error(stated, 2.0, x / (np.asarray(surface.h_max) / h_rms)))
 
@@ -199,30 +196,24 @@ class Calibrated(Theory):
         own = _own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
 
-    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        area, (low, high) = answer.area, TESTED_AREA
-        broad = f"the longest wavelength is more than {TESTED_ZETA_1:g} times the shortest"
-        reasons: dict[str, Any]
-        if isinstance(surface, MeasuredSurface):
-            law = _own_law(surface)
-            straight = None if law.curve is None else law.curve.straight(np.asarray(mean_separation) / law.h_rms)
-            text = (
-                "the light-load and near-full-contact approximations disagree for this map: stiffness is constant "
-                "over a range of forces"
-            )
-            reasons = {broad: surface.q1 / surface.longest > TESTED_ZETA_1 * (1 + 1e-9)}
-            reasons |= {} if straight is None else {text: straight & (area >= low)}
-        else:
-            assert isinstance(surface, Surface)
-            heights, (least, most) = np.asarray(surface.h_max / surface.h_rms), TESTED_HEIGHTS
-            reasons = {
-                f"the Hurst exponent is below {TESTED_HURST:g}": surface.hurst < TESTED_HURST * (1 - 1e-9),
-                broad: surface.zeta_1 > TESTED_ZETA_1 * (1 + 1e-9),
-                f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < least) | (heights > most),
-            }
-        reasons[f"A/A0 is below {low:g}"] = (area > 0) & (area < low * (1 - 1e-9))
-        reasons[f"A/A0 is above {high:g}"] = area > high * (1 + 1e-9)
-        return {text: np.broadcast_to(mask, area.shape) for text, mask in reasons.items()}
+    def reasons(
+        self,
+        surface: AnySurface,
+        answer: TheoryAnswer,
+        mean_separation: FloatArray,
+    ) -> Mapping[str, Any]:
+        reasons = super().reasons(surface, answer, mean_separation)
+        if not isinstance(surface, MeasuredSurface):
+            return reasons
+        law = _own_law(surface)
+        if law.curve is None:
+            return reasons
+        text = (
+            "the light-load and near-full-contact approximations disagree for this map: stiffness is "
+            "constant over a range of forces"
+        )
+        straight = law.curve.straight(np.asarray(mean_separation) / law.h_rms)
+        return {text: straight & (answer.area >= TESTED_AREA[0]), **reasons}
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         return surface.departures(by_map=self.scatter_name(surface) != self.name)

@@ -20,6 +20,7 @@ from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "pressure", "stiffness")
+COMPARED = (5e-4, 0.98)  # A/A0 of the lightest and the heaviest contacts whose errors were averaged
 FEW, MIN_SHARED = 64, 40  # most surfaces, and least entries per surface, for which polynomials are made
 
 Owners = NDArray[np.int64]
@@ -87,8 +88,12 @@ class Table(SurfaceSpline):
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""
         if theory not in self.scatter:
             return np.full(np.shape(area), np.nan)
+        row = self.scatter[theory][QUANTITIES.index(quantity)]
         with np.errstate(divide="ignore"):
-            return np.exp(known_at(self.log_area, self.scatter[theory][QUANTITIES.index(quantity)], np.log(area)))
+            scatter = np.exp(known_at(self.log_area, row, np.log(area)))
+        lightest, heaviest = COMPARED
+        compared = (np.asarray(area) >= lightest) & (np.asarray(area) <= heaviest)
+        return np.where(compared, scatter, np.nan)
 
 
 def known_at(places: FloatArray, row: FloatArray, x: FloatArray) -> FloatArray:

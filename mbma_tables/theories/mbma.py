@@ -129,6 +129,7 @@ class Mbma(Theory):
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         return {
+            **super().reasons(surface, answer, mean_separation),
             f"areas of islands are added without overlap, but A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
             & (self.variant.addition == "sum"),
             "stiffness falls with compression here, which no simulation shows": mean_separation

@@ -40,6 +40,15 @@ class Wrapped(Theory):
         """None: its author is responsible."""
         return ()
 
+    def reasons(
+        self,
+        surface: AnySurface,
+        answer: TheoryAnswer,
+        mean_separation: FloatArray,
+    ) -> dict[str, Any]:
+        """None: its author is responsible."""
+        return {}
+
     def __init__(self, theory: UserTheory) -> None:
         self.name = theory.name
         self._theory = theory

@@ -14,7 +14,7 @@ from mbma_tables.common.arguments import FloatArray, describe_entries, require, 
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import calibrated_table
+from mbma_tables.theories import calibrated_table, tested
 
 LOOKS, FEW_LOOKS = 128, 8  # initial gaps of an inversion, for one surface and for each of a batch,
 LOOKED_AT, FAR = 7.0, 12.0  # range of ln u - ln(h_max - u) for these, and largest u/h_rms without last contact
@@ -134,10 +134,12 @@ class Theory(abc.ABC):
 
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """Reasons why results lie outside the tested range of the theory, each with a mask."""
+        reasons = tested.untested(surface, answer.area)
         if self.ends_at_h_max:
-            return {}
+            return reasons
         beyond = mean_separation > np.asarray(surface.h_max)
-        return {"u is above h_max, where the surface has no contact but the theory's heights are unbounded": beyond}
+        text = "u is above h_max, where the surface has no contact but the theory's heights are unbounded"
+        return {text: beyond, **reasons}
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation of ln of a quantity against simulations, at A/A0 = `area`.
@@ -146,9 +148,12 @@ class Theory(abc.ABC):
         contact. Root mean squares of ln(theory/simulation), with the simulations in the calibrated law's file; NaN
         if not known, as for surfaces unlike those.
         """
+        shape = np.broadcast_shapes(np.shape(area), surface.shape)
         if self.departures(surface):
-            return np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
-        return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
+            return np.full(shape, np.nan)
+        table = calibrated_table.shipped()
+        scatter = table.standard_deviation(self.scatter_name(surface), quantity, area)
+        return np.where(tested.is_compared(surface), np.broadcast_to(scatter, shape), np.nan)
 
     def gaps(self) -> Any:
         """Of a simulated map, the theory that knows the flow through its gaps."""

@@ -152,6 +152,15 @@ class Saturated(Yielding):
         scatter, *masks = self._each(ask, mean_separation, area)
         return scatter, {name: mask > 0 for name, mask in zip(names, masks, strict=True)}
 
+    def reasons(
+        self,
+        surface: AnySurface,
+        answer: TheoryAnswer,
+        mean_separation: FloatArray,
+    ) -> dict[str, Any]:
+        elastic_reasons = self.elastic.reasons(surface, answer, mean_separation)
+        return {**elastic_reasons, **self._of_hardness(surface, answer)}
+
     def gaps(self) -> Any:
         """The simulation at one hardness."""
         return self._simulation(float(self.hardness)) if self.hardness.ndim == 0 else None

@@ -22,6 +22,11 @@ REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) above which areas are those of full contact
 CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
 MANY = 200  # most hardnesses for which inversions use as many gaps as without
+ROUNDING = 1e-9  # relative, of numbers beside the ends of ranges
+# nominal pressure over the hardness from which the bulk yields: D. Tabor, The Hardness of Metals (1951),
+# the hardness of a metal is three times its yield stress
+BULK_YIELD = 1 / 3
+FROZEN_ERROR = 0.05  # of the stiffness of a frozen contact, root mean square (docs/yield.md)
 MAX_LEVEL = 37.0  # heights over h_rms above which shares underflow
 
 
@@ -242,7 +247,35 @@ class Yielding(Theory):
         eta, elastic = self._eta(surface), self.elastic.scatter(surface, quantity, area)
         return shipped().standard_deviation(self.elastic.scatter_name(surface), quantity, eta, area, elastic)
 
-    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
-        soft = np.broadcast_to(self._eta(surface) < self.tested_eta * (1 - 1e-9), np.shape(answer.area))
-        own = {f"the hardness over E* times the rms gradient is below {self.tested_eta:g}": soft}
-        return {**self.elastic.reasons(surface, answer, mean_separation), **own}
+    def reasons(
+        self,
+        surface: AnySurface,
+        answer: TheoryAnswer,
+        mean_separation: FloatArray,
+    ) -> Mapping[str, Any]:
+        # the frozen contact is at least as stiff as that of loading, in which yielded points give way
+        elastic = self.elastic.answer(surface, np.asarray(mean_separation, dtype=float))
+        unloading = elastic.stiffness * law.frozen_factor(self._eta(surface))
+        softer = answer.stiffness > unloading * (1 + FROZEN_ERROR)
+        text = (
+            "unloading would be softer than loading here, since the theory's force and the heights of the "
+            "surface disagree: theory='calibrated'"
+        )
+        elastic_reasons = self.elastic.reasons(surface, answer, mean_separation)
+        return {**elastic_reasons, **self._of_hardness(surface, answer), text: softer}
+
+    def _of_hardness(self, surface: AnySurface, answer: TheoryAnswer) -> dict[str, Any]:
+        """Reasons why contacts with this hardness were not tested, each with a mask."""
+        shape = np.shape(answer.area)
+        soft = self._eta(surface) < self.tested_eta * (1 - ROUNDING)
+        # a pressure that the whole face bears is the stress of the bulk
+        bulk = answer.pressure > BULK_YIELD * self.hardness * (1 + ROUNDING)
+        soft_text = f"the hardness over E* times the rms gradient is below {self.tested_eta:g}"
+        bulk_text = (
+            "the nominal pressure is above a third of the hardness, which is about the yield stress: the bulk "
+            "of the softer body yields, not its asperities alone; at most hardness/3 is covered"
+        )
+        return {
+            soft_text: np.broadcast_to(soft, shape),
+            bulk_text: np.broadcast_to(bulk, shape),
+        }

@@ -129,7 +129,10 @@ test_what_cannot_be_asked = refusals(
 def test_ends_validity_and_advice(theory):
     gw_or_persson = theory in ("persson", "greenwood_williamson")
     if gw_or_persson:  # heights without an end
-        assert contact(SURFACE, mean_separation=[2.5, 3.1], theory=theory).valid.tolist() == [True, False]
+        within = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=3.0)
+        pressed = contact(within, mean_separation=[2.0, 3.1], theory=theory)
+        assert pressed.valid.tolist() == [True, False]
+        assert any("u is above h_max" in reason for reason in pressed.reasons)
         with pytest.raises(OutOfRangeError, match="pressure must be positive"):
             contact(SURFACE, pressure=0.0, theory=theory)
     else:
@@ -150,7 +153,8 @@ def test_ends_validity_and_advice(theory):
 
 
 def test_mbma_says_where_it_is_not_to_be_trusted():
-    found = contact(SURFACE, mean_separation=[2.5, 0.3], theory="mbma")
+    within = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=3.0)
+    found = contact(within, mean_separation=[2.0, 0.3], theory="mbma")
     assert found.valid.tolist() == [True, False]
     assert [mask.tolist() for mask in found.reasons.values()] == [[False, True]] * 2
     assert any("stiffness falls" in reason for reason in found.reasons)

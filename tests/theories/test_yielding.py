@@ -139,7 +139,9 @@ def test_batches_labels_and_units():
     for name in ("area", "yielded", "unloading_stiffness", "scatter", "psi", "valid"):
         own = getattr(labelled, name)
         assert set(own.dims) <= {"load", "metal"}
-        assert own.values == pytest.approx(np.broadcast_to(getattr(plain, name), own.shape), rel=1e-12), name
+        expected = np.broadcast_to(getattr(plain, name), own.shape)
+        # lighter contacts than those compared with simulations have no scatter
+        assert own.values == pytest.approx(expected, rel=1e-12, nan_ok=name == "scatter"), name
     given = {"pressure": "30 MPa", "E_star": "100 GPa", "hardness": "1500 MPa"}
     named = contact(Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um"), **given, theory="calibrated")
     assert named.area == pytest.approx(one.area, rel=1e-12)

@@ -100,14 +100,35 @@ function cubic(p, q, y) {
   return p.x + s * d + s * (1 - s) * (a * (1 - s) + b * s);
 }
 
+// Reasons why the surface is outside the simulated range, as `theories/tested.py` has them.
+function untestedSurface(state, h_rms) {
+  if (state.samples) return [];
+  const ratio = state.h_max / h_rms,
+    zeta_1 = state.q1 / state.q0,
+    [narrow, broad] = LIMITS.zeta_1,
+    [flat, high_peaks] = LIMITS.heights;
+  return [
+    [`the Hurst exponent is below ${LIMITS.hurst}`, state.hurst < LIMITS.hurst * (1 - 1e-9)],
+    [`the longest wavelength is less than ${narrow} times the shortest`, zeta_1 < narrow * (1 - 1e-9)],
+    [`the longest wavelength is more than ${broad} times the shortest`, zeta_1 > broad * (1 + 1e-9)],
+    [`h_max/h_rms is outside ${flat} to ${high_peaks}`, ratio < flat || ratio > high_peaks],
+  ];
+}
+
 // Standard deviations of logarithms, as `Contact.scatter`: by contact fraction, null where not known.
 function scatterOf(state, curve) {
   const other = curve.theory === "mbma" && state.variant !== "reported",
     rows = LIMITS.scatter[other ? `mbma_${state.variant}` : curve.theory],
-    nodes = LIMITS.log_area;
+    nodes = LIMITS.log_area,
+    [lightest, heaviest] = LIMITS.compared,
+    zeta_1 = state.q1 / state.q0,
+    alike =
+      state.hurst >= LIMITS.hurst * (1 - 1e-9) &&
+      zeta_1 >= LIMITS.zeta_1[0] * (1 - 1e-9) &&
+      zeta_1 <= LIMITS.broadest * (1 + 1e-9);
   const at = (quantity) => (area) => {
     const row = rows[quantity].map((value, k) => [nodes[k], value]).filter(([, value]) => value !== null);
-    if (area === null || !row.length) return null;
+    if ((!state.samples && !alike) || area === null || !row.length || area < lightest || area > heaviest) return null;
     const x = Math.log(area),
       above = row.findIndex(([node]) => node >= x);
     if (above < 0) return rows[quantity].at(-1) === null ? null : Math.exp(row.at(-1)[1]);
@@ -142,19 +163,10 @@ function concernsOf(state, curve, h_rms, gradient) {
     reasons.push(["stiffness falls with compression here, which no simulation shows", (k) => curve.gap[k] < gap]);
   } else if (curve.theory === "persson") {
     reasons.push(["u is above h_max, where the surface has no contact", (k) => curve.gap[k] > state.h_max]);
-  } else {
-    if (!state.samples) {
-      const ratio = state.h_max / h_rms,
-        zeta_1 = state.q1 / state.q0,
-        [flat, high_peaks] = LIMITS.heights;
-      reasons.push([`the Hurst exponent is below ${LIMITS.hurst}`, always(state.hurst < LIMITS.hurst * (1 - 1e-9))]);
-      const broad = `the longest wavelength is more than ${LIMITS.zeta_1} times the shortest`;
-      reasons.push([broad, always(zeta_1 > LIMITS.zeta_1 * (1 + 1e-9))]);
-      reasons.push([`h_max/h_rms is outside ${flat} to ${high_peaks}`, always(ratio < flat || ratio > high_peaks)]);
-    }
-    reasons.push([`A/A0 is below ${low}`, (k) => curve.area[k] > 0 && curve.area[k] < low]);
-    reasons.push([`A/A0 is above ${high}`, (k) => curve.area[k] > high]);
   }
+  untestedSurface(state, h_rms).forEach(([text, holds]) => reasons.push([text, always(holds)]));
+  reasons.push([`A/A0 is below ${low}`, (k) => curve.area[k] > 0 && curve.area[k] < low]);
+  reasons.push([`A/A0 is above ${high}`, (k) => curve.area[k] > high]);
   return reasons;
 }
 
