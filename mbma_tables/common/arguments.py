@@ -18,6 +18,7 @@ from mbma_tables.core import in_blocks
 
 SHOWN = 3  # offending entries quoted in a message
 BLOCK = 1 << 16  # entries between two checks for Ctrl-C
+BLOCK_NUMBERS = 1 << 20  # intermediate numbers between two of them, 8 MB
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,6 +178,24 @@ def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: in
     """Rows computed by a loop of the core from the arguments, in their broadcast shape."""
     columns, shape = rows(*given)
     return list(filled(fill, columns, outputs, *more).reshape(outputs, *shape))
+
+
+def entry_by_entry(function: Callable[..., Any], width: int, *given: ArrayLike) -> FloatArray:
+    """Results of a function of flat arrays, computed block by block for the broadcast arguments.
+
+    Memory stays flat, and Ctrl-C takes effect between two blocks. The function needs about `width` numbers
+    for each entry; entries are the last axis of its results, which must not depend on one another.
+    """
+    columns = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
+    flat = [column.ravel() for column in columns]
+
+    def of_block(block: slice) -> FloatArray:
+        return np.asarray(function(*(column[block] for column in flat)))
+
+    # an empty array has the shape of its results, too
+    parts = in_blocks(of_block, max(flat[0].size, 1), max(BLOCK_NUMBERS // width, 1))
+    whole = np.concatenate(parts, axis=-1)
+    return np.asarray(whole.reshape((*whole.shape[:-1], *columns[0].shape)))
 
 
 def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, answered, require
+from mbma_tables.common.arguments import FloatArray, answered, entry_by_entry, require
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.core import core
@@ -162,9 +162,19 @@ class Law:
         from scipy.special import erf
 
         s = self.spectrum
-        P = erf(np.sqrt(2) * np.asarray(force, float)[..., None] / np.sqrt(s.below))
-        weights = sum(a * P**n for n, a in zip(POWERS, self.coefficients, strict=True))
-        return np.asarray(weights @ (s.x * s.variance / (4 * s.gradient)))
+        loads = np.asarray(force, float)
+        shares = s.x * s.variance / (4 * s.gradient)
+        reach = np.sqrt(2) / np.sqrt(s.below)
+
+        def of_block(part: FloatArray) -> FloatArray:
+            cover = erf(part[:, None] * reach)
+            weights = np.zeros_like(cover)
+            for power, coefficient in zip(POWERS, self.coefficients.tolist(), strict=True):
+                weights += coefficient * cover**power
+            # a sum for each load, whose order does not depend on how many there are
+            return np.asarray((weights * shares).sum(axis=-1))
+
+        return entry_by_entry(of_block, s.x.size, loads)
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor; 0 at loads that close the gap."""

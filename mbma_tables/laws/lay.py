@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, require
+from mbma_tables.common.arguments import FloatArray, entry_by_entry, require
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.laws.effective_medium import NEAREST, FlowConstants
-from mbma_tables.laws.gas import open_gaps
+from mbma_tables.laws.gas import NODES, open_gaps
 
 ROUNDS, RESOLVED = 200, 1e-11
 # root mean square of ln(medium/simulation) at 16 surfaces with gamma from 1 to 8, `python -m generate film`:
@@ -30,6 +30,8 @@ def anisotropic_medium(
     scale = np.sum(share * gap, axis=1)
     cube = (gap / scale[:, None]) ** 3
     log_k = np.zeros((2, len(share)))
+    # each entry ends by itself, so that it does not depend on the others
+    active = np.ones(len(share), dtype=bool)
     for _ in range(ROUNDS):
         factor = _depolarisation(log_k, peklenik)
         t = cube / np.exp(log_k)[..., None]
@@ -41,8 +43,9 @@ def anisotropic_medium(
         turn = by_factor * factor[0] * factor[1] / 2  # derivative of L by ln k
         (a, d), (b, c) = own + turn, -turn
         step = np.stack([miss[0] * d - b * miss[1], a * miss[1] - c * miss[0]]) / (a * d - b * c)
-        log_k -= np.clip(step, -1, 1)
-        if np.abs(step).max(initial=0.0) < RESOLVED:
+        log_k -= np.where(active, np.clip(step, -1, 1), 0.0)
+        active &= np.abs(step).max(axis=0) >= RESOLVED
+        if not active.any():
             break
     else:
         raise ConvergenceError(f"the effective medium of gaps did not converge to {RESOLVED:g} in {ROUNDS} steps")
@@ -72,15 +75,22 @@ def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowCons
     >>> ((1 - 1.5 / u**2) * ratio[:, 0]).round(4), [1 + 3 * (1 - 3 * c) / 400 for c in (0.8, 0.2)]
     (array([0.9895, 1.0029]), [0.9895, 1.003])
     """
-    held = np.minimum(area, flow.threshold - NEAREST)
-    share, gap = open_gaps(u, held, 1.0, blended=True)
-    blocked = np.where(area > 0, flow.obstructed(held), 0.0)
-    k, carried = anisotropic_medium(share, gap, blocked, np.broadcast_to(peklenik, u.shape))
-    shear = u - carried
-    if np.all(np.asarray(peklenik) == 1):
-        return np.ones_like(k), shear
-    plain, _ = anisotropic_medium(share, gap, blocked, np.ones(u.shape))
-    return k / plain, shear
+    isotropic = bool(np.all(np.asarray(peklenik) == 1))
+
+    def of_block(gaps: FloatArray, areas: FloatArray, lays: FloatArray) -> FloatArray:
+        percolating = np.minimum(areas, flow.threshold - NEAREST)
+        share, gap = open_gaps(gaps, percolating, 1.0, blended=True)
+        blocked = np.where(areas > 0, flow.obstructed(percolating), 0.0)
+        k, carried = anisotropic_medium(share, gap, blocked, lays)
+        ratio = np.ones_like(k)
+        if not isotropic:
+            plain, _ = anisotropic_medium(share, gap, blocked, np.ones(gaps.shape))
+            ratio = k / plain
+        return np.stack([ratio, gaps - carried])
+
+    # a dozen arrays of two axes for each node
+    ratio, shear = entry_by_entry(of_block, 24 * NODES, u, area, peklenik)
+    return ratio, shear
 
 
 def stress_shares(

@@ -133,8 +133,10 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
     height, slope, chance = arrays["h_rms"], arrays["m2"], arrays["probability"]
     require("probability", chance, chance < 1, "between 0 and 1")
     area = np.broadcast_to(arrays["nominal_area"], broadcast_shape(**arrays))
-    c = -np.log(chance) * (2 * math.pi) ** 1.5 * height / area * height / slope
-    least = area * c / (LEAST * math.exp(-(LEAST**2) / 2))
+    with np.errstate(over="ignore"):  # what is infinite is refused as too small an area
+        reach = -np.log(chance) * (2 * math.pi) ** 1.5 * height * height / slope
+        c = reach / area
+    least = reach / (LEAST * math.exp(-(LEAST**2) / 2))
     allowed = f"at least {float(np.max(least)):.4g}, where the highest point is at 2 h_rms"
     require("nominal_area", area, area >= least, allowed)
     x = np.sqrt(-2 * np.log(np.minimum(c, 0.5)))

@@ -128,6 +128,11 @@ class SpectralSurface(AnySurface):
         held = np.flatnonzero(C[order] > 0)
         inside = order[held[0] : held[-1] + 1] if held.size else order[:0]
         vars(self).update({name: frozen(array[inside]) for name, array in keep.items()})
+        if held.size == 1:
+            raise InputError(
+                f"the spectrum has one wavenumber, {self.q[0]:.6g}: theories need a band of them, "
+                "the largest more than 3 times the smallest"
+            )
         if held.size < 2 or not self.laws.width.size:
             raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
         numbers = {"q0": self.q[0], "q1": self.q[-1], "h_rms": math.sqrt(self.laws.moment(0))}

@@ -16,7 +16,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated_table, tested
-from mbma_tables.theories.protocol import Curve, Theory, TheoryAnswer
+from mbma_tables.theories.protocol import Curve, Theory, TheoryAnswer, unfinished
 
 if TYPE_CHECKING:
     from mbma_tables.theories.calibrated_curves import OwnLaw
@@ -164,10 +164,19 @@ class Calibrated(Theory):
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
-        if isinstance(surface, MeasuredSurface):
-            return _own_law(surface).mean_separation(quantity, np.asarray(wanted, float))
-        assert isinstance(surface, Surface)
         wanted = np.asarray(wanted, float)
+        u = self._mean_separation(surface, quantity, wanted)
+        # nearer to h_max the rounding of u is as large as what is left, and with it the force
+        rounded = (u > surface.h_max * (1 - ROUNDING)) & (wanted > 0)
+        if rounded.any():
+            raise unfinished(rounded, f"the separation at this {quantity}")
+        return u
+
+    def _mean_separation(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
+        """The same, also where u differs from h_max by rounding."""
+        if isinstance(surface, MeasuredSurface):
+            return _own_law(surface).mean_separation(quantity, wanted)
+        assert isinstance(surface, Surface)
         batch = _bound(surface, wanted)
         flat, owner, shape, own = batch.placed(wanted)
         if quantity == "area":

@@ -12,8 +12,10 @@ def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
     """k_s = 2 k1 k2/(k1 + k2) of two bodies, positive conductivities in one unit."""
     first, second = positive_array("k1", k1), positive_array("k2", k2)
     broadcast_shape(k1=first, k2=second)
+    smaller = np.minimum(first, second)
+    larger = np.maximum(first, second)
     # the smaller over the larger cannot overflow
-    return (2 / (1 / first + 1 / second))[()]
+    return (2 * (smaller / (1 + smaller / larger)))[()]
 
 
 def cooper_mikic_yovanovich(

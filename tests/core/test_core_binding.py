@@ -182,6 +182,13 @@ LONG = {
         "from mbma_tables.laws.gas import mean_inverse\nshare = np.linspace(1e-3, 0.1, u.size)",
         "mean_inverse(u, share, 0.3, 1.0)",
     ),
+    "energy": ("", "contact(one, mean_separation=u[::10], theory='persson').energy"),
+    "flow factors": (
+        "from mbma_tables.laws.effective_medium import FlowConstants\n"
+        "from mbma_tables.laws.lay import factors\n"
+        "gaps, share = u[::300], np.full(u[::300].shape, 0.02)",
+        "factors(gaps, share, 3.0, FlowConstants())",
+    ),
 }
 ASKED = """
 import signal, sys, time

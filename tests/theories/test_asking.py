@@ -189,6 +189,33 @@ def test_forces_that_no_gap_resolves_are_refused(cap):
     assert found.pressure == pytest.approx([1e-150, 1e-3], rel=1e-10)
 
 
+@pytest.mark.parametrize("height", [3.0, 9.0])
+def test_areas_that_no_gap_resolves_are_refused(height):
+    """Beside h_max, where rounding of u is as large as the depth; 9 h_rms is outside of the table."""
+    surface = Surface(0.8, 0.01, 0.64, 1.0, height)
+    with pytest.raises(ConvergenceError, match="the separation at this area was not found for 1 entries") as caught:
+        contact(surface, area=[1e-300, 1e-3], theory="calibrated")
+    assert caught.value.mask.tolist() == [True, False]
+    found = contact(surface, area=[0.0, 1e-12, 1e-3], theory="calibrated")
+    assert (np.abs(found.area - [0.0, 1e-12, 1e-3]) <= found.error * found.area).all()
+
+
+@each
+@pytest.mark.parametrize("cap", [None, 0.02])
+def test_the_bits_of_every_theory_do_not_depend_on_the_other_entries(theory, cap):
+    surface = Surface(0.8, 0.01, 0.64, 1.0, 3.0)
+    u = np.linspace(0.3, 2.9, 3001)
+    names = ["pressure", "area", "stiffness", "unloading_stiffness", "yielded", "plane_separation"]
+    names += ["energy"] if cap is None else []
+    many = contact(surface, mean_separation=u, theory=theory, hardness=cap)
+    labelled = contact(surface, mean_separation=xr.DataArray(u, dims="gap"), theory=theory, hardness=cap)
+    for k in (0, 17, 1500, 3000):
+        one = contact(surface, mean_separation=float(u[k]), theory=theory, hardness=cap)
+        for name in names:
+            value = float(getattr(one, name))
+            assert value == getattr(many, name)[k] == float(getattr(labelled, name)[k]), name
+
+
 def test_a_request_takes_few_calls_in_few_files():
     command = [sys.executable, "-m", "benchmarks.request"]
     for row in subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout.splitlines():
