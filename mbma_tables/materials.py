@@ -7,6 +7,8 @@ area, which is the pressure that counts here. A ground or polished face is harde
 micrometres: measure it if it matters. The sources of the numbers are in tables/metals.csv.
 """
 
+from __future__ import annotations
+
 import csv
 import dataclasses
 import difflib
@@ -46,7 +48,9 @@ ROCKWELL = {"HRC": (HRC, HV_OF_HRC), "HRB": (HRB, HV_OF_HRB)}
 BRINELL_LOAD = 30.0  # kgf per D^2 [mm^2] of Brinell numbers without one: steels, ISO 6506-1
 BRINELL_DIAMETERS = (0.24, 0.6)  # of indentations over that of the ball, ISO 6506-1
 # number, scale, and of Brinell numbers the ball's diameter [mm] and force [kgf]; other loads do not matter
-_SCALE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*(?:([0-9.]+)/([0-9.]+))?[0-9./]*\s*")
+_SCALE = re.compile(
+    r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*(?:([0-9]+\.?[0-9]*)/([0-9]+\.?[0-9]*))?[0-9./]*\s*"
+)
 # ranges of metals' constants: numbers outside are in another unit
 MODULI, HARDNESSES, CONDUCTIVITIES = (0.01, 2000.0), (1e-4, 150.0), (0.01, 5000.0)
 
@@ -401,7 +405,7 @@ def hardness(given: str) -> str:
 
 def _pressure_of_number(number: float, scale: str, ball: str | None, force: str | None) -> float:
     """Mean pressure [GPa] of a hardness number, of a Brinell number with diameter [mm] and force [kgf] if given."""
-    value = np.asarray(number)
+    value = finite_array("hardness", number)
     if scale.startswith("HB"):
         load = BRINELL_LOAD
         if ball is not None and force is not None:

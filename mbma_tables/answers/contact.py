@@ -1,5 +1,7 @@
 """`contact`: pressure, area and stiffness of a surface by any theory, at a given separation, pressure or area."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 from collections.abc import Sequence

@@ -1,5 +1,7 @@
 """Flow factors, asperity pressure and contact area of a rough gap, before contact and in it, for lubrication codes."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

@@ -1,5 +1,7 @@
 """Conductance and tangential stiffness of a contact: quantities that depend on constants of the bodies or of a gas."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
 from typing import Any

@@ -1,5 +1,7 @@
 """Leakage of a contact: flow coefficient with uncertainty, by a table of `laws.effective_medium`, and leakage rates."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from typing import Any

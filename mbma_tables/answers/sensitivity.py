@@ -1,5 +1,7 @@
 """Sensitivity of results to each parameter of a surface: logarithmic derivatives."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import math

@@ -1,5 +1,7 @@
 """Checks of arguments: one message per error, with the offending entries."""
 
+from __future__ import annotations
+
 import difflib
 import functools
 import importlib

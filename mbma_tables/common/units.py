@@ -242,7 +242,7 @@ def force_over_area(force: Any, area: Any, length: str | None) -> str:
     size = Units(length=length).number("nominal_area", area)
     if length is None:
         raise InputError("force needs a nominal area whose unit is known: give the surface its unit")
-    return f"{newtons / (float(size) * factor(length, 'm', power=2)):.17g} Pa"
+    return f"{newtons / (float(size) * factor(length, 'm', power=2)):.15g} Pa"
 
 
 def in_unit(surface: Any, unit: str | None) -> Any:

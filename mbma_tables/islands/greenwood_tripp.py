@@ -5,6 +5,8 @@ With heights over the summits' standard deviation sigma and radii over L = sqrt(
     d(rho) = rho^2 - X + w(rho),   p = (mu/2) F_{3/2}(d),   w = (4/pi) integral t/(t + rho) p K(k) dt
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import math

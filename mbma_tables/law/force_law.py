@@ -5,6 +5,8 @@ displacement of the half-space under p: the problem of J. A. Greenwood and J. H.
 with any law. Newton's unknown is w at the nodes of `islands.spectral`. Forces are over E*; a cylinder's are per length.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import math

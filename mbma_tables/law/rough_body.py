@@ -1,5 +1,7 @@
 """A rough sphere or cylinder on a flat: force against approach, and the profile of the mean pressure."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from collections.abc import Sequence

@@ -3,6 +3,8 @@
 Lengths are in h_rms: flow per length of seal is k h_rms^3 (p1 - p2)/(12 viscosity width).
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
 

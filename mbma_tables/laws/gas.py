@@ -1,5 +1,7 @@
 """Conductance of a gas in the gaps of a contact, by the distribution of gaps; docs/joints.md has the equations."""
 
+from __future__ import annotations
+
 import math
 from typing import Any, NamedTuple
 

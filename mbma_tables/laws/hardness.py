@@ -4,6 +4,8 @@ eta = p_m/(E* g), g the rms gradient, x = F/(p_m A0) and F in A0 E* g. Loading o
 negative gaps: points that yield are flattened.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Surfaces with a lay: flow factors by an effective medium of gaps (docs/lubrication.md), tangential stiffness."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,6 +4,8 @@ Finite volumes with the harmonic mean of h^3 at faces; mean pressure gradients a
 factorisation. Closed gaps are found by labelling connected gaps, not by a small conductance.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Closed forms of `closed_forms.toml` (docs/formula.md): the island model "formula", and total force and area."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import pathlib

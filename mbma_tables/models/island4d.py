@@ -1,5 +1,7 @@
 """The island model of the four-parameter table: F_hat and A_hat as functions of the paper's numbers, from one file."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

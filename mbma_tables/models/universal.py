@@ -1,5 +1,7 @@
 """The island model of the universal table: Phi_F and Phi_A over (X, mu)."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 
 import numpy as np

@@ -4,6 +4,8 @@ A profile along any line of an isotropic surface has its variance of height m0 a
 the gradient of the surface has 2 m2. Everything else that is assumed follows from Gaussian heights.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -4,6 +4,8 @@ Self-affine ones have heights in s = h_rms / sqrt(1 - zeta_1^(-2H)) and lengths 
 their accuracy, a band [za, zb] is given by log(za) and log(zb/za), and a place between samples by its `Place`.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any, NamedTuple
 

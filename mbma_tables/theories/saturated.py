@@ -1,5 +1,7 @@
 """Simulated maps with a hardness, for each hardness anew, and quicker simulations, the default theory of maps."""
 
+from __future__ import annotations
+
 import collections
 from collections.abc import Callable
 from typing import Any, ClassVar

@@ -1,5 +1,7 @@
 """Any theory with a hardness: its elastic result is corrected by `mbma_tables.laws.hardness`."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from collections.abc import Mapping

@@ -1,5 +1,7 @@
 """Conductivity of two bodies, and an older correlation for the conductance of their contact, thermal or electrical."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

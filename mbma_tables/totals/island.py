@@ -1,5 +1,7 @@
 """Contact islands: band, radii, densities, force and area."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from typing import Any
