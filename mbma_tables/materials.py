@@ -385,8 +385,9 @@ def hardness(given: str) -> str:
     text = str(given)
     if match := _SCALE.fullmatch(text):
         return f"{_pressure_of_number(float(match[1]), match[2], match[3], match[4]):.6g} GPa"
-    # a name such as 6061-T6 begins with a digit
-    named = not text.strip().replace(".", "").isdigit() and _words(text) in _NAMES
+    # a name such as 6061-T6 begins and ends with a digit, as a plain number does
+    plain = text.strip().replace(".", "").isdigit()
+    named = text[-1:].isdigit() and not plain and _words(text) in _NAMES
     if named or text[:1].isalpha():
         try:
             known = pair(text).hardness

@@ -149,6 +149,11 @@ def test_names_of_metals_in_other_standards_and_spellings(typed, name):
     assert materials.get(typed) == materials.get(name)
 
 
+def test_a_name_that_begins_with_a_digit_is_a_hardness_too():
+    assert materials.hardness("6061-T6") == materials.hardness("aluminium 6061 hard")
+    assert materials.hardness("304") == "304"  # a plain number, in the unit of the modulus
+
+
 def test_unknown_metals_are_answered_with_the_alike():
     with pytest.raises(InputError, match="give aluminium 1100, aluminium 6061, aluminium 7075, perhaps") as told:
         materials.get("aluminum")
