@@ -16,6 +16,7 @@ import hypothesis
 import numpy as np
 from hypothesis import strategies as st
 
+from generate.audit_routes import Question, routes_here
 from generate.boundary_elements.evidence import evidence
 from generate.files import ROOT
 from generate.page import table
@@ -29,6 +30,7 @@ RANGES = ((0.05, 1.0), (np.log(3.1), np.log(1e5)), (1.0, 32.0), (-7.0, -0.5), (3
 GAPS = 20  # of one surface
 ROUNDED = 4 * np.finfo(float).eps  # of a mean separation
 FORMATS = "{} | {:,} | {:,} | {} | {:.2g}"
+ROUTE_QUESTIONS = 150
 SMALLEST = 1e-290  # beyond, values lose digits to underflow
 
 
@@ -260,6 +262,40 @@ def failures(seed: int, scale: float) -> list[Found]:
     return [*few, last._replace(worst=longest, where=last.where or slowest)]
 
 
+def routes(seed: int, scale: float) -> list[Found]:
+    """Differences of each route from a joint's contact, over rounding or the errors that both state."""
+    rng = np.random.default_rng(seed)
+    asked_by = routes_here()
+    counts = dict.fromkeys(asked_by, 0)
+    beyond = dict.fromkeys(asked_by, 0)
+    worst = dict.fromkeys(asked_by, 0.0)
+    places = dict.fromkeys(asked_by, "")
+    refused = 0
+    for _ in range(max(int(ROUTE_QUESTIONS * scale), 1)):
+        try:
+            question = Question(rng)
+        except MbmaError:
+            refused += 1
+            continue
+        for name, route in asked_by.items():
+            # what the joint answers each route answers too: an error is one more difference
+            try:
+                ratios, where = np.concatenate(route(question)), repr(question)
+            except MbmaError as fault:
+                ratios, where = np.array([np.inf]), f"{fault}: {question!r}"
+            ratios = np.where(np.isnan(ratios), np.inf, ratios)
+            counts[name] += ratios.size
+            beyond[name] += int((ratios > 1).sum())
+            if ratios.max() > worst[name]:
+                worst[name] = float(ratios.max())
+                places[name] = where
+    rows = []
+    for name in asked_by:
+        what = f"routes: joint and {name}"
+        rows.append(Found(what, counts[name], refused, beyond[name], worst[name], places[name]))
+    return rows
+
+
 @click.command()
 @click.option("--seed", type=int, default=1, show_default=True, help="Of the random numbers.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor of the numbers of examples.")
@@ -268,7 +304,8 @@ def failures(seed: int, scale: float) -> list[Found]:
 def audit(seed: int, scale: float, only: str, write: bool) -> None:
     """Search for answers beyond their stated error, untested answers that are valid, warnings, errors and hangs."""
     checks: dict[str, Callable[[int, float], list[Found]]] = {
-        **{what: functools.partial(bound, what) for what in BOUNDS}, "valid": validity, "requests": failures,
+        **{what: functools.partial(bound, what) for what in BOUNDS}, "valid": validity,
+        "routes": routes, "requests": failures,
     }  # fmt: skip
     rows = []
     for found in itertools.chain.from_iterable(check(seed, scale) for name, check in checks.items() if only in name):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from generate import audit
+from mbma_tables import InputError
 
 
 @pytest.mark.parametrize("what", audit.BOUNDS)
@@ -34,6 +35,29 @@ def test_untested_answers_and_bad_failures_are_found(monkeypatch):
     warning, error, hang = audit.failures(1, 1e-3)
     assert all("1 / 0" not in each.where and each.beyond == 2 for each in (warning, error, hang))
     assert audit.validity(3, 0.02)[0].beyond == 0
+
+
+@pytest.mark.slow
+def test_every_route_answers_a_question_alike():
+    """Contact, texts, table, both commands, law and exported C within rounding or stated errors."""
+    for found in audit.routes(5, 0.05):
+        assert found.answers > 100
+        assert found.beyond == 0, found
+
+
+def test_a_route_that_answers_otherwise_is_counted(monkeypatch):
+    def wrong(question):
+        return question.misses({"area": np.asarray(question.answer.area) * (1 + 1e-9)})
+
+    def failing(question):
+        raise InputError("no such route")
+
+    monkeypatch.setattr(audit, "routes_here", {"wrong": wrong, "failing": failing}.copy)
+    by_wrong, by_failing = audit.routes(1, 0.01)
+    assert by_wrong.beyond == by_wrong.answers == 5
+    assert by_wrong.worst == pytest.approx(1000, rel=1e-3)
+    assert by_failing.beyond == 1
+    assert by_failing.where.startswith("no such route: ")
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc"), reason="needs /proc")
