@@ -55,6 +55,7 @@ class TestCorrected:
     @pytest.fixture(scope="class", params=[("pitted", 1, 128), ("ground", 0, 128)], ids=["pitted", "ground"])
     @staticmethod
     def part(request):
+        pytest.importorskip("tamaas")
         values = heights(Part(*request.param))
         surface = Surface.from_map(values, 1.0, periodic=True, unit="um")
         engine, pressure = Contact(values, (128.0, 128.0)), law_loads(surface, (0.07, 0.14, 0.35, 0.55))

@@ -332,6 +332,7 @@ def test_projection_is_the_nearest_allowed_field():
     "recipe", [Recipe("self_affine", 0.8, 8, 2, 1, 64), Recipe("stretched", 0.8, 8, 2, 1, 64, 4.0)]
 )
 def test_capped_boundary_elements(recipe):
+    pytest.importorskip("tamaas")
     unscaled = heights(recipe)
     surface = unscaled / bearing(unscaled, recipe.sizes).gradient
     elastic, capped = (Contact(surface, recipe.sizes, hardness=cap) for cap in (np.inf, 0.2))
