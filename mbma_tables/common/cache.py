@@ -2,14 +2,17 @@
 
 The folder is that of the platform's caches; the environment variable `MBMA_TABLES_CACHE` names another, and "off"
 turns it off. Results that cannot be read or written are computed again, without a warning.
+
+Each file ends in `SUFFIX`; files of other names in the folder are never read, counted or removed. It begins with the
+SHA-256 of what follows, arrays in numpy's compressed format, so that a damaged file is recognised before it is opened.
 """
 
 import contextlib
+import hashlib
 import io
 import os
 import pathlib
 import sys
-import zipfile
 from typing import Any
 
 import numpy as np
@@ -20,7 +23,8 @@ from mbma_tables.common.files import read_file, write_file
 
 VARIABLE = "MBMA_TABLES_CACHE"
 MAX_BYTES = 2**30  # total size of the files
-SUFFIX = ".npz"
+SUFFIX = ".mbma_tables_cache"  # no other program gives this name to its files
+DIGEST = hashlib.sha256().digest_size
 
 
 def folder() -> pathlib.Path | None:
@@ -36,22 +40,27 @@ def folder() -> pathlib.Path | None:
 
 
 def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
-    """The arrays stored under a name, of these shapes; None if there are none."""
+    """The arrays stored under a name, of these shapes; None if there are none, or the file is damaged."""
     place = folder()
     if place is None:
         return None
+    path = place / f"{name}{SUFFIX}"
     try:
-        content = read_file(place / f"{name}{SUFFIX}", MAX_BYTES)
-        with np.load(io.BytesIO(content), allow_pickle=False) as kept:
-            found: dict[str, Any] = {key: kept[key] for key in shapes}
-    # damaged file
-    except (InputError, OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        content = read_file(path, MAX_BYTES)
+    except InputError:
         return None
-    if any(found[key].shape != shape or not np.isfinite(found[key]).all() for key, shape in shapes.items()):
+    checksum, packed = content[:DIGEST], content[DIGEST:]
+    if hashlib.sha256(packed).digest() != checksum:
+        return None
+    with np.load(io.BytesIO(packed), allow_pickle=False) as archive:
+        if not shapes.keys() <= set(archive.files):
+            return None
+        arrays: dict[str, Any] = {key: archive[key] for key in shapes}
+    if any(arrays[key].shape != shape or not np.isfinite(arrays[key]).all() for key, shape in shapes.items()):
         return None
     with contextlib.suppress(OSError):
-        os.utime(place / f"{name}{SUFFIX}")
-    return found
+        os.utime(path)
+    return arrays
 
 
 def keep(name: str, **arrays: FloatArray) -> None:
@@ -59,20 +68,24 @@ def keep(name: str, **arrays: FloatArray) -> None:
     place = folder()
     if place is None:
         return
-    content = io.BytesIO()
-    np.savez_compressed(content, allow_pickle=False, **arrays)
+    packed = io.BytesIO()
+    np.savez_compressed(packed, allow_pickle=False, **arrays)
+    content = hashlib.sha256(packed.getvalue()).digest() + packed.getvalue()
     with contextlib.suppress(InputError):
-        write_file(place / f"{name}{SUFFIX}", content.getvalue(), make_folders=True)
+        write_file(place / f"{name}{SUFFIX}", content, make_folders=True)
 
 
 def files() -> list[tuple[pathlib.Path, os.stat_result]]:
     """The stored files, least recently used first."""
-    place, found = folder(), []
-    for path in place.glob(f"*{SUFFIX}") if place is not None else ():
+    place = folder()
+    if place is None:
+        return []
+    stored = []
+    for path in place.glob(f"*{SUFFIX}"):
         # another process may remove it
         with contextlib.suppress(OSError):
-            found.append((path, path.stat()))
-    return sorted(found, key=lambda entry: entry[1].st_mtime)
+            stored.append((path, path.stat()))
+    return sorted(stored, key=lambda entry: entry[1].st_mtime)
 
 
 def trim(most: int = MAX_BYTES) -> int:

@@ -229,12 +229,41 @@ class TestCache:
         cache.trim(0)
         for name, used in (("old", 100), ("new", 300), ("middle", 200)):
             cache.keep(name, values=np.random.default_rng(1).random(1000))
-            os.utime(place / f"{name}.npz", (used, used))
-        assert cache.trim(2 * (place / "old.npz").stat().st_size) == 1
+            os.utime(place / f"{name}{cache.SUFFIX}", (used, used))
+        assert cache.trim(2 * (place / f"old{cache.SUFFIX}").stat().st_size) == 1
         assert [path.stem for path, _ in cache.files()] == ["middle", "new"]
         assert cache.load("middle", values=(1000,)) is not None
         assert cache.load("middle", values=(999,)) is None
         assert [path.stem for path, _ in cache.files()] == ["new", "middle"]
+
+    def test_files_of_others_in_its_folder_are_neither_counted_nor_removed(self, place):
+        place.mkdir()
+        of_others = [place / name for name in ("measurement.npz", f"{'0' * 64}.npz", "notes.txt", "cache.npz.draft")]
+        for path in of_others:
+            path.write_bytes(b"of a user")
+        cache.keep("own", values=np.zeros(10))
+        assert len(cache.files()) == 1
+        assert cache.trim(0) == 1
+        cache.keep("own", values=np.zeros(10))
+        assert json.loads(run("cache", "--clear", "--json"))["removed"] == 1
+        assert sorted(place.iterdir()) == sorted(of_others)
+        assert {path.read_bytes() for path in of_others} == {b"of a user"}
+
+    def test_no_flipped_bit_is_an_error_or_another_number(self, place):
+        cache.keep("own", row=np.arange(7.0), gap=np.arange(30.0).reshape(5, 6))
+        path = place / f"own{cache.SUFFIX}"
+        whole = path.read_bytes()
+        for bit in range(8 * len(whole)):
+            damaged = bytearray(whole)
+            damaged[bit // 8] ^= 1 << bit % 8
+            path.write_bytes(damaged)
+            assert cache.load("own", row=(7,), gap=(5, 6)) is None
+        for length in range(len(whole)):
+            path.write_bytes(whole[:length])
+            assert cache.load("own", row=(7,), gap=(5, 6)) is None
+        path.write_bytes(whole)
+        np.testing.assert_array_equal(cache.load("own", row=(7,))["row"], np.arange(7.0))
+        assert cache.load("own", other=(7,)) is None
 
     def test_the_command_and_it_may_be_off_or_impossible(self, place, monkeypatch, tmp_path):
         cache.keep("one", values=np.zeros(10))
