@@ -24,6 +24,9 @@ MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary element
 TOLERANCE = 1e-5
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
+# loads added where the areas of two neighbours differ by more than this factor, at most so many; where an area jumps,
+# as when a plateau is reached, no two loads closer than this in ln F
+SPACING, BETWEEN, CLOSEST = 2.5, 10, 0.1
 # loads added for the flow, at most: where its logarithm falls by more than this, and where an axis closes between
 # loads further apart than this in ln F, which counts as such a fall
 FLOWS, STEEP, NARROW, CLOSING = 6, 1.2, 0.1, 3.5
@@ -98,7 +101,10 @@ class Press:
         return self._found[load]
 
     def loads(self, wanted: FloatArray, more: bool) -> tuple[FloatArray, FloatArray]:
-        """Loads, and rows of `quantities` at them, rising; `more` are added until contact is covered far enough."""
+        """Loads, and rows of `quantities` at them, rising.
+
+        `more` are added until contact is covered far enough, and where it grows too much from load to load.
+        """
         found: dict[float, FloatArray] = {}
 
         def add(load: float) -> None:
@@ -116,6 +122,11 @@ class Press:
                         add(low * LIGHTER)
                 if found[high][0] < HIGHEST and high * HEAVIER < self._cap * self.gradient:
                     add(high * HEAVIER)
+            for _ in range(BETWEEN if more else 0):
+                between = _widest(np.array(sorted(found)), np.array([found[load][0] for load in sorted(found)]))
+                if between is None:
+                    break
+                add(between)
         cache.trim()
         return np.array(sorted(found)), np.array([found[load] for load in sorted(found)]).T
 
@@ -161,6 +172,18 @@ class Press:
         at = np.array(sorted(found))
         cache.trim()
         return separation(at), np.array([found[own] for own in at.tolist()])
+
+
+def _widest(force: FloatArray, area: FloatArray) -> float | None:
+    """The load in the middle, in ln F, of the neighbours whose areas differ most; None if they are close enough."""
+    ratio = area[1:] / area[:-1]
+    # lighter and heavier contacts than those that the loads reach are not valid
+    inside = (area[1:] > LOWEST) & (area[:-1] < HIGHEST) & (np.diff(np.log(force)) > 2 * CLOSEST)
+    ratio = np.where(inside, ratio, 0.0)
+    widest = int(ratio.argmax())
+    if ratio[widest] <= SPACING:
+        return None
+    return float(np.sqrt(force[widest] * force[widest + 1]))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

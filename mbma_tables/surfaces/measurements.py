@@ -19,6 +19,9 @@ from mbma_tables.common.units import factor, known
 
 LISTS = (2, 3)  # columns of a list of points, as opposed to a matrix of heights
 MAX_TEXT_BYTES, MAX_HEADER_BYTES = 256 * 2**20, 2**14
+TEXTS = (".csv", ".txt", ".asc", ".xyz")  # names of files that hold numbers as text
+CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # bytes that no text has
+INFINITE = re.compile(rb"(?i)(?<![a-z])inf(inity)?(?![a-z])")
 MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: their fourth powers, as in C, neither overflow nor underflow
 
 
@@ -36,50 +39,144 @@ def read_measurement(
     unit: str | None = None,
     channel: int | None = None,
 ) -> Any:
-    """The topography or line scan in a file: any format of SurfaceTopography, and text with commas; "-" is stdin.
+    """The topography or line scan in a file: any format of SurfaceTopography, and text; "-" is stdin.
 
     Sampling steps, in `unit`, are of files that have none, and so is the unit. A list of points may name units in the
-    header of its columns, like "x [um]". Rows of a matrix without lengths are x, as those of an array.
+    header of its columns, like "x [um]". Rows of a matrix without lengths are x, as those of an array. Numbers of a
+    text are separated by semicolons, tabs, blanks or commas; a comma is a decimal mark where another separator is used.
     """
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"
     if not piped and not os.path.isfile(place):
         raise InputError(f"there is no file {os.fspath(path)!r}{': it is a folder' if os.path.isdir(place) else ''}")
+    suffix = place.suffix.lower()
     with warnings.catch_warnings():
         # its readers warn of faults that they correct
         warnings.simplefilter("ignore")
         try:
             # opened here, because its readers leave unreadable files open
             with io.BytesIO(sys.stdin.buffer.read()) if piped else open(place, "rb") as stream:
-                named = _units_of_header(stream.read(MAX_HEADER_BYTES))
+                start = stream.read(MAX_HEADER_BYTES)
+                if suffix in TEXTS and CONTROL.search(start):
+                    # a binary format would be recognised in nearly any bytes
+                    raise InputError(f"{place.name} is no text, as its name says: rename it to its own format")
+                named = _units_of_header(start)
                 stream.seek(0)
                 with module.open_topography(stream) as reader:
-                    return _channel_of(reader, place, dx, dy, unit, channel, named)
+                    topography = _channel_of(reader, place, dx, dy, unit, channel, named)
+                    _refuse_infinite(reader, stream, place.name)
+                    return topography
         except MbmaError:
             raise
         # its readers pass on any exception of their parsers
         except Exception as fault:
             reason = str(fault).strip().splitlines() or [type(fault).__name__]
-            if place.suffix.lower() == ".csv":
-                with module.open_topography(io.BytesIO(_without_commas(place))) as reader:
-                    return _channel_of(reader, place, dx, dy, unit, channel, named)
             name = type(fault).__name__
             why = "no reader supports its format" if name == "CannotDetectFileFormat" else f"{name}: {reason[0]}"
-            raise InputError(f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}") from None
+        if suffix in TEXTS:
+            with module.open_topography(io.BytesIO(_plain_matrix(place, why))) as reader:
+                return _channel_of(reader, place, dx, dy, unit, channel, named)
+        raise InputError(f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}")
 
 
-def _without_commas(path: pathlib.Path) -> bytes:
-    """A matrix of numbers with commas or semicolons, converted to that library's plain text."""
+def _refuse_infinite(reader: Any, stream: Any, name: str) -> None:
+    """Raise an error for infinite heights, which these readers take as undefined."""
+    kind = type(reader).__name__
+    infinite = False
+    if kind == "NPYReader":
+        stream.seek(0)
+        infinite = bool(np.isinf(np.load(stream, allow_pickle=False)).any())
+    elif kind == "AscReader":
+        stream.seek(0)
+        infinite = any(INFINITE.search(line) for line in stream if not line.lstrip().startswith(b"#"))
+    if infinite:
+        raise InputError(f"{name} holds infinite heights: write NaN where a height is undefined")
+
+
+def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
+    """A matrix of numbers with any separator and decimal mark, converted to that library's plain text.
+
+    `why` says what that library found wrong with the file.
+    """
     try:
-        lines = read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig").replace(";", ",").splitlines()
-        numbers = numbers_of(lines, ",")
-    except (UnicodeDecodeError, InputError) as fault:
-        why = fault if isinstance(fault, InputError) else "it is no text"
-        raise InputError(f"{path.name} must hold numbers with commas between them: {why}") from None
+        text = read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path.name} cannot be read as a map: it is no text in UTF-8") from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    rows = _separated(lines, path.name)
+    try:
+        numbers = numbers_of([" ".join(row) for row in rows], None)
+    except InputError as fault:
+        raise InputError(
+            f"{path.name} cannot be read as a map ({why}): it must hold numbers with one separator between them, "
+            f"semicolons, tabs, blanks or commas: {fault}"
+        ) from None
+    if np.isinf(numbers).any():
+        raise InputError(f"{path.name} holds infinite heights: write NaN where a height is undefined")
     content = io.BytesIO()
     np.savetxt(content, numbers)
     content.seek(0)
     return content.getvalue()
+
+
+def _separated(lines: Sequence[str], name: str) -> list[list[str]]:
+    """The numbers of each line as text with decimal points.
+
+    The separator is the first of semicolon, tab, comma with a blank, blank, comma that occurs. Beside another
+    separator a comma is the decimal mark.
+    """
+    text = "\n".join(lines)
+    points = "." in text
+    if ";" in text:
+        separator = r"\s*;\s*"
+    elif "\t" in text:
+        separator = r"\s*\t\s*"
+    elif points and "," in text:
+        separator = r"\s*,\s*"
+    elif re.search(r",[ ]", text):
+        separator = r"\s*,\s+"
+    elif re.search(r"\S[ ]+\S", text):
+        separator = r"\s+"
+    else:
+        separator = ","
+    rows = []
+    for line in lines:
+        numbers = re.split(separator, line.strip())
+        # some programs end each row with a separator
+        rows.append(numbers[:-1] if numbers[-1] == "" else numbers)
+    if separator == ",":
+        _refuse_ambiguous(rows, name)
+    every = [number for row in rows for number in row]
+    if any("," in number for number in every):
+        if points or any(number.count(",") > 1 for number in every):
+            raise InputError(
+                f"{name} has commas inside numbers that also hold points, or several commas: write decimal points, "
+                "and no separators of thousands"
+            )
+        rows = [[number.replace(",", ".") for number in row] for row in rows]
+    return rows
+
+
+def _refuse_ambiguous(rows: Sequence[Sequence[str]], name: str) -> None:
+    """Raise an error for whole numbers between commas that may be numbers with decimal commas.
+
+    Every second one of these is a fraction: it has no sign, and either zeros in front, which no whole number has, or
+    always the same number of digits, unlike the whole numbers.
+    """
+    if any(len(row) % 2 for row in rows):
+        return
+    fractions = [number for row in rows for number in row[1::2]]
+    wholes = [number for row in rows for number in row[::2]]
+    if not fractions or not all(number.isdigit() for number in fractions):
+        return
+    widths = {len(number) for number in fractions}
+    padded = any(len(number) > 1 and number.startswith("0") for number in fractions)
+    alike = len(widths) == 1 and (widths == {1} or {len(number.lstrip("+-")) for number in wholes} != widths)
+    if padded or alike:
+        raise InputError(
+            f"{name} has commas only: it cannot be told whether they separate numbers or are decimal commas. Write "
+            "decimal points, or semicolons between the numbers"
+        )
 
 
 def _units_of_header(content: bytes) -> list[str]:

@@ -268,9 +268,58 @@ class TestReading:
         np.save(tmp_path / "a.npy", heights)
         assert read_measurement(tmp_path / "a.npy", dx=STEP).unit is None
 
+    @pytest.mark.parametrize("suffix", [".csv", ".txt", ".asc"])
+    @pytest.mark.parametrize("separator", [";", "; ", "\t", " ", ", "])
+    @pytest.mark.parametrize("mark", [".", ","])
+    def test_every_separator_with_both_decimal_marks(self, tmp_path, suffix, separator, mark):
+        values = np.round(10 * waves(shape=(40, 36)), 3)
+        path = tmp_path / f"a{suffix}"
+        rows = [separator.join(f"{value:.3f}".replace(".", mark) for value in row) for row in values]
+        path.write_text("\n".join(rows))
+        np.testing.assert_array_equal(read_measurement(path, dx=1.0, unit="um").heights(), values)
+
+    @pytest.mark.parametrize("digits", [1, 2, 3])
+    def test_commas_that_may_be_decimal_are_refused(self, tmp_path, digits):
+        values = 7 + waves(shape=(40, 36))
+        rows = [",".join(f"{value:.{digits}f}".replace(".", ",") for value in row) for row in values]
+        (tmp_path / "a.csv").write_text("\n".join(rows))
+        with pytest.raises(InputError, match="separate numbers or are decimal commas. Write decimal points"):
+            read_measurement(tmp_path / "a.csv", dx=1.0)
+
+    def test_whole_numbers_between_commas(self, tmp_path):
+        values = np.rint(20000 + 3000 * waves(shape=(40, 36)))
+        for offset in (0, 20000):
+            np.savetxt(tmp_path / "a.csv", values - offset, delimiter=",", fmt="%d")
+            np.testing.assert_array_equal(read_measurement(tmp_path / "a.csv", dx=1.0).heights(), values - offset)
+
+    def test_two_decimal_marks_are_refused(self, tmp_path):
+        (tmp_path / "a.csv").write_text("1,5;2.5\n" * 40)
+        with pytest.raises(InputError, match="commas inside numbers that also hold points"):
+            read_measurement(tmp_path / "a.csv", dx=1.0)
+
+    @pytest.mark.parametrize("suffix", [".npy", ".txt", ".csv"])
+    def test_infinite_heights_are_refused_as_in_an_array(self, tmp_path, suffix):
+        values = MAP.copy()
+        values[3, 4] = np.inf
+        path = tmp_path / f"a{suffix}"
+        if suffix == ".npy":
+            np.save(path, values)
+        else:
+            np.savetxt(path, values, delimiter=";" if suffix == ".csv" else " ")
+        with pytest.raises(InputError, match="finite"):
+            Surface.from_map(path, STEP)
+        with pytest.raises(InputError, match="finite"):
+            Surface.from_map(values, STEP)
+
+    @pytest.mark.parametrize("seed", range(5))
+    def test_random_bytes_are_no_text(self, tmp_path, seed):
+        (tmp_path / "a.csv").write_bytes(np.random.default_rng(seed).bytes(5000))
+        with pytest.raises(InputError, match="is no text"):
+            Surface.from_map(tmp_path / "a.csv", STEP)
+
     def test_a_csv_of_words(self, tmp_path):
         (tmp_path / "w.csv").write_text("1,2,3,4,5\na,b,c,d,e\n")
-        with pytest.raises(InputError, match="must hold numbers with commas"):
+        with pytest.raises(InputError, match="must hold numbers with one separator"):
             read_measurement(tmp_path / "w.csv")
 
 
