@@ -38,6 +38,15 @@ QUANTITIES = ("area", "mean_separation", "energy")
 YIELDING = (*QUANTITIES, "plane_separation", "area_yielded", "frozen_stiffness", "pressure_weighted_height")
 
 
+def resolving(shortest: float, step: float, unit: str | None) -> str:
+    """The option of `Surface.from_map` that leaves wavelengths of enough sampling steps; empty if they are."""
+    if shortest >= MIN_POINTS * step * (1 - ROUNDING):
+        return ""
+    # a little longer, so that four digits are enough
+    wavelength = f"{1.001 * MIN_POINTS * step:.4g}"
+    return f"short_cutoff='{wavelength} {unit}'" if unit else f"short_cutoff={wavelength}"
+
+
 def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> FloatArray:
     """A map on half as many points along each axis, by its waves of at least `points` of the new sampling steps."""
     from scipy.signal import resample

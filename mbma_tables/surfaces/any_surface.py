@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -40,6 +40,15 @@ MEANINGS = {
 }
 
 
+def _doubts(provenance: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Texts "not_valid" of the records of a surface, and of those that it was combined or averaged from."""
+    for record in provenance:
+        if "not_valid" in record:
+            yield record["not_valid"]
+        for part in record.get("of", ()):
+            yield from _doubts(part)
+
+
 class AnySurface(Displayed, abc.ABC):
     """A rough surface, or a batch of them: the interface that theories and their users need."""
 
@@ -67,7 +76,12 @@ class AnySurface(Displayed, abc.ABC):
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
         """Reasons why it is neither the isotropic Gaussian surface of theories nor similar to those simulated."""
-        return ()
+        return self.doubts
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons why its measurement may not represent the surface, whatever the theory; each with a remedy."""
+        return tuple(dict.fromkeys(_doubts(self.provenance)))
 
     def with_numbers(self, *numbers: Any) -> Self:
         """The same kind of surface with other `parameters`, in their order."""

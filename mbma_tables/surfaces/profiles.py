@@ -7,6 +7,7 @@ height and gradient.
 """
 
 import dataclasses
+import itertools
 import math
 from typing import Any
 
@@ -21,11 +22,16 @@ from mbma_tables.surfaces.treatment import MIN_POWER, Treated
 
 PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # panels between two nodes
+BLOCK = 10_000  # wavenumbers whose panels are in memory at a time: 40 MB, 0.1 s
 STRAIGHT = 1.0  # standard deviation of the change of slope, d ln C/d ln q, from node to node
 HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
 END = 1e-3  # share of the squared gradient in the wavelengths above the surface's last
 LONGEST, ROLLED_OFF = 4, 0.5  # longest wavelengths of a trace: with half of the variance there is no roll-off
 MIN_NODES = 5
+ONE_TRACE = (
+    "one trace cannot tell lay, heights and gradient of a surface as well as the stated scatter: measure a map, "
+    "Surface.from_map(map)"
+)
 
 
 def measured_profile(treated: Treated) -> SpectralSurface:
@@ -44,8 +50,7 @@ def measured_profile(treated: Treated) -> SpectralSurface:
     # panels between nodes, evenly spaced in ln q
     place = np.arange(PANELS * (edges.size - 1) + 1) / PANELS
     fine = np.exp(np.interp(place, np.arange(edges.size), np.log(edges)))
-    sides = 4 * np.pi * np.sqrt(np.maximum(fine**2 - q[:, None] ** 2, 0))
-    kernel = np.add.reduceat(np.diff(sides, axis=1), np.searchsorted(number, np.arange(count.size)), axis=0)
+    kernel = _panel_sums(fine, q, np.searchsorted(number, np.arange(count.size)))
     mean, squares = np.bincount(number, C) / count, (h_rms**2, gradient**2)
     nodes = _isotropic(edges, fine, mean, count / overlap, kernel / count[:, None], squares)
     longest, notes = float(C[:LONGEST].sum() / C.sum()), _limits(length * gradient / h_rms)
@@ -70,6 +75,19 @@ def measured_profile(treated: Treated) -> SpectralSurface:
     own, samples = PowerLaws(edges, nodes).at(q), np.interp(np.log(q), np.log(edges[:-1]), count / overlap)
     surface = SpectralSurface(q, own, heights=heights, samples=samples).scaled(scale, treated.unit)
     return dataclasses.replace(surface, provenance=treated.history(found, *notes))
+
+
+def _panel_sums(fine: FloatArray, q: FloatArray, starts: Any) -> FloatArray:
+    """C_1D for C = 1 on each panel, summed over the wavenumbers of each bin; bins begin at `starts`."""
+    sums = np.zeros((starts.size, fine.size - 1))
+    for bin_, (start, stop) in enumerate(itertools.pairwise([*starts.tolist(), q.size])):
+        # a wave appears at lower wavenumbers only: panels below the bin have no share
+        lowest = max(int(np.searchsorted(fine, q[start])) - 1, 0)
+        for first in range(start, stop, BLOCK):
+            block = q[first : min(first + BLOCK, stop), None]
+            sides = 4 * np.pi * np.sqrt(np.maximum(fine[lowest:] ** 2 - block**2, 0))
+            sums[bin_, lowest:] += np.diff(sides, axis=1).sum(axis=0)
+    return sums
 
 
 def _components(trace: Treated, step: float, low: float) -> tuple[FloatArray, FloatArray]:
@@ -148,4 +166,4 @@ def _limits(waves: float) -> tuple[dict[str, Any], ...]:
         "one trace cannot tell anisotropy: across a lay the gradient is up to sqrt(2) times too large, along it too "
         f"small. Its highest point is a line's: a Gaussian square of its length reaches about {level:.1f} h_rms"
     )
-    return ({"step": "unseen", "h_max": level, "told": told},)
+    return ({"step": "unseen", "h_max": level, "told": told, "not_valid": ONE_TRACE},)

@@ -45,6 +45,8 @@ WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers 
 SAME_LAW = 0.01  # largest deviation of ln C from one power law for which a spectrum counts as self-affine
 FINE = 1.02  # ratio of wavenumbers in a sum of spectra, which deviates from power laws between them by at most 1e-4
 NO_POWER = 1e-3  # share of the squared gradient beyond the last wavelengths that count
+# the same for boundary elements: rounding to single precision, or to the 16 bits of an instrument, is 1e-13 or 1e-7
+ROUNDED = 1e-6
 SIDE = 1e-12  # beside a wavenumber, relative
 NO_MAP: dict[str, Any] = {"bearing": None, "bands": None, "map": None, "table": None, "scans": ()}
 
@@ -203,7 +205,7 @@ class SpectralSurface(AnySurface):
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
         """Reasons why it is unlike the surfaces compared with BEM, as a map or as an isotropic Gaussian one."""
-        return self.outside(BY_MAP if by_map else BY_SPECTRUM, by_map)
+        return (*self.doubts, *self.outside(BY_MAP if by_map else BY_SPECTRUM, by_map))
 
     def outside(self, tested: Mapping[str, tuple[float, float]], by_map: bool = False) -> tuple[str, ...]:
         """Statistics that lie outside tested ranges, and the remedy."""
@@ -212,16 +214,18 @@ class SpectralSurface(AnySurface):
             known["kurtosis of slopes"] = self.bearing.slope_kurtosis
         if self.anisotropy is not None:
             known["anisotropy"] = self.anisotropy
-        beyond = "beyond, only 'calibrated' by a map was tested"
-        mend = "theory='simulated' simulates the map" if by_map else beyond
-        if by_map and self.map is not None:
-            from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING
+        remedy = "beyond, only 'calibrated' by a map was tested"
+        if by_map and self.scans:
+            remedy = "contact(surface.scans[0], ..., theory='simulated') simulates one scan"
+        elif by_map:
+            remedy = "theory='simulated' simulates the map"
+            if self.map is not None:
+                from mbma_tables.laws.pressing import resolving
 
-            resolved = MIN_POINTS * max(self.map.steps)
-            if 2 * np.pi / self.q1 < resolved * (1 - ROUNDING):
-                mend += f" with a short_cutoff of {resolved:.4g}"
+                cutoff = resolving(self.shortest(ROUNDED), max(self.map.steps), self.unit)
+                remedy += f" of Surface.from_map(..., {cutoff})" if cutoff else ""
         return tuple(
-            f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
+            f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {remedy}"
             for name, (low, high) in tested.items()
             if name in known and not low <= known[name] <= high
         )
@@ -303,17 +307,22 @@ class SpectralSurface(AnySurface):
 
     def resolved(self) -> Self:
         """The same measured surface, with a record of the influence of its shortest octave of wavelengths."""
-        laws, q = self.laws, self.q
-        below = laws.below(2, laws.place(q))
+        unit = f" {self.unit}" if self.unit else ""
         # the map may be sampled more finely than its shortest wavelength
-        end = float(q[np.argmax(below >= (1 - NO_POWER) * below[-1])])
-        before = float(laws.below(2, laws.place(np.asarray(end / 2))))
-        factor = math.sqrt(laws.moment(2) / before) if before > 0 else math.inf
-        shortest, unit = 2 * math.pi / end, f" {self.unit}" if self.unit else ""
-        finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
+        shortest, sampled = self.shortest(NO_POWER), 2 * math.pi / float(self.q[-1])
+        before = float(self.laws.below(2, self.laws.place(np.asarray(math.pi / shortest))))
+        gradient = math.sqrt(before / float(self.laws.moment(2)))
+        finer = f" (sampled to {sampled:.4g}{unit}, without power there)" if sampled < shortest else ""
         told = (
             f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the "
-            f"last octave of them area at light load would be {factor:.2f} times larger"
+            f"last octave of them the rms gradient would be {gradient:.2f} times as large"
         )
-        record = {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
+        if self.map is not None:
+            told += f"; a simulation with short_cutoff={2 * shortest:.4g} gives the area without them"
+        record = {"step": "resolution", "shortest": shortest, "gradient_without_last_octave": gradient, "told": told}
         return dataclasses.replace(self, provenance=(*self.provenance, record))
+
+    def shortest(self, without: float) -> float:
+        """Wavelength [length] below which lies at most this share of the squared gradient."""
+        below = self.laws.below(2, self.laws.place(self.q))
+        return 2 * math.pi / float(self.q[np.argmax(below >= (1 - without) * below[-1])])

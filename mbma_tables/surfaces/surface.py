@@ -16,6 +16,11 @@ from mbma_tables.surfaces.self_affine import SelfAffine
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
 
+UNNAMED = (
+    "the convention of the spectrum is not named: give Surface.from_spectrum(..., convention='paper') if h_rms^2 is "
+    "2 pi integral C q dq, or convention='isotropic' if it is integral C q dq/(2 pi), as of most programs"
+)
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Surface(SelfAffine):
@@ -68,7 +73,7 @@ class Surface(SelfAffine):
         h_max: float | None = None,
         nominal_area: float | str | None = None,
         heights: ArrayLike | None = None,
-        convention: str = "paper",
+        convention: str | None = None,
         unit: str | None = None,
         model: str = "measured",
         band: tuple[float, float] | None = None,
@@ -87,7 +92,9 @@ class Surface(SelfAffine):
             Heights measured anywhere on the surface [length], of any shape; their mean is subtracted. Default: a
             Gaussian distribution that ends at h_max.
         convention : {"paper", "isotropic"}, optional
-            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi).
+            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi). If it is not named, that of the
+            paper is taken, and results are not `valid`. The one-dimensional spectrum of a trace [length^3] is neither:
+            `from_profile` takes the trace.
         model : {"measured", "self-affine"}, optional
             The spectrum itself, or the five numbers of its `MeasuredSurface.fit(band)`.
         band : tuple of float, optional
@@ -107,18 +114,23 @@ class Surface(SelfAffine):
         >>> import numpy as np
         >>> from mbma_tables import Surface
         >>> q = np.geomspace(1, 100, 40)
-        >>> surface = Surface.from_spectrum(q, 1e-3 * q**-3.4, h_max=0.3)
+        >>> surface = Surface.from_spectrum(q, 1e-3 * q**-3.4, h_max=0.3, convention="paper")
         >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}, alpha = {surface.alpha:.1f}")
         h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
         """
-        if convention not in ("paper", "isotropic"):
-            raise InputError(f"convention must be 'paper' or 'isotropic', got {convention!r}")
+        if convention not in (None, "paper", "isotropic"):
+            raise InputError(
+                "convention must be 'paper' or 'isotropic' (of a trace, give the trace to Surface.from_profile), "
+                f"got {convention!r}"
+            )
         if np.ma.is_masked(C) and np.shape(q) == np.shape(C):
             shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
             q, C = np.asarray(q)[shown], np.asarray(C)[shown]
         known = None if heights is None else Heights.of(heights)
-        own = finite_array("C", C) * (1.0 if convention == "paper" else 1 / (4 * math.pi**2))
-        return _modelled(MeasuredSurface(q, own, h_max, known, unit=unit, nominal_area=nominal_area), model, band)
+        own = finite_array("C", C) * (1 / (4 * math.pi**2) if convention == "isotropic" else 1.0)
+        unnamed = () if convention else ({"step": "convention", "not_valid": UNNAMED},)
+        surface = MeasuredSurface(q, own, h_max, known, unit=unit, provenance=unnamed, nominal_area=nominal_area)
+        return _modelled(surface, model, band)
 
     @classmethod
     @hinted

@@ -15,6 +15,7 @@ from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, Table, coarser
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.spectral import ROUNDED
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.tablefiles.netcdf import OWN_REMEDY, read_own, write_own
@@ -50,8 +51,8 @@ def sides(treated: Treated) -> tuple[float, float]:
 
 
 def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
-    """Sampling steps along the shortest wavelength of a map."""
-    return 2 * np.pi / float(surface.q1) / max(whole.steps)
+    """Sampling steps along the shortest wavelength of a map, but for rounding of its heights."""
+    return surface.shortest(ROUNDED) / max(whole.steps)
 
 
 def reduced(values: FloatArray, points: float, mirrored: bool) -> tuple[FloatArray, float, float]:

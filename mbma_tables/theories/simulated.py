@@ -15,7 +15,17 @@ from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared_property
 from mbma_tables.laws.energy_spline import LoadCurve
-from mbma_tables.laws.pressing import AREA_OF_FLOW, HIGHEST, LOWEST, MIN_POINTS, ROUNDING, TOLERANCE, Press, Table
+from mbma_tables.laws.pressing import (
+    AREA_OF_FLOW,
+    HIGHEST,
+    LOWEST,
+    MIN_POINTS,
+    ROUNDING,
+    TOLERANCE,
+    Press,
+    Table,
+    resolving,
+)
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import own_map
@@ -69,6 +79,7 @@ class BoundaryElements(Theory):
     of_yielded_gaps = False  # whether its flow is that of gaps that yielded
     areas: tuple[float, ...] = own_map.AREAS  # by the law of the map, at its loads
     tolerance, tested = TOLERANCE, (LOWEST, HIGHEST)  # of boundary elements; A/A0
+    remedies = "", ""  # for lighter and for heavier contacts
     # standard deviations against contact on the full grid at tolerance 1e-6, at `TESTED_AREAS`, which lie between the
     # loads, of a map of typical sensitivity: the larger of the 70% and half of the 97.5% quantile of the errors
     scatters: ClassVar[dict[str, tuple[float, ...]]] = {
@@ -108,16 +119,19 @@ class BoundaryElements(Theory):
         assert isinstance(surface, MeasuredSurface)
         steps, mirrored = own_map.steps_along(surface, whole), not whole.periodic
         values, points, cut = own_map.reduced(whole.heights - whole.heights.mean(), steps, mirrored)
-        given = values, own_map.sides(whole), own_law(surface).gradient
-        settings: Any = {"mirrored": mirrored, "left_out": cut * max(whole.steps)}
-        press = Press(*given, cls.tolerance, **settings)
+        press = Press(
+            values,
+            own_map.sides(whole),
+            own_law(surface).gradient,
+            cls.tolerance,
+            mirrored,
+            left_out=cut * max(whole.steps),
+        )
         force, rows = press.loads(own_map.law_loads(surface, cls.areas), True)
-        # flow by the accurate gaps
-        gaps = press if cls.tolerance == TOLERANCE else Press(*given, **settings)
         digest = hashlib.sha256(np.ascontiguousarray(whole.heights, "<f8").tobytes()).hexdigest()[:16]
         own = f"of the map of {' x '.join(map(str, whole.heights.shape))} points with SHA-256 {digest}"
         origin = f"boundary elements, tolerance {cls.tolerance:g}, {own}"
-        return cls(surface, np.array([force, *rows]), points, gaps, origin)
+        return cls(surface, np.array([force, *rows]), points, press, origin)
 
     def to_netcdf(self, path: os.PathLike[str] | str) -> None:
         """Write a table that opens without the map; a file that cannot be written is a `TableFileError`."""
@@ -138,8 +152,8 @@ class BoundaryElements(Theory):
         return saturated.Saturated(self, yielding.hardness)  # type: ignore[no-any-return]
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """None: the theory is of this map."""
-        return ()
+        """What is doubtful about the measurement; the theory is of this map, whatever its statistics."""
+        return surface.doubts
 
     def bends(self, surface: AnySurface) -> FloatArray:
         """Mean separations [length] of the first and the last load."""
@@ -169,13 +183,18 @@ class BoundaryElements(Theory):
     def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         area, left_out = answer.area, self.pressed.left_out
         coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
-        coarse += f": give a short_cutoff of {MIN_POINTS:g} steps"
+        whole = self.surface.map
+        if whole is None:
+            coarse += f": simulate it again with a short_cutoff of {MIN_POINTS:g} steps"
+        else:
+            cutoff = resolving(self.points * max(whole.steps), max(whole.steps), self.surface.unit)
+            coarse += f": give Surface.from_map(..., {cutoff})"
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         return {
             coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
             cut: np.full(area.shape, left_out > 0),
-            f"A/A0 is below {self.tested[0]:g}": (area < self.tested[0]) & (area > 0),
-            f"A/A0 is above {self.tested[1]:g}": area > self.tested[1],
+            f"A/A0 is below {self.tested[0]:g}{self.remedies[0]}": (area < self.tested[0]) & (area > 0),
+            f"A/A0 is above {self.tested[1]:g}{self.remedies[1]}": area > self.tested[1],
         }
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:

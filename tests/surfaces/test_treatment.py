@@ -112,7 +112,7 @@ class TestCutoff:
         assert entry["of_variance"] == pytest.approx(1 - after[0] / before[0], rel=1e-9)
         assert entry["of_gradient"] == pytest.approx(1 - after[1] / before[1], rel=1e-9)
         assert 0.1 < entry["of_gradient"] < 0.9
-        assert f"area at light load is {math.sqrt(before[1] / after[1]):.2f} times" in entry["told"]
+        assert f"the rms gradient is {math.sqrt(after[1] / before[1]):.2f} times" in entry["told"]
         assert cut.waves == (0.0, pytest.approx(2 * np.pi * 6.5 / SIDE))
 
     def test_periodic_waves_are_those_of_the_library(self):
@@ -157,7 +157,7 @@ class TestFilters:
         noise = 0.1 * np.random.default_rng(1).standard_normal((64, 64))
         own = Surface.from_map(noise, 1.0, periodic=True, unit="um", s_filter="10 um")
         assert "an S-filter at 10 um removes" in told(own, "s_filter")
-        assert "times larger than without" in told(own, "s_filter")
+        assert "times that without" in told(own, "s_filter")
         assert 2 * np.pi / float(own.q1) == pytest.approx(0.388 * 10, rel=0.1)
 
 
@@ -283,7 +283,7 @@ class TestReading:
         values = 7 + waves(shape=(40, 36))
         rows = [",".join(f"{value:.{digits}f}".replace(".", ",") for value in row) for row in values]
         (tmp_path / "a.csv").write_text("\n".join(rows))
-        with pytest.raises(InputError, match="separate numbers or are decimal commas. Write decimal points"):
+        with pytest.raises(InputError, match=r"are decimal commas\. Write decimal points"):
             read_measurement(tmp_path / "a.csv", dx=1.0)
 
     def test_whole_numbers_between_commas(self, tmp_path):

@@ -1,0 +1,167 @@
+"""Measurements that may not represent their surface: results are not valid, and the stated remedy works."""
+
+import re
+
+import numpy as np
+import pytest
+from helpers import topographies
+
+from generate.machined.makers import FAMILIES, Part, heights
+from mbma_tables import Surface, contact
+from mbma_tables.surfaces.averages import average
+
+topographies()
+
+PART = Part("eroded", 1, 64)
+MAP = heights(PART)
+
+
+def asked(surface, theory="corrected", area=0.1):
+    return contact(surface, area=area, theory=theory)
+
+
+def of(values, **options):
+    return Surface.from_map(values, 1.0, periodic=True, **options)
+
+
+def with_spikes(share, seed=0):
+    """The map with points of both signs, three standard deviations away."""
+    rng = np.random.default_rng(seed)
+    chosen = rng.random(MAP.shape) < share
+    chosen[30, 30] = True
+    return MAP + np.where(chosen, rng.choice([-3.0, 3.0], MAP.shape) * MAP.std(), 0.0), chosen
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_machined_surfaces_raise_no_doubt(family):
+    assert of(heights(Part(family, 1, 64))).doubts == ()
+
+
+class TestSpikes:
+    @pytest.mark.parametrize("share", [0.0, 0.001, 0.006, 0.02])
+    @pytest.mark.parametrize("theory", ["corrected", "calibrated"])
+    def test_results_are_not_valid_until_they_are_removed(self, share, theory):
+        spoilt, _ = with_spikes(share)
+        found = asked(of(spoilt), theory)
+        assert not found.valid
+        reason = next(text for text in found.reasons if "spikes" in text)
+        assert re.search(r"\(\.\.\., (outliers=10)\)", reason)
+
+    @pytest.mark.parametrize("share", [0.0, 0.006, 0.02])
+    def test_the_remedy_removes_them_and_little_else(self, share):
+        spoilt, chosen = with_spikes(share)
+        mended = of(spoilt, outliers=10)
+        removed = next(entry["points"] for entry in mended.provenance if entry["step"] == "outliers")
+        assert removed == pytest.approx(chosen.sum(), abs=2)
+        assert not any("spikes" in text for text in mended.doubts)
+        assert asked(mended).pressure == pytest.approx(asked(of(MAP)).pressure, rel=0.02)
+
+    def test_the_edge_of_a_pillar_is_none(self):
+        pillar = 0.1 * heights(Part("gaussian", 1, 64))
+        pillar[20:30, 20:30] += 5.0
+        assert of(pillar).doubts == ()
+
+
+class TestHoles:
+    @pytest.mark.parametrize(("count", "valid"), [(4, True), (40, False)])
+    def test_more_than_a_thousandth_filled_is_not_valid(self, count, valid):
+        holed = MAP.copy()
+        holed.ravel()[np.random.default_rng(1).choice(MAP.size, count, replace=False)] = np.nan
+        # filled points leave waves of two sampling steps
+        found = asked(of(holed, short_cutoff=4.0))
+        assert bool(found.valid) == valid
+        assert valid or "of the points are filled" in next(iter(found.reasons))
+
+    def test_the_shipped_map_with_holes_is_not_valid(self):
+        surface = Surface.from_map("docs/data/maps/frt-2.frt", fill="harmonic", short_cutoff=0.0008, outliers=10)
+        found = asked(surface, area=0.005)
+        assert not found.valid
+        assert "0.28 of the points are filled" in next(iter(found.reasons))
+
+
+class TestSeams:
+    @pytest.mark.parametrize("axis", [0, 1])
+    def test_a_step_between_two_images_is_not_valid(self, axis):
+        stitched = np.array(np.moveaxis(MAP, axis, 0))
+        stitched[32:] += MAP.std()
+        stitched = np.moveaxis(stitched, 0, axis)
+        found = asked(Surface.from_map(stitched, 1.0, short_cutoff=4.0))
+        assert not found.valid
+        reason = next(iter(found.reasons))
+        assert f"between {('rows', 'columns')[axis]} 31 and 32" in reason
+        parts = re.findall(r"Surface\.from_map\((heights\[.*?\]), \.\.\.\)", reason)
+        for part, half in zip(parts, np.split(stitched, 2, axis), strict=True):
+            values = eval(part, {"heights": stitched})
+            np.testing.assert_array_equal(values, half)
+            assert Surface.from_map(values, 1.0).doubts == ()
+
+
+def test_one_trace_is_never_valid():
+    line = MAP[:, 5]
+    for theory in ("calibrated", "persson", "mbma"):
+        found = contact(Surface.from_profile(line, 1.0), pressure=1e-3, theory=theory)
+        assert not found.valid
+        assert np.isnan(found.scatter)
+        assert "Surface.from_map(map)" in next(iter(found.reasons))
+
+
+def test_doubts_go_on_to_what_is_made_of_a_surface():
+    trace, clean = Surface.from_profile(MAP[:, 5], 1.0), of(MAP)
+    for made in (trace.combined(clean), clean.combined(trace), trace.resized(2.0, 1.0)):
+        assert made.doubts == trace.doubts
+    spoilt = of(with_spikes(0.0)[0])
+    assert average([clean, spoilt]).doubts == spoilt.doubts
+
+
+def test_a_spectrum_without_its_convention_is_not_valid():
+    q = np.geomspace(0.1, 10.0, 60)
+    given = {"q": q, "C": 1e-4 * np.maximum(q, 0.3) ** -3.6, "h_max": 0.5}
+    found = contact(Surface.from_spectrum(**given), pressure=1e-3, theory="calibrated")
+    assert not found.valid
+    remedies = re.findall(r"convention='(\w+)'", next(iter(found.reasons)))
+    assert remedies == ["paper", "isotropic"]
+    for remedy in remedies:
+        named = Surface.from_spectrum(**given, convention=remedy)
+        assert contact(named, area=0.05, theory="calibrated").valid
+
+
+class TestSampling:
+    """Maps with wavelengths of fewer than four sampling steps."""
+
+    @pytest.mark.parametrize("unit", [None, "um"])
+    @pytest.mark.parametrize("step", [1.0, 0.123456])
+    @pytest.mark.parametrize("theory", ["simulated", "corrected"])
+    def test_the_stated_cutoff_makes_it_valid(self, unit, step, theory):
+        noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(MAP.shape)
+        given = {"heights": step * noise, "dx": step, "periodic": True, "unit": unit}
+        found = asked(Surface.from_map(**given), theory)
+        assert not found.valid
+        remedy = re.search(r"Surface\.from_map\(\.\.\., (.*)\)$", next(iter(found.reasons)))
+        mended = eval(f"Surface.from_map(**given, {remedy[1]})", {"Surface": Surface, "given": given})
+        assert asked(mended, theory).valid
+
+    def test_the_calibrated_law_names_the_same(self):
+        noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(MAP.shape)
+        found = asked(of(noise), "calibrated")
+        assert "theory='simulated' simulates the map of Surface.from_map(..., short_cutoff=4.004)" in str(found.reasons)
+
+    @pytest.mark.parametrize("bits", [16, 24])
+    def test_rounding_of_heights_is_no_wavelength(self, bits):
+        # as of an instrument with integers of 16 bits, and of single precision
+        least = np.ptp(MAP) / 2**bits
+        rounded = of(least * np.rint(MAP / least))
+        assert asked(rounded).valid
+        assert asked(rounded).pressure == pytest.approx(asked(of(MAP)).pressure, rel=1e-3)
+
+    def test_light_contacts_name_the_theory_that_reaches_them(self):
+        found = contact(of(MAP), area=0.002, theory="corrected")
+        assert list(found.reasons) == ["A/A0 is below 0.003: theory='simulated' was tested from 0.001 on"]
+        assert contact(of(MAP), area=0.002, theory="simulated").valid
+
+    def test_an_average_names_a_scan(self):
+        both = average([of(MAP), of(MAP[::-1])])
+        found = contact(both, area=0.1, theory="calibrated")
+        remedy = re.search(r"contact\(surface\.scans\[0\], \.\.\., theory='simulated'\)", str(found.reasons))
+        assert remedy
+        call = remedy[0].replace("...", "area=0.1")
+        assert eval(call, {"contact": contact, "surface": both}).valid
