@@ -92,7 +92,8 @@ def answered(part: Part, theory: str, folder: pathlib.Path) -> dict[str, Any]:
             continue
         stiffness, leakage = pressure * (STEP - 1) / (found.mean_separation - beside.mean_separation), found.leakage
         of_it = (found.scatter, found.area_scatter, found.stiffness_scatter, leakage.scatter, found.valid)
-        sensitivity = np.nan if theory == "calibrated" else of_map(theory, surface).sensitivity
+        own = None if theory == "calibrated" else of_map(theory, surface)
+        sensitivity = np.nan if own is None else own.sensitivity_at(np.asarray(found.area))
         answer = found.area, found.mean_separation, stiffness, leakage.x, leakage.y
         rows[:, k] = *answer, *of_it, leakage.valid, sensitivity
     return dict(zip(ANSWERS, rows, strict=True))

@@ -63,14 +63,16 @@ def reached(ratio: FloatArray) -> float:
 
 
 def of_sensitivity(data: xr.Dataset, form: str) -> FloatArray:
-    """The factor by which the scatter of each surface differs from that of a typical one."""
-    return np.asarray((data[f"{form}_sensitivity"].max("load").values / TYPICAL) ** POWER)
+    """The factor by which the scatter of each surface and load differs from that of a typical surface."""
+    sensitivity = data[f"{form}_sensitivity"]
+    # a load that a theory refuses has none
+    return np.asarray((sensitivity.fillna(sensitivity.max("load")).values / TYPICAL) ** POWER)
 
 
 def by_area(data: xr.Dataset, form: str, quantity: str, rows: Any) -> FloatArray:
     """One constant for each load of the truth: as many valid errors of surfaces of these numbers are covered."""
     kept: Any = seen(data, form, quantity) & valid(data, form, quantity)[..., None]
-    error = np.abs(errors(data, form, quantity)) / of_sensitivity(data, form)[:, None, None]
+    error = np.abs(errors(data, form, quantity)) / of_sensitivity(data, form)[..., None]
     found = [error[rows, k][kept[rows, k]] for k in range(error.shape[1])]
     return np.array([reached(own) if own.size else np.nan for own in found])
 
@@ -78,7 +80,7 @@ def by_area(data: xr.Dataset, form: str, quantity: str, rows: Any) -> FloatArray
 def scatter(data: xr.Dataset, form: str, quantity: str, rows: Any) -> FloatArray:
     """Standard deviations of all surfaces, (surfaces, loads), by constants fitted to those of a mask."""
     if form != "calibrated" or quantity == "flow":
-        return by_area(data, form, quantity, np.flatnonzero(rows)) * of_sensitivity(data, form)[:, None]
+        return by_area(data, form, quantity, np.flatnonzero(rows)) * of_sensitivity(data, form)
     own = valid(data, form)
     # the part that is not fitted here
     rest = data[f"calibrated_{quantity}_scatter"].values ** 2 - np.where(own, *MAP_SCATTER[quantity]) ** 2

@@ -50,8 +50,10 @@ class LoadCurve:
         # ln F, u and ln erfinv(A) of the first and the last load
         self._ends = self.x[[0, -1]]
         self._gaps, self._roots = self._spline(self._ends), self._log_root(self._ends)
-        with np.errstate(divide="ignore"):
-            first, last = force[[0, -1]] / -self._slope(self._ends)
+        # a monotone cubic may be level at an end: the straight line to the load beside it is not
+        chords = np.diff(u)[[0, -1]] / np.diff(self.x)[[0, -1]]
+        slopes = self._slope(self._ends)
+        first, last = force[[0, -1]] / -np.where(slopes < 0, slopes, chords)
         self._power = max(float(first * (top - u[0]) / force[0]), 1.0)
         self._rate = float(last * u[-1] / force[-1])  # -d ln F/d ln u
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, nearest, number_in, require_flag
-from mbma_tables.common.errors import InputError, NotSelfAffineError
+from mbma_tables.common.errors import InputError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights
@@ -17,7 +17,7 @@ from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import SCATTER, log_bins
 from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface
-from mbma_tables.surfaces.spectrum import PowerLaws
+from mbma_tables.surfaces.spectrum import MIN_ZETA_1, PowerLaws
 from mbma_tables.surfaces.treatment import CALLED, MIN_POWER, OPTIONS, Treated, Treatment, mirrored, squares, treat
 
 S = TypeVar("S", bound=SpectralSurface)
@@ -196,6 +196,13 @@ def measured_map(treated: Treated) -> SpectralSurface:
     bins = log_bins(q, C, waves / (2 * treated.overlap))
     # for ridges, or a few cosines, some bins have no wavelength
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
+    if bins.q.size < 2 or bins.q[-1] <= MIN_ZETA_1 * bins.q[0]:
+        ends = sorted({f"{2 * math.pi * scale / float(bins.q[k]):.4g}" for k in (0, -1)}, key=float)
+        raise OutOfRangeError(
+            f"the map holds wavelengths of {' to '.join(ends)} {treated.unit or ''}".rstrip()
+            + f" only, and a rough surface has wavelengths of more than a factor of {MIN_ZETA_1:g}: theories of regular "
+            "patterns apply, or include the roughness that the pattern carries"
+        )
     own = Heights.of(values)
     values = values if treated.periodic else mirrored(values)
 

@@ -96,7 +96,7 @@ def test_info_and_verify(file, tmp_path):
     (verdict,) = json.loads(run("tables", "verify", file, "--json"))["tables"]
     assert verdict["points"] >= 12
     assert verdict["table_error"] < 1e-9
-    assert "hashes match; 12 simulated loads" in run("tables", "verify", file)
+    assert "hashes match; 14 simulated loads" in run("tables", "verify", file)
     bad = tmp_path / "bad.nc"
     bad.write_bytes(file.read_bytes().replace(b"mbma fit MAP", b"mbma fit PAM"))
     assert "mbma fit MAP --simulate" in refused("tables", "verify", bad)
