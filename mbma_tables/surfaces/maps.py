@@ -200,8 +200,8 @@ def measured_map(treated: Treated) -> SpectralSurface:
         ends = sorted({f"{2 * math.pi * scale / float(bins.q[k]):.4g}" for k in (0, -1)}, key=float)
         raise OutOfRangeError(
             f"the map holds wavelengths of {' to '.join(ends)} {treated.unit or ''}".rstrip()
-            + f" only, and a rough surface has wavelengths of more than a factor of {MIN_ZETA_1:g}: theories of regular "
-            "patterns apply, or include the roughness that the pattern carries"
+            + f" only, and a rough surface has wavelengths of more than a factor of {MIN_ZETA_1:g}: use a theory of "
+            "regular patterns, or include the roughness that the pattern carries"
         )
     own = Heights.of(values)
     values = values if treated.periodic else mirrored(values)

@@ -7,7 +7,7 @@ import pytest
 from helpers import topographies
 
 from generate.machined.makers import FAMILIES, Part, heights
-from mbma_tables import Surface, contact
+from mbma_tables import OutOfRangeError, Surface, contact
 from mbma_tables.surfaces.averages import average
 
 topographies()
@@ -165,3 +165,13 @@ class TestSampling:
         assert remedy
         call = remedy[0].replace("...", "area=0.1")
         assert eval(call, {"contact": contact, "surface": both}).valid
+
+
+@pytest.mark.parametrize("pattern", ["sine", "egg-box"])
+def test_a_regular_pattern_is_refused_with_its_wavelength(pattern):
+    x = np.arange(64.0)
+    along = np.sin(2 * np.pi * x / 16)
+    values = np.outer(along, along if pattern == "egg-box" else np.ones(64))
+    length = "16" if pattern == "sine" else "11.31"
+    with pytest.raises(OutOfRangeError, match=f"the map holds wavelengths of {length} um only"):
+        Surface.from_map(values, 1.0, periodic=True, unit="um")

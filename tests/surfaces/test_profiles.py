@@ -6,6 +6,7 @@ from helpers import refusals, topographies
 
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
+from mbma_tables.surfaces import profiles
 
 POINTS = 8000
 SHORTEST = 2 * np.pi / 6  # six sampling steps a wave
@@ -148,3 +149,14 @@ def test_a_line_of_few_waves_keeps_its_variance_and_gradient(wave):
     found = Surface.from_profile(line, 0.5, periodic=True)
     assert found.h_rms == pytest.approx(line.std(), rel=1e-3)
     assert found.rms_gradient == pytest.approx(np.sqrt(2) * slope.std(), rel=1e-3)
+
+
+def test_sums_over_panels_do_not_depend_on_blocks(monkeypatch):
+    q = np.arange(1.0, 500.0)
+    fine = np.geomspace(0.5, 500.0, 81)
+    starts = np.array([0, 3, 40, 200])
+    sides = 4 * np.pi * np.sqrt(np.maximum(fine**2 - q[:, None] ** 2, 0))
+    expected = np.add.reduceat(np.diff(sides, axis=1), starts, axis=0)
+    for block in (7, 10_000):
+        monkeypatch.setattr(profiles, "BLOCK", block)
+        np.testing.assert_allclose(profiles._panel_sums(fine, q, starts), expected, rtol=1e-12)

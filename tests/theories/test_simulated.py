@@ -175,6 +175,61 @@ def test_loads_far_apart_keep_the_curves_monotone():
     assert (curve.stiffness(x) > 0).all()
 
 
+def worn_track(points=64):
+    """Rough ground with a band that is worn flat, on which contact grows from 9% to 34% at nearly one load."""
+    rng = np.random.default_rng(1)
+    ground = makers.rough(rng, points, 24, 5.0, 0.8)
+    flat = np.minimum(ground, np.quantile(ground, 0.3)) - 0.3
+    off = np.abs(np.arange(points) - points / 2) - points / 5
+    share = 1 / (1 + np.exp(-off / 2))
+    return makers.finished(ground * share + flat * (1 - share), 5.0)
+
+
+@pytest.mark.parametrize("name", ["simulated", "corrected"])
+@pytest.mark.parametrize("values", [worn_track(), makers.heights(Part("etched", 1, 64))], ids=["track", "etched"])
+def test_areas_of_neighbouring_loads_differ_little(name, values):
+    surface = Surface.from_map(values, 1.0, periodic=True)
+    theory = of_map(name, surface)
+    force, area = theory.rows[:2]
+    tested = (area[1:] > 1e-3) & (area[:-1] < 0.9) & (np.diff(np.log(force)) > 0.2)
+    assert (area[1:] / area[:-1])[tested].max() <= 2.5
+    # and between them the scatter covers
+    between = np.exp((np.log(force[1:]) + np.log(force[:-1])) / 2)[(area[1:] > 0.02) & (area[:-1] < 0.6)]
+    engine = OwnContact(values, values.shape, 1e-6)
+    simulated = np.array([engine.press(load)["area"] for load in between.tolist()])
+    found = contact(surface, pressure=between, theory=name)
+    deviations = np.abs(np.log(found.area / simulated)) / found.area_scatter
+    assert (deviations < 3).all()
+
+
+def test_the_grids_own_error_is_in_the_scatter_of_the_area():
+    part = Part("gaussian", 0, 64)
+    coarse, fine = (Surface.from_map(makers.heights(Part("gaussian", k, 64)), 1.0, periodic=True) for k in (0, 2))
+    for surface, points in ((coarse, part.shortest), (fine, 8.0)):
+        found = contact(surface, area=0.4, theory="simulated")
+        assert found.area_scatter > 0.012 * (4 / points) ** 2 * 0.9
+
+
+@pytest.mark.parametrize("family", ["turned", "ground"])
+def test_leakage_of_the_quick_simulation_is_that_of_the_full_one(family):
+    surface = Surface.from_map(makers.heights(Part(family, 1, 64)), 1.0, periodic=True)
+    pressure = contact(surface, area=[0.008, 0.015, 0.05], theory="simulated").pressure
+    quick, full = (contact(surface, pressure=pressure, theory=name).leakage for name in ("corrected", "simulated"))
+    np.testing.assert_allclose(quick.x, full.x, rtol=5e-3)
+    np.testing.assert_allclose(quick.y, full.y, rtol=5e-3)
+    np.testing.assert_array_equal(quick.valid, full.valid)
+
+
+def test_a_curve_that_is_level_at_its_end_goes_on():
+    # the monotone cubic through these loads is level at the last one
+    rows = np.array(
+        [[1e-4, 0.01, 0.5, 1.0], [0.001, 0.5, 0.51, 0.99], [3.0, 0.02, 0.019, 0.0189], [1e-5, 0.01, 0.02, 1.0]]
+    )
+    curve = LoadCurve(rows, 4.0)
+    u = np.array([3.0, 0.02, 0.0189, 0.01, 1e-4])
+    assert (np.diff(curve.log_force(u)) > 0).all()
+
+
 @pytest.mark.parametrize("eta", [0.1, 0.4])
 def test_a_hardness_is_simulated(eta):
     values, cap = makers.heights(Part("honed", 1, 128)), eta * makers.GRADIENT
