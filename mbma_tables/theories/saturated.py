@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.common.shared import shared
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.laws.pressing import MIN_POINTS, ROUNDING, TOLERANCE, Press
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -193,7 +193,7 @@ class Corrected(BoundaryElements):
         "flow": (0.00729, 0.0153, 0.0185, 0.0327, 0.0327, 0.0327, 0.0327),
     }
 
-    @functools.cached_property
+    @shared_property
     def flows(self) -> tuple[FloatArray, FloatArray]:
         """Of the full simulation, at the gaps that this one has under the same loads."""
         full = of_map(BoundaryElements.name, self.surface)
