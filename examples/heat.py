@@ -94,7 +94,7 @@ def command(out: pathlib.Path | None) -> None:
     p, table = pressure(top.global_coordinates()[0]), conductance_table()
     h = np.interp(p, *table)
     scatter = float(
-        contact(JOINT, pressure=2e7, E_star=E_STAR, theory="calibrated", hardness=HARDNESS).stiffness_scatter
+        contact(JOINT, pressure=2e7, E_star=E_STAR, theory="calibrated", hardness=HARDNESS).unloading_stiffness_scatter
     )
     click.echo(
         f"pressure up to {p.max() / 1e6:.0f} MPa, h up to {h.max():.3g} W/(m^2 K), scatter of ln h {scatter:.2f}"

@@ -25,7 +25,7 @@ LIGHTEST, HEAVIEST = 0.01, 0.97  # A/A0 that constants are fitted to
 EDGES = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.95)  # contact fractions between which errors are told
 BARS = {"area": 0.05, "yielded": 0.05, "force": np.log(1.25), "stiffness": np.log(1.25)}
 QUANTITIES = ("area", "yielded", "force", "stiffness")  # as the file names them
-LIBRARY = {"area": "area", "force": "pressure", "stiffness": "stiffness"}  # and as the library does
+LIBRARY = {"area": "area", "force": "pressure", "stiffness": "unloading_stiffness"}  # and as the library does
 # constants of each part, and errors that count alike: "planes" is the gap between mean planes
 PARTS: dict[str, tuple[tuple[str, ...], float]] = {
     "area": (("area_power", "area_scale"), 0.015),
@@ -193,7 +193,8 @@ def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter)
         for quantity, named in LIBRARY.items():
             # of stiffness by the own area, as stated
             area = frame["own" if quantity == "stiffness" else "contact"].to_numpy()
-            known = calibrated_table.shipped().standard_deviation(name, named, area)
+            elastic = "stiffness" if quantity == "stiffness" else named
+            known = calibrated_table.shipped().standard_deviation(name, elastic, area)
             sizes = frame[quantity] / scatter.standard_deviation(name, named, frame["eta"].to_numpy(), area, known)
             shares[f"{name} {quantity}"] = within(sizes[np.isfinite(sizes)].to_numpy())
     return shares

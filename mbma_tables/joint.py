@@ -508,10 +508,13 @@ class Joint(Displayed):
             "mean_separation": Variable(found.mean_separation, gap, "mean gap"),
             "separation_scatter": Variable(found.separation_scatter, gap, "model uncertainty (1 sd) of the mean gap"),
             "stiffness": Variable(found.stiffness, stiff, "-dp/du of loading"),
+            "stiffness_scatter": Variable(found.stiffness_scatter, "1", f"{sd} stiffness; not known where it yields"),
             "unloading_stiffness": Variable(found.unloading_stiffness, stiff, "-dp/du of a small unloading"),
             "tangential_stiffness": Variable(sheared.stiffness, stiff, "shear stress over displacement before slip"),
-            "stiffness_scatter": Variable(
-                found.stiffness_scatter, "1", f"{sd} unloading and tangential stiffness and of the solid's conductance"
+            "unloading_stiffness_scatter": Variable(
+                found.unloading_stiffness_scatter,
+                "1",
+                f"{sd} unloading and tangential stiffness and of the solid's conductance",
             ),
             "conductance": Variable(solid, CONDUCTANCE, "thermal, of the solid spots"),
             "gas_conductance": Variable(gas, CONDUCTANCE, f"thermal, of {self.gas} in the gaps"),
@@ -576,9 +579,9 @@ class Joint(Displayed):
         held = self.quantities(pressed)
         x, values = held["pressure"], {name: one.values for name, one in held.items()}
         scatter = dict.fromkeys(
-            ("unloading_stiffness", "tangential_stiffness", "conductance"), values["stiffness_scatter"]
+            ("unloading_stiffness", "tangential_stiffness", "conductance"), values["unloading_stiffness_scatter"]
         )
-        scatter |= {"area": values["area_scatter"]}
+        scatter |= {"area": values["area_scatter"], "stiffness": values["stiffness_scatter"]}
         scatter |= {"mean_separation": values["separation_scatter"] / values["mean_separation"]}
         panels = {
             "real contact area  A/A0": ("area",),

@@ -251,13 +251,13 @@ def frozen(seen: list[Capped]) -> str:
                 kept[kept] = ~np.asarray(fault.mask)
                 by = contact(one.surface, pressure=one.force[kept] * g, **options)
             error = np.log(by.unloading_stiffness / (one.frozen[kept] * g))
-            parts.append(np.stack([one.area[kept], error, by.stiffness_scatter]))
+            parts.append(np.stack([one.area[kept], error, by.unloading_stiffness_scatter]))
         area, error, stated = np.concatenate(parts, axis=1)
         sizes = (np.abs(error) / stated)[np.isfinite(stated)]
         within = f"{np.mean(sizes < 1):.0%} / {np.mean(sizes < 2):.0%}"
         cells = ((own.mean(), own.std()) for own in binned(area, 100 * error, YIELD_BINS))
         rows.append([f"`{theory}`", f"{eta:g}", *cells, within])
-    header = f"theory | eta | {spans(YIELD_BINS)} | within one / two of `stiffness_scatter`"
+    header = f"theory | eta | {spans(YIELD_BINS)} | within one / two of `unloading_stiffness_scatter`"
     return table(header, rows, "{} | {} | {:+.0f} ± {:.0f}")
 
 

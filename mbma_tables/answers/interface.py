@@ -228,7 +228,7 @@ class Interface:
         -------
         ndarray or DataArray
             [unit of k/length of the surface]; in W/(m^2 K) for "45 W/(m K)", in S/m^2 for "6e6 S/m". Its scatter is
-            `stiffness_scatter`.
+            `unloading_stiffness_scatter`.
 
         Examples
         --------

@@ -23,7 +23,9 @@ from mbma_tables.theories.protocol import TheoryAnswer
 if TYPE_CHECKING:
     from mbma_tables.answers.leakage import Leakage
 
-OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
+OF_HARDNESS = ("yielded", "unloading_stiffness", "unloading_stiffness_scatter", "plane_separation")
+# what yields depends on the heaviest load before: none is assumed, also where pressures of one request fall
+FIRST_LOADING = "first; each pressure is reached from no contact"
 MOST_SHOWN = 10_000  # entries up to which the text includes errors, scatter and validity
 
 
@@ -79,7 +81,9 @@ class Contact(Interface, Displayed):
             facts["conductance"] = "needs the surface's unit"
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
         if source.yields:
+            more["unloading_stiffness_scatter"] = self.unloading_stiffness_scatter
             more |= {"psi": self.psi, "yielded": self.yielded}
+            facts["loading"] = FIRST_LOADING
         elif units["pressure"] != "1":
             facts["elastic_hardness"] = shown(self.elastic_hardness, units["pressure"])
             # reveals a pressure in an unintended unit
@@ -253,8 +257,21 @@ class Contact(Interface, Displayed):
 
     @described
     def stiffness_scatter(self) -> Any:
-        """Model uncertainty, one standard deviation of ln `unloading_stiffness` and ln conductance at this pressure."""
+        """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
+
+        NaN where a hardness is given: the slope of the loading curve of contacts that yield was not compared with
+        simulations; `unloading_stiffness_scatter` is that of their unloading stiffness and conductance.
+        """
         return self._scatter("stiffness")
+
+    @described
+    def unloading_stiffness_scatter(self) -> Any:
+        """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
+
+        Also of the conductance and of the tangential stiffness, which are proportional to it. Without a hardness both
+        stiffnesses are the same, and so are their uncertainties.
+        """
+        return self._scatter("unloading_stiffness" if self._source.yields else "stiffness")
 
     @described
     def separation_scatter(self) -> Any:

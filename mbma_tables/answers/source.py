@@ -40,7 +40,9 @@ MEANINGS = {
     "error": "bound on the relative numerical error against the theory",
     "scatter": "model uncertainty: standard deviation of ln F at this mean separation",
     "area_scatter": "model uncertainty: standard deviation of ln A at this pressure",
-    "stiffness_scatter": "model uncertainty: standard deviation of ln of the unloading stiffness at this pressure",
+    "stiffness_scatter": "model uncertainty: standard deviation of ln of the stiffness at this pressure",
+    "unloading_stiffness_scatter": "model uncertainty: standard deviation of ln of the unloading stiffness, "
+    "and of the conductance, at this pressure",
     "separation_scatter": "model uncertainty: standard deviation of the mean separation at this pressure",
     "valid": "whether the theory was tested for such contacts",
 }

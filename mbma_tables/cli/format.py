@@ -31,7 +31,14 @@ if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
-SCATTER = ("scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
+# model uncertainties of a contact, with what a line of text calls them
+SCATTER = {
+    "scatter": "ln force at a separation",
+    "area_scatter": "ln area at a force",
+    "stiffness_scatter": "ln stiffness",
+    "unloading_stiffness_scatter": "ln unloading stiffness",
+    "separation_scatter": "u",
+}
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
 
 
@@ -135,7 +142,7 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     return facts, notes
 
 
-def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
+def _validity(answer: Contact, yields: bool) -> tuple[list[str], dict[str, Any]]:
     """Range in which a contact's theory was tested, and its scatter: lines of text, and machine-readable facts."""
     valid, notes = np.atleast_1d(answer.valid), []
     reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in answer.reasons.items()}
@@ -143,9 +150,12 @@ def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
         listed = "; ".join(f"{reason} ({len(places)})" for reason, places in reasons.items())
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
     scatter = {name: getattr(answer, name) for name in SCATTER}
-    ranges = ", ".join(shown(values, answer.units[name]) for name, values in scatter.items())
+    # of an elastic contact both stiffnesses are one
+    listed_names = [name for name in SCATTER if yields or name != "unloading_stiffness_scatter"]
+    meanings = ", ".join(SCATTER[name] for name in listed_names)
+    ranges = ", ".join(shown(scatter[name], answer.units[name]) for name in listed_names)
     if np.isfinite([*scatter.values()]).any():
-        notes.append(f"scatter of ln force at a separation, ln area at a force, ln stiffness, u: {ranges}")
+        notes.append(f"scatter of {meanings}: {ranges}")
     return notes, {"valid": valid.tolist(), "reasons": reasons, **{n: np.ravel(v).tolist() for n, v in scatter.items()}}
 
 
@@ -184,7 +194,7 @@ def report_answer(
             notes[-1] = (
                 f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to {ELASTIC_PSI:g} (from {limit} on)"
             )
-        told, validity = _validity(answer)
+        told, validity = _validity(answer, model.yields)
         notes, facts = notes + told, facts | validity
     own = {name: shown_unit(name, specimen.units) for name in values}
     return Report(command, specimen.title, notes, facts, values, own | dict(units))

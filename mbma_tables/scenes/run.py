@@ -33,7 +33,14 @@ if TYPE_CHECKING:
 
     from mbma_tables.theories.mbma import Mbma
 
-VALIDITY = ("valid", "scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
+VALIDITY = (
+    "valid",
+    "scatter",
+    "area_scatter",
+    "stiffness_scatter",
+    "unloading_stiffness_scatter",
+    "separation_scatter",
+)
 YIELDED = ("yielded", "mean_pressure", "plane_separation", "unloading_stiffness")
 
 

@@ -144,9 +144,9 @@ class Theory(abc.ABC):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation of ln of a quantity against simulations, at A/A0 = `area`.
 
-        "pressure" at given u, "area" at given F, "stiffness" -dF/du at given F, with a hardness that of the frozen
-        contact. Root mean squares of ln(theory/simulation), with the simulations in the calibrated law's file; NaN
-        if not known, as for surfaces unlike those.
+        "pressure" at given u, "area" at given F, "stiffness" -dF/du at given F; with a hardness also
+        "unloading_stiffness", that of the frozen contact at given F. Root mean squares of ln(theory/simulation), with
+        the simulations in the calibrated law's file; NaN if not known, as for surfaces unlike those.
         """
         shape = np.broadcast_shapes(np.shape(area), surface.shape)
         if self.departures(surface):

@@ -19,13 +19,13 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import own_map
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 from mbma_tables.theories.simulated import BoundaryElements as BoundaryElements
-from mbma_tables.theories.yielding import Yielding
+from mbma_tables.theories.yielding import Yielding, elastic_scatter
 
 # points along a side, and of the map, between which "corrected" is the default
 LEAST_SIDE, MOST_POINTS = 64, 2**18
 KEPT = 8  # hardnesses of maps whose simulations are kept
 # standard deviations of ln of a quantity, by `python -m generate machined`
-SCATTER = {"area": 0.010, "pressure": 0.011, "stiffness": 0.033}
+SCATTER = {"area": 0.010, "pressure": 0.011, "unloading_stiffness": 0.033}
 
 Loaded = collections.namedtuple("Loaded", ("answer", "yielded", "unloading_stiffness", "plane_separation"))
 
@@ -168,9 +168,13 @@ class Saturated(Yielding):
         return self._simulation(float(self.hardness)) if self.hardness.ndim == 0 else None
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
-        """Standard deviation against contact at a tolerance of 1e-6; "stiffness" is the frozen contact's."""
-        elastic = self.elastic.scatter(surface, quantity, area)
-        return np.where(np.isinf(self.hardness), elastic, np.hypot(elastic, SCATTER.get(quantity, 0.0)))
+        """Standard deviation against contact at a tolerance of 1e-6.
+
+        "stiffness", the slope of the loading curve, was not compared: NaN, but where the hardness is infinite.
+        """
+        elastic = elastic_scatter(self.elastic, surface, quantity, area)
+        measured = np.hypot(elastic, SCATTER.get(quantity, np.nan if quantity == "stiffness" else 0.0))
+        return np.where(np.isinf(self.hardness), elastic, measured)
 
 
 class Corrected(BoundaryElements):

@@ -19,7 +19,7 @@ from mbma_tables.theories.calibrated_table import known_at, shipped_part
 from mbma_tables.theories.protocol import FEW_LOOKS, Curve, Theory, TheoryAnswer, unfinished
 
 GROUP = "hardness"  # group of the calibrated laws' file
-QUANTITIES = ("area", "yielded", "pressure", "stiffness")
+QUANTITIES = ("area", "yielded", "pressure", "unloading_stiffness")
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) above which areas are those of full contact
 CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
@@ -74,6 +74,11 @@ def shipped() -> Scatter:
     known = zip(str(attributes["theories"]).split(), variables["stated_scatter"], strict=True)
     weights = dict(zip(("area", "pressure"), variables["elastic_weight"], strict=True))
     return Scatter(variables["eta"], np.log(variables["contact"]), dict(known), weights)
+
+
+def elastic_scatter(theory: Theory, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+    """Standard deviation of an elastic theory, whose unloading stiffness is that of loading."""
+    return theory.scatter(surface, "stiffness" if quantity == "unloading_stiffness" else quantity, area)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -241,12 +246,17 @@ class Yielding(Theory):
         return u[0], u[1]
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
-        """Standard deviation against boundary elements with a hardness; "stiffness" is the frozen contact's.
+        """Standard deviation against boundary elements with a hardness.
 
         That of the calibrated law is measured; for others that of the elastic theory is propagated and combined with
-        that of the hardness law. NaN if the elastic theory's is not known, and for a stiffness that was not measured.
+        that of the hardness law. NaN if the elastic theory's is not known, and for an unloading stiffness that was not
+        measured. "stiffness", the slope of the loading curve, was not compared with simulations: NaN, but where the
+        hardness is infinite.
         """
-        eta, elastic = self._eta(surface), self.elastic.scatter(surface, quantity, area)
+        elastic = elastic_scatter(self.elastic, surface, quantity, area)
+        if quantity == "stiffness":
+            return np.where(np.isinf(self.hardness), elastic, np.nan)
+        eta = self._eta(surface)
         return shipped().standard_deviation(self.elastic.scatter_name(surface), quantity, eta, area, elastic)
 
     def reasons(

@@ -28,6 +28,33 @@ each = pytest.mark.parametrize("theory", THEORIES)
 
 
 @each
+def test_each_stiffness_has_its_own_uncertainty(theory):
+    """With a hardness the simulated stiffness is that of unloading; the slope of loading has no stated uncertainty."""
+    numbers = {"area": 0.05, "E_star": MODULUS, "theory": theory}
+    elastic = contact(SURFACE, **numbers)
+    assert elastic.unloading_stiffness_scatter == pytest.approx(elastic.stiffness_scatter, nan_ok=True)
+    both = contact(SURFACE, **numbers, hardness=[np.inf, HARDNESS])
+    np.testing.assert_array_equal(both.stiffness_scatter, [elastic.stiffness_scatter, np.nan])
+    assert both.unloading_stiffness_scatter[0] == pytest.approx(elastic.stiffness_scatter, nan_ok=True)
+    if theory == "calibrated":
+        # what the file of simulations states for the frozen contact
+        own = contact(SURFACE, **numbers, hardness=HARDNESS)
+        assert 0.02 < own.unloading_stiffness_scatter < 0.3
+        assert both.unloading_stiffness_scatter[1] == own.unloading_stiffness_scatter
+
+
+def test_the_text_of_contacts_that_yield_names_first_loading():
+    """Pressures that fall in a request are not unloading, which the text must not leave open."""
+    falling = {"pressure": [50.0, 25.0], "E_star": MODULUS, "theory": "calibrated"}
+    found = contact(SURFACE, **falling, hardness=HARDNESS)
+    assert "loading first; each pressure is reached from no contact" in repr(found)
+    assert (
+        found.mean_separation[1] == contact(SURFACE, **falling | {"pressure": 25.0}, hardness=HARDNESS).mean_separation
+    )
+    assert "each pressure is reached" not in repr(contact(SURFACE, **falling))
+
+
+@each
 def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
     u = [0.5, 1.9, 2.9]
     elastic = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory)
