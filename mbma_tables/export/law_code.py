@@ -3,6 +3,7 @@
 import base64
 import functools
 import re
+import zlib
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from mbma_tables.export.text import (
     numerals,
     opening,
     page_file,
+    template,
     wrapped,
 )
 from mbma_tables.law import block as at
@@ -169,14 +171,16 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
         )
     said = (line.replace("{", "{{").replace("}", "}}") for line in asked.said)
     lines = [*said, language.usage, _example(exported, language)]
+    interface = name.upper()  # as solvers read the name of a surface interaction
     first = 0.0 if exported.ends else (exported.law.h_max - exported.law.highest) / 2
     numbers = {"H_MAX": exported.law.h_max, "FIRST": first, "C_TURN": exported.c_turn}
     numbers |= {"C_LEAST": exported.c_least, "C_MOST": exported.c_most}
     each = {what: language.number(ratio) for what, ratio in asked.slopes.items()}
     parts = {
-        "HEADER": opening((line.format(name=name) for line in lines), language.mark),
+        "HEADER": opening((line.format(name=name, interface=interface) for line in lines), language.mark),
         "NAME": name,
         "SUBROUTINE": "",
+        "INTERFACE": interface,
         "LENGTH": exported.length,
         "STRESS": exported.stress,
         "ELASTIC": "yes" if yields else "",
@@ -187,7 +191,7 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
         **dict(language.parts),
         **dict(file.parts if file else ()),
     }
-    template = file.template if file and file.template else language.template
+    template_name = file.template if file and file.template else language.template
     if target == "fortran-law":  # all functions are alike, but for the one of two answers
         public = [what for what in FUNCTIONS if what in asked.more or what not in MORE]
         parts["PUBLIC"], each = ", ".join(public), dict.fromkeys(public, "")
@@ -208,7 +212,9 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
             parts["ELASTIC"] = re.sub(rf"\b({names})\b", r"elastic_\1", text)
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts)
-    return filled(template, each, **parts)
+        routine = language.subroutine.removesuffix(".c")
+        parts["DISPATCHER"] = filled("interfaces.c", **parts, ROUTINE=routine, LISTS=routine.upper())
+    return filled(template_name, each, **parts)
 
 
 def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[str, str]:
@@ -232,8 +238,9 @@ def _core(target: str, asked: AskedLaw) -> dict[str, str]:
         return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
     return parts | {
         "CORE": core_text(name),
+        "CODE": _code_mark(),
         "DECLARED": filled("law.h", dict.fromkeys(asked.slopes, ""), HEADER="", NAME=name, LEAKAGE=leaks).lstrip(),
-        "LAWS": "".join(_data(own, block) for own, block in blocks.items()).rstrip(),
+        "LAWS": "".join(_data(f"{name}_{own}", block) for own, block in blocks.items()).rstrip(),
     }
 
 
@@ -257,6 +264,13 @@ def core_text(prefix: str) -> str:
     renamed = [f"#define {name} {prefix}_{name}" for text in texts for name in _MADE.findall(text)]
     parts = [re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts]
     return "\n".join(["/* functions of the core, which this file holds, under names of its own */", *renamed, *parts])
+
+
+@functools.cache
+def _code_mark() -> str:
+    """A number in C of all code that laws in one file share: laws of different code are refused there."""
+    shared = [core_text(""), *map(template, ("law.c", "interfaces.c", "uinter.c", "gapcon.c"))]
+    return f"0x{zlib.crc32(''.join(shared).encode()):08x}"
 
 
 def _data(name: str, block: FloatArray) -> str:

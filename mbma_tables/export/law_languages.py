@@ -173,6 +173,21 @@ CALLED = (
     "tests; not run in Abaqus."
 )
 LAST = "At pressures beyond the law's range the last value is used, with one warning on stderr."
+# of a solver's surface interactions, by the names of its routine
+INTERACTIONS = (
+    "Surface interactions of other names stop the job. Several laws in one job, each exported under a name of its own: "
+    'begin a file with the line #define {routine}_INTERFACES INTERFACE("{{interface}}", {{name}}) '
+    'INTERFACE("SEAL", seal) and go on with the contents of {{name}}.c and seal.c, or #include both; the text in '
+    "quotes is the name of the surface interaction, the other one that of the law."
+)
+SEVERAL_UINTER = INTERACTIONS.format(routine="UINTER")
+SEVERAL_GAPCON = INTERACTIONS.format(routine="GAPCON")
+# how a user subroutine ends the job: Abaqus has a routine for it, CalculiX its own routines' exit status
+STOP_IN_ABAQUS = (
+    ("STOP_DECLARED", "SUBROUTINE FOR_NAME(xit, XIT)(void); /* of Abaqus, closes its files */"),
+    ("STOP", "FOR_NAME(xit, XIT)()"),
+)
+STOP_IN_CALCULIX = (("STOP_DECLARED", ""), ("STOP", "exit(201) /* as CalculiX's own routines do */"))
 SUBROUTINE = C._replace(beside=())
 GAPCON = SUBROUTINE._replace(subroutine="gapcon.c")
 LANGUAGES = {
@@ -244,25 +259,30 @@ LANGUAGES = {
         reserved=modelica_words,
     ),
     "abaqus-uinter": SUBROUTINE._replace(
-        usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.c. Place the bodies so that their "
+        usage="WITHOUT FRICTION: the faces slide freely. *SURFACE INTERACTION, NAME={interface}, USER: abaqus job=... "
+        f"user={{name}}.c. {SEVERAL_UINTER} Place the bodies so that their "
         "surfaces touch where the mean planes are h_max apart. Beyond the law's range the increment is tried again "
-        "with a smaller step. Without friction. A linear perturbation step stops the program: for "
+        "with a smaller step. A linear perturbation step stops the program: for "
         "modes of a preloaded joint take the tangent at its pressure, from this file, as a spring's stiffness. "
         f"{CALLED} Arguments: Abaqus 2017, user subroutines, UINTER.",
         subroutine="uinter.c",
+        parts=STOP_IN_ABAQUS,
     ),
     "abaqus-gapcon": GAPCON._replace(
-        usage=f"*GAP CONDUCTANCE, USER: abaqus job=... user={{name}}.c, beside a table of pressures. {LAST} {CALLED} "
+        usage="*GAP CONDUCTANCE, USER of *SURFACE INTERACTION, NAME={interface}: abaqus job=... user={name}.c, beside "
+        f"a table of pressures. {SEVERAL_GAPCON} {LAST} {CALLED} "
         "Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON.",
-        parts=(("SOLVER", "Abaqus/Standard"),),
+        parts=(("SOLVER", "Abaqus/Standard"), *STOP_IN_ABAQUS),
     ),
     "calculix-gapcon": GAPCON._replace(
-        usage="*GAP CONDUCTANCE, USER in place of CalculiX's gapcon.f: in its sources cc -O2 -c {name}.c -o gapcon.o, "
+        usage="*GAP CONDUCTANCE, USER of *SURFACE INTERACTION, NAME={interface}, in place of CalculiX's "
+        "gapcon.f: in its sources cc -O2 -c {name}.c -o gapcon.o, "
         "ar r ccx_2.20.a gapcon.o, and make, which links ccx again. Use it with *CONTACT PAIR, TYPE=SURFACE TO SURFACE "
         "and *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR: with NODE TO SURFACE 2.20 hands over "
         "another pressure, without a message, and with TABULAR it has no force. EXPONENTIAL, which `mbma export "
         "calculix --conductivity` fits to this law, gives closure and conductance in one interaction. "
-        f"{LAST} {{name}}.c is C99, also C++11. Run in ccx 2.20. Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
-        parts=(("SOLVER", "CalculiX"),),
+        f"{SEVERAL_GAPCON} {LAST} {{name}}.c is C99, also C++11. Run in ccx 2.20. "
+        "Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
+        parts=(("SOLVER", "CalculiX"), *STOP_IN_CALCULIX),
     ),
 }

@@ -350,6 +350,7 @@ PROGRAM = """program ask
   real(dp) :: temp(2) = [20.0_dp, 120.0_dp], predef(2, 1), time(2), coords(3), c
   integer :: status
   {declared}
+  call get_command_argument(1, ciname)
   open (10, file="c.txt")
   open (11, file="values.txt")
   do
@@ -358,6 +359,10 @@ PROGRAM = """program ask
     {asked}
   end do
 end program
+
+subroutine xit
+  stop 7
+end subroutine
 """
 UINTER = PROGRAM.format(
     declared="""integer, parameter :: ndir = 3, nstatv = 2, npred = 1, nprops = 1, mcrd = 3
@@ -392,7 +397,7 @@ def called(target, program, name, folder, asked):
     run("gcc", *WARNINGS, *STRICT, "-O1", "-c", "road.c", folder=folder)
     fortran = ("gfortran", *WARNINGS, "-std=f2008", "-fcheck=all", "-O1")
     run(*fortran, "ask.f90", "road.o", "-lm", "-o", "ask", folder=folder)
-    done = subprocess.run("./ask", cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run(("./ask", "ROAD"), cwd=folder, capture_output=True, text=True, check=True)
     return *np.loadtxt(folder / "values.txt").T, done.stderr
 
 
@@ -446,6 +451,80 @@ def test_gapcon(target, more, name, tmp_path):
     text = " ".join((tmp_path / "road.c").read_text().replace("\n *", " ").split())
     for words in ("TYPE=SURFACE TO SURFACE", "PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR", "-o gapcon.o, ar r ccx_"):
         assert (words in text) == bool(more)
+
+
+# a target, the program that calls it, and the status with which it ends a job
+INTERACTIONS = {
+    "abaqus-uinter": (UINTER, 7),
+    "abaqus-gapcon": (GAPCON.replace("AREA", ""), 7),
+    "calculix-gapcon": (GAPCON.replace("AREA", ", 1d0"), 201),
+}
+LISTED = 'INTERFACE("ROAD", road) INTERFACE("INTPROP-2", seal)'
+
+
+def joined(how, routine, folder):
+    """Object files of a job with the two laws road and seal, exported by themselves."""
+    line = f"#define {routine}_INTERFACES {LISTED}\n"
+    road, seal = ((folder / file).read_text() for file in ("road.c", "seal.c"))
+    if how == "separate":
+        (folder / "one.c").write_text(line + road)
+        run("gcc", *WARNINGS, *STRICT, "-c", "one.c", folder=folder)
+        run("gcc", *WARNINGS, *STRICT, f"-D{routine}_ELSEWHERE", "-c", "seal.c", folder=folder)
+        return "one.o", "seal.o"
+    both = road + seal if how == "copied" else '#include "road.c"\n#include "seal.c"\n'
+    (folder / "job.c").write_text(line + both)
+    compilers = {"included in C++": ("g++", "-x", "c++", "-std=c++11")}
+    run(*compilers.get(how, ("gcc", *STRICT)), *WARNINGS, "-c", "job.c", folder=folder)
+    return ("job.o",)
+
+
+@needs("gfortran", "gcc", "g++")
+@pytest.mark.parametrize("how", ["copied", "included", "included in C++", "separate"])
+@pytest.mark.parametrize("target", INTERACTIONS)
+def test_two_exported_laws_in_one_job_by_surface_interaction(target, how, tmp_path):
+    """Each surface interaction has its own law, in capital letters or not; any other name stops the job."""
+    program, stopped = INTERACTIONS[target]
+    laws = {"road": "mbma", "seal": "calibrated"}
+    for name, law in laws.items():
+        (tmp_path / f"{name}.c").write_text(law_points.text(target, law, name=name, **HEAT))
+    objects = joined(how, LANGUAGES[target].subroutine.removesuffix(".c").upper(), tmp_path)
+    (tmp_path / "ask.f90").write_text(program)
+    # overclosures, or pressures for conductance
+    x = np.array([0.05, 0.4, 1.5]) if "uinter" in target else np.array([1e-5, 1e-3, 1e-2])
+    np.savetxt(tmp_path / "c.txt", x, "%.17g")
+    fortran = ("gfortran", *WARNINGS, "-std=f2008", "-fcheck=all")
+    run(*fortran, "ask.f90", *objects, "-lm", "-o", "ask", folder=tmp_path)
+    for interaction, name in {"ROAD": "road", "INTPROP-2": "seal", "IntProp-2": "seal"}.items():
+        run("./ask", interaction, folder=tmp_path)
+        values = np.loadtxt(tmp_path / "values.txt")[:, 0]
+        law = points(laws[name]).law
+        if "uinter" in target:
+            expected = law.pressure(separation=law.h_max - 2 * x)
+        else:
+            expected = CONDUCTIVITY / 13.3 * law.at_pressure(x).stiffness
+        np.testing.assert_allclose(values, expected, rtol=1e-11)
+    for unknown in ("SEAL", "ROAD2", "ROA", "INTPROP-2" + 72 * "X", ""):
+        done = subprocess.run(("./ask", unknown), cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == stopped
+        assert f"no law for the surface interaction '{unknown[:80]}', only for 'ROAD' 'INTPROP-2'" in done.stderr
+
+
+@needs("gcc")
+@pytest.mark.parametrize("target", INTERACTIONS)
+def test_several_laws_in_one_file_without_a_list_do_not_compile(target, tmp_path):
+    """A law that no surface interaction could reach is an error of the compiler; so are laws of different versions."""
+    texts = [law_points.text(target, law, name=law, **HEAT) for law in ("mbma", "persson")]
+    of_another_version = re.sub(r"(MBMA_LAW_CODE (?:!= )?)0x\w+", r"\g<1>0x1", texts[1])
+    routine = LANGUAGES[target].subroutine.removesuffix(".c").upper()
+    listed = f'#define {routine}_INTERFACES INTERFACE("MBMA", mbma) INTERFACE("PERSSON", persson)\n'
+    refused = {"several laws in one file": "".join(texts)}
+    refused["laws of different versions"] = listed + texts[0] + of_another_version
+    for message, text in refused.items():
+        (tmp_path / "job.c").write_text(text)
+        command = ("gcc", "-fsyntax-only", "job.c")
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode != 0
+        assert message in done.stderr
 
 
 MODELICA = """
