@@ -119,7 +119,7 @@ test_requests_that_are_refused = refusals(
     ("c-law", "calibrated", {"kappa": 3.0}, "kappa must be"),
     ("cobol-law", "mbma", {}, "target must be one of"),
     ("c-law", "mbma", {"name": "1 x"}, "a name must be a letter"),
-    ("fortran-law", "mbma", {"name": "Energy"}, "name must not be that of a function of the law"),
+    ("fortran-law", "mbma", {"name": "Energy"}, "which a function of the law needs for itself"),
 )
 
 
