@@ -40,7 +40,7 @@ from mbma_tables.materials import Metal, Pair, effective_modulus, hardness_in, p
 from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import Surface, assumptions
 from mbma_tables.theories import OF_MAPS, THEORIES, get_theory
 from mbma_tables.theories.protocol import Theory
 
@@ -560,12 +560,16 @@ class Joint(Displayed):
         return self.at_pressure(np.geomspace(*RANGE, POINTS) * float(hardness_in(Units(stress="GPa"), hardness)))
 
     def facts(self) -> dict[str, str]:
-        """The arguments of the joint, by name."""
+        """The arguments of the joint, by name, and what its faces assume beyond them."""
         a, b = self.pair.metals
         hardness = self.hardness or self.pair.hardness or f"not known: name the temper of {self.pair.softer.name}"
         theory = chosen_theory(self.surface, self.theory).name
         facts = {"metals": f"{a.name} on {b.name}", "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa"}
-        return facts | {"hardness": str(hardness), "theory": theory, "gas": self.gas, "surface": repr(self.surface)}
+        facts |= {"hardness": str(hardness), "theory": theory, "gas": self.gas, "surface": repr(self.surface)}
+        assumed = assumptions(self.surface)
+        if assumed:
+            facts["assumed"] = "; ".join(assumed)
+        return facts
 
     _facts = facts
 

@@ -11,7 +11,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from helpers import random_map
+from helpers import random_map, run
 
 from mbma_tables import InputError, Joint, Surface, contact, contact_law, materials
 from mbma_tables.cli import main
@@ -320,6 +320,21 @@ def test_a_nominal_area_is_of_a_map_too():
     given = {"materials": "steel 1020", "nominal_area": "4 cm^2", "theory": "calibrated"}
     one, other = Joint(named, **given), Joint(made, **given)
     assert one.surface.h_max == other.surface.h_max > made.h_max
+
+
+def test_a_joint_names_what_its_faces_assume(joint):
+    """All that a face given by numbers assumes is in the text, the table and the command, each line once."""
+    faces = [Surface.from_roughness(**FACE | {"Rq": Rq}, nominal_area="4 cm^2") for Rq in ("0.4 um", "0.7 um")]
+    expected = {line for face in faces for record in face.provenance for line in record.get("assumed", ())}
+    assert any("heights are Gaussian" in line for line in expected)
+    assumed = joint.facts()["assumed"]
+    for line in expected:
+        assert assumed.count(line) == 1
+        assert line in repr(joint)
+    assert joint.table("10 MPa").attrs["assumed"] == assumed
+    output = run("joint", EXAMPLE, "-p", "10MPa")
+    shown = [line for line in output.splitlines() if line.startswith("assumed: ")]
+    assert len(shown) == len(set(shown)) > 3
 
 
 def test_results_without_units_are_displayed():

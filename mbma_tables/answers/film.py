@@ -52,14 +52,16 @@ class FlowFactors(Displayed):
     area: FloatArray = quantity("real over nominal contact area")
     scatter: FloatArray = quantity("model uncertainty (1 sd) of ln phi")
     shear_scatter: FloatArray = quantity("model uncertainty (1 sd) of ln phi_s")
-    valid: Any = quantity("whether flow through such gaps was simulated")
+    valid: Any = quantity("whether flow through such gaps was simulated; of the factors, not of the pressure")
+    pressure_scatter: FloatArray = quantity("model uncertainty (1 sd) of ln of the asperity pressure")
+    pressure_valid: Any = quantity("whether asperity pressures at such gaps were simulated; as `contact(...).valid`")
     _dims = ("gap",)
 
     K_x = property(lambda self: self.phi_x * self.mean_separation**3, doc="Flow coefficient phi_x u^3 [length^3].")
     K_y = property(lambda self: self.phi_y * self.mean_separation**3, doc="Flow coefficient phi_y u^3 [length^3].")
 
     def _facts(self) -> dict[str, str]:
-        held = ("mean_separation", "phi_x", "phi_y", "pressure", "area", "valid")
+        held = ("mean_separation", "phi_x", "phi_y", "pressure", "area", "valid", "pressure_valid")
         numbers = {name: shown(getattr(self, name), self.units.get(name, "1")) for name in held}
         return numbers | {"peklenik": f"{self.peklenik:.3g}", "surface": repr(self.surface)}
 
@@ -74,7 +76,7 @@ class FlowFactors(Displayed):
         panels: dict[str, list[tuple[str, FloatArray, FloatArray | None]]] = {
             "pressure flow factor": [(name, at[name], at["scatter"]) for name in ("phi_x", "phi_y")],
             "shear flow factor": [(name, at[name], at["shear_scatter"]) for name in ("shear_x", "shear_y")],
-            f"asperity pressure [{self.units['pressure']}]": [("pressure", at["pressure"], None)],
+            f"asperity pressure [{self.units['pressure']}]": [("pressure", at["pressure"], at["pressure_scatter"])],
             "real contact area  A/A0": [("area", at["area"], None)],
         }
         return draw_panels(at["mean_separation"], panels, f"mean gap u [{self.units['mean_separation']}]")
@@ -163,7 +165,10 @@ def flow_factors(
     kept = {text: mask for text, mask in reasons.items() if np.any(mask)}
     shear_scatter, valid = np.full(u.shape, OWN_SHEAR if own else SHEAR), ~np.logical_or.reduce(list(reasons.values()))
     flows, asperities = (u, phi_x, phi_y, shear[0], shear[1]), (np.ravel(found.pressure), area)
-    return FlowFactors(kept, float(gamma), surface, units, *flows, *asperities, scatter, shear_scatter, valid)
+    # the lightest contacts count here: their pressure depends on the highest points alone
+    of_pressure = np.ravel(found.scatter), np.ravel(found.valid)
+    uncertain = scatter, shear_scatter, valid, *of_pressure
+    return FlowFactors(kept, float(gamma), surface, units, *flows, *asperities, *uncertain)
 
 
 def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:

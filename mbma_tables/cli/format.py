@@ -24,8 +24,7 @@ from mbma_tables.common.units import Units, unit_of
 from mbma_tables.export.text import comment
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.specimen import Specimen
-from mbma_tables.surfaces.roughness import ASSUMED
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import assumptions
 
 if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
@@ -120,6 +119,11 @@ def shown_unit(name: str, units: Units) -> str:
     return "-" if unit == "1" else unit
 
 
+def assumption_notes(assumed: list[str]) -> list[str]:
+    """Lines of text of the assumptions of a surface."""
+    return [f"assumed: {line}" for line in assumed]
+
+
 def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     """The surface's parameters in machine-readable form, and as lines of text."""
     surface = specimen.surface
@@ -128,10 +132,8 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     numbers = {name: float(value) for name, value in known.items() if value is not None}
     units = {name: shown_unit(name, specimen.units).strip("-") for name in numbers}
     listed = (f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items())
-    assumed = [line for record in surface.provenance for line in record.get("assumed", ())]
-    if isinstance(surface, Surface) and ASSUMED not in assumed:
-        assumed.insert(0, ASSUMED)
-    notes = [f"surface: {', '.join(listed)}", *(f"assumed: {line}" for line in assumed)]
+    assumed = assumptions(surface)
+    notes = [f"surface: {', '.join(listed)}", *assumption_notes(assumed)]
     notes += [record["told"] for record in surface.provenance if "told" in record]
     facts: dict[str, Any] = {"length_unit": surface.unit, **numbers, "assumed": assumed}
     facts["provenance"] = [dict(record) for record in surface.provenance]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from mbma_tables.cli.format import Report, to_json
+from mbma_tables.cli.format import Report, assumption_notes, to_json
 from mbma_tables.cli.options import (
     Output,
     check_plot,
@@ -25,6 +25,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file, written_bytes
 from mbma_tables.common.progress import echo
 from mbma_tables.export.text import written_by
+from mbma_tables.surfaces.surface import assumptions
 
 if TYPE_CHECKING:
     pass
@@ -187,9 +188,12 @@ def joint_command(
     found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
     held, facts = joint.quantities(found), joint.facts()
     values = {name: kept.values for name, kept in held.items()} | {"valid": np.where(found.valid, "yes", "no")}
-    notes = [f"{name}: {text}" for name, text in facts.items()]
+    # a line for each assumption, as of other commands
+    assumed = assumptions(joint.surface)
+    notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
+    notes += assumption_notes(assumed)
     for reason, mask in found.reasons.items():
         notes.append(f"not valid at {int(np.sum(mask))} of {np.size(mask)}: {reason}")
     units = {name: kept.unit for name, kept in held.items() if kept.unit != "1"}
     picture = b"" if plot is None else to_picture(joint.plot(), plot.suffix[1:])
-    Report("joint", file.name, notes, facts, values, units).write(output, plot, picture)
+    Report("joint", file.name, notes, {**facts, "assumed": assumed}, values, units).write(output, plot, picture)

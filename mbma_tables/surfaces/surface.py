@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import finite_array, hinted
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.roughness import ASSUMED
 from mbma_tables.surfaces.self_affine import SelfAffine
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
@@ -319,6 +321,22 @@ class MeasuredSurface(SpectralSurface):
 
         numbers = fit_spectrum(**points_of_fit(self), band=band, anisotropy=self.anisotropy)
         return Surface(**numbers, h_max=self.h_max, unit=self.unit, provenance=self.provenance)
+
+
+def assumptions(surface: Any) -> list[str]:
+    """What a surface, and the faces that it combines, assume beyond the numbers given, each line once."""
+    lines = dict.fromkeys(_assumed(surface.provenance))
+    if isinstance(surface, Surface) and ASSUMED not in lines:
+        return [ASSUMED, *lines]
+    return list(lines)
+
+
+def _assumed(provenance: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """The assumptions of records, and of the records of combined faces in them."""
+    for record in provenance:
+        yield from record.get("assumed", ())
+        for face in record.get("of", ()):
+            yield from _assumed(face)
 
 
 def _modelled(surface: MeasuredSurface, model: str, band: Any) -> Surface | MeasuredSurface:

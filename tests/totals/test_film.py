@@ -58,6 +58,17 @@ def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
         assert abs(np.log([found.shear_x[k], found.shear_y[k]] / ((gap - couette) / z.std()))).max() < 0.35
 
 
+def test_the_asperity_pressure_is_as_valid_as_that_of_the_contact():
+    """Flow through the lightest contacts is nearly that before contact; their pressure was not simulated."""
+    u = np.array([0.8, 1.0, 1.5, 1.7])
+    found = flow_factors(BEARING, u, E_star="110 GPa", theory="calibrated")
+    known = contact(BEARING, mean_separation=u, E_star="110 GPa", theory="calibrated")
+    assert found.valid.all()
+    np.testing.assert_array_equal(found.pressure_valid, known.valid)
+    assert list(found.pressure_valid) == [True, True, False, False]
+    np.testing.assert_array_equal(found.pressure_scatter, known.scatter)
+
+
 def test_isotropic_factors_are_those_of_the_leakage():
     u = np.array([0.6, 1.0, 1.7, 4.0])
     found = flow_factors(BEARING, u, E_star="110 GPa")
