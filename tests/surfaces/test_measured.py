@@ -83,7 +83,7 @@ class TestMeasuredSurface:
             (Q - 0.5, C, {"h_max": 1.0}, "leave q = 0 out"),
             (Q[:3], C[:2], {"h_max": 1.0}, "two columns of one length"),
             (Q.reshape(3, 3), C.reshape(3, 3), {"h_max": 1.0}, "two columns of one length"),
-            (Q[:1], C[:1], {"h_max": 1.0}, "no two neighbours"),
+            (Q[:1], C[:1], {"h_max": 1.0}, "the spectrum has one wavenumber"),
             ([1.0, 2.0], [1.0, 1.0], {"h_max": 1.0}, "greater than 3"),
             ([1.0, 9.0], [0.0, 0.0], {"h_max": 1.0}, "holds no height"),
             ([1.0, 9.0, 99.0], [1.0, 0.0, 1.0], {"h_max": 1.0}, "holds no height"),
