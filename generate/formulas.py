@@ -24,6 +24,7 @@ from collections.abc import Iterable, Mapping
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
 from generate.files import ROOT
 from mbma_tables import Surface, contact
@@ -165,7 +166,7 @@ def least_largest(
     rounds: int = LAWSON_ROUNDS,
 ) -> tuple[float, FloatArray]:
     """Least largest error ``|A c - target|``, by Lawson's reweighting, and its coefficients."""
-    weight: FloatArray = np.ones(target.size)
+    weight: NDArray[np.floating] = np.ones(target.size)
     least_error = math.inf
     best_coefficients: FloatArray = np.zeros(A.shape[1])
     for _ in range(rounds):
