@@ -481,7 +481,10 @@ def write(path: pathlib.Path, evidence: pathlib.Path = FILE) -> xr.Dataset:
     help="The library's file.",
 )
 def leakage_law(evidence: pathlib.Path, table: pathlib.Path) -> None:
-    """Fit the law of leakage to the training set of EVIDENCE; write it beside the calibrated law."""
+    """Fit the law of leakage to the training set of EVIDENCE.
+
+    Write it beside the calibrated law.
+    """
     made = write(table, evidence)
     names = dataclasses.asdict(FlowConstants())
     click.echo(", ".join(f"{name} {made.attrs[f'flow_{name}']:g}" for name in names))
