@@ -429,7 +429,7 @@ def certificate(
     def drawn(low: float, high: float) -> float:
         # half of them at the ends of an axis, where bands of the medium hold few wavenumbers
         # and errors are largest
-        place = np.clip(rng.uniform(-0.5, 1.5), 0, 1)
+        place: float = np.clip(rng.uniform(-0.5, 1.5), 0, 1)
         return low + (high - low) * place
 
     largest_simulated = 0.0
