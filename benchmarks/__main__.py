@@ -35,8 +35,8 @@ from generate import page
 from generate.files import ROOT
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.common.files import shipped_file
-from mbma_tables.laws.calibrated import Law, Spectrum
 from mbma_tables.theories import Calibrated
+from mbma_tables.theories.calibrated.formulas import Law, Spectrum
 
 POINTS = 20_000
 HELD_OUT = 500

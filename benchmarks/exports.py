@@ -13,7 +13,7 @@ from benchmarks.kernels import held_out
 from benchmarks.rows import microseconds, report, rounds, times_faster
 from mbma_tables import contact, open_table
 from mbma_tables.export.c_code import FLAGS, SOURCES, write_code
-from mbma_tables.totals.contact import QUADRATURE_SHARE
+from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
 
 POINTS, SURFACES = 20_000, 2000
 RTOL = 1e-8

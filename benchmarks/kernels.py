@@ -18,8 +18,8 @@ import numpy as np
 from scipy.special import erf
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.surfaces.variants import get_variant
+from mbma_tables.theories.mbma.geometry import geometry
+from mbma_tables.theories.mbma.variants import get_variant
 
 MANY, SURFACES, DESIGNS, SOME, CALLS = 100_000, 2_000, 20, 1_000, 2_000
 SEED, ROUNDS = 7, 9

@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 
 from mbma_tables import Surface, contact, materials
 from mbma_tables.common.plots import to_picture
-from mbma_tables.totals.conductance import cooper_mikic_yovanovich, mean_conductivity
+from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
 
 # both faces' roughness in one
 JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6)

@@ -18,7 +18,7 @@ from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, conde
 from mbma_tables import Surface, contact, materials
 from mbma_tables.common.plots import to_picture
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.totals.conductance import mean_conductivity
+from mbma_tables.quantities.conductance import mean_conductivity
 
 HOLE, CONE, RIM, THICK = 4e-3, 12e-3, 30e-3, 6e-3  # m: radii of the hole, of the pressed ring, of the plates
 STEEL, ALUMINIUM = materials.get("steel 4140"), materials.get("aluminium 6061")

@@ -20,8 +20,8 @@ from scipy.optimize import OptimizeResult, minimize
 
 from mbma_tables import Contact, Surface, contact
 from mbma_tables.common.plots import to_picture
-from mbma_tables.laws import boundary_elements
-from mbma_tables.laws.reynolds import flow_conductance
+from mbma_tables.theories.simulated import boundary_elements
+from mbma_tables.theories.simulated.reynolds import flow_conductance
 
 LONGEST = 500.0  # um
 Q0 = 2 * np.pi / LONGEST

@@ -22,8 +22,8 @@ from generate.files import ROOT
 from generate.page import table
 from generate.page import write as write_page
 from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
-from mbma_tables.laws.calibrated import self_affine_law
 from mbma_tables.theories import THEORIES
+from mbma_tables.theories.calibrated.formulas import self_affine_law
 
 LONGEST = 10.0  # seconds of one request
 RANGES = ((0.05, 1.0), (np.log(3.1), np.log(1e5)), (1.0, 32.0), (-7.0, -0.5), (3.0, 9.0))  # of searches

@@ -22,10 +22,10 @@ from generate.splines import coefficients
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file, written_bytes
+from mbma_tables.common.netcdf import HDF5_LOCK, SEAL
 from mbma_tables.data import read_groups
-from mbma_tables.laws.calibrated import Constants, Law, Spectrum
-from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL
-from mbma_tables.theories.calibrated_table import AXES, load
+from mbma_tables.theories.calibrated.formulas import Constants, Law, Spectrum
+from mbma_tables.theories.calibrated.table import AXES, load
 
 # as the file names them: the library's "pressure" is "force" there
 QUANTITIES = ("area", "force", "stiffness")

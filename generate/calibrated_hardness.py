@@ -25,9 +25,10 @@ from generate.calibrated_file import (
 from generate.files import read_csv
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws import hardness as cap
-from mbma_tables.theories import calibrated_table, get_theory
-from mbma_tables.theories.yielding import GROUP, Scatter, Yielding
+from mbma_tables.theories import get_theory
+from mbma_tables.theories.calibrated import table as calibrated_table
+from mbma_tables.theories.yielding import formulas as cap
+from mbma_tables.theories.yielding.theory import GROUP, Scatter, Yielding
 
 # A/A0 that constants are fitted to
 LIGHTEST = 0.01

@@ -15,9 +15,9 @@ from generate.files import read_csv, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws.calibrated import Law, Spectrum, area
 from mbma_tables.scenes.plan import Distance
 from mbma_tables.theories import Persson
+from mbma_tables.theories.calibrated.formulas import Law, Spectrum, area
 
 SIMULATED = "boundary elements"
 POINTS, SLOW_POINTS = 1000, 50  # of each timed surface, in one call

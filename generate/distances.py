@@ -25,9 +25,9 @@ from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.data import FILE
-from mbma_tables.laws.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
-from mbma_tables.laws.map_curves import MAP_CONSTANTS
-from mbma_tables.surfaces.variants import REPORTED, Variant
+from mbma_tables.theories.calibrated.formulas import CONSTANTS, YANG_PERSSON, Law, Spectrum
+from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS
+from mbma_tables.theories.mbma.variants import REPORTED, Variant
 
 LOW, DEEP, HIGH = 0.01, 0.1, 0.97  # A/A0 of the simulations between which distances are summed up
 RANGES = ((LOW, DEEP), (DEEP, HIGH))

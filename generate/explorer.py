@@ -21,8 +21,8 @@ from mbma_tables.export import c_code
 from mbma_tables.export.explorer import MODULE, explorer_page
 from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import core_file
-from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.variants import REPORTED
+from mbma_tables.theories.mbma.tables import universal_model
+from mbma_tables.theories.mbma.variants import REPORTED
 
 # with two numbers at a time, which browsers have learned by 2023
 ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", *c_code.FLAGS, "-s", "-msimd128")

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.common.table_schema import ISLAND4D, UNIVERSAL
 from mbma_tables.core import ARITHMETIC
 from mbma_tables.data import FILE, boundary_elements
-from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
 ROOT = pathlib.Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
@@ -20,10 +20,10 @@ SOLVER = (
     "mbma_tables/core/height_coefficients.h",
     "mbma_tables/core/heights.h",
     "mbma_tables/core/newton.c",
-    "mbma_tables.islands.spectral",
-    "mbma_tables.islands.greenwood_tripp",
+    "mbma_tables.theories.mbma.half_space",
+    "mbma_tables.theories.mbma.greenwood_tripp",
 )
-GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.models.island4d")
+GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.theories.mbma.geometry", "mbma_tables.theories.mbma.island4d")
 MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 

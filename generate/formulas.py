@@ -1,6 +1,6 @@
 """`python -m generate formulas`: fit the closed forms again, certify them on other samples.
 
-`models/closed_forms.toml` is the one place where the forms are kept; its expressions are Python and
+`theories/mbma/closed_forms.toml` is the one place where the forms are kept; its expressions are Python and
 C. docs/formula.md says how the terms were chosen. Samples are rounded, so that the same
 coefficients come out on all processors.
 
@@ -30,10 +30,10 @@ from generate.files import ROOT
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import Certificate
-from mbma_tables.models.closed_form_certificates import RANGES
-from mbma_tables.models.closed_forms import FUNCTIONS, Function, Steps, evaluate
+from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.theories.mbma.closed_form_certificates import RANGES
+from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function, Steps, evaluate
+from mbma_tables.theories.mbma.island_models import Certificate
 
 FORMS = ROOT / "mbma_tables" / "models" / "closed_forms.toml"
 MODULE = ROOT / "mbma_tables" / "models" / "closed_form_certificates.py"

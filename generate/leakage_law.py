@@ -20,18 +20,18 @@ from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURF
 from generate.calibrated_file import FOLDS, bins, by_bin, fitted, law_table, rms, within, write_part
 from generate.splines import coefficients
 from generate.workers import results
-from mbma_tables.answers.leakage import GROUP
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.contacts.leakage import GROUP
 from mbma_tables.data import FILE
-from mbma_tables.laws import effective_medium as leakage
-from mbma_tables.laws.calibrated import Constants, Law, Spectrum, force_at_area, light_factor
-from mbma_tables.laws.effective_medium import FlowConstants
+from mbma_tables.quantities import effective_medium as leakage
+from mbma_tables.quantities.effective_medium import FlowConstants
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.calibrated_table import load
+from mbma_tables.theories.calibrated.formulas import Constants, Law, Spectrum, force_at_area, light_factor
+from mbma_tables.theories.calibrated.table import load
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
-from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.mbma.theory import Mbma
 from mbma_tables.theories.persson import Persson
-from mbma_tables.theories.yielding import Yielding
+from mbma_tables.theories.yielding.theory import Yielding
 
 MIN_WAVES = 4  # longest waves a side: below, the cell's own scatter rules
 # contact fractions between which errors are stated

@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.special import erf
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws.calibrated import Spectrum
+from mbma_tables.theories.calibrated.formulas import Spectrum
 
 FORCES = np.geomspace(1e-7, 30.0, 400)
 BEFORE = 10.0  # range of ln s, below the first wavenumber, over which v is integrated, too

@@ -10,7 +10,7 @@ import netCDF4
 
 from mbma_tables.common.arguments import needed
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
+from mbma_tables.common.netcdf import HDF5_LOCK, read_sealed
 
 if TYPE_CHECKING:
     import xarray as xr

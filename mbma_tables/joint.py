@@ -12,16 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.contact import chosen_theory, contact
-from mbma_tables.answers.interface import checked_direction, checked_friction, ratio_of
-from mbma_tables.answers.result import Contact
-from mbma_tables.answers.sensitivity import (
-    OfOneMap,
-    Sensitivity,
-    Unknowns,
-    relative_derivatives,
-    unknowns_of,
-)
 from mbma_tables.common.arguments import (
     checked_hardness,
     hinted,
@@ -33,16 +23,26 @@ from mbma_tables.common.display import Displayed, Variable, dataset_of, saved
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import Units, force_over_area
+from mbma_tables.contacts.contact import chosen_theory, contact
+from mbma_tables.contacts.interface import checked_direction, checked_friction, ratio_of
+from mbma_tables.contacts.result import Contact
+from mbma_tables.contacts.sensitivity import (
+    OfOneMap,
+    Sensitivity,
+    Unknowns,
+    relative_derivatives,
+    unknowns_of,
+)
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
-from mbma_tables.laws.gas import checked_gas
 from mbma_tables.materials import Metal, Pair, effective_modulus, hardness_in, pair
+from mbma_tables.quantities.gas import checked_gas
 from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
 from mbma_tables.theories import OF_MAPS, THEORIES, get_theory
-from mbma_tables.theories.protocol import Theory
+from mbma_tables.theories.base import Theory
 
 if TYPE_CHECKING:
     import xarray as xr

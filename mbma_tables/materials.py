@@ -489,7 +489,7 @@ def tangential_ratio(
     E : pair of float or str, optional
         Young's moduli of the bodies.
     share : callable, optional
-        c of Poisson's ratios, 1/2 for isotropic surfaces (`mbma_tables.laws.lay`).
+        c of Poisson's ratios, 1/2 for isotropic surfaces (`mbma_tables.quantities.lay`).
 
     Returns
     -------

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from mbma_tables import Surface
-from mbma_tables.surfaces.variants import PRINTED, REPORTED
+from mbma_tables.theories.mbma.variants import PRINTED, REPORTED
 
 # variants of one's own: other numbers, and other formulas
 OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)

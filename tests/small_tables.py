@@ -10,7 +10,7 @@ import numpy as np
 
 from generate.tables.commands import KINDS
 from generate.tables.configuration import load
-from mbma_tables.tablefiles.netcdf import SEAL, SEAL_LENGTH
+from mbma_tables.common.netcdf import SEAL, SEAL_LENGTH
 
 SMALL = {
     "universal": """

@@ -19,8 +19,8 @@ from generate import distances
 from generate.files import ROOT
 from generate.page import MARKED, fill, printed, svg
 from generate.pages import library
-from mbma_tables.models.tables import shipped
-from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS
+from mbma_tables.common.table_schema import FORMAT_VERSIONS, KINDS
+from mbma_tables.theories.mbma.tables import shipped
 
 PATHS = [*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")]
 PAGES = {str(path.relative_to(ROOT)).removeprefix("docs/"): path.read_text(encoding="utf-8") for path in PATHS}

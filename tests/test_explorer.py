@@ -17,7 +17,7 @@ from mbma_tables.export.explorer import MODULE, explorer_page
 from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import page_file
 from mbma_tables.theories import Mbma
-from mbma_tables.totals.contact import by_table
+from mbma_tables.theories.mbma.sums import by_table
 
 QUANTITIES = {"gap": "mean_separation", "pressure": "pressure", "area": "area", "stiffness": "stiffness"}
 NAMES = ("hurst", "q0", "q1", "h_rms", "h_max")

@@ -18,8 +18,8 @@ from mbma_tables.cli import main
 from mbma_tables.export import targets
 from mbma_tables.export.law_code import law_text
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.laws.gas import GASES
-from mbma_tables.theories.calibrated import Calibrated
+from mbma_tables.quantities.gas import GASES
+from mbma_tables.theories.calibrated.theory import Calibrated
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
 METALS = ("steel 4140 hard", "aluminium 6061 hard")

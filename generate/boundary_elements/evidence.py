@@ -14,13 +14,13 @@ from generate.boundary_elements.surfaces import REFINEMENT, SPLITS
 from generate.files import dataset
 from mbma_tables import Surface
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws import hardness
-from mbma_tables.laws.calibrated import Constants, Law, Spectrum
-from mbma_tables.laws.map_curves import MapConstants, MapLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import matched
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.calibrated_curves import Curve
+from mbma_tables.theories.calibrated.curves import Curve
+from mbma_tables.theories.calibrated.formulas import Constants, Law, Spectrum
+from mbma_tables.theories.calibrated.map_curves import MapConstants, MapLaw
+from mbma_tables.theories.yielding import formulas as hardness
 
 GAUSSIAN = ("self_affine", "plateau", "filtered")
 MIN_WAVES = 2  # constants see no surface of one longest wave a side

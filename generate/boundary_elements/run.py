@@ -38,12 +38,12 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.data import FILE
-from mbma_tables.laws.bearing_curve import FRACTIONS, QUANTILES, bearing
-from mbma_tables.laws.boundary_elements import LOADS
-from mbma_tables.laws.boundary_elements import Contact as YieldingContact
-from mbma_tables.laws.gas import mean_inverse
+from mbma_tables.quantities.gas import mean_inverse
+from mbma_tables.surfaces.bearing_curve import FRACTIONS, QUANTILES, bearing
 from mbma_tables.surfaces.maps import prepared as treated_map
 from mbma_tables.surfaces.treatment import Treated, mirrored
+from mbma_tables.theories.simulated.boundary_elements import LOADS
+from mbma_tables.theories.simulated.boundary_elements import Contact as YieldingContact
 
 TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("variables.toml").read_text(encoding="utf-8"))
 DIMENSIONS = ("surface", "load", "quantile", "top", "band", "band_or_end", "axis")

@@ -18,11 +18,12 @@ from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
-from mbma_tables.laws import bearing_curve, boundary_elements
-from mbma_tables.laws.bearing_curve import band_sums, bearing, radial_bands
-from mbma_tables.laws.boundary_elements import CORRECTION, TOLERANCE
-from mbma_tables.laws.boundary_elements import LOADS as LOADS
-from mbma_tables.laws.reynolds import flow_conductance
+from mbma_tables.surfaces import bearing_curve
+from mbma_tables.surfaces.bearing_curve import band_sums, bearing, radial_bands
+from mbma_tables.theories.simulated import boundary_elements
+from mbma_tables.theories.simulated.boundary_elements import CORRECTION, TOLERANCE
+from mbma_tables.theories.simulated.boundary_elements import LOADS as LOADS
+from mbma_tables.theories.simulated.reynolds import flow_conductance
 
 # beyond LOADS, where heavy tails of the gradient keep gaps open
 HIGHER_LOADS = (1.5, 2.1, 3.0)

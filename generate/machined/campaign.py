@@ -23,12 +23,12 @@ from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.data import FILE
-from mbma_tables.laws import boundary_elements
-from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.own_map import law_loads
-from mbma_tables.theories.saturated import of_map
-from mbma_tables.theories.yielding import Yielding
+from mbma_tables.theories.simulated import boundary_elements
+from mbma_tables.theories.simulated.own_map import law_loads
+from mbma_tables.theories.simulated.reynolds import flow_conductance
+from mbma_tables.theories.simulated.yielded import of_map
+from mbma_tables.theories.yielding.theory import Yielding
 
 NUMBERS = 10  # parts of each family
 LARGE = 512  # points a side of one more of each family

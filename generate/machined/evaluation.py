@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from generate.machined.makers import FAMILIES
 from generate.page import table
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.theories.calibrated import MAP_SCATTER
-from mbma_tables.theories.simulated import POWER, TYPICAL
+from mbma_tables.theories.calibrated.theory import MAP_SCATTER
+from mbma_tables.theories.simulated.theory import POWER, TYPICAL
 
 QUANTITIES = ("area", "pressure", "stiffness", "flow")
 # A/A0 between which errors count

@@ -13,13 +13,13 @@ from generate.boundary_elements.solve import Contact
 from generate.calibrated_file import rms, write_part
 from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables import Surface, flow_factors
-from mbma_tables.answers.leakage import shipped_flow
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.contacts.leakage import shipped_flow
 from mbma_tables.data import FILE
-from mbma_tables.laws.bearing_curve import bearing
-from mbma_tables.laws.effective_medium import wide_gap
-from mbma_tables.laws.lay import CONSTANTS, factors, stress_shares
-from mbma_tables.laws.reynolds import flow_and_couette
+from mbma_tables.quantities.effective_medium import wide_gap
+from mbma_tables.quantities.lay import CONSTANTS, factors, stress_shares
+from mbma_tables.surfaces.bearing_curve import bearing
+from mbma_tables.theories.simulated.reynolds import flow_and_couette
 
 POINTS, SHORTEST, LONGEST = 256, 8.0, 64.0
 # F/(A0 E* g) at 2% to 40% contact; surfaces by lay, Hurst exponent and seed
@@ -65,7 +65,7 @@ def mean_traction(kernel: FloatArray, inverse: FloatArray, mask: FloatArray, dir
 
 
 def shares(mask: FloatArray) -> dict[float, tuple[float, float]]:
-    """c of `laws.lay` along axis 0 and along axis 1 for each of `NUS`, from (1 - nu)/(1 - nu c) = k_t/k_n.
+    """c of `quantities.lay` along axis 0 and along axis 1 for each of `NUS`, from (1 - nu)/(1 - nu c) = k_t/k_n.
 
     Both stiffnesses are of one contact area, kept fixed. In Fourier space the compliances are (1 - nu)/(G q) and
     (1/(G q)) (1 - nu k k^T), k the direction of the wavevector; normal and tangential displacements are not coupled.
@@ -109,7 +109,7 @@ def tangential_errors(constants: FloatArray, known: FloatArray) -> FloatArray:
 def tangential() -> None:
     """Stiffness ratios of stuck contacts by boundary elements, for docs/joints.md: two minutes a set of surfaces.
 
-    The constants of `mbma_tables.laws.lay` are fitted to the first set; the second has other seeds, Hurst exponents and
+    The constants of `mbma_tables.quantities.lay` are fitted to the first set; the second has other seeds, Hurst exponents and
     lays.
     """
     known = {kind: tangential_rows(kind) for kind in SETS}
@@ -150,7 +150,7 @@ def film_rows() -> FloatArray:
 def film() -> None:
     """Flow factors against Reynolds' equation on simulated gaps, for docs/lubrication.md: six minutes.
 
-    No constant of `mbma_tables.laws.lay` was fitted to these surfaces.
+    No constant of `mbma_tables.quantities.lay` was fitted to these surfaces.
     """
     lay, gamma, u, area, *columns = film_rows()
     flow, sheared, whole = np.reshape(columns, (3, 2, -1))

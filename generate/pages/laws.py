@@ -17,12 +17,12 @@ from generate.files import dataset
 from generate.leakage_law import CERTIFICATE, EDGES, LAWS, Flow, cases, errors, noise_floor, summary
 from generate.page import Measured, panels, spans, table
 from mbma_tables import Surface, contact, materials
-from mbma_tables.answers.leakage import GROUP, shipped_flow
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.laws.calibrated import CONSTANTS
-from mbma_tables.theories.calibrated_table import shipped, shipped_part
+from mbma_tables.contacts.leakage import GROUP, shipped_flow
+from mbma_tables.theories.calibrated.formulas import CONSTANTS
+from mbma_tables.theories.calibrated.table import shipped, shipped_part
 
 # rows of the accuracy of the calibrated law, as its file names them
 SETS = (

@@ -19,14 +19,14 @@ from generate.distances import pocket_errors
 from generate.files import ROOT
 from generate.page import Measured, duration, panels, table
 from mbma_tables import Surface, contact
+from mbma_tables.common.netcdf import read_table
 from mbma_tables.common.plots import draw_compression, theory_label
-from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
-from mbma_tables.models.closed_forms import FUNCTIONS, Function
-from mbma_tables.models.tables import shipped
+from mbma_tables.common.table_schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.scenes.plan import shipped_costs, shipped_distances
-from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.theories import THEORIES
+from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
+from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function
+from mbma_tables.theories.mbma.tables import shipped
 
 BOX = {"boxstyle": "square,pad=0.4", "facecolor": "#e8eef7", "edgecolor": "#4a6fa5"}
 RIGHT, SHARED = 0.83, {"common", "core"}  # edge of the boxes; what every room uses: no arrows

@@ -18,19 +18,19 @@ from generate.machined.campaign import FORMS
 from generate.machined.evaluation import by_family, covered, families_left_out, yielding
 from generate.page import Measured, panels, printed, table
 from mbma_tables import Surface, contact
-from mbma_tables.answers.measurement import curves, draw
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.common.files import write_file
-from mbma_tables.laws.boundary_elements import LOADS
-from mbma_tables.laws.pressing import Press
+from mbma_tables.contacts.measurement import curves, draw
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories import BoundaryElements, get_theory
-from mbma_tables.theories.calibrated_curves import own_law
-from mbma_tables.theories.numerical import answer_where_finite
-from mbma_tables.theories.protocol import Theory
+from mbma_tables.theories.base import Theory
+from mbma_tables.theories.calibrated.curves import own_law
+from mbma_tables.theories.simulated.boundary_elements import LOADS
+from mbma_tables.theories.simulated.pressing import Press
+from mbma_tables.theories.users import answer_where_finite
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"

@@ -15,8 +15,8 @@ from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Joint, Surface, flow_factors, rough_contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import boundary_elements
-from mbma_tables.law.rough_body import mean_wavelength
-from mbma_tables.totals.conductance import cooper_mikic_yovanovich, mean_conductivity
+from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
+from mbma_tables.rough_body.rough_contact import mean_wavelength
 
 PAIRS = {"steel on aluminium": ("steel 4140 hard", "aluminium 6061 hard"), "copper on copper": "copper C11000 hard"}
 SHORTEST, PRESSURES = ("8 um", "2 um"), (1.0, 10.0, 100.0)  # MPa

@@ -19,10 +19,10 @@ from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.errors import MbmaError
-from mbma_tables.islands.geometry import geometry, kinks
-from mbma_tables.models import answer_islands
-from mbma_tables.models.tables import get_model
-from mbma_tables.surfaces.variants import get_variant
+from mbma_tables.theories.mbma.geometry import geometry, kinks
+from mbma_tables.theories.mbma.island_models import answer_islands
+from mbma_tables.theories.mbma.tables import get_model
+from mbma_tables.theories.mbma.variants import get_variant
 
 ULP = np.finfo(float).eps
 ISLAND_MODELS, VARIANTS = ("exact", "universal", "formula", "rigid"), ("reported", "printed")

@@ -22,13 +22,13 @@ from generate.splines import coefficients, padding
 from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance
 from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.greenwood_tripp import height_integral
-from mbma_tables.models.island4d import SPHERE_FLOOR, band_fields, spline_of, to_axes
+from mbma_tables.common.table_schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell
 from mbma_tables.surfaces.spectrum import BROADENING
-from mbma_tables.surfaces.variants import Variant, get_variant
-from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell
+from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.theories.mbma.geometry import geometry
+from mbma_tables.theories.mbma.greenwood_tripp import height_integral
+from mbma_tables.theories.mbma.island4d import SPHERE_FLOOR, band_fields, spline_of, to_axes
+from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 VISITED = {"hurst": (0.3, 1.0), "log10_zeta_1": (math.log10(3.001), 4.0), "log10_approach": (-8.0, 1.0)}
 COVER_TRIALS = 4096

@@ -12,11 +12,11 @@ from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedErr
 from generate.tables.writing import about, label
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu
-from mbma_tables.surfaces.variants import VARIANTS
-from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, UNIVERSAL, X_STEPS, TableContent
+from mbma_tables.common.table_schema import BUCKET_BITS, CELL_EDGES, UNIVERSAL, X_STEPS, TableContent
+from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.theories.mbma.geometry import geometry
+from mbma_tables.theories.mbma.universal import TERMS, UniversalModel, fractions_of_mu
+from mbma_tables.theories.mbma.variants import VARIANTS
 
 VISITED = {"hurst": (0.05, 1.0), "log10_zeta_1": (0.4786, 8.0), "log10_approach": (-7.0, 1.0)}
 

@@ -18,7 +18,7 @@ from mbma_tables.common.units import unit_of
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
-    from mbma_tables.answers.result import Contact
+    from mbma_tables.contacts.result import Contact
 
 LIGHTEST = 1e-4  # A/A0 at a curve's second point
 SEARCHED = 1 - np.append(np.geomspace(1e-3, 0.2, 60), np.linspace(0.2, 2.0, 141)[1:])  # d/h_max where areas are found
@@ -57,7 +57,7 @@ def contact_command(
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
     ((name, numbers),) = loads.items()
     model = model.of(specimen.surface, name)
-    from mbma_tables.answers.contact import contact
+    from mbma_tables.contacts.contact import contact
 
     known: dict[str, Any] = {name: finite_array(name, specimen.units.number(name, numbers))}
     answer = contact(specimen.surface, **known, **model.keywords(specimen))
@@ -106,8 +106,8 @@ def curve_command(
     Example: mbma curve --surface concrete --plot concrete.png
     """
     options.check_plot(plot, output.out)
-    from mbma_tables.answers.contact import contact
     from mbma_tables.common import plots
+    from mbma_tables.contacts.contact import contact
     from mbma_tables.scenes.run import other_theory
 
     model, surface = model.of(specimen.surface), specimen.surface
@@ -146,8 +146,8 @@ def sensitivity_command(loads: dict[str, Any], specimen: Specimen, model: option
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
-    from mbma_tables.answers.contact import one_known
-    from mbma_tables.answers.sensitivity import sensitivity
+    from mbma_tables.contacts.contact import one_known
+    from mbma_tables.contacts.sensitivity import sensitivity
 
     model = model.of(specimen.surface, one_known(**dict.fromkeys(options.LOADS) | loads)[0])
     found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, **model._asdict())
@@ -175,7 +175,7 @@ def island_command(
     """
     if delta is None:
         raise InputError("approaches are needed: --delta")
-    from mbma_tables.totals.island import island
+    from mbma_tables.theories.mbma.island import island
 
     asked = {name: value for name, value in model.keywords(specimen).items() if name != "theory"}
     answer = island(specimen.surface, finite_array("delta", specimen.units.number("delta", delta)), **asked)
@@ -213,9 +213,9 @@ def fit_command(
     Example: mbma fit wafer.sur --short-cutoff 2um --plot wafer.png
     """
     options.check_plot(plot, output.out)
-    from mbma_tables.answers.measurement import areal, curves, described, draw, table_of_loads
     from mbma_tables.common.plots import pressure_label, to_picture
     from mbma_tables.common.units import Units
+    from mbma_tables.contacts.measurement import areal, curves, described, draw, table_of_loads
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
     from mbma_tables.theories import BoundaryElements, theory_name

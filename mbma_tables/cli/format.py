@@ -27,7 +27,7 @@ from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.surface import assumptions
 
 if TYPE_CHECKING:
-    from mbma_tables.answers.result import Contact
+    from mbma_tables.contacts.result import Contact
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 # model uncertainties of a contact, with what a line of text calls them

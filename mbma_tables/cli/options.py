@@ -14,14 +14,14 @@ import click
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
 from mbma_tables.materials import hardness_in
-from mbma_tables.models import ISLAND_MODELS
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import CASES
-from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import OF_MAPS, THEORIES
+from mbma_tables.theories.mbma.island_models import ISLAND_MODELS
+from mbma_tables.theories.mbma.variants import NAMED
 
 LOADS = ("separation", "mean_separation", "pressure", "area")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]

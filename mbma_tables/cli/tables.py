@@ -10,16 +10,16 @@ import click
 from mbma_tables.cli.options import json_option
 from mbma_tables.common import cache
 from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own, read_table
 from mbma_tables.common.progress import echo
-from mbma_tables.tablefiles.netcdf import OWN, OWN_REMEDY, holds_own, read_own, read_table
-from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
+from mbma_tables.common.table_schema import KINDS, UNIVERSAL
 
 FAITHFUL = 1e-6  # relative, of an own table's curves at the loads they go through
 
 
 def _place(name: str) -> tuple[Path, str | None]:
     """Path and kind of a table; for a file, whose kind is unknown, None."""
-    from mbma_tables.models.tables import shipped
+    from mbma_tables.theories.mbma.tables import shipped
 
     if name not in KINDS and not Path(name).exists():
         raise InputError(f"no table and no file is called {name!r}: the tables are {' and '.join(KINDS)}")
@@ -37,7 +37,7 @@ def tables_group() -> None:
 
 def _verified(table: str) -> tuple[dict[str, Any], str]:
     """What a check of a table found, and a line of it."""
-    from mbma_tables.models.tables import verify
+    from mbma_tables.theories.mbma.tables import verify
 
     if holds_own(table):
         import numpy as np

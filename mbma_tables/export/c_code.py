@@ -24,15 +24,16 @@ from mbma_tables.common.files import write_file
 from mbma_tables.export.conformance import FORM, POINTS_FILE, points_text
 from mbma_tables.export.targets import Target
 from mbma_tables.export.text import about, braces, core_file, filled, number, numerals, opening, written_by
-from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
-from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
-from mbma_tables.models.closed_forms import FUNCTIONS
-from mbma_tables.models.tables import universal_model
-from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
-from mbma_tables.surfaces.variants import Variant, get_variant
-from mbma_tables.theories import calibrated_table, persson
-from mbma_tables.totals.contact import QUADRATURE_SHARE
+from mbma_tables.theories import persson
+from mbma_tables.theories.calibrated import table as calibrated_table
+from mbma_tables.theories.calibrated.formulas import LAW_ERROR, YANG_PERSSON
+from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
+from mbma_tables.theories.mbma.closed_forms import FUNCTIONS
+from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
+from mbma_tables.theories.mbma.tables import universal_model
+from mbma_tables.theories.mbma.universal import RECORD, UniversalModel
+from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 CORE = ("totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
 MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")

@@ -15,20 +15,22 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.answers import source
 from mbma_tables.common.arguments import number_in, positive_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
+from mbma_tables.contacts import source
 from mbma_tables.export import c_code
 from mbma_tables.export.text import page_file
-from mbma_tables.laws import hardness as hardness_law
-from mbma_tables.laws.calibrated import TESTED_AREA
 from mbma_tables.materials import hardness_in
-from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
-from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
-from mbma_tables.theories import OF_MAPS, calibrated_table, mbma, tested, theory_name
+from mbma_tables.theories import OF_MAPS, tested, theory_name
+from mbma_tables.theories.calibrated import table as calibrated_table
+from mbma_tables.theories.calibrated.formulas import TESTED_AREA
+from mbma_tables.theories.mbma import theory as mbma
+from mbma_tables.theories.mbma.tables import universal_model
+from mbma_tables.theories.mbma.variants import FITTED, PRINTED, REPORTED, get_variant
+from mbma_tables.theories.yielding import formulas as hardness_law
 
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")

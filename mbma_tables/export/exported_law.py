@@ -10,25 +10,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.answers.contact import chosen_theory, contact
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, in_unit, modulus_and_units
+from mbma_tables.contacts.contact import chosen_theory, contact
 from mbma_tables.export.text import about, number
 from mbma_tables.law import block as at
-from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.leakage import LeakageLaw
 from mbma_tables.law.make import contact_law
-from mbma_tables.law.rough_body import pressed
 from mbma_tables.materials import ELASTIC_PSI, hardness_in
+from mbma_tables.rough_body.force_law import ForceLaw
+from mbma_tables.rough_body.rough_contact import pressed
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import calibrated_table
-from mbma_tables.theories.mbma import Mbma
-from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.theories.base import Theory, UserTheory
+from mbma_tables.theories.calibrated import table as calibrated_table
+from mbma_tables.theories.mbma.theory import Mbma
+from mbma_tables.theories.mbma.variants import Variant
 
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
@@ -227,7 +227,7 @@ class ExportedLaw:
     def _hashes(self) -> Iterator[str]:
         """Lines on the table that the theory uses, and on a surface not given by five numbers."""
         if isinstance(self.theory, Mbma):
-            from mbma_tables.models.tables import universal_model
+            from mbma_tables.theories.mbma.tables import universal_model
 
             yield f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}"
         elif self.theory.name == "calibrated":

@@ -27,8 +27,8 @@ from mbma_tables.export.text import (
     wrapped,
 )
 from mbma_tables.law import block as at
-from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ContactLaw
+from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 
 LAW_MODULE = "law.wasm"  # the core's laws for JavaScript

@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.answers.film import flow_factors
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
+from mbma_tables.contacts.film import flow_factors
 from mbma_tables.export.exported_law import KAPPA, ExportedLaw, GasInGaps, exported_law
 from mbma_tables.export.law_table import MAX_ROWS, MIN_ROWS, LawTable, chosen_rows, rounded
 from mbma_tables.export.targets import AGAINST
 from mbma_tables.export.text import about, number
-from mbma_tables.law.force_law import ForceLaw
 from mbma_tables.law.law import ROUNDING
-from mbma_tables.laws.calibrated import TESTED_AREA
-from mbma_tables.laws.effective_medium import LARGEST_AREA
+from mbma_tables.quantities.effective_medium import LARGEST_AREA
+from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.theories.base import Theory, UserTheory
+from mbma_tables.theories.calibrated.formulas import TESTED_AREA
+from mbma_tables.theories.mbma.variants import Variant
 
 FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness

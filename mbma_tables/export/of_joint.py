@@ -17,7 +17,7 @@ from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import Target, targets
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.protocol import Theory
+from mbma_tables.theories.base import Theory
 
 MILLI = 1e3  # mW of a W, the power of the system N, mm, MPa, s
 

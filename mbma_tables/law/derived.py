@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.answers.interface import OF_LAY, OF_YIELDING, NormalOfLaw, Tangential, ratio_of
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
+from mbma_tables.contacts.interface import OF_LAY, OF_YIELDING, NormalOfLaw, Tangential, ratio_of
 
 if TYPE_CHECKING:
     from mbma_tables.law.leakage import LeakageLaw
@@ -79,7 +79,7 @@ class Derived:
         """The law of the elastic contact, and `unloading_stiffness` over its stiffness."""
         if math.isinf(self.hardness):
             return self, 1.0
-        from mbma_tables.laws.hardness import frozen_factor
+        from mbma_tables.theories.yielding.formulas import frozen_factor
 
         factor = frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient)))
         return dataclasses.replace(self.elastic(), units=self.units), float(factor)

@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.answers.contact import chosen_theory
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.shared import frozen
 from mbma_tables.common.units import modulus_and_units
+from mbma_tables.contacts.contact import chosen_theory
 from mbma_tables.law import block as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.materials import Metal, Pair, bodies, hardness_in
-from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel
-from mbma_tables.models.tables import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories.mbma import Mbma
-from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.totals.island import check_band
-from mbma_tables.totals.profile import profile
+from mbma_tables.theories.base import Theory, UserTheory
+from mbma_tables.theories.mbma.island import check_band
+from mbma_tables.theories.mbma.island_models import MAX_RTOL, MIN_RTOL, AnyModel
+from mbma_tables.theories.mbma.profile import profile
+from mbma_tables.theories.mbma.tables import get_model
+from mbma_tables.theories.mbma.theory import Mbma
+from mbma_tables.theories.mbma.variants import Variant
 
 MIN_LAW_RTOL = 1e-9
 RESOLVED = 1e-3  # for polynomials this accurate the last coefficients estimate the error

@@ -21,8 +21,8 @@ import numpy as np
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.models import AnyModel
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, OUTPUTS, REFINEMENTS, Problem
+from mbma_tables.theories.mbma.island_models import AnyModel
 
 TABLES = ("universal", "island4d")  # island models that are tables
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
@@ -225,7 +225,7 @@ def make_plan(problem: Problem) -> Plan:
 def certified_error(island_model: str | AnyModel, asked: float) -> float:
     """Bound on the relative error of islands, for results at `asked`; NaN if it is known afterwards only."""
     if island_model == "universal":
-        from mbma_tables.models.tables import open_table
+        from mbma_tables.theories.mbma.tables import open_table
 
         certificate = open_table(island_model).content.attributes
         return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))

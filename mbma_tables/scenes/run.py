@@ -12,26 +12,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.answers.source import MEANINGS
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
 from mbma_tables.common.units import unit_of
+from mbma_tables.contacts.source import MEANINGS
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.models import RigidModel, answer_islands
-from mbma_tables.models.tables import get_model
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.surfaces.variants import Variant, get_variant
+from mbma_tables.theories.mbma.island_models import RigidModel, answer_islands
+from mbma_tables.theories.mbma.tables import get_model
+from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mbma_tables.theories.mbma import Mbma
+    from mbma_tables.theories.mbma.theory import Mbma
 
 VALIDITY = (
     "valid",
@@ -62,11 +62,11 @@ class Run:
 
 def _contact(run: Run, step: Step) -> None:
     """One contact at all gaps, and of it the requested quantities."""
-    from mbma_tables.answers.contact import contact
+    from mbma_tables.contacts.contact import contact
 
     problem, wanted, theory = run.problem, run.problem.outputs, run.problem.theory
     if theory == "mbma":
-        from mbma_tables.theories.mbma import Mbma
+        from mbma_tables.theories.mbma.theory import Mbma
 
         assert step.island_model is not None
         assert step.rtol is not None
@@ -141,7 +141,7 @@ def _asked(run: Run, step: Step) -> tuple[Any, Variant, float]:
 
 def hertz_area(run: Run, step: Step) -> None:
     """A/A0 with eta = 1 in Eq. 38 (C.1)."""
-    from mbma_tables.totals.profile import profile
+    from mbma_tables.theories.mbma.profile import profile
 
     shape, variant, rtol = _asked(run, step)
     assert step.island_model is not None
@@ -155,8 +155,8 @@ def hertz_area(run: Run, step: Step) -> None:
 
 def island_statistics(run: Run, step: Step) -> None:
     """Number of islands at every gap; load, area, density along their approach (Eqs. 40, 42)."""
-    from mbma_tables.totals.island import islands_of, scale_area, scale_force
-    from mbma_tables.totals.profile import profile, source_of
+    from mbma_tables.theories.mbma.island import islands_of, scale_area, scale_force
+    from mbma_tables.theories.mbma.profile import profile, source_of
 
     problem, surface, (shape, variant, rtol) = run.problem, run.surface, _asked(run, step)
     assert step.island_model is not None
@@ -190,8 +190,8 @@ def island_statistics(run: Run, step: Step) -> None:
 
 def profiles(run: Run, step: Step) -> None:
     """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
-    from mbma_tables.islands import greenwood_tripp
-    from mbma_tables.totals.island import islands_of
+    from mbma_tables.theories.mbma import greenwood_tripp
+    from mbma_tables.theories.mbma.island import islands_of
 
     problem = run.problem
     delta = np.atleast_1d(np.asarray(problem.deltas, dtype=float)).ravel()
@@ -209,7 +209,7 @@ def profiles(run: Run, step: Step) -> None:
 def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float, hardness: float = math.inf) -> Curve:
     """A theory, by its name, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories import get_theory
-    from mbma_tables.theories.numerical import answer_where_finite
+    from mbma_tables.theories.users import answer_where_finite
 
     theory, u = get_theory(name, surface), (float(surface.h_max) + gap) / 2
     if hardness < math.inf:
@@ -328,7 +328,7 @@ def _hashes(steps: list[Step]) -> dict[str, str]:
     used: dict[Any, Any] = {step.island_model_name: step.island_model for step in steps}
     if not used.keys() & set(TABLES):
         return {}
-    from mbma_tables.models.tables import open_table
+    from mbma_tables.theories.mbma.tables import open_table
 
     tables = {name: open_table(name) if used[name] == name else used[name] for name in TABLES if name in used}
     return {name: str(table.content.attributes["values_sha256"]) for name, table in tables.items()}

@@ -14,6 +14,7 @@ from typing import Any
 from mbma_tables.common.arguments import nearest, one_number, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
+from mbma_tables.common.netcdf import is_own
 from mbma_tables.common.plain_text import visible
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
@@ -23,7 +24,6 @@ from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
-from mbma_tables.tablefiles.netcdf import is_own
 
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.errors import InputError
-from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
+from mbma_tables.surfaces.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
 

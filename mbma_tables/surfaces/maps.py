@@ -11,7 +11,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, nearest, number_in, require_flag
 from mbma_tables.common.errors import InputError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.common.units import Units, factor, known, resolve
-from mbma_tables.laws import bearing_curve as bearing
+from mbma_tables.surfaces import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.profiles import measured_profile

@@ -15,14 +15,14 @@ from mbma_tables.common.arguments import finite_array, one_number, positive_arra
 from mbma_tables.common.display import Variable
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
-from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.any_surface import AnySurface, frozen
+from mbma_tables.surfaces.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights, of_area
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1, PowerLaws
 from mbma_tables.surfaces.treatment import Treated
 
 if TYPE_CHECKING:
-    from mbma_tables.laws.pressing import Table
+    from mbma_tables.theories.simulated.pressing import Table
 
 # ranges of the surfaces of the data set's group elastic. If they are taken as isotropic Gaussian ones, area is within
 # 20% between 1% and 10% contact; outside the ranges it is wrong by 30% to factors
@@ -67,13 +67,13 @@ class SpectralSurface(AnySurface):
     heights : Heights, optional
         Distribution of heights; a Gaussian that ends at h_max if not given.
     bearing : Bearing, optional
-        Curves of a periodic map: shape of its highest and lowest parts (`mbma_tables.laws.bearing_curve`).
+        Curves of a periodic map: shape of its highest and lowest parts (`mbma_tables.surfaces.bearing_curve`).
     bands : RadialSpectrum, optional
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
     map : Treated, optional
         The treated heights themselves, for `theory="simulated"`.
     table : Table, optional
-        What boundary elements found of them already (`mbma_tables.laws.pressing`).
+        What boundary elements found of them already (`mbma_tables.theories.simulated.pressing`).
     scans : tuple of MeasuredSurface, optional
         Several, of which it is the average (`mbma_tables.surfaces.averages`).
     samples : array_like, shape (n,), optional
@@ -220,7 +220,7 @@ class SpectralSurface(AnySurface):
         elif by_map:
             remedy = "theory='simulated' simulates the map"
             if self.map is not None:
-                from mbma_tables.laws.pressing import resolving
+                from mbma_tables.theories.simulated.pressing import resolving
 
                 cutoff = resolving(self.shortest(ROUNDED), max(self.map.steps), self.unit)
                 remedy += f" of Surface.from_map(..., {cutoff})" if cutoff else ""

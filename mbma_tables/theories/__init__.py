@@ -11,12 +11,12 @@ from mbma_tables.common.shared import shared
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.theories.calibrated import Calibrated
+    from mbma_tables.theories.base import Theory, TheoryAnswer, UserTheory
+    from mbma_tables.theories.calibrated.theory import Calibrated
     from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
-    from mbma_tables.theories.mbma import Mbma
+    from mbma_tables.theories.mbma.theory import Mbma
     from mbma_tables.theories.persson import Method, Persson
-    from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
-    from mbma_tables.theories.saturated import BoundaryElements as BoundaryElements
+    from mbma_tables.theories.simulated.yielded import BoundaryElements as BoundaryElements
 
 __all__ = [
     "THEORIES",
@@ -67,11 +67,11 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     >>> get_theory("persson").name
     'persson'
     """
-    from mbma_tables.theories.numerical import Wrapped
-    from mbma_tables.theories.protocol import Theory, UserTheory
+    from mbma_tables.theories.base import Theory, UserTheory
+    from mbma_tables.theories.users import Wrapped
 
     if isinstance(theory, str) and theory in OF_MAPS:
-        from mbma_tables.theories.saturated import of_map
+        from mbma_tables.theories.simulated.yielded import of_map
 
         return of_map(theory, surface)
     found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
@@ -136,6 +136,6 @@ def theory_name(
         return "simulated"
     if getattr(surface, "map", None) is None:
         return "calibrated"
-    from mbma_tables.theories.saturated import applies
+    from mbma_tables.theories.simulated.yielded import applies
 
     return "corrected" if applies(surface) else "calibrated"

@@ -1,4 +1,4 @@
-"""Persson's theory (Eqs. 18-21); (19) is u_P of `laws.calibrated` with the weight W = gamma P + (1 - gamma) P^3."""
+"""Persson's theory (Eqs. 18-21); (19) is u_P of `theories.calibrated.formulas` with the weight W = gamma P + (1 - gamma) P^3."""
 
 import math
 from typing import Any, Literal
@@ -8,10 +8,10 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, finite_array, grouped, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.shared import shared
-from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON, Law, area, self_affine_law, spectrum_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
-from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.base import Theory, TheoryAnswer
+from mbma_tables.theories.calibrated.formulas import LAW_ERROR, YANG_PERSSON, Law, area, self_affine_law, spectrum_of
 
 Method = Literal["full", "simplified"]
 

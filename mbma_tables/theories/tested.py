@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.laws.calibrated import TESTED_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories.calibrated.formulas import TESTED_AREA
 
 HURST = 0.2  # least Hurst exponent
 ZETA_1 = (8.0, 128.0)  # longest over shortest wavelength

@@ -221,7 +221,7 @@ def test_faults_of_the_system_are_one_line(folder, monkeypatch):
     def fail(*_, **__):
         raise OSError("odd\nfault")
 
-    monkeypatch.setattr("mbma_tables.answers.contact.contact", fail)
+    monkeypatch.setattr("mbma_tables.contacts.contact.contact", fail)
     assert refused("contact", "--surface", "concrete", "-d", "0.1") == "mbma: odd fault\n"
 
 
@@ -280,7 +280,7 @@ def test_a_terminal_sees_that_work_goes_on():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-@pytest.mark.parametrize("module", ["click", "mbma_tables.islands.greenwood_tripp"])
+@pytest.mark.parametrize("module", ["click", "mbma_tables.theories.mbma.greenwood_tripp"])
 def test_control_c_ends_it_with_130(folder, module):
     # while modules are imported, and with the last of them in place
     command = [sys.executable, "-X", "importtime", "-m", "mbma_tables", "curve", "--surface", "concrete"]

@@ -7,8 +7,8 @@ import pytest
 from helpers import random_map, refused, run, topographies
 
 from mbma_tables import Surface
-from mbma_tables.answers.measurement import table_of_loads
 from mbma_tables.common.errors import InputError
+from mbma_tables.contacts.measurement import table_of_loads
 from mbma_tables.scenes.specimen import read_specimen
 
 library = topographies()

@@ -8,9 +8,9 @@ from helpers import refused, run
 from small_tables import small_table
 
 from generate.tables.writing import write_table
-from mbma_tables.models import tables as tabulated
-from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS, UNIVERSAL
+from mbma_tables.common.netcdf import read_table
+from mbma_tables.common.table_schema import FORMAT_VERSIONS, KINDS, UNIVERSAL
+from mbma_tables.theories.mbma import tables as tabulated
 
 
 @pytest.fixture

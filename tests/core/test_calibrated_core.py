@@ -10,11 +10,11 @@ from scipy.interpolate import NdBSpline
 from scipy.special import erf
 
 from mbma_tables import ConvergenceError, InputError
-from mbma_tables.answers import leakage
-from mbma_tables.answers.leakage import shipped_flow
+from mbma_tables.contacts import leakage
+from mbma_tables.contacts.leakage import shipped_flow
 from mbma_tables.core import GENERATIONS, core
-from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum
-from mbma_tables.theories.calibrated_table import shipped
+from mbma_tables.theories.calibrated.formulas import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum
+from mbma_tables.theories.calibrated.table import shipped
 
 PLAIN = importlib.import_module("mbma_tables.core._plain")
 FUSED = [importlib.import_module(f"mbma_tables.core._{name}") for name, least in GENERATIONS.items()

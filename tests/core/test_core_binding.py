@@ -16,7 +16,7 @@ import pytest
 
 from mbma_tables import Surface, contact_law, open_table
 from mbma_tables.core import core
-from mbma_tables.totals.profile import RULES
+from mbma_tables.theories.mbma.profile import RULES
 
 
 def run(code, timeout=120):
@@ -174,18 +174,18 @@ LONG = {
     ),
     "leakage": ("found = contact(one, mean_separation=u, theory='calibrated')", "found.leakage.K"),
     "factors of the flow through a map": (
-        "from mbma_tables.laws.reynolds import flow_conductance\n"
+        "from mbma_tables.theories.simulated.reynolds import flow_conductance\n"
         "gap = np.random.default_rng(1).uniform(0.1, 1.0, (600, 600))",
         "flow_conductance(gap, (1.0, 1.0))",
     ),
     "gas conductance": (
-        "from mbma_tables.laws.gas import mean_inverse\nshare = np.linspace(1e-3, 0.1, u.size)",
+        "from mbma_tables.quantities.gas import mean_inverse\nshare = np.linspace(1e-3, 0.1, u.size)",
         "mean_inverse(u, share, 0.3, 1.0)",
     ),
     "energy": ("", "contact(one, mean_separation=u[::10], theory='persson').energy"),
     "flow factors": (
-        "from mbma_tables.laws.effective_medium import FlowConstants\n"
-        "from mbma_tables.laws.lay import factors\n"
+        "from mbma_tables.quantities.effective_medium import FlowConstants\n"
+        "from mbma_tables.quantities.lay import factors\n"
         "gaps, share = u[::300], np.full(u[::300].shape, 0.02)",
         "factors(gaps, share, 3.0, FlowConstants())",
     ),

@@ -17,11 +17,11 @@ from mbma_tables.core import GENERATIONS, core
 ROOT = pathlib.Path(__file__).parents[2]
 QUICK = [
     "core/test_calibrated_core.py",
-    "islands/test_core_islands.py",
+    "theories/mbma/test_core_islands.py",
 ]
 QUICK += [f"totals/test_{name}.py" for name in ("kernel", "law", "island_models")]
-MORE = ["islands/test_geometry.py", "models", "totals/test_contact.py"]
-MORE += ["theories/test_calibrated_theory.py", "theories/test_yielding.py"]
+MORE = ["theories/mbma/test_geometry.py", "models", "theories/mbma/test_contact.py"]
+MORE += ["theories/calibrated/test_calibrated_theory.py", "theories/yielding/test_yielding.py"]
 pytestmark = pytest.mark.slow
 
 

@@ -21,10 +21,10 @@ from mbma_tables.export import c_code, conformance, data, solvers
 from mbma_tables.export.c_code import SELFTEST, SOURCES, check, read_report, write_code
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.text import checked_name
-from mbma_tables.models.closed_form_certificates import RANGES
-from mbma_tables.models.tables import universal_model
-from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.variants import Variant, get_variant
+from mbma_tables.theories.mbma.closed_form_certificates import RANGES
+from mbma_tables.theories.mbma.tables import universal_model
+from mbma_tables.theories.mbma.universal import UniversalModel
+from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 POINTS, SURFACES = 10_000, 60
 SHARES = (1e-4, 0.01, 0.2, 0.5, 0.9, 0.99)  # u/h_max

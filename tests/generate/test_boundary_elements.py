@@ -12,7 +12,7 @@ from generate.boundary_elements.solve import Contact, simulate
 from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Recipe, Task, campaign, heights
 from generate.calibrated_file import write_part
 from mbma_tables import InputError
-from mbma_tables.laws.bearing_curve import FRACTIONS, bearing
+from mbma_tables.surfaces.bearing_curve import FRACTIONS, bearing
 
 pytest.importorskip("tamaas")
 SQUARE = (1.0, 1.0)

@@ -20,11 +20,11 @@ from generate.tables.commands import KINDS, TABLES
 from generate.tables.configuration import MIN_SHIPPED_POINTS, load
 from generate.tables.island4d import evaluate
 from generate.tables.writing import write_table
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.tables import shipped
-from mbma_tables.models.universal import UniversalModel
-from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import UNIVERSAL, error_cell
+from mbma_tables.common.netcdf import read_table
+from mbma_tables.common.table_schema import UNIVERSAL, error_cell
+from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.theories.mbma.tables import shipped
+from mbma_tables.theories.mbma.universal import UniversalModel
 
 # fresh points find other worst places than the few hundred of a small certificate
 STATED_FACTOR = 1.5

@@ -12,7 +12,7 @@ from generate.calibrated import EDGES, coverage, cross_validate, errors, fit, me
 from generate.calibrated_file import QUANTITIES, write_part
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.data import read_groups
-from mbma_tables.laws.calibrated import CONSTANTS, Law, Spectrum
+from mbma_tables.theories.calibrated.formulas import CONSTANTS, Law, Spectrum
 
 FORCES = np.geomspace(4e-4, 1.0, 15)
 TRUE = dataclasses.replace(

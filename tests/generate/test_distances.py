@@ -18,8 +18,8 @@ from generate.pages import simulations
 from generate.theories_of_others import FORCES, Corrected
 from mbma_tables import InputError, Surface, contact
 from mbma_tables.common.files import shipped_file
-from mbma_tables.laws.calibrated import PERSSON, Law, Spectrum
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories.calibrated.formulas import PERSSON, Law, Spectrum
 
 PAGE = (ROOT / "docs" / "fidelity.md").read_text("utf-8")
 PICKED = ("bem", "gfmd", "gfmd 3", "challenge", "rolloff", *distances.MEASURED)  # data sets of few surfaces

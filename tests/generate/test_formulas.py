@@ -8,7 +8,7 @@ from generate import formulas as fit
 from generate.formulas import FORMS, MODULE, forms_text, module_text
 from generate.pages.library import expressions
 from mbma_tables import Surface, contact, greenwood_tripp
-from mbma_tables.models.closed_forms import CERTIFICATES, FUNCTIONS, RANGES, evaluate
+from mbma_tables.theories.mbma.closed_forms import CERTIFICATES, FUNCTIONS, RANGES, evaluate
 
 PRINTED = {"rel": 0.011, "abs": 0}  # three digits are stated, the largest error rounded up
 SHIPPED = {f"{form}_{result}": one for form, results in FUNCTIONS.items() for result, one in results.items()}

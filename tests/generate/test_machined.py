@@ -10,8 +10,8 @@ from generate.files import dataset
 from generate.machined import campaign, evaluation
 from generate.machined.campaign import solved, surface_of
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
-from mbma_tables.laws.map_curves import PLATEAU_SHIFT, MapLaw
-from mbma_tables.theories.saturated import BoundaryElements, Corrected
+from mbma_tables.theories.calibrated.map_curves import PLATEAU_SHIFT, MapLaw
+from mbma_tables.theories.simulated.yielded import BoundaryElements, Corrected
 
 
 @pytest.fixture(scope="module")

@@ -13,15 +13,15 @@ from helpers import refusals
 from scipy.integrate import quad
 
 from mbma_tables import ConvergenceError, OutOfRangeError, Scene, Surface, contact, contact_law, island, open_table
-from mbma_tables.models import answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import run as runs
 from mbma_tables.scenes.problem import ELASTIC, OF_CONTACT, OUTPUTS
-from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Persson
-from mbma_tables.theories.yielding import Yielding
-from mbma_tables.totals.island import scale_area
-from mbma_tables.totals.profile import source_of
+from mbma_tables.theories.mbma.island import scale_area
+from mbma_tables.theories.mbma.island_models import answer_islands
+from mbma_tables.theories.mbma.profile import source_of
+from mbma_tables.theories.mbma.variants import REPORTED
+from mbma_tables.theories.yielding.theory import Yielding
 
 CONCRETE = Surface.named("concrete")
 GAPS = (0.2, 0.5, 0.9)
@@ -193,9 +193,9 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
 
         monkeypatch.setattr(module, name, counted)
 
-    count(importlib.import_module("mbma_tables.answers.contact"), "contact", "contact")
+    count(importlib.import_module("mbma_tables.contacts.contact"), "contact", "contact")
     count(importlib.import_module("mbma_tables.law.make"), "contact_law", "contact_law")
-    count(importlib.import_module("mbma_tables.answers.leakage"), "leakage_of", "leakage")
+    count(importlib.import_module("mbma_tables.contacts.leakage"), "leakage_of", "leakage")
     for name in ("island_statistics", "profiles", "hertz_area"):
         count(runs, name, name)
     for theory in (GreenwoodWilliamson, Persson):
@@ -220,7 +220,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
 
 @pytest.mark.parametrize("name", ["comparison", "pressure_profile"])
 def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
-    from mbma_tables.models import tables as tabulated
+    from mbma_tables.theories.mbma import tables as tabulated
 
     def refuse(*_):
         raise AssertionError("a table was read")

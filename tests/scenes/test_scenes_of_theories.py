@@ -7,8 +7,8 @@ import pytest
 from helpers import Springs, refusals
 
 from mbma_tables import InputError, Scene, Surface, contact
+from mbma_tables.quantities.conductance import mean_conductivity
 from mbma_tables.theories import THEORIES
-from mbma_tables.totals.conductance import mean_conductivity
 
 CONCRETE = Surface.named("concrete")
 MODULUS = 13.3

@@ -9,7 +9,7 @@ from helpers import fresh, random_map
 
 from mbma_tables import Surface, contact
 from mbma_tables.theories import THEORIES, BoundaryElements, get_theory
-from mbma_tables.theories.yielding import Yielding
+from mbma_tables.theories.yielding.theory import Yielding
 
 MAP = 0.1 * random_map(64, 0.05, 0.25, power=0)
 PRESSURES = np.array([1e-3, 3e-3])

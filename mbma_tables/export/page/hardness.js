@@ -1,4 +1,4 @@
-// Contact with a hardness, from the elastic one: the formulas of mbma_tables/laws/hardness.py, and its constants.
+// Contact with a hardness, from the elastic one: the formulas of mbma_tables/theories/yielding/formulas.py, and its constants.
 
 const CAP = LIMITS.hardness;
 

@@ -1,1 +1,0 @@
-"""`contact`, its result, leakage, sensitivity; units, shapes, checks."""

@@ -1,0 +1,1 @@
+"""Contacts: the questions that surfaces, bodies and theories answer, and their results."""

@@ -1,0 +1,386 @@
+"""Sensitivity of results to each parameter of a surface: logarithmic derivatives."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.common.arguments import FloatArray, hinted, one_number
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import DIMENSIONS, Units, factor, modulus_and_units, unit_of
+from mbma_tables.contacts.contact import chosen_theory, contact, one_known
+from mbma_tables.materials import Metal, Pair, bodies, hardness_in
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.maps import extrapolated
+from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.theories.base import Theory, UserTheory
+from mbma_tables.theories.calibrated.theory import Calibrated
+from mbma_tables.theories.mbma.island_models import AnyModel
+from mbma_tables.theories.mbma.variants import Variant
+
+STEP = 0.02  # step of the logarithm of a parameter
+NEAR = 0.9  # share of a parameter's upper limit above which its steps go down
+MAX_ERROR = 0.05  # largest error of a slope, over itself or 1; else it is NaN
+ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Result of `sensitivity`; its text is a table.
+
+    Stiffness is that of loading, conductance that over the mean conductivity of the bodies [1/length].
+    """
+
+    by: str  #: quantity held fixed: "separation", "mean_separation", "pressure" or "area"
+    parameters: dict[str, float]  #: the surface's parameters, the modulus if given, and the quantity held fixed
+    answers: dict[str, float]  #: the results for these parameters
+    #: d ln(result)/d ln(parameter) by parameter and result, the other parameters held; NaN where the result jumps
+    slopes: dict[str, dict[str, float]]
+    errors: dict[str, dict[str, float]]  #: estimates of their errors
+    units: Units  #: of parameters and results
+
+    def __str__(self) -> str:
+        width = max(map(len, self.parameters)) + 2
+        lines = [f"d ln(answer)/d ln(parameter) at given {self.by}", f"{'':{width}}{'value':>22}"]
+        lines[1] += "".join(f"{name:>17}" for name in self.answers)
+        for name, value in self.parameters.items():
+            slopes = "".join(f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}" for answer in self.answers)
+            unit = unit_of(name.rpartition(".")[2], self.units)
+            number = f"{value:.5g} {unit}".removesuffix(" 1")
+            lines.append(f"{name:{width}}{number:>22}{slopes}")
+        return "\n".join(lines)
+
+
+@hinted
+def sensitivity(
+    surface: AnySurface,
+    *,
+    separation: ArrayLike | None = None,
+    mean_separation: ArrayLike | None = None,
+    pressure: ArrayLike | None = None,
+    area: ArrayLike | None = None,
+    E_star: float | str = 1.0,
+    theory: str | Theory | UserTheory | None = None,
+    island_model: str | AnyModel = "universal",
+    variant: str | Variant = "reported",
+    rtol: float = 1e-8,
+    hardness: float | str | None = None,
+    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
+) -> Sensitivity:
+    """Sensitivity of pressure, area, stiffness and conductance to each parameter of a surface, for any theory.
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface. Its parameters are its five numbers, or those of the drawing that it was made from
+        (`Surface.from_roughness`). Those of one given by a spectrum are "heights" and "lengths", factors of all
+        heights and of all lengths along the plane, like an instrument's calibration factors; h_max alone; the
+        "shortest" and "longest" wavelengths, cut-offs that only remove wavelengths, and with an extrapolated spectrum
+        its exponent "extrapolate_hurst". Where the calibrated law uses a map's own heights and curves, and where the
+        map is simulated, h_max and cut-offs are left out: they follow from the map.
+    separation, mean_separation, pressure, area : float or str, one of them
+        The quantity held fixed, as for `contact`.
+    E_star : float or str
+        Effective modulus, as for `contact`.
+    theory, island_model, variant, rtol, hardness, materials : optional
+        As for `contact`, with the same default theory; a hardness is one of the parameters. The simulation of a map
+        answers for its heights and lengths by similarity, without a hardness.
+
+    Returns
+    -------
+    Sensitivity
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For a batch, unknown names, where there is no contact, and for the simulation of a map with a hardness.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, sensitivity
+    >>> ground = Surface.from_roughness(Rq=0.5, Rdq=0.1, longest=100, hurst=0.8, h_max=1.8, unit="um")
+    >>> found = sensitivity(ground, pressure="10 MPa", E_star="100 GPa")
+    >>> print(f"area goes like Rdq^{found.slopes['Rdq']['area']:.2f}")
+    area goes like Rdq^-1.15
+    >>> found = sensitivity(ground, pressure="10 MPa", materials="steel 1020", theory="calibrated")
+    >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
+    'conductance goes like hardness^-0.68'
+    """
+    by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
+    chosen = chosen_theory(surface, theory, by, island_model=island_model, variant=variant, rtol=rtol)
+    E_star, hardness, _ = bodies(materials, E_star, hardness)
+    modulus, units = modulus_and_units(E_star, surface)
+    return relative_derivatives(
+        unknowns_of(surface, chosen),
+        chosen,
+        units,
+        moduli={"E_star": modulus},
+        modulus_of=_itself,
+        by=by,
+        value=units.number(by, value),
+        hardness=hardness_in(units, np.inf if hardness is None else hardness),
+    )
+
+
+def _itself(E_star: Any) -> Any:
+    return E_star
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknowns:
+    """Numbers that a surface was made from, and the function that makes it again of others."""
+
+    numbers: Mapping[str, float]
+    make: Callable[..., AnySurface]  # takes the numbers by name
+    batches: bool = False  # whether `make` takes arrays of them
+    #: signs of steps of numbers that can move to one side only
+    one_sided: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    #: names of the numbers in results, where they are not their own
+    labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def answers(
+        self, numbers: Mapping[str, Any], by: str, value: Any, modulus: Any, cap: Any, theory: Theory
+    ) -> dict[str, Any]:
+        """`ANSWERS` of the surface of these numbers."""
+        pressed: Any = contact(self.make(**numbers), **{by: value}, E_star=modulus, hardness=cap, theory=theory)
+        answers = {name: getattr(pressed, name) for name in ANSWERS if name != "conductance"}
+        return answers | {"conductance": pressed.unloading_stiffness / modulus}
+
+
+class OfOneMap(Unknowns):
+    """A map whose theory is a simulation of it: heights and lengths scale what was simulated.
+
+    A map with heights `a` and lengths `l` times as large is pressed as the map itself is by bodies of modulus E* a/l,
+    at gaps 1/a times as large.
+    """
+
+    def answers(
+        self, numbers: Mapping[str, Any], by: str, value: Any, modulus: Any, cap: Any, theory: Theory
+    ) -> dict[str, Any]:
+        """`ANSWERS` of the map with these factors."""
+        heights, lengths = numbers["heights"], numbers["lengths"]
+        equal_modulus = modulus * heights / lengths
+        scale = {"pressure": equal_modulus, "area": 1.0}.get(by, heights)
+        pressed: Any = contact(self.make(), **{by: value / scale}, theory=theory)
+        return {
+            "mean_separation": heights * pressed.mean_separation,
+            "pressure": equal_modulus * pressed.pressure,
+            "area": pressed.area,
+            "stiffness": equal_modulus / heights * pressed.stiffness,
+            "conductance": equal_modulus / (heights * modulus) * pressed.unloading_stiffness,
+        }
+
+
+def relative_derivatives(
+    unknowns: Unknowns,
+    theory: Theory,
+    units: Units,
+    *,
+    moduli: Mapping[str, Any],
+    modulus_of: Callable[..., Any],
+    by: str,
+    value: Any,
+    hardness: Any,
+) -> Sensitivity:
+    """d ln(answer)/d ln(number) for the numbers of a surface, the moduli, the quantity held fixed and the hardness.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+        Of the surface.
+    theory : Theory
+    units : Units
+        Of all numbers.
+    moduli : mapping
+        Of the bodies, by name.
+    modulus_of : callable
+        E* of these moduli, in their order.
+    by, value : str, float
+        The quantity held fixed.
+    hardness : float
+        Of the softer body, infinite where nothing yields.
+    """
+    from scipy.differentiate import jacobian
+
+    yields = not np.equal(hardness, np.inf).all()
+    if yields and isinstance(unknowns, OfOneMap):
+        raise InputError(
+            f"theory {theory.name!r} simulates the map anew for each hardness, too coarsely for derivatives by it: "
+            "give theory='calibrated', or hardness=float('inf') for the elastic contact"
+        )
+    given = {**unknowns.numbers, **moduli, by: value}
+    if yields:
+        given["hardness"] = hardness
+    numbers = {name: float(one_number(name, number)) for name, number in given.items()}
+    # without a modulus all stresses are over it; the logarithm of zero does not vary
+    fixed = set(moduli) if units.stress == "1" else set()
+    varied = [name for name, number in numbers.items() if number != 0 and name not in fixed]
+    same = "mean_separation" if by == "separation" else by
+    wanted = [name for name in ANSWERS if name != same]
+
+    def logarithms_of(given: dict[str, Any]) -> FloatArray:
+        """Of the answers wanted, for numbers or arrays of them."""
+        modulus = modulus_of(*(given[name] for name in moduli))
+        own = {name: given[name] for name in unknowns.numbers}
+        answers = unknowns.answers(own, by, given[by], modulus, given.get("hardness", np.inf), theory)
+        return np.log([answers[name] for name in wanted])
+
+    @np.errstate(all="ignore")
+    def logarithms(x: FloatArray) -> FloatArray:
+        """Of the answers, as rows, where the logarithms of the varied numbers are moved by rows of x."""
+        moved, back = np.unique(x.reshape(len(varied), -1), axis=1, return_inverse=True)
+        count = moved.shape[1]
+        columns = {name: np.full(count, number) for name, number in numbers.items()}
+        for name, row in zip(varied, moved, strict=True):
+            columns[name] = numbers[name] * np.exp(row)
+        if unknowns.batches:
+            table = logarithms_of(columns)
+        else:
+            entries = [{name: column[k] for name, column in columns.items()} for k in range(count)]
+            table = np.transpose([logarithms_of(entry) for entry in entries])
+        return table[:, back.ravel()].reshape(-1, *x.shape[1:])
+
+    here = np.exp(logarithms(np.zeros((len(varied), 1))))[:, 0]
+    if not (here > 0).all():
+        raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
+    with np.errstate(all="ignore"):
+        derivative = jacobian(
+            logarithms,
+            np.zeros(len(varied)),
+            order=4,
+            maxiter=3 if unknowns.batches else 2,
+            initial_step=STEP,
+            step_direction=_sides(varied, numbers, unknowns.one_sided),
+        )
+        # a discontinuous result has no slope
+        accurate = derivative.error <= MAX_ERROR * np.maximum(1, np.abs(derivative.df))
+        slopes = np.where(accurate, derivative.df, np.nan)
+    labels = [unknowns.labels.get(name, name) for name in varied]
+    return Sensitivity(
+        by,
+        {label: numbers[name] for label, name in zip(labels, varied, strict=True)},
+        dict(zip(wanted, here.tolist(), strict=True)),
+        _by_name(labels, wanted, slopes),
+        _by_name(labels, wanted, derivative.error),
+        units,
+    )
+
+
+def _by_name(labels: Sequence[str], wanted: Sequence[str], table: FloatArray) -> dict[str, dict[str, float]]:
+    """A table with a row for each answer and a column for each number, by the names of both."""
+    columns = table.T.tolist()
+    return {name: dict(zip(wanted, column, strict=True)) for name, column in zip(labels, columns, strict=True)}
+
+
+def _sides(varied: Sequence[str], numbers: Mapping[str, float], one_sided: Mapping[str, float]) -> FloatArray:
+    """Signs of one-sided steps, 0 for central ones, which need room to a number's upper limit."""
+    limits = {"area": 1.0, "pressure": numbers.get("hardness", np.inf)}
+    signs = dict(one_sided)
+    for name in varied:
+        limit = 1.0 if name.endswith("hurst") else limits.get(name, np.inf)
+        if numbers[name] > NEAR * limit:
+            signs[name] = -1.0
+    if signs.get("pressure"):
+        signs["hardness"] = 1.0
+    return np.array([signs.get(name, 0.0) for name in varied])
+
+
+def unknowns_of(surface: AnySurface, theory: Theory | None, unit: str | None = None) -> Unknowns:
+    """The numbers that a surface was made from.
+
+    Parameters
+    ----------
+    surface : AnySurface
+        One surface.
+    theory : Theory or None
+        The theory that is asked about it; None where the surface is combined with another, which leaves the curves and
+        the points of a map out.
+    unit : str, optional
+        Unit of length of the numbers; default: the surface's.
+    """
+    if surface.labelled or surface.shape != ():
+        raise InputError("sensitivities are of one surface, not of a batch")
+    drawn = _of_drawing(surface, unit)
+    if drawn is not None:
+        return drawn
+    moved: Any = surface if unit in (None, surface.unit) else surface.to(unit or "")
+    if isinstance(moved, Surface):
+        own = {name: getattr(moved, name) for name in PARAMETERS}
+        return Unknowns(own, functools.partial(Surface, unit=moved.unit), batches=True)
+    # what keeps points of a map, or the table of their simulation, has the theory of one map
+    simulated = moved.map is not None or moved.table is not None
+    if simulated and theory is not None:
+        from mbma_tables.theories import BoundaryElements
+
+        if isinstance(theory, BoundaryElements):
+            return OfOneMap({"heights": 1.0, "lengths": 1.0}, lambda: moved)
+    return _of_spectrum(moved, theory)
+
+
+def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
+    """The numbers of the drawing, if the surface was made of these and not changed since."""
+    record = surface.provenance[0] if surface.provenance else {}
+    if record.get("step") != "from_roughness" or record["unit"] != surface.unit:
+        return None
+    drawn: Any = Surface.from_roughness(**record["given"], unit=record["unit"])
+    if type(drawn) is not type(surface):
+        return None
+    names = PARAMETERS if isinstance(surface, Surface) else ("q", "C", "h_max")
+    for name in names:
+        before, now = getattr(drawn, name), getattr(surface, name)
+        if np.shape(before) != np.shape(now) or not np.allclose(before, now, rtol=1e-9, atol=0):
+            return None
+    numbers = dict(record["given"])
+    if unit not in (None, surface.unit):
+        for name in numbers:
+            power = DIMENSIONS.get(name, (0, 0))[0]
+            numbers[name] *= factor(surface.unit, unit, power=power)
+    make = functools.partial(Surface.from_roughness, unit=unit or surface.unit)
+    return Unknowns(numbers, make, batches=isinstance(surface, Surface))
+
+
+def _of_spectrum(surface: MeasuredSurface, theory: Theory | None) -> Unknowns:
+    """Factors of heights and lengths, and what else the spectrum was made from."""
+    steps = {record["step"]: record for record in surface.provenance}
+    own: dict[str, float] = {"heights": 1.0, "lengths": 1.0}
+    cut_offs: dict[str, float] = {}
+    uncut = surface
+    # the calibrated law uses measured heights, which have their own highest point and shortest wavelengths
+    takes_map = theory is not None and theory.name == Calibrated.name
+    of_its_heights = takes_map or theory is None
+    if surface.heights.is_gaussian or not of_its_heights:
+        own["h_max"] = float(surface.h_max)
+    if "extrapolated" in steps:
+        uncut = surface.between(float(surface.q0), 2 * math.pi / steps["resolution"]["shortest"])
+        own["extrapolate_hurst"] = steps["extrapolated"]["hurst"]
+    elif surface.bearing is None or not takes_map:
+        cut_offs = {
+            "shortest": 2 * math.pi / float(surface.q1),
+            "longest": 2 * math.pi / float(surface.q0),
+        }
+
+    def make(heights: float, lengths: float, **others: float) -> MeasuredSurface:
+        moved = uncut
+        if any(others[name] != wavelength for name, wavelength in cut_offs.items()):
+            moved = uncut.between(2 * math.pi / others["longest"], 2 * math.pi / others["shortest"])
+        if "extrapolate_hurst" in others:
+            shortest = steps["extrapolated"]["shortest"]
+            moved = extrapolated(uncut, shortest, others["extrapolate_hurst"])
+        if "h_max" in others:
+            h_max = others["h_max"]
+            distribution = moved.heights
+            if distribution.is_gaussian:
+                distribution = Heights.gaussian(float(moved.h_rms), h_max)
+            moved = dataclasses.replace(moved, h_max=h_max, heights=distribution)
+        return moved.resized(heights, lengths)
+
+    # a spectrum is not known beyond its ends: cut-offs only remove wavelengths
+    return Unknowns(own | cut_offs, make, one_sided={"shortest": 1.0, "longest": -1.0})

@@ -1,1 +1,0 @@
-"""Contact islands: height integrals, the Greenwood-Tripp problem, geometry."""

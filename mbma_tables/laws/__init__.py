@@ -1,1 +1,0 @@
-"""Formulas: calibrated laws, hardness, leakage, gas, bearing curves; BEM."""

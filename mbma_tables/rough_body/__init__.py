@@ -1,0 +1,1 @@
+"""Rough spheres and cylinders on a flat."""

@@ -1,1 +1,0 @@
-"""Table files: schema, reading, checking."""

@@ -1,0 +1,230 @@
+"""One map pressed at a list of loads by boundary elements, and the flow through its gaps.
+
+Each load, and each flow, is stored in `mbma_tables.common.cache` as soon as it is computed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.common import cache
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.progress import doing, shown
+from mbma_tables.theories.simulated.boundary_elements import Contact, composed, wavenumbers, waves
+from mbma_tables.theories.simulated.reynolds import flow_tensor
+
+MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary elements are too large
+TOLERANCE = 1e-5
+LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
+MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
+# loads added where the areas of two neighbours differ by more than this factor, at most so many; where an area jumps,
+# as when a plateau is reached, no two loads closer than this in ln F
+SPACING, BETWEEN, CLOSEST = 2.5, 10, 0.1
+# loads added for the flow, at most: where its logarithm falls by more than this, and where an axis closes between
+# loads further apart than this in ln F, which counts as such a fall
+FLOWS, STEEP, NARROW, CLOSING = 6, 1.2, 0.1, 3.5
+# A/A0 up to which flow along both axes was open on most maps, so that its scatter is known; a fall beyond counts less
+AREA_OF_FLOW, BEYOND = 0.2, 0.6
+ROUNDING = 1e-6
+KEPT = "pressed 2"  # of what is cached: another text where this file finds other numbers
+QUANTITIES = ("area", "mean_separation", "energy")
+YIELDING = (*QUANTITIES, "plane_separation", "area_yielded", "frozen_stiffness", "pressure_weighted_height")
+
+
+def resolving(shortest: float, step: float, unit: str | None) -> str:
+    """The option of `Surface.from_map` that leaves wavelengths of enough sampling steps; empty if they are."""
+    if shortest >= MIN_POINTS * step * (1 - ROUNDING):
+        return ""
+    # a little longer, so that four digits are enough
+    wavelength = f"{1.001 * MIN_POINTS * step:.4g}"
+    return f"short_cutoff='{wavelength} {unit}'" if unit else f"short_cutoff={wavelength}"
+
+
+def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> FloatArray:
+    """A map on half as many points along each axis, by its waves of at least `points` of the new sampling steps."""
+    from scipy.signal import resample
+
+    if points:
+        q = wavenumbers(values.shape, values.shape, mirrored)
+        kept = np.where(q <= np.pi / points * (1 + ROUNDING), waves(values, mirrored), 0)
+        values = composed(kept, values.shape, mirrored)
+    half = tuple(count // 2 for count in values.shape)
+    if mirrored:
+        return composed(waves(values, True), half, True)
+    return np.asarray(resample(resample(values, half[0]), half[1], axis=1))
+
+
+class Press:
+    """A map that is pressed when it is first called with a load over A0 E*; lengths of the map.
+
+    `gradient` is about its rms gradient, `hardness` is over E*, and `left_out` the wavelength [length] below which a
+    large map was cut off, 0 if it was not; `mirrored` as for `Contact`.
+    """
+
+    def __init__(
+        self, heights: FloatArray, sizes: tuple[float, float], gradient: float, tolerance: float = TOLERANCE,
+        mirrored: bool = False, hardness: float = np.inf, left_out: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.left_out = left_out
+        self.heights, self.sizes, self.gradient, self.mirrored = heights, sizes, gradient, mirrored
+        self._tolerance, self._cap = tolerance, hardness / gradient
+        self._engine: Contact | None = None
+        self.quantities = YIELDING if hardness < np.inf else QUANTITIES
+        # of rms gradient one, heights of order one
+        self.scale = float(np.abs(heights).max())
+        self._sizes = sizes[0] * gradient / self.scale, sizes[1] * gradient / self.scale
+        settings = heights.shape, *(f"{side:.9g}" for side in self._sizes), tolerance, mirrored, f"{self._cap:.9g}"
+        self._own = _digest(heights / self.scale, *settings)
+        units = {"energy": gradient * self.scale, "frozen_stiffness": gradient / self.scale}
+        lengths = dict.fromkeys(("mean_separation", "plane_separation", "pressure_weighted_height"), self.scale)
+        self._units = np.array([(units | lengths).get(name, 1.0) for name in self.quantities])
+        self._found: dict[float, tuple[FloatArray, FloatArray]] = {}
+
+    def name(self, load: float) -> str:
+        """Under which a load is cached."""
+        return _digest(self._own, f"{load / self.gradient:.9g}")
+
+    def __call__(self, load: float) -> tuple[FloatArray, FloatArray]:
+        """`quantities`, and the gaps in single precision."""
+        if load not in self._found:
+            name = self.name(load)
+            kept = cache.load(name, row=(len(self.quantities),), gap=self.heights.shape)
+            if kept is None:
+                if self._engine is None:
+                    own = self.heights / self.scale
+                    self._engine = Contact(own, self._sizes, self._tolerance, self._cap, self.mirrored)
+                result = self._engine.press(load / self.gradient)
+                if self._cap < np.inf:
+                    result["frozen_stiffness"] = self._engine.frozen_stiffness()
+                row = np.array([result[name] for name in self.quantities])
+                kept = {"row": row, "gap": self._engine.gap.astype(np.float32)}
+                cache.keep(name, **kept)
+            self._found[load] = kept["row"] * self._units, kept["gap"] * np.float32(self.scale)
+        return self._found[load]
+
+    def loads(self, wanted: FloatArray, more: bool) -> tuple[FloatArray, FloatArray]:
+        """Loads, and rows of `quantities` at them, rising.
+
+        `more` are added until contact is covered far enough, and where it grows too much from load to load.
+        """
+        found: dict[float, FloatArray] = {}
+
+        def add(load: float) -> None:
+            doing(f"boundary elements {_bar(len(found), max(len(wanted), len(found) + 1))}")
+            found[load] = self(load)[0]
+
+        with shown("boundary elements"):
+            for load in wanted.tolist():
+                add(load)
+            for _ in range(MORE if more else 0):
+                low, high = min(found), max(found)
+                # where one element touches, the solver may fail
+                if found[low][0] > LOWEST:
+                    with contextlib.suppress(ConvergenceError):
+                        add(low * LIGHTER)
+                if found[high][0] < HIGHEST and high * HEAVIER < self._cap * self.gradient:
+                    add(high * HEAVIER)
+            for _ in range(BETWEEN if more else 0):
+                between = _widest(np.array(sorted(found)), np.array([found[load][0] for load in sorted(found)]))
+                if between is None:
+                    break
+                add(between)
+        cache.trim()
+        return np.array(sorted(found)), np.array([found[load] for load in sorted(found)]).T
+
+    def flow(self, load: float) -> FloatArray:
+        """Flow coefficients xx, yy and xy [length^3] through the gaps under a load over A0 E*; 0 where blocked."""
+        name = f"{self.name(load)}-flow"
+        kept = cache.load(name, flow=(3,))
+        if kept is None:
+            kept = {"flow": flow_tensor(self(load)[1] / self.scale, self.sizes, self.mirrored)}
+            cache.keep(name, **kept)
+        return np.asarray(kept["flow"] * self.scale**3)
+
+    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Mean gaps u of some loads [length], falling, and their flow, shape (m, 3).
+
+        At every second ln F, then between loads where it falls most, or an axis closes; `separation` is u at ln F.
+        """
+        found: dict[float, FloatArray] = {}
+
+        def add(own: float) -> bool:
+            doing(f"flow through the gaps {_bar(len(found), max(x.size // 2 + FLOWS // 2, len(found) + 1))}")
+            found[own] = self.flow(float(np.exp(own)))
+            return bool(found[own][:2].any())
+
+        with shown("flow through the gaps"):
+            # once blocked both ways, heavier loads are
+            for own in x[::2].tolist():
+                if not add(own):
+                    break
+            for _ in range(FLOWS):
+                at = np.array(sorted(found))
+                K = np.array([found[own][:2] for own in at.tolist()])
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    fall = np.nan_to_num(np.log(K[:-1] / K[1:]), posinf=np.inf)
+                closing = np.where(np.diff(at) > NARROW, CLOSING, 0.0)[:, None]
+                heavy = np.array([self(float(np.exp(own)))[0][0] for own in at[:-1].tolist()]) > AREA_OF_FLOW
+                worst = np.where(np.isinf(fall), closing, fall).max(axis=1) * np.where(heavy, BEYOND, 1.0)
+                k = int(worst.argmax())
+                if worst[k] < STEEP:
+                    break
+                between = x[(x > at[k]) & (x < at[k + 1])]
+                add(float(between[between.size // 2]) if between.size else float(at[k] + at[k + 1]) / 2)
+        at = np.array(sorted(found))
+        cache.trim()
+        return separation(at), np.array([found[own] for own in at.tolist()])
+
+
+def _widest(force: FloatArray, area: FloatArray) -> float | None:
+    """The load in the middle, in ln F, of the neighbours whose areas differ most; None if they are close enough."""
+    ratio = area[1:] / area[:-1]
+    # lighter and heavier contacts than those that the loads reach are not valid
+    inside = (area[1:] > LOWEST) & (area[:-1] < HIGHEST) & (np.diff(np.log(force)) > 2 * CLOSEST)
+    ratio = np.where(inside, ratio, 0.0)
+    widest = int(ratio.argmax())
+    if ratio[widest] <= SPACING:
+        return None
+    return float(np.sqrt(force[widest] * force[widest + 1]))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Table:
+    """What was found of a map, without the map and its gaps."""
+
+    rows: FloatArray  # F/(A0 E*), A/A0, u and U/(A0 E*) of loads, shape (4, n)
+    flow_gaps: FloatArray  # mean gaps, falling, shape (m,),
+    flow: FloatArray  # and flow coefficients xx, yy, xy there [length^3], shape (m, 3)
+    points: float  # sampling steps along the shortest wavelength
+    left_out: float  # as of `Press`
+    origin: str  # description of the map and of the simulation
+
+    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """`flow_gaps` and `flow`."""
+        return self.flow_gaps, self.flow
+
+    def resized(self, up: float, along: float) -> Table:
+        """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
+        by = np.array([[up / along], [1.0], [up], [up**2 / along]])
+        gaps, flow, left_out = self.flow_gaps * up, self.flow * up**3, self.left_out * along
+        return dataclasses.replace(self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out)
+
+
+def _digest(*parts: Any) -> str:
+    """SHA-256 of numbers and of arrays, these in single precision, so that it is independent of the unit of length."""
+    digest = hashlib.sha256(KEPT.encode())
+    for part in parts:
+        array = isinstance(part, np.ndarray)
+        digest.update(np.ascontiguousarray(part, "<f4").tobytes() if array else f";{part!r};".encode())
+    return digest.hexdigest()
+
+
+def _bar(done: int, number: int) -> str:
+    return f"[{'#' * done}{'.' * (number - done)}] {done} of {number}"

@@ -1,0 +1,1 @@
+"""Contact with a hardness: formulas, and any theory with them."""

@@ -1,1 +1,0 @@
-"""Pressure and area of a surface as sums over its islands."""
