@@ -26,7 +26,7 @@ from generate.files import read_csv
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.calibrated import table as calibrated_table
+from mbma_tables.theories.evidence import shipped_deviations
 from mbma_tables.theories.yielding import formulas as cap
 from mbma_tables.theories.yielding.theory import GROUP, Scatter, Yielding
 
@@ -318,7 +318,7 @@ def coverage(
             # of stiffness by the theory's own area, as stated
             area = frame["own" if quantity == "stiffness" else "contact"].to_numpy()
             of_elastic = "stiffness" if quantity == "stiffness" else in_library
-            elastic = calibrated_table.shipped().standard_deviation(name, of_elastic, area)
+            elastic = shipped_deviations().standard_deviation(name, of_elastic, area)
             deviation = scatter.standard_deviation(name, in_library, eta, area, elastic)
             sizes = frame[quantity] / deviation
             shares[f"{name} {quantity}"] = within(sizes[np.isfinite(sizes)].to_numpy())

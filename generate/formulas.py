@@ -35,8 +35,8 @@ from mbma_tables.theories.mbma.closed_form_certificates import RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function, Steps, evaluate
 from mbma_tables.theories.mbma.island_models import Certificate
 
-FORMS = ROOT / "mbma_tables" / "models" / "closed_forms.toml"
-MODULE = ROOT / "mbma_tables" / "models" / "closed_form_certificates.py"
+FORMS = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_forms.toml"
+MODULE = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_form_certificates.py"
 NUMBER = re.compile(r"\d[\d.]*(?:e-?\d+)?")
 WIDTH = 120
 DATA_DIGITS = 10

@@ -109,8 +109,8 @@ def tangential_errors(constants: FloatArray, known: FloatArray) -> FloatArray:
 def tangential() -> None:
     """Stiffness ratios of stuck contacts by boundary elements, for docs/joints.md: two minutes a set of surfaces.
 
-    The constants of `mbma_tables.quantities.lay` are fitted to the first set; the second has other seeds, Hurst exponents and
-    lays.
+    The constants of `mbma_tables.quantities.lay` are fitted to the first set; the second has other seeds, Hurst
+    exponents and lays.
     """
     known = {kind: tangential_rows(kind) for kind in SETS}
     recipes = [(*one, load, kind == "fitted") for kind in SETS for one in SETS[kind] for load in LOADS for _ in NUS]

@@ -22,7 +22,8 @@ from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.contacts.leakage import GROUP, shipped_flow
 from mbma_tables.theories.calibrated.formulas import CONSTANTS
-from mbma_tables.theories.calibrated.table import shipped, shipped_part
+from mbma_tables.theories.calibrated.table import shipped
+from mbma_tables.theories.evidence import shipped_part
 
 # rows of the accuracy of the calibrated law, as its file names them
 SETS = (

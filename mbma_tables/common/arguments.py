@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.errors import InputError, MbmaError, OutOfRangeError
-from mbma_tables.core import in_blocks
+from mbma_tables.common.interrupts import in_blocks
 
 SHOWN = 3  # offending entries quoted in a message
 BLOCK = 1 << 16  # entries between two checks for Ctrl-C

@@ -23,9 +23,9 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.treatment import mirrored
 from mbma_tables.theories import OF_MAPS
 from mbma_tables.theories.base import Theory
-from mbma_tables.theories.calibrated.formulas import TESTED_AREA
 from mbma_tables.theories.simulated.own_map import map_of
 from mbma_tables.theories.simulated.reynolds import flow_and_couette
+from mbma_tables.theories.tested import TESTED_AREA
 
 RANGE = (0.2, 50.0)  # u/h_rms
 # simulated: A/A0 of the lightest contact, knots of curves in contact and before it, the first gap before it over the

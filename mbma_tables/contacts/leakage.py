@@ -1,4 +1,4 @@
-"""Leakage of a contact: flow coefficient with uncertainty, by a table of `quantities.effective_medium`, and leakage rates."""
+"""Leakage of a contact: flow coefficient with uncertainty, by a table of the effective medium, and leakage rates."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, positive_array, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.common.units import unit_of
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import core
 from mbma_tables.quantities.effective_medium import LARGEST_AREA, FlowConstants, contact_factor, wide_gap
 from mbma_tables.surfaces.any_surface import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import Spectrum, self_affine_law, spectrum_of
-from mbma_tables.theories.calibrated.table import Owners, SurfaceSpline, known_at, nodes_of, shipped_part
+from mbma_tables.theories.evidence import Owners, SurfaceSpline, known_at, nodes_of, shipped_part
 from mbma_tables.theories.mbma.theory import Mbma
 
 GROUP = "leakage"

@@ -25,11 +25,10 @@ from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import OF_MAPS, tested, theory_name
-from mbma_tables.theories.calibrated import table as calibrated_table
-from mbma_tables.theories.calibrated.formulas import TESTED_AREA
 from mbma_tables.theories.mbma import theory as mbma
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import FITTED, PRINTED, REPORTED, get_variant
+from mbma_tables.theories.tested import TESTED_AREA
 from mbma_tables.theories.yielding import formulas as hardness_law
 
 MODULE = "explorer.wasm"
@@ -55,12 +54,12 @@ def packed(values: Any) -> dict[str, Any]:
 
 def _limits() -> dict[str, Any]:
     """Tested ranges of theories, with the texts of `Contact.reasons`, and their scatter."""
-    table, quantities = calibrated_table.shipped(), calibrated_table.QUANTITIES
+    deviations = shipped_deviations()
     return {
-        "log_area": table.log_area.tolist(),
+        "log_area": deviations.log_area.tolist(),
         "scatter": {
-            name: dict(zip(quantities, np.where(np.isfinite(rows), rows, np.array(None)).tolist(), strict=True))
-            for name, rows in table.scatter.items()
+            name: dict(zip(QUANTITIES, np.where(np.isfinite(rows), rows, np.array(None)).tolist(), strict=True))
+            for name, rows in deviations.log_rms.items()
         },
         "gradient": source.MAX_GRADIENT,
         "mbma_area": mbma.MAX_AREA,
@@ -68,7 +67,7 @@ def _limits() -> dict[str, Any]:
         "zeta_1": tested.ZETA_1,
         "broadest": tested.BROADEST,
         "heights": tested.HEIGHTS,
-        "compared": calibrated_table.COMPARED,
+        "compared": COMPARED,
         "area": TESTED_AREA,
         "max_samples": MAX_SAMPLES,
         "hardness": dataclasses.asdict(hardness_law.CONSTANTS),

@@ -26,7 +26,7 @@ from mbma_tables.rough_body.rough_contact import pressed
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.calibrated import table as calibrated_table
+from mbma_tables.theories.evidence import NAME
 from mbma_tables.theories.mbma.theory import Mbma
 from mbma_tables.theories.mbma.variants import Variant
 
@@ -231,7 +231,7 @@ class ExportedLaw:
 
             yield f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}"
         elif self.theory.name == "calibrated":
-            yield f"table: {calibrated_table.NAME} {shipped_file(calibrated_table.NAME).read_bytes()[-65:-49].decode()}"
+            yield f"table: {NAME} {shipped_file(NAME).read_bytes()[-65:-49].decode()}"
         if isinstance(self.surface, MeasuredSurface):
             values = hashlib.sha256(np.stack([self.surface.q, self.surface.C]).tobytes())
             yield f"spectrum: values {values.hexdigest()[:16]}"

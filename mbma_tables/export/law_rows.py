@@ -23,8 +23,8 @@ from mbma_tables.quantities.effective_medium import LARGEST_AREA
 from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.calibrated.formulas import TESTED_AREA
 from mbma_tables.theories.mbma.variants import Variant
+from mbma_tables.theories.tested import TESTED_AREA
 
 FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness

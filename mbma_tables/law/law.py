@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import frozen
 from mbma_tables.common.units import UNKNOWN, Units, unit_of
 from mbma_tables.contacts.source import MEANINGS, LawPoint, LawValues
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import core
 from mbma_tables.law import block as at
 from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.law.derived import Derived

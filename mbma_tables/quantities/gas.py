@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, finite_array, nearest, require, rows
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared
-from mbma_tables.core import in_blocks
 
 BEND, LIGHT, SOFT, POWER = 0.3, 0.004, 0.3, 1.2  # constants of q
 DEEP, DEEPEST = 2.5, 1.25  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms

@@ -2,7 +2,8 @@
 
 At the approach delta from where the smooth bodies would touch, with p = law(u), u = r^2/(2 R) - delta + w, and w the
 displacement of the half-space under p: the problem of J. A. Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153)
-with any law. Newton's unknown is w at the nodes of `theories.mbma.half_space`. Forces are over E*; a cylinder's are per length.
+with any law. Newton's unknown is w at the nodes of `theories.mbma.half_space`. Forces are over E*; a cylinder's are per
+length.
 """
 
 from __future__ import annotations

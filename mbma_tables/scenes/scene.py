@@ -37,7 +37,7 @@ class Scene(Problem):
         Effective modulus, as a number or as text with a unit ("100 GPa"); stresses are in its unit, over E* if it is 1.
     hardness : float or str, optional
         Largest pressure that the softer body supports, in the unit of `E_star`, for "yield": the theory's elastic
-        result is corrected by `mbma_tables.theories.yielding.formulas`, and conductance is that at constant contact area.
+        result is corrected by `mbma_tables.theories.yielding`, and conductance is that at constant contact area.
     rtol : float, optional
         Requested relative error, in [1e-10, 0.1]; without `seconds` by default 1e-6, or 1e-4 for other theories.
     seconds : float, optional

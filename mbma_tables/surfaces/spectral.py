@@ -22,7 +22,7 @@ from mbma_tables.surfaces.spectrum import MIN_ZETA_1, PowerLaws
 from mbma_tables.surfaces.treatment import Treated
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.simulated.pressing import Table
+    from mbma_tables.surfaces.map_simulation import MapSimulation
 
 # ranges of the surfaces of the data set's group elastic. If they are taken as isotropic Gaussian ones, area is within
 # 20% between 1% and 10% contact; outside the ranges it is wrong by 30% to factors
@@ -72,7 +72,7 @@ class SpectralSurface(AnySurface):
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
     map : Treated, optional
         The treated heights themselves, for `theory="simulated"`.
-    table : Table, optional
+    table : MapSimulation, optional
         What boundary elements found of them already (`mbma_tables.theories.simulated.pressing`).
     scans : tuple of MeasuredSurface, optional
         Several, of which it is the average (`mbma_tables.surfaces.averages`).
@@ -109,7 +109,7 @@ class SpectralSurface(AnySurface):
     bearing: Bearing | None = None
     bands: RadialSpectrum | None = None
     map: Treated | None = None
-    table: Table | None = None
+    table: MapSimulation | None = None
     scans: tuple[Any, ...] = ()
     samples: Any = None
     anisotropy: float | None = None
@@ -220,7 +220,7 @@ class SpectralSurface(AnySurface):
         elif by_map:
             remedy = "theory='simulated' simulates the map"
             if self.map is not None:
-                from mbma_tables.theories.simulated.pressing import resolving
+                from mbma_tables.surfaces.map_simulation import resolving
 
                 cutoff = resolving(self.shortest(ROUNDED), max(self.map.steps), self.unit)
                 remedy += f" of Surface.from_map(..., {cutoff})" if cutoff else ""

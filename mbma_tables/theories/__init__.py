@@ -34,11 +34,20 @@ __all__ = [
     "theory_name",
 ]
 
-THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")  # also their modules
+THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")
 _NAMED = dict(zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True))
 # a theory's module is imported when first needed
-_HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson", "BoundaryElements": "saturated"}
-_HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
+_HOMES = {
+    "Mbma": "mbma.theory",
+    "Calibrated": "calibrated.theory",
+    "Persson": "persson",
+    "Method": "persson",
+    "GreenwoodWilliamson": "greenwood_williamson",
+    "BoundaryElements": "simulated.yielded",
+    "Theory": "base",
+    "TheoryAnswer": "base",
+    "UserTheory": "base",
+}
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by simulating it
 # of MBMA
 OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise"}

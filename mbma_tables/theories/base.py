@@ -15,7 +15,7 @@ from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import tested
-from mbma_tables.theories.calibrated import table as calibrated_table
+from mbma_tables.theories.evidence import shipped_deviations
 
 LOOKS, FEW_LOOKS = 128, 8  # initial gaps of an inversion, for one surface and for each of a batch,
 LOOKED_AT, FAR = 7.0, 12.0  # range of ln u - ln(h_max - u) for these, and largest u/h_rms without last contact
@@ -121,7 +121,7 @@ class Theory(abc.ABC):
         return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
 
     def heights(self, surface: AnySurface) -> Any:
-        """End of the Gaussian heights over h_rms, or a map's own `theories.yielding.formulas.BearingCurve`; for a hardness."""
+        """End of the Gaussian heights over h_rms, or a map's own `BearingCurve`; for a hardness."""
         return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if self.ends_at_h_max else np.inf
 
     def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
@@ -152,8 +152,7 @@ class Theory(abc.ABC):
         shape = np.broadcast_shapes(np.shape(area), surface.shape)
         if self.departures(surface):
             return np.full(shape, np.nan)
-        table = calibrated_table.shipped()
-        scatter = table.standard_deviation(self.scatter_name(surface), quantity, area)
+        scatter = shipped_deviations().standard_deviation(self.scatter_name(surface), quantity, area)
         return np.where(tested.is_compared(surface), np.broadcast_to(scatter, shape), np.nan)
 
     def gaps(self) -> Any:

@@ -1,4 +1,4 @@
-"""Persson's theory (Eqs. 18-21); (19) is u_P of `theories.calibrated.formulas` with the weight W = gamma P + (1 - gamma) P^3."""
+"""Persson's theory (Eqs. 18-21); (19) is u_P of `calibrated.formulas` with the weight W = gamma P + (1 - gamma) P^3."""
 
 import math
 from typing import Any, Literal

@@ -10,8 +10,8 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.calibrated.formulas import TESTED_AREA
 
+TESTED_AREA = (1e-3, 0.97)  # A/A0 that was simulated
 HURST = 0.2  # least Hurst exponent
 ZETA_1 = (8.0, 128.0)  # longest over shortest wavelength
 # h_max/h_rms: simulated up to 5.5, beyond which separation and stiffness change by 0.1% at most from

@@ -15,7 +15,7 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.contacts.leakage import flow, flow_of_spectrum, shipped_flow
 from mbma_tables.quantities import effective_medium as leakage
 from mbma_tables.theories.calibrated.formulas import Spectrum
-from mbma_tables.theories.calibrated.table import shipped_part
+from mbma_tables.theories.evidence import shipped_part
 
 SEAL = Surface(hurst=0.8, q0=0.01, q1=0.3, h_rms=1.0, h_max=3.5, unit="um")
 REFERENCE = pathlib.Path(__file__).parents[2] / "docs" / "data" / "leakage.csv"

@@ -19,8 +19,9 @@ QUICK = [
     "core/test_calibrated_core.py",
     "theories/mbma/test_core_islands.py",
 ]
-QUICK += [f"totals/test_{name}.py" for name in ("kernel", "law", "island_models")]
-MORE = ["theories/mbma/test_geometry.py", "models", "theories/mbma/test_contact.py"]
+QUICK += ["theories/mbma/test_kernel.py", "law/test_law.py", "theories/mbma/test_island_models.py"]
+MORE = ["theories/mbma/test_geometry.py", "theories/mbma/test_universal_model.py", "theories/mbma/test_contact.py"]
+MORE += ["theories/mbma/test_island4d_model.py", "theories/mbma/test_closed_forms.py"]
 MORE += ["theories/calibrated/test_calibrated_theory.py", "theories/yielding/test_yielding.py"]
 pytestmark = pytest.mark.slow
 

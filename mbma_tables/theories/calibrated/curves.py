@@ -16,15 +16,9 @@ from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.surfaces.bearing_curve import FRACTIONS
 from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.calibrated.formulas import (
-    LAW_ERROR,
-    TESTED_AREA,
-    Law,
-    force_at_area,
-    light_factor,
-    spectrum_of,
-)
+from mbma_tables.theories.calibrated.formulas import LAW_ERROR, Law, force_at_area, light_factor, spectrum_of
 from mbma_tables.theories.calibrated.map_curves import LOG_FORCE, MapLaw, convex
+from mbma_tables.theories.tested import TESTED_AREA
 
 if TYPE_CHECKING:
     from mbma_tables.theories.yielding.formulas import BearingCurve

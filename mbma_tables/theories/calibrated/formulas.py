@@ -21,7 +21,6 @@ from mbma_tables.core import core
 POWERS = (1, 3, 16)  # powers of the cover in the weight W
 NARROWNESS = 0.65  # reference of W's slope
 LAW_ERROR = 1e-7  # numerical error of a measured spectrum's law
-TESTED_AREA = (1e-3, 0.97)  # A/A0 that was simulated
 KEPT = 256  # spectra and laws of surfaces in the cache
 MOST_FORCE = 1e100  # for which contact is full
 UNRESOLVED = 4  # the core's status where a quadrature did not reach its tolerance

@@ -16,15 +16,10 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import tested
 from mbma_tables.theories.base import Curve, Theory, TheoryAnswer, unfinished
 from mbma_tables.theories.calibrated import table as calibrated_table
-from mbma_tables.theories.calibrated.formulas import (
-    KEPT,
-    TESTED_AREA,
-    Law,
-    force_at_area,
-    light_factor,
-    self_affine_law,
-)
+from mbma_tables.theories.calibrated.formulas import KEPT, Law, force_at_area, light_factor, self_affine_law
 from mbma_tables.theories.calibrated.formulas import area as law_area
+from mbma_tables.theories.evidence import shipped_deviations
+from mbma_tables.theories.tested import TESTED_AREA
 
 if TYPE_CHECKING:
     from mbma_tables.theories.calibrated.curves import OwnLaw
@@ -242,7 +237,7 @@ class Calibrated(Theory):
         assert isinstance(surface, MeasuredSurface)
         if surface.outside(PRESSED):
             return np.full(np.shape(area), np.nan)
-        stated = calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
+        stated = shipped_deviations().standard_deviation(self.scatter_name(surface), quantity, area)
         stated = np.hypot(stated, MAP_SCATTER[quantity][bool(self.departures(surface))])
         return np.hypot(stated, _spread(surface, quantity, area)) if surface.scans else stated
 

@@ -25,7 +25,8 @@ from mbma_tables.common.arguments import (
     whole_number_in,
 )
 from mbma_tables.common.errors import ConvergenceError, InputError
-from mbma_tables.core import core, in_blocks
+from mbma_tables.common.interrupts import in_blocks
+from mbma_tables.core import core
 from mbma_tables.theories.mbma.half_space import basis
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5)  # of height integrals

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.table_schema import TableContent, error_cell
-from mbma_tables.core import in_blocks
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS
 from mbma_tables.theories.mbma import greenwood_tripp
 from mbma_tables.theories.mbma.island_models import SOLVER, IslandAnswer, check_outside

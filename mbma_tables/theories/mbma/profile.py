@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared, shared_property
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import core
 from mbma_tables.surfaces.spectrum import Place
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.mbma.geometry import floors_of, geometry, kinks, measured_islands, s_over_h_rms

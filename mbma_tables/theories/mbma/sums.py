@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, grouped, spread
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.core import OK, UNRESOLVED, core, in_blocks
+from mbma_tables.common.interrupts import in_blocks
+from mbma_tables.core import OK, UNRESOLVED, core
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.mbma.island_models import AnyModel, exact_model

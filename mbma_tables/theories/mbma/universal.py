@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.common.errors import TableFileError
+from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared_property
 from mbma_tables.common.table_schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import core
 from mbma_tables.theories.mbma.island_models import SOLVER, IslandAnswer, check_outside
 
 BLOCK = 1 << 16  # islands between two checks for Ctrl-C

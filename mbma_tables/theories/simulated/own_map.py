@@ -15,11 +15,12 @@ from mbma_tables.common.netcdf import OWN_REMEDY, read_own, write_own
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING, MapSimulation
 from mbma_tables.surfaces.spectral import ROUNDED
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.calibrated.curves import own_law
-from mbma_tables.theories.simulated.pressing import MIN_POINTS, ROUNDING, Table, coarser
+from mbma_tables.theories.simulated.pressing import coarser
 
 # A/A0 by the law of the map, at which it is simulated
 AREAS = (7e-4, 0.0015, 0.006, 0.012, 0.05, 0.09, 0.22, 0.3, 0.52, 0.65, 0.88, 0.95)
@@ -140,7 +141,7 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
         if values["flow"].shape != (*values["flow_gaps"].shape, 3) or rows.ndim != 2:
             raise InputError("has loads and flows that do not fit each other")
         points, left_out, anisotropy = numbers
-        table = Table(rows, values["flow_gaps"], values["flow"], points, left_out, own["source"])
+        table = MapSimulation(rows, values["flow_gaps"], values["flow"], points, left_out, own["source"])
         return MeasuredSurface(
             values["q"], values["C"], values["h_max"].item(), **parts, table=table,
             samples=values["samples"], anisotropy=anisotropy, unit=own.get("length_unit"),

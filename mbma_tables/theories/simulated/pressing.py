@@ -6,7 +6,6 @@ Each load, and each flow, is stored in `mbma_tables.common.cache` as soon as it 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import hashlib
 from collections.abc import Callable
 from typing import Any
@@ -17,10 +16,10 @@ from mbma_tables.common import cache
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.progress import doing, shown
+from mbma_tables.surfaces.map_simulation import ROUNDING
 from mbma_tables.theories.simulated.boundary_elements import Contact, composed, wavenumbers, waves
 from mbma_tables.theories.simulated.reynolds import flow_tensor
 
-MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary elements are too large
 TOLERANCE = 1e-5
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
@@ -32,19 +31,9 @@ SPACING, BETWEEN, CLOSEST = 2.5, 10, 0.1
 FLOWS, STEEP, NARROW, CLOSING = 6, 1.2, 0.1, 3.5
 # A/A0 up to which flow along both axes was open on most maps, so that its scatter is known; a fall beyond counts less
 AREA_OF_FLOW, BEYOND = 0.2, 0.6
-ROUNDING = 1e-6
 KEPT = "pressed 2"  # of what is cached: another text where this file finds other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
 YIELDING = (*QUANTITIES, "plane_separation", "area_yielded", "frozen_stiffness", "pressure_weighted_height")
-
-
-def resolving(shortest: float, step: float, unit: str | None) -> str:
-    """The option of `Surface.from_map` that leaves wavelengths of enough sampling steps; empty if they are."""
-    if shortest >= MIN_POINTS * step * (1 - ROUNDING):
-        return ""
-    # a little longer, so that four digits are enough
-    wavelength = f"{1.001 * MIN_POINTS * step:.4g}"
-    return f"short_cutoff='{wavelength} {unit}'" if unit else f"short_cutoff={wavelength}"
 
 
 def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> FloatArray:
@@ -193,28 +182,6 @@ def _widest(force: FloatArray, area: FloatArray) -> float | None:
     if ratio[widest] <= SPACING:
         return None
     return float(np.sqrt(force[widest] * force[widest + 1]))
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Table:
-    """What was found of a map, without the map and its gaps."""
-
-    rows: FloatArray  # F/(A0 E*), A/A0, u and U/(A0 E*) of loads, shape (4, n)
-    flow_gaps: FloatArray  # mean gaps, falling, shape (m,),
-    flow: FloatArray  # and flow coefficients xx, yy, xy there [length^3], shape (m, 3)
-    points: float  # sampling steps along the shortest wavelength
-    left_out: float  # as of `Press`
-    origin: str  # description of the map and of the simulation
-
-    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
-        """`flow_gaps` and `flow`."""
-        return self.flow_gaps, self.flow
-
-    def resized(self, up: float, along: float) -> Table:
-        """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
-        by = np.array([[up / along], [1.0], [up], [up**2 / along]])
-        gaps, flow, left_out = self.flow_gaps * up, self.flow * up**3, self.left_out * along
-        return dataclasses.replace(self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out)
 
 
 def _digest(*parts: Any) -> str:

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.core import interruptible
+from mbma_tables.common.interrupts import interruptible
 
 
 def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:

@@ -15,23 +15,14 @@ from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared_property
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING, MapSimulation, resolving
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.calibrated.theory import Calibrated
 from mbma_tables.theories.simulated import own_map
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
-from mbma_tables.theories.simulated.pressing import (
-    AREA_OF_FLOW,
-    HIGHEST,
-    LOWEST,
-    MIN_POINTS,
-    ROUNDING,
-    TOLERANCE,
-    Press,
-    Table,
-    resolving,
-)
+from mbma_tables.theories.simulated.pressing import AREA_OF_FLOW, HIGHEST, LOWEST, TOLERANCE, Press
 
 # A/A0 of the 142 maps of `python -m generate machined` at which scatter was measured
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
@@ -59,7 +50,7 @@ class BoundaryElements(Theory):
 
     Notes
     -----
-    The curves are those of `mbma_tables.theories.simulated.energy_spline`; beyond the loads no answer is `valid`. They are the
+    The curves are those of `energy_spline`; beyond the loads no answer is `valid`. They are the
     theory: `error` is that of evaluating them, and how far they are from contact simulated at a load between is the
     `scatter`, which was measured on 142 maps.
 
@@ -93,7 +84,7 @@ class BoundaryElements(Theory):
     }
 
     def __init__(
-        self, surface: MeasuredSurface, rows: FloatArray, points: float, pressed: Press | Table, origin: str
+        self, surface: MeasuredSurface, rows: FloatArray, points: float, pressed: Press | MapSimulation, origin: str
     ) -> None:
         self.surface, self.rows, self.points, self.pressed, self.origin = surface, rows, points, pressed, origin
         top, steps = float(surface.h_max), np.diff(rows)

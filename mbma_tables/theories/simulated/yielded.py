@@ -14,10 +14,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.simulated import own_map
-from mbma_tables.theories.simulated.pressing import MIN_POINTS, ROUNDING, TOLERANCE, Press
+from mbma_tables.theories.simulated.pressing import TOLERANCE, Press
 from mbma_tables.theories.simulated.theory import BoundaryElements as BoundaryElements
 from mbma_tables.theories.yielding.theory import Yielding, elastic_scatter
 

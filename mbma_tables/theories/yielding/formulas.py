@@ -237,7 +237,7 @@ def _levels(u: FloatArray) -> FloatArray:
 
 
 class BearingCurve:
-    """Q(u) of a map's own heights: of M(a) [h_rms] of `surfaces.bearing_curve`, a = `FRACTIONS`, and its highest point."""
+    """Q(u) of a map's own heights: of M(a) [h_rms] of `bearing_curve`, a = `FRACTIONS`, and its highest point."""
 
     def __init__(self, mean_height: FloatArray, h_max: float) -> None:
         above = FRACTIONS * mean_height

@@ -26,10 +26,11 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
 from mbma_tables.theories.calibrated.formulas import CONSTANTS, Law, Spectrum, self_affine_law
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS, hertz_ellipse
-from mbma_tables.theories.calibrated.table import NAME, QUANTITIES, load, shipped
+from mbma_tables.theories.calibrated.table import load, shipped
+from mbma_tables.theories.evidence import NAME, QUANTITIES, shipped_deviations
 from mbma_tables.theories.mbma.variants import get_variant
 
-DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
+DATA = pathlib.Path(__file__).parents[3] / "docs" / "data"
 THEORY = Calibrated()
 SURFACE = Surface(hurst=0.8, q0=0.2, q1=12.8, h_rms=1.5, h_max=4.95)
 SHARES = np.array([1e-5, 0.001, 0.03, 0.2, 0.5, 0.8, 0.93])
@@ -129,7 +130,7 @@ class TestScatter:
     @pytest.mark.parametrize("quantity", QUANTITIES)
     def test_stated_scatter_covers_held_out_errors(self, held_out, quantity):
         named = {"pressure": "force"}.get(quantity, quantity)
-        known = [shipped().standard_deviation("calibrated", quantity, one.area) for one in held_out]
+        known = [shipped_deviations().standard_deviation("calibrated", quantity, one.area) for one in held_out]
         missed = [errors(one, one.law(CONSTANTS), named) for one in held_out]
         sizes = np.abs(np.concatenate(missed)) / np.concatenate(known)
         assert sizes.size > 300
@@ -164,7 +165,9 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number, top):
     touching = area > 0.002
     for quantity, found, exact in (("area", law.area(force / g), area), ("pressure", law.force(u / h_rms) * g, force)):
         errors_of = np.abs(np.log(found / exact))[touching]
-        assert np.all(errors_of <= 2 * shipped().standard_deviation("calibrated", quantity, area[touching])), quantity
+        assert np.all(
+            errors_of <= 2 * shipped_deviations().standard_deviation("calibrated", quantity, area[touching])
+        ), quantity
 
 
 def synthetic():
@@ -347,7 +350,7 @@ def test_published_simulations(rows, gradient):
     s0, t = min(0.497 + 0.041 * math.log(law.spectrum.alpha / 10), 0.95), force / 0.321
     before = erf(math.sqrt(2) * force / np.sqrt((s0 + t) / (1 + t)))
     assert np.all(np.abs(law.area(force) - area) <= np.abs(before - area))
-    scatter = shipped().standard_deviation("calibrated", "pressure", area)
+    scatter = shipped_deviations().standard_deviation("calibrated", "pressure", area)
     assert np.all(np.abs(np.log(law.force(gap) / force)) <= 3 * scatter)
 
 

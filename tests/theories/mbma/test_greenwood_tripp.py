@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from generate.cost import iterated, ring_matrix
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, greenwood_tripp, height_integral
 
-PUBLISHED = pathlib.Path(__file__).parent.parent / "data" / "greenwood_tripp.csv"
+PUBLISHED = pathlib.Path(__file__).parents[2] / "data" / "greenwood_tripp.csv"
 
 approaches = st.floats(-6, 40)
 stiffnesses = st.floats(-14, 8).map(lambda power: 10**power)
@@ -181,7 +181,7 @@ OTHERS = pytest.mark.skipif(find_spec("ContactMechanics") is None, reason="Conta
 @pytest.fixture(scope="module")
 def theirs():
     """The function of the notebook that compares both programs."""
-    page, names = pathlib.Path(__file__).parents[2] / "docs" / "tutorials" / "other_program.md", {}
+    page, names = pathlib.Path(__file__).parents[3] / "docs" / "tutorials" / "other_program.md", {}
     exec(page.read_text(encoding="utf-8").partition("```{code-cell}\n")[2].partition("```")[0], names)
     return names["theirs"]
 

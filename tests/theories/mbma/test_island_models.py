@@ -147,7 +147,7 @@ def test_what_is_nearly_nothing_ends_and_states_its_digits(island_model):
     assert found.error[2] > 1e-7
 
 
-DATA = pathlib.Path(__file__).parents[2] / "docs" / "data" / "boundary_elements.csv"
+DATA = pathlib.Path(__file__).parents[3] / "docs" / "data" / "boundary_elements.csv"
 COVER = dataclasses.replace(REPORTED, name="cover", addition="cover")
 COVERED = Surface(0.8, 0.01, 2.0, 1.0, 3.0)
 COVERED_GAPS = np.array([2.9, 2.0, 0.5, -1.0, -2.9])
@@ -186,7 +186,7 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
     assert abs(np.mean(errors)) < 0.02
 
 
-ROOT = pathlib.Path(__file__).parents[2]
+ROOT = pathlib.Path(__file__).parents[3]
 FLAT = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
 OWN_GAPS = np.array([2.09, 1.0, -1.5, 2.5])
 

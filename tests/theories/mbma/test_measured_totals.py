@@ -15,7 +15,7 @@ from mbma_tables.theories.mbma.profile import profile, source_of
 from mbma_tables.theories.mbma.tables import get_model
 from mbma_tables.theories.mbma.variants import FITTED, PRINTED, REPORTED
 
-DATA = pathlib.Path(__file__).parents[1] / "data"
+DATA = pathlib.Path(__file__).parents[2] / "data"
 DEPTHS = np.array([1e-9, 1e-4, 0.02, 0.3, 1.0, 1.5, 2.0])  # (h_max - d)/h_max
 
 

@@ -16,7 +16,7 @@ from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.surfaces.bearing_curve import bearing
 from mbma_tables.theories import THEORIES, get_theory
-from mbma_tables.theories.calibrated.table import shipped, shipped_part
+from mbma_tables.theories.evidence import shipped_deviations, shipped_part
 from mbma_tables.theories.simulated.boundary_elements import Contact, project
 from mbma_tables.theories.yielding import formulas as hardness
 from mbma_tables.theories.yielding.theory import MANY, Yielding
@@ -183,7 +183,7 @@ def test_a_map_yields_by_its_own_heights():
     u = np.maximum(level - (heights - heights.mean()), 0).mean()
     found = contact(surface, mean_separation=u, theory="calibrated", hardness=soft)
     assert found.area == pytest.approx(0.2, rel=0.03)
-    assert found.scatter < shipped().standard_deviation("calibrated", "pressure", found.area)
+    assert found.scatter < shipped_deviations().standard_deviation("calibrated", "pressure", found.area)
     law = contact_law(surface, theory="calibrated", hardness=0.3 * float(surface.rms_gradient), rtol=1e-3)
     assert law.turning_point is None
 

@@ -1,0 +1,44 @@
+"""The boundary-element simulation of a map, as a surface carries it: loads and flow, without the heights."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from mbma_tables.common.arguments import FloatArray
+
+MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary elements are too large
+ROUNDING = 1e-6  # relative, of wavelengths and sampling steps
+
+
+def resolving(shortest: float, step: float, unit: str | None) -> str:
+    """The option of `Surface.from_map` that leaves wavelengths of enough sampling steps; empty if they are."""
+    if shortest >= MIN_POINTS * step * (1 - ROUNDING):
+        return ""
+    # a little longer, so that four digits are enough
+    wavelength = f"{1.001 * MIN_POINTS * step:.4g}"
+    return f"short_cutoff='{wavelength} {unit}'" if unit else f"short_cutoff={wavelength}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MapSimulation:
+    """What was found of a map, without the map and its gaps."""
+
+    rows: FloatArray  # F/(A0 E*), A/A0, u and U/(A0 E*) of loads, shape (4, n)
+    flow_gaps: FloatArray  # mean gaps, falling, shape (m,),
+    flow: FloatArray  # and flow coefficients xx, yy, xy there [length^3], shape (m, 3)
+    points: float  # sampling steps along the shortest wavelength
+    left_out: float  # wavelength [length] below which a large map was cut off; 0 if it was not
+    origin: str  # description of the map and of the simulation
+
+    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """`flow_gaps` and `flow`."""
+        return self.flow_gaps, self.flow
+
+    def resized(self, up: float, along: float) -> MapSimulation:
+        """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
+        by = np.array([[up / along], [1.0], [up], [up**2 / along]])
+        gaps, flow, left_out = self.flow_gaps * up, self.flow * up**3, self.left_out * along
+        return dataclasses.replace(self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out)
