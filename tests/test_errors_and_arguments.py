@@ -195,8 +195,8 @@ def test_public_names_are_there_and_others_are_not():
     for name in mbma_tables.__all__:
         assert getattr(mbma_tables, name) is not None
         assert name in dir(mbma_tables)
-    with pytest.raises(AttributeError, match="no attribute 'contacts'"):
-        _ = mbma_tables.contacts
+    with pytest.raises(AttributeError, match="no attribute 'contakt'"):
+        _ = mbma_tables.contakt
     with pytest.raises(TypeError, match="takes 1 positional argument"):
         contact(ROAD, 1.0)
 

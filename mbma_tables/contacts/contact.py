@@ -77,9 +77,9 @@ def contact(
         Largest pressure p_m that the softer body supports, in the unit of `E_star` (over E* if that is 1), or a text
         that `mbma_tables.materials.hardness` accepts: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
         theory's elastic result is corrected by `mbma_tables.theories.yielding`; u is then the mean gap with yielded
-        points flattened. Each of several entries is a first loading, also after a larger one. Default: that of the softer of
-        `materials`, or infinite. If it is infinite, nothing yields, and results at which the named metals (without
-        names: all metals) would yield are not `valid`.
+        points flattened. Each of several entries is a first loading, also after a larger one. Default: that of the
+        softer of `materials`, or infinite. If it is infinite, nothing yields, and results at which the named metals
+        (without names: all metals) would yield are not `valid`.
     materials : str, pair of str, optional
         Metals in contact, one of `mbma_tables.materials.METALS` each, or `Metal` objects; in place of `E_star`.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model

@@ -25,6 +25,7 @@ from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import OF_MAPS, tested, theory_name
+from mbma_tables.theories.evidence import COMPARED, QUANTITIES, shipped_deviations
 from mbma_tables.theories.mbma import theory as mbma
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import FITTED, PRINTED, REPORTED, get_variant

@@ -257,7 +257,7 @@ def test_the_command_writes_a_joint(tmp_path):
         (("--export", "mbdyn", "--length-unit", "mm", "--out", "-"), "mbdyn is written in m and Pa, got mm and Pa"),
         (("--export", "csv", "--pressure", "1MPa", "--out", "-"), "--export writes the joint: leave --pressure"),
         (("--rows", "20", "--pressure", "1MPa"), "--rows belong to --export"),
-        ((), "pressures are needed"),
+        ((), "pressures or forces are needed"),
     ],
 )
 def test_what_the_command_refuses(words, message):
