@@ -90,8 +90,8 @@ FIRST_USE = (
     "print(time.process_time() - t)"
 )
 HEAD = """\
-# What accuracy costs, measured by python -m generate cost; docs/cost.md says how. Costs are times
-# over that of a fixed piece of work in the same run; the row of island model unit has its seconds.
+# What accuracy costs, measured by python -m generate cost; docs/cost.md says how. Costs are times over that of a
+# fixed piece of work in the same run; the row of island model unit has its seconds.
 """
 
 
