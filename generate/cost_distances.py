@@ -10,7 +10,15 @@ from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.calibrated_file import rms
-from generate.distances import COVER, ISLAND_MODELS, RANGES, THEORIES, distances, held_out, summed_up
+from generate.distances import (
+    COVER,
+    ISLAND_MODELS,
+    RANGES,
+    THEORIES,
+    distances,
+    held_out,
+    summed_up,
+)
 from generate.files import read_csv, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
@@ -20,11 +28,15 @@ from mbma_tables.theories import Persson
 from mbma_tables.theories.calibrated.formulas import Law, Spectrum, area
 
 SIMULATED = "boundary elements"
-POINTS, SLOW_POINTS = 1000, 50  # of each timed surface, in one call
+# of each timed surface, in one call
+POINTS = 1000
+SLOW_POINTS = 50
 SLOW = ("inverse of (19)", "exact")
-TIMED = tuple(  # those of the grids
-    Surface(hurst, 1.0, zeta_1, 1.0, top)
-    for hurst, zeta_1, top in ((0.3, 12.0, 3.4), (0.5, 21.0, 3.6), (0.9, 12.0, 3.0))
+# surfaces of the grids
+TIMED = (
+    Surface(0.3, 1.0, 12.0, 1.0, 3.4),
+    Surface(0.5, 1.0, 21.0, 1.0, 3.6),
+    Surface(0.9, 1.0, 12.0, 1.0, 3.0),
 )
 MAP = Recipe("self_affine", 0.8, 16.0, 4, 1, 256)
 LAW_RTOL = 1e-6
@@ -38,7 +50,9 @@ WAYS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("Persson simplified", "inverse of (20)", {"theory": Persson("simplified")}),
     ("G-W", "quadrature", {"theory": "greenwood_williamson"}),
     ("G-W", "law", {"theory": "greenwood_williamson"}),
-    *(("MBMA reported", name, MBMA | {"island_model": name}) for name in ("universal", "exact", "island4d")),
+    ("MBMA reported", "universal", MBMA | {"island_model": "universal"}),
+    ("MBMA reported", "exact", MBMA | {"island_model": "exact"}),
+    ("MBMA reported", "island4d", MBMA | {"island_model": "island4d"}),
     *(("MBMA reported", name, {"rtol": 1e-4, "island_model": name}) for name in ISLAND_MODELS),
     ("MBMA reported", "law", {"theory": "mbma"}),
     *((f"MBMA {name}", "universal", MBMA | {"variant": name}) for name in ("printed", "fitted")),
@@ -54,13 +68,20 @@ HEAD = """\
 
 def timed(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> float:
     """Cost of a point, of mean separations of each surface in one call a surface."""
-    pairs = [(surface, np.linspace(0.02, 0.98, count) * float(surface.h_max)) for surface in TIMED]
-    return measure(lambda: [answer(surface, u) for surface, u in pairs])[0] / (len(pairs) * count)
+    share_of_h_max = np.linspace(0.02, 0.98, count)
+    pairs = [(surface, share_of_h_max * float(surface.h_max)) for surface in TIMED]
+
+    def run() -> list[Any]:
+        return [answer(surface, u) for surface, u in pairs]
+
+    cost, _ = measure(run)
+    return cost / (len(pairs) * count)
 
 
 def quadrature(surface: Surface, u: FloatArray) -> Any:
     """Force and area by the calibrated law's own integrals."""
-    law = Law(Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1)), float(surface.h_max))
+    spectrum = Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
+    law = Law(spectrum, float(surface.h_max))
     force = law.force(u)
     return force, law.area(force)
 
@@ -70,15 +91,17 @@ def by_map() -> tuple[float, float]:
     z = heights(MAP)
 
     def made() -> Any:
-        found = Surface.from_map(z, 1 / len(z), periodic=True, model="measured")
+        surface = Surface.from_map(z, 1 / len(z), periodic=True, model="measured")
         # the curve itself is made when first used
-        contact(found, mean_separation=float(found.h_rms), theory="calibrated")
-        return found
+        contact(surface, mean_separation=float(surface.h_rms), theory="calibrated")
+        return surface
 
     surface = made()
     u = np.linspace(0.02, 0.98, POINTS) * float(surface.h_max)
-    answer = measure(lambda: contact(surface, mean_separation=u, theory="calibrated"))[0] / POINTS
-    return answer, measure(made)[0]
+    ask = functools.partial(contact, surface, mean_separation=u, theory="calibrated")
+    cost, _ = measure(ask)
+    cost_of_making, _ = measure(made)
+    return cost / POINTS, cost_of_making
 
 
 def by_law(options: dict[str, Any]) -> tuple[float, float]:
@@ -88,58 +111,102 @@ def by_law(options: dict[str, Any]) -> tuple[float, float]:
         return {surface: contact_law(surface, rtol=LAW_RTOL, **options) for surface in TIMED}
 
     laws = make()
-    return timed(lambda surface, u: (laws[surface].pressure(u), laws[surface].area(u))), measure(make)[0] / len(laws)
+
+    def answer(surface: Surface, u: FloatArray) -> tuple[Any, Any]:
+        return laws[surface].pressure(u), laws[surface].area(u)
+
+    cost = timed(answer)
+    cost_of_making, _ = measure(make)
+    return cost, cost_of_making / len(laws)
+
+
+def by_contact(options: dict[str, Any], surface: Surface, u: FloatArray) -> Any:
+    return contact(surface, mean_separation=u, **options)
+
+
+def closed_form_area(surface: Surface, force: FloatArray) -> Any:
+    return area(force, surface.alpha)
 
 
 def ways() -> Iterator[tuple[str, str, str, float, float]]:
     """Theory, way to it, name of its deviations, cost of a point and once a surface."""
-    area_alone = timed(lambda surface, force: area(force, surface.alpha))
+    area_alone = timed(closed_form_area)
     yield "calibrated", "closed form, area of a force", "area alone", area_alone, 0.0
     yield "calibrated", "quadrature", "calibrated", timed(quadrature), 0.0
     yield "calibrated, map", "map of 256 x 256", "calibrated, map", *by_map()
     for theory, way, options in WAYS:
-        name, ask = way if way in ISLAND_MODELS else theory, functools.partial(contact, **options)
+        # models of islands deviate by themselves
+        name = way if way in ISLAND_MODELS else theory
         if way == "law":
             yield theory, way, name, *by_law(options)
         else:
             count = SLOW_POINTS if way in SLOW else POINTS
-            yield theory, way, name, timed(lambda surface, u, ask=ask: ask(surface, mean_separation=u), count), 0.0  # type: ignore[misc]
+            cost = timed(functools.partial(by_contact, options), count)
+            yield theory, way, name, cost, 0.0
+
+
+def deviations() -> dict[str, list[float]]:
+    """Columns of `Distance` by theory, on all held-out surfaces."""
+    surfaces = held_out()
+    columns = dict[str, list[float]]()
+    for name, theory in (THEORIES | ISLAND_MODELS).items():
+        misses = distances(surfaces, theory)
+        of_area = [summed_up(surfaces, misses["area"], *ends) for ends in RANGES]
+        of_force = [summed_up(surfaces, misses["force"], *ends) for ends in RANGES]
+        sizes = [size for size, _ in of_area + of_force]
+        shares_reached = [reached for _, reached in of_area]
+        columns[name] = sizes + shares_reached
+    columns["area alone"] = [*columns["calibrated"][:2], np.nan, np.nan, 1, 1]
+    return columns
 
 
 def study() -> bytes:
-    """Every theory with its deviations on all held-out surfaces, and boundary elements on coarser grids, as a file."""
-    seen, known = held_out(), dict[str, list[float]]()
-    for name, theory in (THEORIES | ISLAND_MODELS).items():
-        found = distances(seen, theory)
-        parts = [summed_up(seen, found[quantity], *ends) for quantity in ("area", "force") for ends in RANGES]
-        known[name] = [rms for rms, _ in parts] + [reached for _, reached in parts[:2]]
-    known["area alone"] = [*known["calibrated"][:2], np.nan, np.nan, 1, 1]
-    rows = [Distance(label, way, cost, once, *known[name]) for label, way, name, cost, once in ways()]
-    return to_csv(HEAD, pd.DataFrame([*rows, *grid_rows()]), "%.4g")
+    """Every theory with its deviations, and boundary elements on coarser grids, as a file."""
+    columns = deviations()
+    rows = []
+    for theory, way, name, cost, once in ways():
+        rows.append(Distance(theory, way, cost, once, *columns[name]))
+    rows += grid_rows()
+    return to_csv(HEAD, pd.DataFrame(rows), "%.4g")
 
 
-def _missed(own: pd.DataFrame) -> pd.DataFrame:
-    """One surface's loads, with their contact and deviations from what its finest two grids converge to."""
-    *_, (_, coarse), (_, fine) = own.groupby("points")
-    coarse, fine = (part[part["start"] == part["start"].iloc[0]] for part in (coarse, fine))
-    touching, u = (2 * fine[name].to_numpy() - coarse[name].to_numpy() for name in ("area", "mean_separation"))
+def _converged(surface: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
+    """A/A0 and mean separation that the finest two grids converge to, as errors are halved."""
+    *_, (_, coarse), (_, fine) = surface.groupby("points")
+    coarse = coarse[coarse["start"] == coarse["start"].iloc[0]]
+    fine = fine[fine["start"] == fine["start"].iloc[0]]
+    area = 2 * fine["area"].to_numpy() - coarse["area"].to_numpy()
+    u = 2 * fine["mean_separation"].to_numpy() - coarse["mean_separation"].to_numpy()
+    return area, u
+
+
+def _missed(surface: pd.DataFrame) -> pd.DataFrame:
+    """One surface's loads, with their contact and deviations from what its grids converge to."""
+    touching, u = _converged(surface)
     parts = []
-    for _, part in own.groupby(["points", "start"]):
-        log_force, gap = np.log(part["force"].to_numpy()), part["mean_separation"].to_numpy()
-        open_ = gap > 0
-        curve = PchipInterpolator(np.log(gap[open_])[::-1], log_force[open_][::-1])
-        errors = {"area": np.log(part["area"] / touching), "force": curve(np.log(u)) - log_force}
-        parts.append(part.assign(touching=touching, **errors))
+    for _, part in surface.groupby(["points", "start"]):
+        log_force = np.log(part["force"].to_numpy())
+        gap = part["mean_separation"].to_numpy()
+        is_open = gap > 0
+        # gaps fall with the load, and interpolation wants them rising
+        log_force_at = PchipInterpolator(np.log(gap[is_open])[::-1], log_force[is_open][::-1])
+        of_area = np.log(part["area"] / touching)
+        of_force = log_force_at(np.log(u)) - log_force
+        parts.append(part.assign(touching=touching, area=of_area, force=of_force))
     return pd.concat(parts)
 
 
 def grid_rows() -> Iterator[Distance]:
     """Boundary elements on their own grids, deviations of those solved cold."""
-    data = read_csv("boundary_element_grids.csv")
-    data = pd.concat([_missed(own) for _, own in data.groupby("seed")])
-    for (grid, start), own in data.groupby(["points", "start"]):
+    loads = read_csv("boundary_element_grids.csv")
+    data = pd.concat([_missed(surface) for _, surface in loads.groupby("seed")])
+    for (grid, start), solved in data.groupby(["points", "start"]):
         # continued loads differ by the solver's tolerance only
         cold = data[(data["points"] == grid) & (data["start"] == "cold")]
-        inside = [cold[cold["touching"].between(*ends)] for ends in RANGES]
-        parts = [rms(part[name].to_numpy()) for name in ("area", "force") for part in inside]
-        yield Distance(SIMULATED, f"{grid} x {grid}, {start}", float(own["cost"].mean()), 0, *[*parts, 1.0, 1.0])
+        in_ranges = [cold[cold["touching"].between(*ends)] for ends in RANGES]
+        of_area = [rms(part["area"].to_numpy()) for part in in_ranges]
+        of_force = [rms(part["force"].to_numpy()) for part in in_ranges]
+        cost = float(solved["cost"].mean())
+        way = f"{grid} x {grid}, {start}"
+        # they reach every load
+        yield Distance(SIMULATED, way, cost, 0, *[*of_area, *of_force, 1.0, 1.0])
