@@ -8,7 +8,7 @@ import json
 import os
 import pathlib
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -52,7 +52,7 @@ MIN_ERRORS = 5  # that state a scatter
 TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("laws.toml").read_text(encoding="utf-8"))
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass of constants
 Variable = tuple[str | Sequence[str], ArrayLike, dict[str, Any]]
-Arrays = dict[str, tuple[str | Sequence[str], ArrayLike]]  # dimensions and values by name
+Arrays = Mapping[str, tuple[str | Sequence[str], ArrayLike]]  # dimensions and values by name
 Stated = dict[str, FloatArray]  # statistics of errors by theory, or by set
 
 
@@ -194,7 +194,7 @@ def law_table(
     The table answers within the covered range.
     """
     axes: Arrays = {name: (name, values) for name, values in nodes.items()}
-    group = law_group(kind, axes | arrays, **more)
+    group = law_group(kind, {**axes, **arrays}, **more)
     for name, ends in covered.items():
         group[name].attrs["covered"] = ends
     return group.set_coords(["contact_low", "contact_high"])

@@ -122,7 +122,7 @@ def answered(part: Part, theory: str, folder: pathlib.Path) -> dict[str, FloatAr
         stiffness = pressure * (STEP - 1) / (answer.mean_separation - closer.mean_separation)
         leakage = answer.leakage
         # the calibrated law solves no map, so it has no sensitivity to the grid
-        sensitivity = np.nan
+        sensitivity: float | FloatArray = np.nan
         if theory != "calibrated":
             sensitivity = of_map(theory, surface).sensitivity_at(np.asarray(answer.area))
         # in the order of `ANSWERS`
