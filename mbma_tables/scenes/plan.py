@@ -1,12 +1,12 @@
-"""The plan of a scene, its steps from effects and tolerance, and the measured costs of tables/cost.csv.
+"""The plan of a scene: its steps from effects and tolerance, by the costs of tables/cost.csv.
 
-The plan depends on the scene only: the island model is the universal table where its certificate suffices, else the
-exact solver, and many gaps of other theories are evaluated by a contact law. A step whose results amplify the error of
-force and area by a factor (`AMPLIFICATION`) has the tolerance over that factor; one half of it is for the islands, the
-other for the quadrature.
+The plan depends on the scene only: the island model is the universal table where its certificate
+suffices, else the exact solver, and many gaps of other theories are evaluated by a contact law. A
+step whose results amplify the error of force and area by a factor (`AMPLIFICATION`) has the
+tolerance over that factor; one half of it is for the islands, the other for the quadrature.
 
-A cost is a time divided by that of a fixed piece of work timed in the same run; the row "unit" has the seconds
-of that work on the machine that measured. `python -m generate cost` measures.
+A cost is a time divided by that of a fixed piece of work timed in the same run; the row "unit" has
+the seconds of that work on the machine that measured. `python -m generate cost` measures.
 """
 
 import csv
@@ -26,31 +26,42 @@ from mbma_tables.theories.mbma.island_models import AnyModel
 
 TABLES = ("universal", "island4d")  # island models that are tables
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
-# gaps found from pressures add their error to that of the values; the elastic errors of force and of area at that force
-# add up where points yield; p(r) at a point converges later than its integrals
-AMPLIFICATION = {"inverse": 2.0, "slopes": 2.0, "yield": 2.0, "profile": 10.0}
+AMPLIFICATION = {
+    # gaps that follow from pressures add their error to that of the values
+    "inverse": 2.0,
+    "slopes": 2.0,
+    # the elastic errors of force and of area at that force add up where points yield
+    "yield": 2.0,
+    # p(r) at a point converges later than its integrals
+    "profile": 10.0,
+}
 MIN_ENERGY_RTOL = 2e-9  # of an integral to 1e-9
-MIN_LAW_GAPS, MIN_LAW_RTOL = 150, 1e-9  # gaps from which a law pays where costs were not measured
+MIN_LAW_GAPS = 150  # from which a law pays where costs were not measured
+MIN_LAW_RTOL = 1e-9
 # of MBMA, over the fixed piece of work: once and for each gap, besides the totals
 OF_MBMA = {"inverse": (2.1, 3e-3), "slopes": (0.3, 5e-4), "energy": (7.0, 0.28)}
-YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # over an elastic call, and over one of many elastic gaps (docs/yield.md)
+# over an elastic call, and over one of many elastic gaps (docs/yield.md)
+YIELDING_CALL = 2.2
+YIELDING_GAP = 2.6
 LAST = 0.95  # largest share of h_max at which the error of a theory is looked up
+# tolerances of which a time budget allows the first that it can
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-
 
 UNIT = "unit"
 TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # text fields
 
 
 class Row(NamedTuple):
-    """One measurement: method, task, largest relative error found, time and evaluations."""
+    """One measurement: method, task, largest relative error, time and evaluations."""
 
     island_model: str
     variant: str  # "gap rtol=1e-06", "island", "open"
     quantity: str  # "both", or "pressure" that a law is inverted for
     error: float | None
-    cost: float  # time over that of the fixed work; seconds in the row of island model `UNIT`
-    evaluations: float | None = None  # islands for a gap, pressures for an exact island, height integrals for a table
+    # time over that of the fixed work; seconds in the row of island model `UNIT`
+    cost: float
+    # islands for a gap, pressures for an exact island, height integrals for a table
+    evaluations: float | None = None
 
     @property
     def what(self) -> str:
@@ -60,32 +71,39 @@ class Row(NamedTuple):
     @property
     def rtol(self) -> float | None:
         """The requested tolerance, if the variant contains one."""
-        _, found, text = self.variant.partition(" rtol=")
-        return float(text) if found else None
+        _, separator, text = self.variant.partition(" rtol=")
+        return float(text) if separator else None
 
 
 class Costs(NamedTuple):
-    """All measurements of a file, and the seconds of the fixed piece of work where they were made."""
+    """All measurements of a file, and the seconds of the fixed work where they were made."""
 
     rows: tuple[Row, ...]
     seconds: float
 
     def of(self, island_model: str, what: str, rtol: float | None = None) -> float:
-        """Seconds at the loosest measured tolerance that meets `rtol`, else the tightest; NaN if none was measured."""
+        """Seconds at the loosest measured tolerance that meets `rtol`, else the tightest.
+
+        NaN if none was measured.
+        """
         rows = [row for row in self.rows if row.island_model == island_model and row.what == what]
         if not rows:
             return math.nan
         # calls and opening a table have one row, without a tolerance
         by_rtol = sorted((row.rtol or 0.0, row.cost) for row in rows)
-        met = [cost for tight, cost in by_rtol if rtol is None or tight <= rtol * (1 + 1e-9)]
-        return self.seconds * (met[-1] if met else by_rtol[0][1])
+        _, cost = by_rtol[0]
+        for measured_rtol, cost_there in by_rtol:
+            # decimal tolerances of a file and of a product may differ by roundoff
+            if rtol is None or measured_rtol <= rtol * (1 + 1e-9):
+                cost = cost_there
+        return self.seconds * cost
 
 
 class Distance(NamedTuple):
-    """A method for a theory: its cost, and the theory's deviation from boundary elements on held-out surfaces.
+    """A method for a theory: its cost, and the theory's deviation from boundary elements.
 
-    Deviations are root mean squares of ln(theory/simulation), of area at equal force and of force at equal mean
-    separation, light at 1-10% contact and deep at 10-97%.
+    Deviations are those on held-out surfaces: root mean squares of ln(theory/simulation), of area
+    at equal force and of force at equal mean separation, light at 1-10% contact and deep at 10-97%.
     """
 
     theory: str
@@ -100,14 +118,23 @@ class Distance(NamedTuple):
     reached_deep: float
 
 
+def _cell(column: str, text: str) -> str | float | None:
+    """Content of a cell of a CSV file; an empty one is no number."""
+    if column in TEXTS:
+        return text
+    return float(text) if text else None
+
+
 def _records(kind: Any, path: pathlib.Path) -> tuple[Any, ...]:
-    """Rows of a CSV file whose columns are the fields of a kind; an empty cell is no number."""
+    """Rows of a CSV file whose columns are the fields of a kind."""
     with path.open(encoding="utf-8", newline="") as file:
-        records = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    return tuple(
-        kind(**{n: text if n in TEXTS else float(text) if text else None for n, text in record.items()})
-        for record in records
-    )
+        content = csv.DictReader(line for line in file if not line.startswith("#"))
+        records = list(content)
+    rows = []
+    for record in records:
+        fields = {column: _cell(column, text) for column, text in record.items()}
+        rows.append(kind(**fields))
+    return tuple(rows)
 
 
 @functools.cache
@@ -158,7 +185,8 @@ class Plan:
     switched_off: tuple[str, ...]  # refinements of the model that are off
     rtol: float  # tolerance of the plan
     overhead: float  # seconds that every scene takes
-    first_use: float  # seconds that the first scene of a process takes besides; no choice depends on it
+    # seconds that the first scene of a process takes besides; no choice depends on it
+    first_use: float
     theory: str = "mbma"
 
     @property
@@ -169,18 +197,28 @@ class Plan:
     @property
     def error(self) -> float:
         """Largest error of a step of the scene's theory; those compared state their own."""
-        return max((step.error for step in self.steps if step.island_model is not None or step.theory), default=0.0)
+        of_theory = [step for step in self.steps if step.island_model is not None or step.theory]
+        return max((step.error for step in of_theory), default=0.0)
 
     def text(self) -> str:
         """The plan as text, like a query plan of a database."""
-        times = f"time={duration(self.seconds)}, first use in a process {duration(self.first_use)} more"
-        lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})", f"  theory: {self.theory}"]
+        first_use = f"first use in a process {duration(self.first_use)} more"
+        times = f"time={duration(self.seconds)}, {first_use}"
+        lines = [
+            f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})",
+            f"  theory: {self.theory}",
+        ]
         for step in self.steps:
             source = step.island_model_name or step.theory
             by = "" if source is None else f" by {source}"
-            asked = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
-            numbers = f"(count={step.count}{asked}, {_bound(step.error)}, time={duration(step.seconds)})"
-            lines += [f"  -> {step.name}{by}  {numbers}", f"       {step.what}", f"       for: {step.why}"]
+            rtol = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
+            time = f"time={duration(step.seconds)}"
+            numbers = f"(count={step.count}{rtol}, {_bound(step.error)}, {time})"
+            lines += [
+                f"  -> {step.name}{by}  {numbers}",
+                f"       {step.what}",
+                f"       for: {step.why}",
+            ]
         lines.append(f"  left out: {', '.join(self.left_out) or 'nothing'}")
         if self.switched_off:
             lines.append(f"  switched off: {', '.join(self.switched_off)}")
@@ -195,12 +233,15 @@ def duration(seconds: float) -> str:
     """A time in its unit."""
     if math.isnan(seconds):
         return "not measured"
-    unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3)) if seconds >= s), ("us", 1e-6))
-    return f"{seconds / size:.3g} {unit}"
+    if seconds >= 1:
+        return f"{seconds:.3g} s"
+    if seconds >= 1e-3:
+        return f"{seconds / 1e-3:.3g} ms"
+    return f"{seconds / 1e-6:.3g} us"
 
 
 def make_plan(problem: Problem) -> Plan:
-    """The steps that meet the tolerance, or the tightest tolerance of `LADDER` whose steps fit the time budget."""
+    """The steps that meet the tolerance, or the tightest of `LADDER` that fit the time budget."""
     if problem.rtol is not None:
         return _Planner(problem, problem.rtol).plan()
     assert problem.seconds is not None
@@ -213,24 +254,29 @@ def make_plan(problem: Problem) -> Plan:
         if plan.error > rtol:
             continue  # too tight for the theory
         if math.isnan(plan.seconds):
-            step = next(step for step in plan.steps if math.isnan(step.seconds))
-            unknown = f"theory {step.theory!r}" if step.theory else f"step {step.name!r}"
-            raise InputError(f"the cost of {unknown} is not known: give rtol instead of seconds")
+            unmeasured = next(step for step in plan.steps if math.isnan(step.seconds))
+            source = f"step {unmeasured.name!r}"
+            if unmeasured.theory:
+                source = f"theory {unmeasured.theory!r}"
+            raise InputError(f"the cost of {source} is not known: give rtol instead of seconds")
         if plan.seconds <= problem.seconds:
             return plan
         least = plan.seconds
-    raise InputError(f"seconds = {problem.seconds:g} is too little: the cheapest plan takes about {least:.3g} s")
+    budget = f"seconds = {problem.seconds:g}"
+    raise InputError(f"{budget} is too little: the cheapest plan takes about {least:.3g} s")
 
 
-def certified_error(island_model: str | AnyModel, asked: float) -> float:
-    """Bound on the relative error of islands, for results at `asked`; NaN if it is known afterwards only."""
+def certified_error(island_model: str | AnyModel, rtol: float) -> float:
+    """Bound on the relative error of islands at `rtol`; NaN if only results have it."""
     if island_model == "universal":
         from mbma_tables.theories.mbma.tables import open_table
 
         certificate = open_table(island_model).content.attributes
         return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))
-    # the exact solver works to a tenth of the requested tolerance
-    return {"exact": 0.1 * asked, "rigid": 0.0}.get(_name(island_model), math.nan)
+    if island_model == "exact":
+        # it works to a tenth of the requested tolerance
+        return 0.1 * rtol
+    return 0.0 if island_model == "rigid" else math.nan
 
 
 @dataclasses.dataclass(frozen=True)
@@ -246,33 +292,74 @@ class _Planner:
         return 0 if self.problem.gaps is None else int(self.problem.gaps.size)
 
     def plan(self) -> Plan:
-        problem, outputs, dropped = self.problem, self.problem.outputs, self.problem.dropped
-        hertz = "area" in outputs and "subscale_area" in dropped
-        wanted = [name for name in OF_CONTACT if name in outputs and not (name == "area" and hertz)]
+        problem = self.problem
+        steps = self.steps()
+        shipped = {step.island_model for step in steps if isinstance(step.island_model, str)}
+        imports = [self.costs.of(island_model, "import") for island_model in shipped]
+        return Plan(
+            steps=tuple(steps),
+            left_out=tuple(name for name in OUTPUTS if name not in problem.outputs),
+            switched_off=tuple(name for name in REFINEMENTS if name in problem.dropped),
+            rtol=self.rtol,
+            overhead=self.costs.of("scene", "call"),
+            first_use=max(imports, default=0.0),
+            theory=problem.theory_name,
+        )
+
+    def steps(self) -> list[Step]:
+        """Steps of all effects, in the order in which they run."""
+        problem = self.problem
+        outputs = problem.outputs
+        hertz = "area" in outputs and "subscale_area" in problem.dropped
+        of_contact = [name for name in OF_CONTACT if name in outputs]
+        if hertz:
+            of_contact.remove("area")
         if problem.prescribed in INVERTED:
-            wanted.append(f"{problem.prescribed} prescribed")
-        steps = [self.contact(wanted)] if wanted else []
+            of_contact.append(f"{problem.prescribed} prescribed")
+        steps = []
+        if of_contact:
+            steps.append(self.contact(of_contact))
         if hertz:
             what = "adaptive sum over islands with eta = 1, the Hertz area"
             steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
         if "island_statistics" in outputs:
-            what = f"number of islands at {self.count} gaps, {problem.points} islands of the distribution (Eq. 42)"
+            islands = f"{problem.points} islands of the distribution (Eq. 42)"
+            what = f"number of islands at {self.count} gaps, {islands}"
             steps.append(self.summed("island statistics", "island_statistics", what, "rigid"))
         if "pressure_profile" in outputs:
-            islands, asked = int(np.size(problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
-            what, seconds = "the island problem solved with p(r) and d(r)", self.costs.of("exact", "profile", asked)
-            steps.append(Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, islands * seconds))
-        for name in problem.theories:
-            closed = name == "greenwood_williamson"
-            error, seconds = 1e-14 if closed else 1e-9, self.costs.of(name if closed else "persson", "gap")
-            what = "another theory at the same gaps"
-            steps.append(Step(name, "comparison", what, None, None, self.count, error, self.count * seconds))
-        left_out = tuple(name for name in OUTPUTS if name not in outputs)
-        switched_off = tuple(name for name in REFINEMENTS if name in dropped)
-        island_models = {step.island_model for step in steps if isinstance(step.island_model, str)}
-        first_use = max((self.costs.of(island_model, "import") for island_model in island_models), default=0.0)
-        overhead = self.costs.of("scene", "call")
-        return Plan(tuple(steps), left_out, switched_off, self.rtol, overhead, first_use, problem.theory_name)
+            steps.append(self.profiles())
+        steps += [self.compared(name) for name in problem.theories]
+        return steps
+
+    def profiles(self) -> Step:
+        """Islands solved one by one."""
+        islands = int(np.size(self.problem.deltas))
+        rtol = ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
+        return Step(
+            name="profiles",
+            why="pressure_profile",
+            what="the island problem solved with p(r) and d(r)",
+            island_model="exact",
+            rtol=rtol,
+            count=islands,
+            error=rtol,
+            seconds=islands * self.costs.of("exact", "profile", rtol),
+        )
+
+    def compared(self, name: str) -> Step:
+        """Another theory at the same gaps; its cost is that of the closed form or of Persson's."""
+        is_closed_form = name == "greenwood_williamson"
+        priced_as = name if is_closed_form else "persson"
+        return Step(
+            name=name,
+            why="comparison",
+            what="another theory at the same gaps",
+            island_model=None,
+            rtol=None,
+            count=self.count,
+            error=1e-14 if is_closed_form else 1e-9,
+            seconds=self.count * self.costs.of(priced_as, "gap"),
+        )
 
     def island_model(self, tolerance: float) -> str | AnyModel:
         """The island model for a step with that tolerance."""
@@ -284,58 +371,129 @@ class _Planner:
         return "universal" if certified_error("universal", share) <= share else "exact"
 
     def contact(self, why: Sequence[str]) -> Step:
-        """One contact at all gaps; of theories other than MBMA a law, if force and area suffice and it costs less."""
-        outputs, theory = self.problem.outputs, self.problem.theory_name
-        parts = {
+        """One contact at all gaps, by the scene's theory."""
+        outputs = self.problem.outputs
+        requirements = {
             "inverse": self.problem.prescribed in INVERTED,
             "slopes": bool(outputs & {"stiffness", "conductance"}),
             "energy": "energy" in outputs,
             "yield": "yield" in outputs,
         }
-        factor = math.prod(by for part, by in AMPLIFICATION.items() if parts.get(part))
-        what = f"pressure, area and derived quantities at {self.count} gaps"
+        parts = frozenset(part for part, is_needed in requirements.items() if is_needed)
+        reasons = ", ".join(why)
         if self.problem.theory == "mbma":
-            if parts["energy"] and self.rtol < MIN_ENERGY_RTOL:
-                raise InputError(f"rtol = {self.rtol:g} is too tight for energy: {MIN_ENERGY_RTOL:.0e} at best")
-            step = self.summed("contact", ", ".join(why), f"sum over islands (Eqs. 48, 49): {what}", None, factor)
-            more = [self.costs.seconds * (a + b * self.count) for part, (a, b) in OF_MBMA.items() if parts[part]]
-            seconds = math.nan if parts["yield"] else step.seconds + sum(more)
-            return dataclasses.replace(step, seconds=seconds, theory=theory)
-        name, asked, error = "contact", None, factor * self.own_error() if parts["yield"] else self.own_error()
-        call, each = (self.costs.of(theory, of) for of in ("call", "invert" if parts["inverse"] else "gap"))
-        each += self.costs.of(theory, "energy") if parts["energy"] else 0.0
-        weights = (YIELDING_CALL, YIELDING_GAP) if parts["yield"] else (1.0, 1.0)
-        seconds = weights[0] * call + weights[1] * self.count * each
-        if outputs & set(OF_CONTACT) <= {"pressure", "area"}:
-            rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL)
-            found = self.costs.of("law", "lookup") + (self.costs.of("law", "invert") if parts["inverse"] else 0.0)
-            by_law = self.costs.of(theory, "law", rtol) + self.count * found
-            if self.count >= MIN_LAW_GAPS if math.isnan(seconds) else by_law < seconds:
-                name, asked, error, seconds = "law", rtol, factor * (rtol + error), by_law
-        return Step(name, ", ".join(why), what, None, asked, self.count, error, seconds, theory)
+            return self.contact_of_mbma(reasons, parts)
+        return self.contact_of_another(reasons, parts)
 
-    def summed(self, name: str, why: str, what: str, priced_as: str | None, factor: float = 1.0) -> Step:
-        """A sum over islands at every gap; `priced_as` is an island model whose totals cost about the same."""
+    @property
+    def evaluation(self) -> str:
+        """What is evaluated in one contact, for the text of a plan."""
+        return f"pressure, area and derived quantities at {self.count} gaps"
+
+    def contact_of_mbma(self, why: str, parts: frozenset[str]) -> Step:
+        """One contact at all gaps, by sums over islands."""
+        if "energy" in parts and self.rtol < MIN_ENERGY_RTOL:
+            best = f"{MIN_ENERGY_RTOL:.0e} at best"
+            raise InputError(f"rtol = {self.rtol:g} is too tight for energy: {best}")
+        factor = math.prod(by for part, by in AMPLIFICATION.items() if part in parts)
+        what = f"sum over islands (Eqs. 48, 49): {self.evaluation}"
+        step = self.summed("contact", why, what, None, factor)
+        besides_totals = []
+        for part, (once, each) in OF_MBMA.items():
+            if part in parts:
+                besides_totals.append(self.costs.seconds * (once + each * self.count))
+        seconds = step.seconds + sum(besides_totals)
+        # the cost of yielding was not measured
+        if "yield" in parts:
+            seconds = math.nan
+        return dataclasses.replace(step, seconds=seconds, theory=self.problem.theory_name)
+
+    def contact_of_another(self, why: str, parts: frozenset[str]) -> Step:
+        """One contact by a theory other than MBMA, or its law if that suffices and costs less."""
+        theory = self.problem.theory_name
+        factor = math.prod(by for part, by in AMPLIFICATION.items() if part in parts)
+        error = self.theory_error()
+        if "yield" in parts:
+            error = factor * error
+        call = self.costs.of(theory, "call")
+        each = self.costs.of(theory, "invert" if "inverse" in parts else "gap")
+        if "energy" in parts:
+            each += self.costs.of(theory, "energy")
+        if "yield" in parts:
+            call = YIELDING_CALL * call
+            seconds = call + YIELDING_GAP * self.count * each
+        else:
+            seconds = call + self.count * each
+        step = Step(
+            name="contact",
+            why=why,
+            what=self.evaluation,
+            island_model=None,
+            rtol=None,
+            count=self.count,
+            error=error,
+            seconds=seconds,
+            theory=theory,
+        )
+        # a law has force and area only
+        if not self.problem.outputs & set(OF_CONTACT) <= {"pressure", "area"}:
+            return step
+        rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL)
+        lookup = self.costs.of("law", "lookup")
+        if "inverse" in parts:
+            lookup += self.costs.of("law", "invert")
+        by_law = self.costs.of(theory, "law", rtol) + self.count * lookup
+        law_pays = by_law < seconds
+        if math.isnan(seconds):
+            law_pays = self.count >= MIN_LAW_GAPS
+        if not law_pays:
+            return step
+        return dataclasses.replace(
+            step,
+            name="law",
+            rtol=rtol,
+            error=factor * (rtol + error),
+            seconds=by_law,
+        )
+
+    def summed(
+        self,
+        name: str,
+        why: str,
+        what: str,
+        priced_as: str | None,
+        factor: float = 1.0,
+    ) -> Step:
+        """A sum over islands at every gap.
+
+        `priced_as` is an island model whose totals cost about the same.
+        """
         tolerance = self.rtol / factor
-        island_model, asked = self.island_model(tolerance), (1 - ISLAND_SHARE) * tolerance
+        island_model = self.island_model(tolerance)
+        rtol = (1 - ISLAND_SHARE) * tolerance
         priced = priced_as or _name(island_model)
+        by_gap = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", rtol)
         # its islands are answered once, as for a law
-        seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked)
-        seconds = min(seconds, self.costs.of(priced, "law", asked))
-        error = factor * (asked + certified_error(island_model, asked))
-        return Step(name, why, what, island_model, asked, self.count, error, seconds)
+        seconds = min(by_gap, self.costs.of(priced, "law", rtol))
+        error = factor * (rtol + certified_error(island_model, rtol))
+        return Step(name, why, what, island_model, rtol, self.count, error, seconds)
 
-    def own_error(self) -> float:
+    def theory_error(self) -> float:
         """Bound of the scene's theory on its numerical error."""
         from mbma_tables.theories import get_theory
 
-        surface, gaps = self.problem.surface, self.problem.gaps
-        h_max, farthest = float(surface.h_max), 0.0
-        if self.problem.prescribed not in INVERTED:
-            # the farther from the mid-plane, the larger
-            farthest = np.max(gaps if self.problem.prescribed == "mean_separations" else (h_max + gaps) / 2)
+        surface = self.problem.surface
+        gaps = self.problem.gaps
+        h_max = float(surface.h_max)
+        farthest = 0.0
+        # the farther from the mid-plane, the larger
+        if self.problem.prescribed == "mean_separations":
+            farthest = np.max(gaps)
+        elif self.problem.prescribed not in INVERTED:
+            farthest = np.max((h_max + gaps) / 2)
         u = min(max(farthest, 0.5 * h_max), LAST * h_max)
-        return float(get_theory(self.problem.theory, surface).answer(surface, np.asarray(u)).error)
+        theory = get_theory(self.problem.theory, surface)
+        return float(theory.answer(surface, np.asarray(u)).error)
 
 
 def _name(island_model: Any) -> str:
