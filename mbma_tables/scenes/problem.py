@@ -1,4 +1,7 @@
-"""The problem defined by a scene, with its effects, checked on construction; `plan` and `run` solve it."""
+"""The problem defined by a scene, with its effects, checked on construction.
+
+`plan` and `run` solve it.
+"""
 
 import dataclasses
 from collections.abc import Iterable, Sequence
@@ -6,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import finite_array, number_in, require, require_name, whole_number_in
+from mbma_tables.common.arguments import (
+    finite_array,
+    number_in,
+    require,
+    require_name,
+    whole_number_in,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, require_surface
 from mbma_tables.materials import hardness_in
@@ -16,7 +25,16 @@ from mbma_tables.theories.mbma.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 # effects, described in docs/scenes.md: those that are read from one contact, and others
-OF_CONTACT = ("pressure", "area", "stiffness", "energy", "conductance", "leakage", "validity", "yield")
+OF_CONTACT = (
+    "pressure",
+    "area",
+    "stiffness",
+    "energy",
+    "conductance",
+    "leakage",
+    "validity",
+    "yield",
+)
 OF_ISLANDS = ("island_statistics", "pressure_profile")  # available for MBMA only
 OUTPUTS = (*OF_CONTACT[:6], *OF_ISLANDS, "comparison", *OF_CONTACT[6:])
 # part of the model, and on unless switched off
@@ -24,8 +42,11 @@ REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
 PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
 INVERTED = ("pressures", "areas")  # gaps follow from them
-MIN_RTOL, MAX_RTOL, MAX_SECONDS = 1e-10, 0.1, 1e6
-DEFAULT_RTOL, DEFAULT_RTOL_OF_OTHERS = 1e-6, 1e-4  # of MBMA, and of theories without a certified table
+MIN_RTOL = 1e-10
+MAX_RTOL = 0.1
+MAX_SECONDS = 1e6
+DEFAULT_RTOL = 1e-6  # of MBMA
+DEFAULT_RTOL_OF_OTHERS = 1e-4  # of theories without a certified table
 NEEDS = {  # what an effect needs and no other uses
     "yield": ("hardness", "the largest pressure that the softer body bears"),
     "conductance": ("conductivities", "k1 and k2 of the two bodies"),
@@ -36,7 +57,7 @@ NEEDS = {  # what an effect needs and no other uses
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Problem:
-    """The parameters of `Scene`, with the derived fields `outputs`, `dropped`, `gaps` and `units`."""
+    """The parameters of `Scene`, with derived fields such as `outputs`, `gaps` and `units`."""
 
     surface: AnySurface
     effects: Sequence[str] = ("pressure", "area")
@@ -51,7 +72,8 @@ class Problem:
     seconds: float | None = None
     variant: str | Variant = "reported"
     island_model: str | AnyModel | None = None
-    theory: Any = None  # str, Theory or UserTheory; by the surface where none is given
+    # str, Theory or UserTheory; by the surface where none is given
+    theory: Any = None
     conductivities: tuple[float | str, float | str] | None = None
     deltas: Any = None
     theories: Sequence[str] = ()
@@ -65,13 +87,28 @@ class Problem:
 
     def __post_init__(self) -> None:
         for name in ("effects", "without", "theories"):
-            if isinstance(getattr(self, name), str) or not isinstance(getattr(self, name), Iterable):
-                raise InputError(f"{name} must be a list of names: write [{getattr(self, name)!r}]")
+            names = getattr(self, name)
+            if isinstance(names, str) or not isinstance(names, Iterable):
+                raise InputError(f"{name} must be a list of names: write [{names!r}]")
         self._choose_effects()
-        outputs, dropped = self.outputs, self.dropped
         require_surface(self.surface)
         if self.surface.labelled or self.surface.shape != ():
             raise InputError("a scene has one surface, not a batch: make a scene for each")
+        self._set_numbers()
+        if self.theory is None:
+            vars(self).update(theory=self._default_theory())
+        self._set_tolerance()
+        whole_number_in("points", self.points, 2, 10_000)
+        vars(self).update(
+            variant=get_variant(self.variant),
+            theories=tuple(self.theories),
+        )
+        vars(self).update(gaps=self._checked_gaps())
+        self._check_parameters_of_effects()
+        self._check_theories()
+
+    def _set_numbers(self) -> None:
+        """Take lengths, stresses and conductivities as numbers in one set of units."""
         E_star, units = modulus_and_units(self.E_star, self.surface)
         vars(self).update(E_star=number_in("E_star", E_star, 1e-300, 1e300), units=units)
         for name in ("separations", "mean_separations", "pressures", "deltas"):
@@ -80,82 +117,107 @@ class Problem:
         if self.conductivities is not None:
             conductivities, unit = units.conductivities(*self.conductivities)
             vars(self).update(conductivities=conductivities, conductance_unit=unit)
-        if self.theory is None:
-            of_mbma = bool(dropped) or bool(outputs.intersection(OF_ISLANDS)) or self.island_model is not None
-            by = "separation" if self.separations is not None else None
-            named = "mbma" if of_mbma else theory_name(self.surface, None, by, variant=self.variant)
-            vars(self).update(theory=named)
+
+    def _default_theory(self) -> str:
+        """MBMA where an option or effect is of it alone, else by the rule of `contact`."""
+        needs_islands = bool(self.outputs.intersection(OF_ISLANDS))
+        if self.dropped or needs_islands or self.island_model is not None:
+            return "mbma"
+        by = "separation" if self.separations is not None else None
+        by_rule: str = theory_name(self.surface, None, by, variant=self.variant)
+        return by_rule
+
+    def _set_tolerance(self) -> None:
+        """Set `rtol`: as given, by default, or None where a time budget is given."""
         rtol: float | None = DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
         if self.rtol is not None:
             rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)
         if self.seconds is not None:
             if self.rtol is not None:
-                raise InputError("rtol and seconds are both given: give the accuracy or the time budget, one of them")
+                both = "rtol and seconds are both given"
+                raise InputError(f"{both}: give the accuracy or the time budget, one of them")
             number_in("seconds", self.seconds, 1e-9, MAX_SECONDS)
             rtol = None
-        whole_number_in("points", self.points, 2, 10_000)
-        vars(self).update(rtol=rtol, variant=get_variant(self.variant), theories=tuple(self.theories))
-        vars(self).update(gaps=self._checked_gaps())
-        self._check_parameters_of_effects()
-        self._check_theories()
+        vars(self).update(rtol=rtol)
 
     def _choose_effects(self) -> None:
-        """Set the requested outputs and the refinements switched off, checked against each other."""
+        """Set the requested outputs and the refinements switched off, checked with each other."""
         for name in self.effects:
             require_name("effect", name, OUTPUTS)
         for name in self.without:
             require_name("refinement", name, REFINEMENTS)
-        outputs, dropped = frozenset(self.effects), frozenset(self.without)
+        outputs = frozenset(self.effects)
+        dropped = frozenset(self.without)
         if not outputs:
-            raise InputError(f"no effect is requested: on needs at least one of {', '.join(OUTPUTS)}")
-        for name in sorted(dropped | outputs & set(ELASTIC)) if "yield" in outputs else ():
-            raise InputError(f"{name!r} is for elastic contacts, and effect 'yield' is on: leave one of the two out")
-        for name in sorted(outputs & set(OF_CONTACT[2:])) if "finite_height" in dropped else ():
-            raise InputError(f"{name!r} needs a surface that ends at h_max: leave finite_height on, or {name!r} out")
+            listed = ", ".join(OUTPUTS)
+            raise InputError(f"no effect is requested: on needs at least one of {listed}")
+        if "yield" in outputs:
+            # refinements are those of an elastic theory
+            elastic = sorted(dropped | outputs & set(ELASTIC))
+            if elastic:
+                excluded = f"{elastic[0]!r} is for elastic contacts, and effect 'yield' is on"
+                raise InputError(f"{excluded}: leave one of the two out")
+        if "finite_height" in dropped:
+            needs_end = sorted(outputs & set(OF_CONTACT[2:]))
+            if needs_end:
+                effect = repr(needs_end[0])
+                remedy = f"leave finite_height on, or {effect} out"
+                raise InputError(f"{effect} needs a surface that ends at h_max: {remedy}")
         if "pressure_profile" in outputs and "sphere_deformation" in dropped:
-            raise InputError(
-                "pressure_profile is that of the deformed sphere: leave sphere_deformation on, or pressure_profile out"
-            )
+            remedy = "leave sphere_deformation on, or pressure_profile out"
+            raise InputError(f"pressure_profile is that of the deformed sphere: {remedy}")
         vars(self).update(outputs=outputs, dropped=dropped)
 
     def _checked_gaps(self) -> Any:
         """The prescribed numbers; None if no effect needs gaps."""
-        given = [name for name in PRESCRIBED if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise InputError(f"{' and '.join(given)} are given: prescribe one of {', '.join(PRESCRIBED)}")
+        prescribed = [name for name in PRESCRIBED if getattr(self, name) is not None]
+        choice = ", ".join(PRESCRIBED)
+        if len(prescribed) > 1:
+            raise InputError(f"{' and '.join(prescribed)} are given: prescribe one of {choice}")
         if self.outputs == {"pressure_profile"}:
-            if given:
-                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or request 'pressure'")
+            # profiles are those of islands at approaches
+            if prescribed:
+                unused = f"{prescribed[0]} are not needed by any effect"
+                raise InputError(f"{unused}: leave them out, or request 'pressure'")
             return None
-        if not given:
-            raise InputError(f"nothing is prescribed: give one of {', '.join(PRESCRIBED)}")
-        name, h_max = given[0], float(self.surface.h_max)
+        if not prescribed:
+            raise InputError(f"nothing is prescribed: give one of {choice}")
+        (name,) = prescribed
         numbers = finite_array(name, getattr(self, name))
         if numbers.ndim > 1:
             raise InputError(f"{name} must be one number or a list, got shape {numbers.shape}")
-        least, why = {
-            "separations": (-h_max, f"at least -h_max = {-h_max:.6g}, where the model ends"),
-            "mean_separations": (0.0, "at least 0, where the model ends (d = -h_max)"),
-        }.get(name, (0.0, "at least 0: there is no adhesion in the model"))
-        require(name, numbers, numbers >= least, why)
+        h_max = float(self.surface.h_max)
+        least = 0.0
+        allowed = "at least 0: there is no adhesion in the model"
+        if name == "separations":
+            least = -h_max
+            allowed = f"at least -h_max = {-h_max:.6g}, where the model ends"
+        if name == "mean_separations":
+            allowed = "at least 0, where the model ends (d = -h_max)"
+        require(name, numbers, numbers >= least, allowed)
         if name in INVERTED and "finite_height" in self.dropped:
-            raise InputError(f"{name} need a surface that ends at h_max: leave finite_height on, or give separations")
+            remedy = "leave finite_height on, or give separations"
+            raise InputError(f"{name} need a surface that ends at h_max: {remedy}")
         return np.atleast_1d(numbers).astype(float)
 
     def _check_parameters_of_effects(self) -> None:
         """Parameters that one effect needs and no other uses."""
         for effect, (name, meaning) in NEEDS.items():
-            is_given = getattr(self, name) not in (None, ()) if name == "theories" else getattr(self, name) is not None
+            argument = getattr(self, name)
+            is_given = argument is not None
+            # no theories are an empty list
+            if name == "theories":
+                is_given = argument not in (None, ())
             if effect in self.outputs and not is_given:
                 raise InputError(f"effect {effect!r} needs {name}: {meaning}")
             if effect not in self.outputs and is_given:
-                raise InputError(
-                    f"{name} given and effect {effect!r} is off: add it to the effects, or leave {name} out"
-                )
+                remedy = f"add it to the effects, or leave {name} out"
+                raise InputError(f"{name} given and effect {effect!r} is off: {remedy}")
         if self.hardness is not None:
             cap = number_in("hardness", self.hardness, 1e-300, 1e300)
             if self.prescribed == "pressures":
-                require("pressures", self.gaps, self.gaps <= cap, f"at most the hardness, {cap:.6g}")
+                allowed = f"at most the hardness, {cap:.6g}"
+                require("pressures", self.gaps, self.gaps <= cap, allowed)
         for name in ("conductivities", "deltas"):
             if getattr(self, name) is not None:
                 numbers = finite_array(name, getattr(self, name))
@@ -166,9 +228,11 @@ class Problem:
         if isinstance(self.island_model, str):
             require_name("island model", self.island_model, ISLAND_MODELS)
         if self.island_model is not None and "sphere_deformation" in self.dropped:
-            raise InputError("sphere_deformation is off, which is the rigid sphere: leave island model out")
+            rigid = "sphere_deformation is off, which is the rigid sphere"
+            raise InputError(f"{rigid}: leave island model out")
         if self.seconds is not None and not isinstance(self.island_model, str | None):
-            raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
+            unmeasured = "the cost of your own island model is not known"
+            raise InputError(f"{unmeasured}: give rtol instead of seconds")
         if isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
         else:
@@ -176,15 +240,25 @@ class Problem:
         for name in self.theories:
             require_name("theory", name, THEORIES)
         if self.theory_name in self.theories:
-            raise InputError(f"the scene is by theory {self.theory_name!r} itself: leave it out of theories")
-        options = {
-            "island_model": self.island_model is not None,
-            "variant": self.variant != get_variant("reported"),
-            "without": bool(self.dropped),
-        } | {f"effect {name!r}": name in self.outputs for name in OF_ISLANDS}
-        given = [name for name, is_given in options.items() if is_given]
-        if given and self.theory != "mbma":
-            raise InputError(f"{' and '.join(given)}: of theory 'mbma', not of {self.theory_name!r}: leave out")
+            itself = f"the scene is by theory {self.theory_name!r} itself"
+            raise InputError(f"{itself}: leave it out of theories")
+        self._check_options_of_mbma()
+
+    def _check_options_of_mbma(self) -> None:
+        """Raise an error for options and effects that other theories do not have."""
+        if self.theory == "mbma":
+            return
+        options = []
+        if self.island_model is not None:
+            options.append("island_model")
+        if self.variant != get_variant("reported"):
+            options.append("variant")
+        if self.dropped:
+            options.append("without")
+        options += [f"effect {name!r}" for name in OF_ISLANDS if name in self.outputs]
+        if options:
+            not_of = f"of theory 'mbma', not of {self.theory_name!r}"
+            raise InputError(f"{' and '.join(options)}: {not_of}: leave out")
 
     @property
     def theory_name(self) -> str:
