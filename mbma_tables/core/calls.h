@@ -88,9 +88,10 @@ static bool are_panels(const argument *a) {
         N(4) != (size_t)(I(5) + 2) * panels * PLACES)
         return false;
     /* the error of a series is estimated from its last four terms */
+    const double most_nodes = MBMA_PANEL_NODES, most_gaps = MBMA_PANEL_GAPS;
     for (int k = 0; k < RULES; k++)
-        if (!(rules[k].count >= 1.0 && rules[k].count <= MBMA_PANEL_NODES && rules[k].gaps >= 2.0 &&
-              rules[k].gaps <= MBMA_PANEL_GAPS))
+        if (!(rules[k].count >= 1.0 && rules[k].count <= most_nodes && rules[k].gaps >= 2.0 &&
+              rules[k].gaps <= most_gaps))
             return false;
     for (size_t k = 0; k < panels; k++)
         if (kinds[k] >= RULES)
