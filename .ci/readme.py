@@ -21,7 +21,9 @@ LARGEST = 800  # MB of the environment of the tests
 
 def megabytes(folder: pathlib.Path) -> float:
     """The size of the files in a folder; links do not count."""
-    files = [path for path in folder.rglob("*") if path.is_file() and not path.is_symlink()]
+    files = [
+        path for path in folder.rglob("*") if path.is_file() and not path.is_symlink()
+    ]
     return sum(path.stat().st_size for path in files) / 1e6
 
 
@@ -33,8 +35,12 @@ def main() -> None:
     clone, *commands = re.findall(r"^    (.+)$", section[1], re.MULTILINE)
     open_address = "<address of this repository>"
     assert open_address in clone, f"README does not clone {open_address}"
-    assert len(commands) == 2, f"README has {len(commands)} commands after the clone's, not 2"
-    cloning, _, entering = clone.replace(open_address, shlex.quote(str(ROOT))).partition(" && ")
+    assert len(commands) == 2, (
+        f"README has {len(commands)} commands after the clone's, not 2"
+    )
+    cloning, _, entering = clone.replace(open_address, shlex.quote(str(ROOT))).partition(
+        " && "
+    )
     folder_name = shlex.split(entering)[-1]
 
     environment = dict(os.environ)
@@ -50,8 +56,12 @@ def main() -> None:
             start = time.perf_counter()
             subprocess.run(command, shell=True, check=True, cwd=checkout, env=environment)
             size = megabytes(checkout / ".venv")
-            print(f"{time.perf_counter() - start:.0f} s, {size:.0f} MB of .venv", flush=True)
-            assert size <= LARGEST, f"the environment takes {size:.0f} MB, more than {LARGEST}"
+            print(
+                f"{time.perf_counter() - start:.0f} s, {size:.0f} MB of .venv", flush=True
+            )
+            assert size <= LARGEST, (
+                f"the environment takes {size:.0f} MB, more than {LARGEST}"
+            )
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Times of tables, totals, laws, the calibrated law, exported C, scenes and a fresh process, each beside a peer.
 
-``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too. One core; every ratio is of two
-processor times taken in turn, the median over the rounds, so that what else the machine does falls on both.
-docs/cost.md has error against time of every island model.
+``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too. One
+core; every ratio is of two processor times taken in turn, the median over the rounds, so
+that what else the machine does falls on both. docs/cost.md has error against time of every
+island model.
 """
 
 import os
@@ -57,18 +58,28 @@ def peers(X: np.ndarray, mu: np.ndarray) -> dict[str, Callable[[], Any]]:
     at = np.stack([X, np.log(mu)], axis=-1)
     cubic = RegularGridInterpolator(nodes, values, method="cubic")
     spline = NdBSpline(*_knots(nodes, values), 5)
-    found = {"scipy RGI, cubic": lambda: cubic(at), "scipy NdBSpline, quintic": lambda: spline(at)}
+    found = {
+        "scipy RGI, cubic": lambda: cubic(at),
+        "scipy NdBSpline, quintic": lambda: spline(at),
+    }
     if importlib.util.find_spec("interpn"):
         import interpn
 
-        starts, steps = np.array([n[0] for n in nodes]), np.array([n[1] - n[0] for n in nodes])
-        fast = interpn.MulticubicRegular.new([GRID, GRID], starts, steps, np.ascontiguousarray(values))
+        starts, steps = (
+            np.array([n[0] for n in nodes]),
+            np.array([n[1] - n[0] for n in nodes]),
+        )
+        fast = interpn.MulticubicRegular.new(
+            [GRID, GRID], starts, steps, np.ascontiguousarray(values)
+        )
         columns = [np.ascontiguousarray(column) for column in at.T]
         found["interpn, cubic"] = lambda: fast.eval(columns)
     return found
 
 
-def _knots(nodes: list[np.ndarray], values: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+def _knots(
+    nodes: list[np.ndarray], values: np.ndarray
+) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
     knots = []
     for axis, own in enumerate(nodes):
         one = make_interp_spline(own, values, k=5, axis=axis)
@@ -85,7 +96,10 @@ def tables(rng: np.random.Generator) -> None:
     some = slice(HELD_OUT)
     exact = greenwood_tripp.solve(X[some], mu[some], rtol=1e-12)
     found = universal.answer(X[some], mu[some])
-    error = max(np.abs(found.phi_F / exact.phi_F - 1).max(), np.abs(found.phi_A / exact.phi_A - 1).max())
+    error = max(
+        np.abs(found.phi_F / exact.phi_F - 1).max(),
+        np.abs(found.phi_A / exact.phi_A - 1).max(),
+    )
     report(f"largest error on {HELD_OUT} fresh points", error, "", at_most=1e-9)
     report("file", shipped_file("universal.nc").stat().st_size / 1e6, "MB", at_most=6)
     given = X[:POINTS], mu[:POINTS]
@@ -93,7 +107,11 @@ def tables(rng: np.random.Generator) -> None:
     others = peers(*given)
     beside = rounds(own | others, 3)
     for name in others:
-        report(f"faster than {name}, {GRID} x {GRID} nodes, one function", times_faster(beside, name, "own"), "x")
+        report(
+            f"faster than {name}, {GRID} x {GRID} nodes, one function",
+            times_faster(beside, name, "own"),
+            "x",
+        )
 
 
 def one_step() -> dict[str, Callable[[], Any]]:
@@ -108,7 +126,9 @@ def one_step() -> dict[str, Callable[[], Any]]:
     if importlib.util.find_spec("tamaas"):
         import tamaas
 
-        model = tamaas.ModelFactory.createModel(tamaas.model_type.basic_2d, [1.0, 1.0], [GRID, GRID])
+        model = tamaas.ModelFactory.createModel(
+            tamaas.model_type.basic_2d, [1.0, 1.0], [GRID, GRID]
+        )
         model.traction[:] = pressures
         steps["Tamaas"] = model.solveNeumann
     return steps
@@ -130,16 +150,33 @@ def totals(rng: np.random.Generator) -> None:
     report("time a total", microseconds(taken["value"], SURFACES), "us", at_most=7)
     rate = exact / statistics.median(taken["exact"])
     report("islands solved by exact, a second", rate, "1/s")
-    report("islands looked up, a second", looked_up / statistics.median(taken["value"]), "1/s")
-    report("faster than our own exact island model", times_faster(taken, "exact", "value"), "x", 150)
+    report(
+        "islands looked up, a second",
+        looked_up / statistics.median(taken["value"]),
+        "1/s",
+    )
+    report(
+        "faster than our own exact island model",
+        times_faster(taken, "exact", "value"),
+        "x",
+        150,
+    )
     nominal = exact / NOMINAL_EXACT / statistics.median(taken["value"])
-    report(f"faster than a solver of {NOMINAL_EXACT} islands/s at exact's island count", nominal, "x")
+    report(
+        f"faster than a solver of {NOMINAL_EXACT} islands/s at exact's island count",
+        nominal,
+        "x",
+    )
     steps = one_step()
     if steps:
         one = Surface.named("concrete")
         both = rounds({"contact": lambda: contact(one, separation=0.4)} | steps)
         for name in steps:
-            report(f"one contact is faster than one step of {name}", times_faster(both, name, "contact"), "x")
+            report(
+                f"one contact is faster than one step of {name}",
+                times_faster(both, name, "contact"),
+                "x",
+            )
 
 
 def laws(rng: np.random.Generator) -> None:
@@ -150,7 +187,12 @@ def laws(rng: np.random.Generator) -> None:
     nodes = np.linspace(0, surface.h_max, 1000)
     values = law.pressure(nodes)
     linear = RegularGridInterpolator((nodes,), values)
-    one, point, forces, fresh = float(gaps[0]), gaps[:1], law.pressure(gaps), itertools.count(1)
+    one, point, forces, fresh = (
+        float(gaps[0]),
+        gaps[:1],
+        law.pressure(gaps),
+        itertools.count(1),
+    )
     taken = rounds(
         {
             "law": lambda: law.pressure(gaps),
@@ -159,7 +201,10 @@ def laws(rng: np.random.Generator) -> None:
             "inverse": lambda: law.at_pressure(forces),
             # a surface that nothing is kept of
             "making": lambda: contact_law(
-                dataclasses.replace(surface, h_max=surface.h_max * (1 + 1e-9 * next(fresh))), "mbma"
+                dataclasses.replace(
+                    surface, h_max=surface.h_max * (1 + 1e-9 * next(fresh))
+                ),
+                "mbma",
             ),
             "numpy": lambda: np.interp(gaps, nodes, values),
             "scalar law": lambda: [law.pressure(one) for _ in range(CALLS)],
@@ -170,7 +215,9 @@ def laws(rng: np.random.Generator) -> None:
     truth = contact(surface, mean_separation=some, rtol=1e-10, theory="mbma").pressure
     click.echo("\ncontact_law of one surface, asphalt")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
-    report("law.pressure, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns")
+    report(
+        "law.pressure, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns"
+    )
     for what, key, most in (
         ("pressure", "law", 0.1),
         ("pressure and stiffness", "slope", 0.12),
@@ -179,9 +226,18 @@ def laws(rng: np.random.Generator) -> None:
     ):
         name = f"{what} against numpy.interp on 1000 nodes, same points"
         report(name, times_faster(taken, key, "numpy"), "x", at_most=most)
-    report("scalar call against RegularGridInterpolator's", times_faster(taken, "scalar scipy", "scalar law"), "x", 25)
+    report(
+        "scalar call against RegularGridInterpolator's",
+        times_faster(taken, "scalar scipy", "scalar law"),
+        "x",
+        25,
+    )
     report("largest error of the law", np.abs(law.pressure(some) / truth - 1).max(), "")
-    report("largest error of numpy.interp", np.abs(np.interp(some, nodes, values) / truth - 1).max(), "")
+    report(
+        "largest error of numpy.interp",
+        np.abs(np.interp(some, nodes, values) / truth - 1).max(),
+        "",
+    )
 
 
 def calibrated(rng: np.random.Generator) -> None:
@@ -198,14 +254,30 @@ def calibrated(rng: np.random.Generator) -> None:
         }
     )
     spent = microseconds(taken["table"], GAPS)
-    report("force, area and stiffness of a random separation", 1e3 * spent, "ns", at_most=100)
+    report(
+        "force, area and stiffness of a random separation", 1e3 * spent, "ns", at_most=100
+    )
     surfaces, gaps = held_out(SURFACES, rng)
-    asked_of = {"one surface": (surface, u), "one gap a surface": (surfaces, (gaps + surfaces.h_max) / 2)}
+    asked_of = {
+        "one surface": (surface, u),
+        "one gap a surface": (surfaces, (gaps + surfaces.h_max) / 2),
+    }
     for what, (batch, mean) in asked_of.items():
-        asked = functools.partial(contact, batch, mean_separation=mean, theory="calibrated")
+        asked = functools.partial(
+            contact, batch, mean_separation=mean, theory="calibrated"
+        )
         both = rounds({"contact": asked, "leakage": lambda asked=asked: asked().leakage})
-        report(f"contact with leakage, {what}", times_faster(both, "leakage", "contact"), "x", at_most=1.5)
-    report("faster than the law's quadrature", microseconds(taken["law"], HELD_OUT) / spent, "x")
+        report(
+            f"contact with leakage, {what}",
+            times_faster(both, "leakage", "contact"),
+            "x",
+            at_most=1.5,
+        )
+    report(
+        "faster than the law's quadrature",
+        microseconds(taken["law"], HELD_OUT) / spent,
+        "x",
+    )
 
 
 def kernels(rng: np.random.Generator) -> None:
@@ -231,12 +303,28 @@ def few_numbers(rng: np.random.Generator) -> None:
     law.at_pressure(1e-4)
     calls: dict[str, tuple[Callable[[], Any], int, float]] = {
         "law.pressure(1.0)": (lambda: law.pressure(1.0), CALLS, 0.1),
-        "law.pressure(separation=1.0)": (lambda: law.pressure(separation=1.0), CALLS, 0.15),
+        "law.pressure(separation=1.0)": (
+            lambda: law.pressure(separation=1.0),
+            CALLS,
+            0.15,
+        ),
         "law.pressure of ten numbers": (lambda: law.pressure(ten), CALLS, 1.0),
-        "contact at a pressure with a hardness": (lambda: contact(surface, pressure=1e-3, **yielding), 50, 500.0),
-        "100 gaps of Persson's theory": (lambda: contact(surface, mean_separation=u, theory="persson"), 3, 2000.0),
+        "contact at a pressure with a hardness": (
+            lambda: contact(surface, pressure=1e-3, **yielding),
+            50,
+            500.0,
+        ),
+        "100 gaps of Persson's theory": (
+            lambda: contact(surface, mean_separation=u, theory="persson"),
+            3,
+            2000.0,
+        ),
         "Persson's law": (lambda: contact_law(surface, theory="persson"), 3, 50e3),
-        "Persson's law with a hardness": (lambda: contact_law(surface, theory="persson", hardness=0.1), 1, 150e3),
+        "Persson's law with a hardness": (
+            lambda: contact_law(surface, theory="persson", hardness=0.1),
+            1,
+            150e3,
+        ),
     }
     click.echo("\nFew numbers")
     for name, (call, count, most) in calls.items():
@@ -263,14 +351,33 @@ def fresh_process(rng: np.random.Generator) -> None:
     click.echo("\nFirst answers in a new process, import included")
     for name, asked in FIRST.items():
         code = f"{begin}{asked}; print(time.perf_counter() - t)"
-        taken = [float(subprocess.check_output([sys.executable, "-c", code])) for _ in range(5)]
+        taken = [
+            float(subprocess.check_output([sys.executable, "-c", code])) for _ in range(5)
+        ]
         report(name, statistics.median(taken), "s", at_most=0.5)
-    command, taken = [sys.executable, "-m", "mbma_tables", "contact", "--surface", "concrete", "-d", "0.4"], []
+    command, taken = (
+        [
+            sys.executable,
+            "-m",
+            "mbma_tables",
+            "contact",
+            "--surface",
+            "concrete",
+            "-d",
+            "0.4",
+        ],
+        [],
+    )
     for _ in range(5):
         start = time.perf_counter()
         subprocess.check_output(command)
         taken.append(time.perf_counter() - start)
-    report("mbma contact --surface concrete -d 0.4", statistics.median(taken), "s", at_most=0.8)
+    report(
+        "mbma contact --surface concrete -d 0.4",
+        statistics.median(taken),
+        "s",
+        at_most=0.8,
+    )
 
 
 @click.command()
@@ -279,13 +386,29 @@ def main(write: bool) -> None:
     """Time the library beside its peers."""
     rng = np.random.default_rng(SEED)
     load = os.getloadavg()
-    click.echo(f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}")
-    for section in (kernels, few_numbers, fresh_process, tables, totals, laws, calibrated, maps, exported, scenes):
+    click.echo(
+        f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}"
+    )
+    for section in (
+        kernels,
+        few_numbers,
+        fresh_process,
+        tables,
+        totals,
+        laws,
+        calibrated,
+        maps,
+        exported,
+        scenes,
+    ):
         section(rng)
     click.echo(f"\nload average {os.getloadavg()[0]:.2f} at the end")
     if write:
         marks = {None: "", True: "met", False: "missed"}
-        rows = [[x.name.strip(), f"{x.value:.3g} {x.unit}".strip(), x.wanted, marks[x.met]] for x in LINES]
+        rows = [
+            [x.name.strip(), f"{x.value:.3g} {x.unit}".strip(), x.wanted, marks[x.met]]
+            for x in LINES
+        ]
         measured = page.table("what | measured | wanted | ", rows)
         machine = f"{os.cpu_count()} cores, load average {load[0]:.1f}."
         page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, ROOT)

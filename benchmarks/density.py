@@ -47,7 +47,9 @@ class Density:
         """Counts of both."""
         total = Density()
         for field in dataclasses.fields(Density):
-            setattr(total, field.name, getattr(self, field.name) + getattr(other, field.name))
+            setattr(
+                total, field.name, getattr(self, field.name) + getattr(other, field.name)
+            )
         return total
 
     def figures(self) -> dict[str, float]:

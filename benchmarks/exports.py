@@ -23,10 +23,17 @@ COMPILER = ("cc", *FLAGS, "-march=native", "-shared", "-fPIC")
 def exported(rng: np.random.Generator) -> None:
     """Islands at random (X, mu), and totals of as many surfaces as gaps."""
     model = open_table("universal")
-    X, mu = rng.uniform(-5.0, 40.0, POINTS), np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS))
+    X, mu = (
+        rng.uniform(-5.0, 40.0, POINTS),
+        np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS)),
+    )
     surfaces, apart = held_out(SURFACES, rng)
     heights = (surfaces.h_max - apart) / surfaces.h_rms, surfaces.h_max / surfaces.h_rms
-    islands, sums, bound = np.empty((POINTS, 3)), np.empty((SURFACES, 4)), np.empty(SURFACES)
+    islands, sums, bound = (
+        np.empty((POINTS, 3)),
+        np.empty((SURFACES, 4)),
+        np.empty(SURFACES),
+    )
     status = np.empty(SURFACES, np.uint8)
 
     def at(array: Any) -> ctypes.c_void_p:
@@ -36,21 +43,43 @@ def exported(rng: np.random.Generator) -> None:
         folder = pathlib.Path(work)
         write_code(folder)
         sources = [str(folder / name) for name in SOURCES if name != "mbma_selftest.c"]
-        subprocess.run([*COMPILER, *sources, "-lm", "-o", str(folder / "model.so")], check=True)
+        subprocess.run(
+            [*COMPILER, *sources, "-lm", "-o", str(folder / "model.so")], check=True
+        )
         library: Any = ctypes.CDLL(str(folder / "model.so"))
     for function in (library.mbma_table, library.mbma_model_variant):
         function.restype = ctypes.c_void_p
-    table, variant = (ctypes.c_void_p(function()) for function in (library.mbma_table, library.mbma_model_variant))
-    size, many, share = ctypes.c_size_t(POINTS), ctypes.c_size_t(SURFACES), ctypes.c_double(QUADRATURE_SHARE * RTOL)
-    known = [np.ascontiguousarray(column, dtype=float) for column in (surfaces.hurst, surfaces.zeta_1, *heights)]
+    table, variant = (
+        ctypes.c_void_p(function())
+        for function in (library.mbma_table, library.mbma_model_variant)
+    )
+    size, many, share = (
+        ctypes.c_size_t(POINTS),
+        ctypes.c_size_t(SURFACES),
+        ctypes.c_double(QUADRATURE_SHARE * RTOL),
+    )
+    known = [
+        np.ascontiguousarray(column, dtype=float)
+        for column in (surfaces.hurst, surfaces.zeta_1, *heights)
+    ]
     seen = ctypes.c_int64()
     taken = rounds(
         {
             "islands": lambda: model.answer(X, mu),
-            "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, at(islands), None),
+            "C islands": lambda: library.mbma_phi(
+                size, at(X), at(mu), table, at(islands), None
+            ),
             "totals": lambda: contact(surfaces, separation=apart, rtol=RTOL),
             "C totals": lambda: library.mbma_totals(
-                many, *map(at, known), share, variant, table, at(sums), at(bound), at(status), ctypes.byref(seen)
+                many,
+                *map(at, known),
+                share,
+                variant,
+                table,
+                at(sums),
+                at(bound),
+                at(status),
+                ctypes.byref(seen),
             ),
         }
     )
@@ -59,9 +88,27 @@ def exported(rng: np.random.Generator) -> None:
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (
         ("islands", POINTS, islands.T[:2], (phi.phi_F, phi.phi_A)),
-        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 2]), (total.pressure, total.area)),
+        (
+            "totals",
+            SURFACES,
+            (unit * sums[:, 0], sums[:, 2]),
+            (total.pressure, total.area),
+        ),
     ):
-        report(f"C, one of {entries} {name}", 1e3 * microseconds(taken[f"C {name}"], entries), "ns")
+        report(
+            f"C, one of {entries} {name}",
+            1e3 * microseconds(taken[f"C {name}"], entries),
+            "ns",
+        )
         most = 1.1 if name == "totals" else None
-        report("  time over the library's", 1 / times_faster(taken, name, f"C {name}"), "x", at_most=most)
-        report("  largest relative difference", np.abs(np.stack(found) / np.stack(right) - 1).max(), "")
+        report(
+            "  time over the library's",
+            1 / times_faster(taken, name, f"C {name}"),
+            "x",
+            at_most=most,
+        )
+        report(
+            "  largest relative difference",
+            np.abs(np.stack(found) / np.stack(right) - 1).max(),
+            "",
+        )

@@ -1,6 +1,7 @@
 """Circles of imports among a package's modules, those inside functions and under TYPE_CHECKING counted.
 
-`python benchmarks/import_circles.py [package]` prints one line a circle, and ends with 1 where there is one.
+`python benchmarks/import_circles.py [package]` prints one line a circle, and ends with 1
+where there is one.
 """
 
 import ast
@@ -20,13 +21,20 @@ def imports_of(name: str, path: pathlib.Path, known: set[str]) -> set[str]:
     return {other for other in found & known if other != name}
 
 
-def import_graph(package: pathlib.Path) -> tuple[dict[str, set[str]], dict[str, pathlib.Path]]:
+def import_graph(
+    package: pathlib.Path,
+) -> tuple[dict[str, set[str]], dict[str, pathlib.Path]]:
     """What each module imports of the others, and their files; the package itself is left out."""
-    names = ((path, path.relative_to(package.parent).with_suffix("").parts) for path in sorted(package.rglob("*.py")))
+    names = (
+        (path, path.relative_to(package.parent).with_suffix("").parts)
+        for path in sorted(package.rglob("*.py"))
+    )
     files = {".".join(parts).removesuffix(".__init__"): path for path, parts in names}
     # the package itself, which names all that is public, is asked for its version alone
     del files[package.name]
-    return {name: imports_of(name, path, set(files)) for name, path in files.items()}, files
+    return {
+        name: imports_of(name, path, set(files)) for name, path in files.items()
+    }, files
 
 
 def circles(package: pathlib.Path) -> list[list[str]]:
@@ -37,7 +45,10 @@ def circles(package: pathlib.Path) -> list[list[str]]:
         for others in reached.values():
             if middle in others:
                 others |= reached[middle]
-    groups = {tuple(n for n in graph if n in reached[name] and name in reached[n]) for name in graph}
+    groups = {
+        tuple(n for n in graph if n in reached[name] and name in reached[n])
+        for name in graph
+    }
     return [list(group) for group in sorted(groups) if group]
 
 

@@ -1,8 +1,9 @@
 """Kernels through the public interface, beside their times in the last version that used numba.
 
-`BEFORE` was measured by ``python -m benchmarks.kernels`` with this file in a checkout of that version (33125d6, numba
-0.68.1, everything compiled), in turns with the present one. Times are in evaluations of `scipy.special.erf` of the same
-round, so that they compare across machines of one kind.
+`BEFORE` was measured by ``python -m benchmarks.kernels`` with this file in a checkout of
+that version (33125d6, numba 0.68.1, everything compiled), in turns with the present one.
+Times are in evaluations of `scipy.special.erf` of the same round, so that they compare
+across machines of one kind.
 """
 
 import dataclasses
@@ -57,11 +58,18 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     rng = np.random.default_rng(SEED)
     universal = open_table("universal")
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
-    fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_variant("reported"))
+    fields = geometry(
+        np.linspace(1e-3, 4, MANY),
+        np.full(MANY, 0.8),
+        np.full(MANY, 200.0),
+        get_variant("reported"),
+    )
     path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
     surfaces, gaps = held_out(SURFACES, rng)
     one, fresh = Surface.named("asphalt"), itertools.count(1)
-    some, many = (rng.uniform(-one.h_max, 0.9999 * one.h_max, count) for count in (SOME, MANY))
+    some, many = (
+        rng.uniform(-one.h_max, 0.9999 * one.h_max, count) for count in (SOME, MANY)
+    )
 
     def another() -> Surface:
         # one that nothing is kept of
@@ -74,11 +82,18 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     calibrated, loads = contact(flat, mean_separation=u, theory="calibrated").pressure, {}
     for nodes in (28, 96):
         # nodes follow from the accuracy asked
-        loads[nodes] = (rng.uniform(0, 20, 200), 10 ** rng.uniform(-2, 4, 200), {28: 1e-6, 96: 1e-13}[nodes])
+        loads[nodes] = (
+            rng.uniform(0, 20, 200),
+            10 ** rng.uniform(-2, 4, 200),
+            {28: 1e-6, 96: 1e-13}[nodes],
+        )
     return {
         "universal table, random": (lambda: universal.answer(X, mu, outside="nan"), MANY),
         "universal table, path": (lambda: universal.answer(*path, outside="nan"), MANY),
-        "totals, a new surface each": (lambda: contact(surfaces, separation=gaps), SURFACES),
+        "totals, a new surface each": (
+            lambda: contact(surfaces, separation=gaps),
+            SURFACES,
+        ),
         "1,000 gaps on a new surface": (
             lambda: [contact(another(), separation=some) for _ in range(DESIGNS)],
             SOME * DESIGNS,
@@ -87,11 +102,26 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
             lambda: [contact(one, separation=some) for _ in range(DESIGNS)],
             SOME * DESIGNS,
         ),
-        "100,000 gaps on a new surface": (lambda: contact(another(), separation=many), MANY),
-        "one gap on a new surface": (lambda: [contact(another(), mean_separation=place) for _ in range(50)], 50),
-        "law: pressure, area, stiffness, energy": (lambda: law.values(separation=many), MANY),
-        "calibrated law, one surface": (lambda: contact(flat, mean_separation=u, theory="calibrated"), MANY),
-        "calibrated law, at a pressure": (lambda: contact(flat, pressure=calibrated, theory="calibrated"), MANY),
+        "100,000 gaps on a new surface": (
+            lambda: contact(another(), separation=many),
+            MANY,
+        ),
+        "one gap on a new surface": (
+            lambda: [contact(another(), mean_separation=place) for _ in range(50)],
+            50,
+        ),
+        "law: pressure, area, stiffness, energy": (
+            lambda: law.values(separation=many),
+            MANY,
+        ),
+        "calibrated law, one surface": (
+            lambda: contact(flat, mean_separation=u, theory="calibrated"),
+            MANY,
+        ),
+        "calibrated law, at a pressure": (
+            lambda: contact(flat, pressure=calibrated, theory="calibrated"),
+            MANY,
+        ),
         "calibrated law, a new surface each": (
             lambda: contact(surfaces, mean_separation=mean, theory="calibrated"),
             SURFACES,
@@ -104,8 +134,14 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
             lambda: contact(surfaces, mean_separation=mean, theory="calibrated").leakage,
             SURFACES,
         ),
-        "exact islands to 1e-6": (lambda: greenwood_tripp.solve(*loads[28][:2], rtol=loads[28][2]), 200),
-        "exact islands to 1e-13": (lambda: greenwood_tripp.solve(*loads[96][:2], rtol=loads[96][2]), 200),
+        "exact islands to 1e-6": (
+            lambda: greenwood_tripp.solve(*loads[28][:2], rtol=loads[28][2]),
+            200,
+        ),
+        "exact islands to 1e-13": (
+            lambda: greenwood_tripp.solve(*loads[96][:2], rtol=loads[96][2]),
+            200,
+        ),
     }
 
 

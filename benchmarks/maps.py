@@ -14,8 +14,13 @@ from mbma_tables.common.cache import VARIABLE
 from mbma_tables.export.law_rows import describe_law
 
 SEEDS = 5
-# points a side, largest magnification (8 points a shortest wavelength), whether periodic, bars of both theories [s]
-MAPS = ((256, 8.0, True, 0.7, 6.0), (256, 8.0, False, 0.7, 6.0), (512, 16.0, True, None, 20.0))
+# points a side, largest magnification (8 points a shortest wavelength), whether periodic,
+# bars of both theories [s]
+MAPS = (
+    (256, 8.0, True, 0.7, 6.0),
+    (256, 8.0, False, 0.7, 6.0),
+    (512, 16.0, True, None, 20.0),
+)
 
 
 def maps(rng: np.random.Generator) -> None:
@@ -25,25 +30,40 @@ def maps(rng: np.random.Generator) -> None:
     os.environ[VARIABLE] = "off"
     try:
         for points, zeta_1, periodic, corrected, simulated in MAPS:
-            z = heights(Recipe("self_affine", 0.8, zeta_1, 4, int(rng.integers(1000, 9999)), points))
+            z = heights(
+                Recipe(
+                    "self_affine", 0.8, zeta_1, 4, int(rng.integers(1000, 9999)), points
+                )
+            )
             for theory, most in (("corrected", corrected), ("simulated", simulated)):
                 start = time.process_time()
                 surface = Surface.from_map(z, 1.0, periodic=periodic)
                 contact(surface, area=0.1, theory=theory)
                 if theory == "simulated":
                     contact(surface, area=0.1, theory=theory).leakage.x  # noqa: B018
-                shape = f"{points} x {points}, {'periodic' if periodic else 'not periodic'}"
+                shape = (
+                    f"{points} x {points}, {'periodic' if periodic else 'not periodic'}"
+                )
                 flow = ", with flow" if theory == "simulated" else ""
-                report(f"a map of {shape}: {theory}{flow}", time.process_time() - start, "s", at_most=most)
+                report(
+                    f"a map of {shape}: {theory}{flow}",
+                    time.process_time() - start,
+                    "s",
+                    at_most=most,
+                )
     finally:
-        os.environ.pop(VARIABLE) if before is None else os.environ.update({VARIABLE: before})
+        os.environ.pop(VARIABLE) if before is None else os.environ.update(
+            {VARIABLE: before}
+        )
     law = contact_law(surface, theory="simulated")
     u, out = rng.uniform(0.2, 2.0, 100_000) * float(surface.h_rms), []
     for _ in range(SEEDS):
         hurst, shortest = rng.uniform(0.5, 0.9), rng.uniform(1.0, 4.0)
         bearing = Surface(hurst, 0.05, 6.0 / shortest, 0.5, 1.75, unit="um")
         start = time.process_time()
-        describe_law(bearing, "110 GPa", length_unit="um", stress_unit="GPa", quantity="film")
+        describe_law(
+            bearing, "110 GPa", length_unit="um", stress_unit="GPa", quantity="film"
+        )
         out.append(time.process_time() - start)
     report(
         "a law of that map, a random gap",

@@ -14,7 +14,8 @@ from typing import Any
 import mbma_tables
 from mbma_tables import Surface, contact, contact_law
 
-# with the separator at its end; the folder around it, or an environment in that, may have the library's name too
+# with the separator at its end; the folder around it, or an environment in that, may have
+# the library's name too
 PACKAGE = os.path.join(os.path.dirname(os.path.abspath(mbma_tables.__file__)), "")
 
 
@@ -43,10 +44,18 @@ def main() -> None:
     joint = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
     law = contact_law(joint, "mbma", E_star="100 GPa")
     requests: dict[str, Callable[[], Any]] = {
-        "mbma by pressure": lambda: contact(joint, pressure="10 MPa", E_star="100 GPa", theory="mbma"),
-        "mbma by gap": lambda: contact(joint, mean_separation=1.9, E_star=1e5, theory="mbma"),
+        "mbma by pressure": lambda: contact(
+            joint, pressure="10 MPa", E_star="100 GPa", theory="mbma"
+        ),
+        "mbma by gap": lambda: contact(
+            joint, mean_separation=1.9, E_star=1e5, theory="mbma"
+        ),
         "calibrated with hardness": lambda: contact(
-            joint, pressure="10 MPa", E_star="100 GPa", theory="calibrated", hardness="1.5 GPa"
+            joint,
+            pressure="10 MPa",
+            E_star="100 GPa",
+            theory="calibrated",
+            hardness="1.5 GPa",
         ),
         "law.at_pressure": lambda: law.at_pressure(0.01),
     }

@@ -25,19 +25,29 @@ class Line:
 LINES: list[Line] = []
 
 
-def report(name: str, value: float, unit: str, at_least: float | None = None, at_most: float | None = None) -> None:
+def report(
+    name: str,
+    value: float,
+    unit: str,
+    at_least: float | None = None,
+    at_most: float | None = None,
+) -> None:
     """Keep and print a number."""
     wanted, met = "", None
     if at_least is not None:
         wanted, met = f">= {at_least:g}", value >= at_least
     if at_most is not None:
         wanted, met = f"<= {at_most:g}", value <= at_most
-    LINES.append(Line(name, float(value), unit, wanted, None if met is None else bool(met)))
+    LINES.append(
+        Line(name, float(value), unit, wanted, None if met is None else bool(met))
+    )
     mark = {None: "", True: "met", False: "MISSED"}[met]
     click.echo(f"  {name:<72} {value:10.4g} {unit:<6} {wanted:>9} {mark}".rstrip())
 
 
-def rounds(runs: dict[str, Callable[[], Any]], count: int = ROUNDS) -> dict[str, list[float]]:
+def rounds(
+    runs: dict[str, Callable[[], Any]], count: int = ROUNDS
+) -> dict[str, list[float]]:
     """Processor seconds of each run in every round; runs take turns, a first round is not counted."""
     taken: dict[str, list[float]] = {name: [] for name in runs}
     for number in range(count + 1):

@@ -26,14 +26,24 @@ EFFECTS = (
 def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
     """Exact force and area; stiffness and energy by other means than a law's."""
     if name in ("pressure", "area"):
-        return np.asarray(getattr(contact(surface, separation=gaps, island_model="exact", rtol=1e-10), name))
+        return np.asarray(
+            getattr(
+                contact(surface, separation=gaps, island_model="exact", rtol=1e-10), name
+            )
+        )
     if name == "stiffness":
         return np.asarray(contact(surface, separation=gaps, rtol=1e-10).stiffness)
     span = surface.h_max - gaps
 
     def integrand(t: float) -> np.ndarray:
         # t^2 for the power at first contact
-        return t * span * contact(surface, separation=surface.h_max - span * t**2, rtol=1e-10).pressure
+        return (
+            t
+            * span
+            * contact(
+                surface, separation=surface.h_max - span * t**2, rtol=1e-10
+            ).pressure
+        )
 
     return np.asarray(quad_vec(integrand, 0, 1, epsrel=1e-9, norm="max")[0])
 
@@ -46,10 +56,17 @@ def scenes(rng: np.random.Generator) -> None:
     for number in range(SCENES):
         h_rms = 10 ** rng.uniform(-3, 1)
         h_max = h_rms * rng.uniform(2.5, 3.8)
-        surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.7, 4), h_rms, h_max)
-        gaps, rtol = np.sort(rng.uniform(-0.5, 0.99, GAPS)) * h_max, 10 ** rng.uniform(-8, -1)
+        surface = Surface(
+            rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.7, 4), h_rms, h_max
+        )
+        gaps, rtol = (
+            np.sort(rng.uniform(-0.5, 0.99, GAPS)) * h_max,
+            10 ** rng.uniform(-8, -1),
+        )
         effects = EFFECTS[number % len(EFFECTS)]
-        extra: dict[str, Any] = {"theories": ["greenwood_williamson"]} if "comparison" in effects else {}
+        extra: dict[str, Any] = (
+            {"theories": ["greenwood_williamson"]} if "comparison" in effects else {}
+        )
         if "conductance" in effects:
             extra |= {"conductivities": (50.0, 20.0)}
         try:
@@ -66,9 +83,16 @@ def scenes(rng: np.random.Generator) -> None:
         # the truth of stiffness is known to 1e-7
         names = [name for name in ("pressure", "area", "energy") if name in found]
         names += ["stiffness"] * ("stiffness" in found and rtol > 1e-6)
-        above += [np.abs(found[name].values / truth(surface, gaps, name) - 1).max() / rtol for name in names]
+        above += [
+            np.abs(found[name].values / truth(surface, gaps, name) - 1).max() / rtol
+            for name in names
+        ]
     ratio = np.array(ratios)
     click.echo(f"\n{SCENES} random scenes, {refused} of them refused as too tight")
     report("largest error over the tolerance asked", max(above), "x", at_most=1)
     report("time over the plan's, median", float(np.median(ratio)), "x")
-    report("within a factor 2 of the plan's time", float(np.mean((ratio > 0.5) & (ratio < 2))), "")
+    report(
+        "within a factor 2 of the plan's time",
+        float(np.mean((ratio > 0.5) & (ratio < 2))),
+        "",
+    )

@@ -1,14 +1,16 @@
 """Thermal contact conductance of a real joint, ground steel on milled aluminium, with its band of uncertainty.
 
-Barber (2003), "Bounds on the electrical resistance between contacting elastic rough bodies", Proc. R. Soc. A 459,
-53-66: the conductance of a contact between two half-spaces and its incremental stiffness solve the same potential
-problem. Per nominal area, with k_s = 2 k1 k2/(k1 + k2), p = F/A0 and the mean separation u,
+Barber (2003), "Bounds on the electrical resistance between contacting elastic rough
+bodies", Proc. R. Soc. A 459, 53-66: the conductance of a contact between two half-spaces
+and its incremental stiffness solve the same potential problem. Per nominal area, with k_s =
+2 k1 k2/(k1 + k2), p = F/A0 and the mean separation u,
 
     h = -(k_s/E*) dp/du.
 
-The aluminium yields: pressures end at its hardness, and the stiffness that counts is that of the contact area as it is,
-since yielded points unload elastically. The slope of the loading curve would give too little. The band holds the range
-of hardnesses of the alloy, whose temper is not known, and one standard deviation of boundary elements about the law.
+The aluminium yields: pressures end at its hardness, and the stiffness that counts is that
+of the contact area as it is, since yielded points unload elastically. The slope of the
+loading curve would give too little. The band holds the range of hardnesses of the alloy,
+whose temper is not known, and one standard deviation of boundary elements about the law.
 
 Only what flows through the solid contact is counted, no gas, no radiation.
 Run with ``python examples/conductance.py``. SI units: m, Pa, W/(m K).
@@ -26,9 +28,13 @@ from mbma_tables.common.plots import to_picture
 from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
 
 # both faces' roughness in one
-JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6)
+JOINT = Surface(
+    hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6
+)
 STEEL, ALUMINIUM = materials.get("steel 4140"), materials.get("aluminium 6061")
-E_STAR = float(materials.effective_modulus(STEEL.E * 1e9, STEEL.nu, ALUMINIUM.E * 1e9, ALUMINIUM.nu))  # Pa
+E_STAR = float(
+    materials.effective_modulus(STEEL.E * 1e9, STEEL.nu, ALUMINIUM.E * 1e9, ALUMINIUM.nu)
+)  # Pa
 SOFT, HARD = (1e9 * hardness for hardness in ALUMINIUM.hardness)
 K_STEEL, K_ALUMINIUM = STEEL.conductivity[0], float(np.mean(ALUMINIUM.conductivity))
 K_MEAN = float(mean_conductivity(K_STEEL, K_ALUMINIUM))
@@ -56,10 +62,18 @@ def conductance_curve(points: int = 200) -> Curve:
     pressure = np.geomspace(*RANGE, points)
     middle = np.sqrt(SOFT * HARD)
     joints = {
-        hardness: contact(JOINT, pressure=pressure, E_star=E_STAR, theory="calibrated", hardness=hardness)
+        hardness: contact(
+            JOINT,
+            pressure=pressure,
+            E_star=E_STAR,
+            theory="calibrated",
+            hardness=hardness,
+        )
         for hardness in (SOFT, middle, HARD, np.inf)
     }
-    h = {p_m: K_MEAN / E_STAR * found.unloading_stiffness for p_m, found in joints.items()}
+    h = {
+        p_m: K_MEAN / E_STAR * found.unloading_stiffness for p_m, found in joints.items()
+    }
     spread, slope = np.exp(joints[middle].scatter), np.sqrt(2 * JOINT.m2 / np.pi)
     return Curve(
         pressure,
@@ -70,7 +84,11 @@ def conductance_curve(points: int = 200) -> Curve:
         h[np.inf],
         K_MEAN / E_STAR * joints[middle].stiffness,
         cooper_mikic_yovanovich(JOINT, pressure, K_MEAN, E_STAR, middle),
-        1.55 * K_MEAN * slope / JOINT.h_rms * (np.sqrt(2) * pressure / (slope * E_STAR)) ** 0.94,
+        1.55
+        * K_MEAN
+        * slope
+        / JOINT.h_rms
+        * (np.sqrt(2) * pressure / (slope * E_STAR)) ** 0.94,
     )
 
 
@@ -79,11 +97,19 @@ def draw(curve: Curve) -> Figure:
     figure = Figure(figsize=(7, 5), layout="constrained")
     axes = figure.subplots()
     p = curve.pressure / 1e6
-    axes.fill_between(p, curve.low, curve.high, alpha=0.25, label="temper of the aluminium, scatter of simulations")
+    axes.fill_between(
+        p,
+        curve.low,
+        curve.high,
+        alpha=0.25,
+        label="temper of the aluminium, scatter of simulations",
+    )
     axes.loglog(p, curve.conductance, label="with yield")
     axes.loglog(p, curve.elastic, "--", label="elastic")
     axes.loglog(p, curve.loading_slope, ":", label="slope of the loading curve: wrong")
-    axes.loglog(p, curve.plastic_correlation, "-.", label="Cooper, Mikic, Yovanovich 1969")
+    axes.loglog(
+        p, curve.plastic_correlation, "-.", label="Cooper, Mikic, Yovanovich 1969"
+    )
     axes.loglog(p, curve.elastic_correlation, "-.", label="Mikic 1974")
     axes.set(xlabel="nominal pressure p [MPa]", ylabel="h [W/(m^2 K)]")
     axes.grid(True, alpha=0.3)
@@ -95,12 +121,24 @@ def main(out: pathlib.Path | None = None, points: int = 200) -> Curve:
     """Compute, print and draw."""
     curve = conductance_curve(points)
     psi = E_STAR * float(JOINT.rms_gradient) / np.array([HARD, SOFT])
-    click.echo(f"rms gradient {JOINT.rms_gradient:.3f}, E* = {E_STAR / 1e9:.1f} GPa, k_s = {K_MEAN:.1f} W/(m K)")
+    click.echo(
+        f"rms gradient {JOINT.rms_gradient:.3f}, E* = {E_STAR / 1e9:.1f} GPa, k_s = {K_MEAN:.1f} W/(m K)"
+    )
     click.echo(
         f"aluminium of {SOFT / 1e9:g} to {HARD / 1e9:g} GPa: psi {psi[1]:.1f} to {psi[0]:.1f}, elastic below 1.1"
     )
-    click.echo("p [MPa]   h [W/(m^2 K)]   low        high       elastic    slope      CMY        Mikic")
-    columns = ("conductance", "low", "high", "elastic", "loading_slope", "plastic_correlation", "elastic_correlation")
+    click.echo(
+        "p [MPa]   h [W/(m^2 K)]   low        high       elastic    slope      CMY        Mikic"
+    )
+    columns = (
+        "conductance",
+        "low",
+        "high",
+        "elastic",
+        "loading_slope",
+        "plastic_correlation",
+        "elastic_correlation",
+    )
     for pressure in PRESSURES:
         at = np.argmin(np.abs(np.log(curve.pressure / pressure)))
         numbers = "   ".join(f"{getattr(curve, name)[at]:<8.3g}" for name in columns)
@@ -111,8 +149,18 @@ def main(out: pathlib.Path | None = None, points: int = 200) -> Curve:
 
 
 @click.command()
-@click.option("--points", default=200, show_default=True, type=click.IntRange(min=20), help="Pressures.")
-@click.option("--out", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Draw to this file, .png or .svg.")
+@click.option(
+    "--points",
+    default=200,
+    show_default=True,
+    type=click.IntRange(min=20),
+    help="Pressures.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=pathlib.Path, dir_okay=False),
+    help="Draw to this file, .png or .svg.",
+)
 def command(points: int, out: pathlib.Path | None) -> None:
     """Thermal contact conductance of ground steel on aluminium."""
     main(out, points)

@@ -3,8 +3,9 @@
     pip install scikit-fem
     python examples/heat.py
 
-The bolt presses the plates around its hole. Where they touch, the flux is h (T1 - T2) with the table of `mbma export
-csv --conductivity` at the pressure there; elsewhere nothing flows. Axisymmetric, by quadratic elements; SI units.
+The bolt presses the plates around its hole. Where they touch, the flux is h (T1 - T2) with
+the table of `mbma export csv --conductivity` at the pressure there; elsewhere nothing
+flows. Axisymmetric, by quadratic elements; SI units.
 """
 
 import pathlib
@@ -20,15 +21,34 @@ from mbma_tables.common.plots import to_picture
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.quantities.conductance import mean_conductivity
 
-HOLE, CONE, RIM, THICK = 4e-3, 12e-3, 30e-3, 6e-3  # m: radii of the hole, of the pressed ring, of the plates
+HOLE, CONE, RIM, THICK = (
+    4e-3,
+    12e-3,
+    30e-3,
+    6e-3,
+)  # m: radii of the hole, of the pressed ring, of the plates
 STEEL, ALUMINIUM = materials.get("steel 4140"), materials.get("aluminium 6061")
-CONDUCTIVITY = STEEL.conductivity[0], float(np.mean(ALUMINIUM.conductivity))  # W/(m K), of the lower and upper plate
-E_STAR = float(materials.effective_modulus(STEEL.E * 1e9, STEEL.nu, ALUMINIUM.E * 1e9, ALUMINIUM.nu))
-JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6, unit="m")
+CONDUCTIVITY = (
+    STEEL.conductivity[0],
+    float(np.mean(ALUMINIUM.conductivity)),
+)  # W/(m K), of the lower and upper plate
+E_STAR = float(
+    materials.effective_modulus(STEEL.E * 1e9, STEEL.nu, ALUMINIUM.E * 1e9, ALUMINIUM.nu)
+)
+JOINT = Surface(
+    hurst=0.8,
+    q0=2 * np.pi / 1e-3,
+    q1=2 * np.pi / 5e-6,
+    h_rms=1.5e-6,
+    h_max=5.5e-6,
+    unit="m",
+)
 HARDNESS = 0.6e9  # Pa, of the aluminium
 FORCE, FLUX = 5e3, 1e4  # N of the bolt; W/m^2 into the lower plate
 
-mesh = MeshQuad.init_tensor(np.linspace(HOLE, RIM, 53), np.linspace(0, THICK, 13)).with_defaults()
+mesh = MeshQuad.init_tensor(
+    np.linspace(HOLE, RIM, 53), np.linspace(0, THICK, 13)
+).with_defaults()
 basis = Basis(mesh, ElementQuad2())
 top, bottom = (basis.boundary(side) for side in ("top", "bottom"))
 
@@ -70,13 +90,18 @@ def conductance_table() -> tuple[np.ndarray, np.ndarray]:
 
 def temperatures(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of both plates at their nodes, the upper one's top at 0; h on the interface's quadrature points."""
-    faces = [side.get_dofs(name).all() for side, name in ((basis, "top"), (basis, "bottom"))]
+    faces = [
+        side.get_dofs(name).all() for side, name in ((basis, "top"), (basis, "bottom"))
+    ]
     lower, upper = (face[np.argsort(basis.doflocs[0, face])] for face in faces)
     of_face = interface.assemble(top, h=h)[lower][:, lower].tocoo()
     places, n = (lower, upper + basis.N), 2 * basis.N
     K = block_diag([k * conduction.assemble(basis) for k in CONDUCTIVITY], format="csr")
     for i, j, sign in ((0, 0, 1), (0, 1, -1), (1, 0, -1), (1, 1, 1)):
-        K = K + coo_matrix((sign * of_face.data, (places[i][of_face.row], places[j][of_face.col])), shape=(n, n))
+        K = K + coo_matrix(
+            (sign * of_face.data, (places[i][of_face.row], places[j][of_face.col])),
+            shape=(n, n),
+        )
     load = np.append(heating.assemble(bottom), np.zeros(basis.N))
     found = solve(*condense(K.tocsr(), load, D=faces[0] + basis.N))
     return found[: basis.N], found[basis.N :]
@@ -84,32 +109,54 @@ def temperatures(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def resistance(h: np.ndarray) -> float:
     """Mean temperature where heat enters, over the heat [K/W]."""
-    return float(heating.assemble(bottom) @ temperatures(h)[0]) / (FLUX * np.pi * (RIM**2 - HOLE**2)) ** 2
+    return (
+        float(heating.assemble(bottom) @ temperatures(h)[0])
+        / (FLUX * np.pi * (RIM**2 - HOLE**2)) ** 2
+    )
 
 
 @click.command()
-@click.option("--out", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Draw to this file, .png or .svg.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=pathlib.Path, dir_okay=False),
+    help="Draw to this file, .png or .svg.",
+)
 def command(out: pathlib.Path | None) -> None:
     """Heat through a bolted joint."""
     p, table = pressure(top.global_coordinates()[0]), conductance_table()
     h = np.interp(p, *table)
     scatter = float(
-        contact(JOINT, pressure=2e7, E_star=E_STAR, theory="calibrated", hardness=HARDNESS).unloading_stiffness_scatter
+        contact(
+            JOINT, pressure=2e7, E_star=E_STAR, theory="calibrated", hardness=HARDNESS
+        ).unloading_stiffness_scatter
     )
     click.echo(
         f"pressure up to {p.max() / 1e6:.0f} MPa, h up to {h.max():.3g} W/(m^2 K), scatter of ln h {scatter:.2f}"
     )
-    cases = {"perfect contact in the cone": 1e9 * (p > 0), "law": h, "law, one sd less": h * np.exp(-scatter)}
-    cases |= {"law, one sd more": h * np.exp(scatter), "smooth faces bonded everywhere": np.full_like(h, 1e9)}
+    cases = {
+        "perfect contact in the cone": 1e9 * (p > 0),
+        "law": h,
+        "law, one sd less": h * np.exp(-scatter),
+    }
+    cases |= {
+        "law, one sd more": h * np.exp(scatter),
+        "smooth faces bonded everywhere": np.full_like(h, 1e9),
+    }
     for name, values in cases.items():
         click.echo(f"{name:32s} {resistance(values):.4f} K/W")
     if out is not None:
         figure = Figure(figsize=(6, 4), layout="constrained")
         axes = figure.subplots()
-        for T, name, plate in zip(temperatures(h), ("top", "bottom"), ("steel", "aluminium"), strict=True):
+        for T, name, plate in zip(
+            temperatures(h), ("top", "bottom"), ("steel", "aluminium"), strict=True
+        ):
             face = basis.get_dofs(name).all()
             order = np.argsort(basis.doflocs[0, face])
-            axes.plot(1e3 * basis.doflocs[0, face][order], T[face][order], label=f"{plate} at the interface")
+            axes.plot(
+                1e3 * basis.doflocs[0, face][order],
+                T[face][order],
+                label=f"{plate} at the interface",
+            )
         axes.axvline(1e3 * CONE, color="0.7", linestyle=":", label="end of the contact")
         axes.set(xlabel="radius [mm]", ylabel="temperature above the cooled face [K]")
         axes.legend()

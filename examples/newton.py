@@ -3,19 +3,31 @@
     pip install scikit-fem
     python examples/newton.py
 
-Nothing but the contact holds the block. At the beginning the bodies just touch, and the law has no stiffness there;
-`law.continued()` has, and answers trial steps beyond full compression. The solution is one of the law itself.
+Nothing but the contact holds the block. At the beginning the bodies just touch, and the law
+has no stiffness there; `law.continued()` has, and answers trial steps beyond full
+compression. The solution is one of the law itself.
 """
 
 import click
 import numpy as np
-from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, MeshQuad, condense, solve
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementQuad2,
+    ElementVector,
+    LinearForm,
+    MeshQuad,
+    condense,
+    solve,
+)
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from mbma_tables import Surface, contact_law
 
 WIDTH, HEIGHT, E, NU = 40.0, 20.0, 200.0, 0.3  # mm, MPa
-law = contact_law(Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated")  # mm, MPa
+law = contact_law(
+    Surface.named("concrete"), E_star="13.3 MPa", theory="calibrated"
+)  # mm, MPa
 trial = law.continued()
 
 
@@ -37,12 +49,16 @@ def contact_stiffness(u, v, w):
     return w.stiffness * u[1] * v[1]
 
 
-mesh = MeshQuad.init_tensor(np.linspace(0, WIDTH, 17), np.linspace(0, HEIGHT, 9)).with_defaults()
+mesh = MeshQuad.init_tensor(
+    np.linspace(0, WIDTH, 17), np.linspace(0, HEIGHT, 9)
+).with_defaults()
 basis = Basis(mesh, ElementVector(ElementQuad2()))
 bottom = basis.boundary("bottom")
 elastic = linear_elasticity(*lame_parameters(E, NU)).assemble(basis)
 load = traction.assemble(basis.boundary("top"))
-held = basis.get_dofs(lambda x: (x[0] == WIDTH / 2) & (x[1] == HEIGHT)).all("u^1")  # sideways, at one node
+held = basis.get_dofs(lambda x: (x[0] == WIDTH / 2) & (x[1] == HEIGHT)).all(
+    "u^1"
+)  # sideways, at one node
 
 moved = basis.zeros()
 for turn in range(40):
@@ -59,4 +75,6 @@ for turn in range(40):
     moved = moved + solve(*condense(tangent, residual, D=held))
 assert trial.inside(separation).all()
 force = float((law.pressure(separation) * bottom.dx).sum())
-click.echo(f"force {force:.9f} N/mm of {0.2 * WIDTH:.9f}, pressure {pressure.min():.3f} to {pressure.max():.3f} MPa")
+click.echo(
+    f"force {force:.9f} N/mm of {0.2 * WIDTH:.9f}, pressure {pressure.min():.3f} to {pressure.max():.3f} MPa"
+)

@@ -17,14 +17,17 @@ from mbma_tables.theories.mbma.tables import shipped
 class FirstOrder:
     """Islands to first order in mu about the sphere that does not deform: Phi = rigid/(1 + c mu).
 
-    c is taken from the solver once, at a small mu; the whole correction is what it states as its error.
+    c is taken from the solver once, at a small mu; the whole correction is what it states
+    as its error.
     """
 
     name = "first order"
 
     def __init__(self) -> None:
         self.X, small = np.linspace(-6.0, 40.0, 93), 1e-3
-        rigid_F, rigid_A = greenwood_tripp.rigid_sphere(self.X, np.full(self.X.size, small))
+        rigid_F, rigid_A = greenwood_tripp.rigid_sphere(
+            self.X, np.full(self.X.size, small)
+        )
         solved = greenwood_tripp.solve(self.X, small)
         self.slope_F = (rigid_F / solved.phi_F - 1) / small
         self.slope_A = (rigid_A / solved.phi_A - 1) / small
@@ -32,12 +35,16 @@ class FirstOrder:
     def answer(self, X: NDArray[np.float64], mu: NDArray[np.float64]) -> IslandAnswer:
         """All that the library asks for: Phi_F, Phi_A and a bound on their relative error, of the shape of X and mu."""
         rigid_F, rigid_A = greenwood_tripp.rigid_sphere(X, mu)
-        drop_F, drop_A = (1 + mu * np.interp(X, self.X, slope) for slope in (self.slope_F, self.slope_A))
+        drop_F, drop_A = (
+            1 + mu * np.interp(X, self.X, slope) for slope in (self.slope_F, self.slope_A)
+        )
         return IslandAnswer(rigid_F / drop_F, rigid_A / drop_A, 1 - 1 / drop_F)
 
 
 @click.command()
-@click.argument("table_file", type=click.Path(path_type=pathlib.Path), default=shipped("universal"))
+@click.argument(
+    "table_file", type=click.Path(path_type=pathlib.Path), default=shipped("universal")
+)
 def main(table_file: pathlib.Path) -> None:
     """Compare one's own model and one's own table with the shipped ones."""
     surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um

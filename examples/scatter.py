@@ -1,8 +1,9 @@
 """What measured scatter of the roughness does to the force at a given gap: a Monte Carlo over surfaces.
 
-H, h_rms and q1 scatter; the samples are dask arrays, so `contact` answers lazily, block by block, on all cores,
-and memory holds a few blocks and the forces. Run with ``python examples/scatter.py [--samples 1000000]``; it needs
-dask (``pip install '.[distributed]'``). Lengths in um; force is F/(A0 E*).
+H, h_rms and q1 scatter; the samples are dask arrays, so `contact` answers lazily, block by
+block, on all cores, and memory holds a few blocks and the forces. Run with ``python
+examples/scatter.py [--samples 1000000]``; it needs dask (``pip install '.[distributed]'``).
+Lengths in um; force is F/(A0 E*).
 """
 
 import dataclasses
@@ -39,13 +40,19 @@ class Spread:
 
 
 def scattered(
-    rng: da.random.Generator, count: int, centre: tuple[float, float], low: float, high: float
+    rng: da.random.Generator,
+    count: int,
+    centre: tuple[float, float],
+    low: float,
+    high: float,
 ) -> xr.DataArray:
     """A normal sample truncated to [low, high]: the inverse of the distribution at uniform numbers."""
     mean, deviation = centre
     below, above = (ndtr((end - mean) / deviation) for end in (low, high))
     uniform = rng.uniform(below, above, size=count, chunks=BLOCK)
-    return xr.DataArray(mean + deviation * da.map_blocks(ndtri, uniform, dtype=float), dims="sample")
+    return xr.DataArray(
+        mean + deviation * da.map_blocks(ndtri, uniform, dtype=float), dims="sample"
+    )
 
 
 def sample_surfaces(count: int) -> Surface:
@@ -61,11 +68,17 @@ def sample_surfaces(count: int) -> Surface:
 
 def spread_of_force(count: int) -> Spread:
     """Forces of the samples at GAP and their quantiles."""
-    force = contact(sample_surfaces(count), separation=GAP, rtol=1e-6).pressure.compute(scheduler="threads").values
+    force = (
+        contact(sample_surfaces(count), separation=GAP, rtol=1e-6)
+        .pressure.compute(scheduler="threads")
+        .values
+    )
     levels = np.array(QUANTILES)
     # the rank of a quantile is binomial
     rank = np.sqrt(levels * (1 - levels) / count)
-    low, high = (np.quantile(force, np.clip(levels + sign * rank, 0, 1)) for sign in (-1, 1))
+    low, high = (
+        np.quantile(force, np.clip(levels + sign * rank, 0, 1)) for sign in (-1, 1)
+    )
     return Spread(force, np.quantile(force, levels), (high - low) / 2)
 
 
@@ -79,8 +92,19 @@ def draw(spread: Spread, nominal: float) -> Figure:
     axes.axvline(nominal, color="black", label="nominal surface")
     for level, value in zip(QUANTILES, spread.quantiles, strict=True):
         axes.axvline(value, color="tab:red", linestyle=":")
-        axes.text(value, 1.01, f"{level:.0%}", color="tab:red", ha="center", transform=axes.get_xaxis_transform())
-    axes.set(xscale="log", xlabel=f"force F/(A0 E*) at d = {GAP} um", ylabel=f"number of {spread.force.size} samples")
+        axes.text(
+            value,
+            1.01,
+            f"{level:.0%}",
+            color="tab:red",
+            ha="center",
+            transform=axes.get_xaxis_transform(),
+        )
+    axes.set(
+        xscale="log",
+        xlabel=f"force F/(A0 E*) at d = {GAP} um",
+        ylabel=f"number of {spread.force.size} samples",
+    )
     axes.legend()
     return figure
 
@@ -89,11 +113,17 @@ def main(out: pathlib.Path | None = None, samples: int = 200_000) -> Spread:
     """Sample, print and draw."""
     spread = spread_of_force(samples)
     middle = np.exp(LOG_H_RMS[0])
-    nominal = contact(Surface(HURST[0], Q0, np.exp(LOG_Q1[0]), middle, CREST * middle), separation=GAP).pressure
+    nominal = contact(
+        Surface(HURST[0], Q0, np.exp(LOG_Q1[0]), middle, CREST * middle), separation=GAP
+    ).pressure
     mean, error = spread.force.mean(), spread.force.std(ddof=1) / np.sqrt(samples)
-    click.echo(f"{samples} samples at d = {GAP} um, F/(A0 E*); the nominal surface gives {nominal:.4e}")
+    click.echo(
+        f"{samples} samples at d = {GAP} um, F/(A0 E*); the nominal surface gives {nominal:.4e}"
+    )
     click.echo(f"mean {mean:.4e} +- {error:.1e}")
-    for level, value, error in zip(QUANTILES, spread.quantiles, spread.standard_errors, strict=True):
+    for level, value, error in zip(
+        QUANTILES, spread.quantiles, spread.standard_errors, strict=True
+    ):
         click.echo(f"{level:4.0%} below {value:.4e} +- {error:.1e}")
     if out is not None:
         out.write_bytes(to_picture(draw(spread, nominal), out.suffix[1:], outlines=True))
@@ -101,8 +131,14 @@ def main(out: pathlib.Path | None = None, samples: int = 200_000) -> Spread:
 
 
 @click.command()
-@click.option("--samples", default=200_000, show_default=True, type=click.IntRange(min=20))
-@click.option("--out", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Draw to this file, .png or .svg.")
+@click.option(
+    "--samples", default=200_000, show_default=True, type=click.IntRange(min=20)
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=pathlib.Path, dir_okay=False),
+    help="Draw to this file, .png or .svg.",
+)
 def command(samples: int, out: pathlib.Path | None) -> None:
     """Spread of force over scattered surfaces."""
     main(out, samples)

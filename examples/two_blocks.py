@@ -1,7 +1,8 @@
 """Two heated and sheared blocks in CalculiX, with the pressure, friction and conductance of their joint in one card.
 
-Run: python examples/two_blocks.py, with ccx (CalculiX 2.20) installed. Units: N, mm, MPa, mW. Poisson's ratio is zero
-and nothing expands, so that pressure, shear and heat flux are uniform and known from the law of the joint.
+Run: python examples/two_blocks.py, with ccx (CalculiX 2.20) installed. Units: N, mm, MPa,
+mW. Poisson's ratio is zero and nothing expands, so that pressure, shear and heat flux are
+uniform and known from the law of the joint.
 """
 
 import pathlib
@@ -42,7 +43,9 @@ def deck(card: str, closure: float, displacements: list[float]) -> str:
     """Pressed by a displacement, from there on by a force, and sheared by displacements of the top."""
     text = "*NODE, NSET=ALL\n"
     for layer, z in enumerate((0.0, HEIGHT, HEIGHT, 2 * HEIGHT)):
-        for corner, (x, y) in enumerate(((0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE))):
+        for corner, (x, y) in enumerate(
+            ((0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE))
+        ):
             text += f"{4 * layer + corner + 1}, {x}, {y}, {z}\n"
     text += "*NSET, NSET=BOTTOM\n1, 2, 3, 4\n*NSET, NSET=TOP\n13, 14, 15, 16\n"
     for block, (name, modulus, k) in enumerate(zip(("LOW", "HIGH"), E, K, strict=True)):
@@ -52,7 +55,9 @@ def deck(card: str, closure: float, displacements: list[float]) -> str:
         text += f"*SOLID SECTION, ELSET={name}, MATERIAL={name}\n"
     text += "*SURFACE, NAME=MASTER, TYPE=ELEMENT\n1, S2\n*SURFACE, NAME=SLAVE, TYPE=ELEMENT\n2, S1\n"
     text += f"{card}*CONTACT PAIR, INTERACTION=JOINT, TYPE=SURFACE TO SURFACE\nSLAVE, MASTER\n"
-    text += "".join(f"*EQUATION\n2\n{node}, 3, 1., 13, 3, -1.\n" for node in (14, 15, 16))  # the top stays level
+    text += "".join(
+        f"*EQUATION\n2\n{node}, 3, 1., 13, 3, -1.\n" for node in (14, 15, 16)
+    )  # the top stays level
     text += f"*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, {HOT / 2}\n"
     text += f"{STEP.format(0.0)}13, 3, 3, {-closure:.9e}\n{PRINT}"
     for moved in (0.0, *displacements):
@@ -64,13 +69,21 @@ def run(text: str) -> list[dict[str, float]]:
     """Temperatures of both faces and shear stress at the end of each step of CalculiX."""
     with tempfile.TemporaryDirectory() as folder:
         pathlib.Path(folder, "blocks.inp").write_text(text)
-        said = subprocess.run(["ccx", "blocks"], cwd=folder, capture_output=True, text=True, check=False).stdout
+        said = subprocess.run(
+            ["ccx", "blocks"], cwd=folder, capture_output=True, text=True, check=False
+        ).stdout
         printed = pathlib.Path(folder, "blocks.dat")
         lines = printed.read_text().splitlines() if printed.exists() else []
-    rows = [[float(word) for word in line.split()] for line in lines if line.strip() and "set" not in line]
+    rows = [
+        [float(word) for word in line.split()]
+        for line in lines
+        if line.strip() and "set" not in line
+    ]
     if not rows or "Job finished" not in said:
         raise RuntimeError(f"CalculiX: {said[-1000:]}")
-    steps = [rows[k : k + 18] for k in range(0, len(rows), 18)]  # 16 nodes, force and heat
+    steps = [
+        rows[k : k + 18] for k in range(0, len(rows), 18)
+    ]  # 16 nodes, force and heat
     return [{"low": s[4][1], "high": s[8][1], "shear": s[16][0] / SIDE**2} for s in steps]
 
 
@@ -86,24 +99,44 @@ def expected(joint: Joint) -> tuple[dict[str, float], list[float], list[float]]:
     # shear moduli are E/2
     compliance = 1 / stick + 2 * HEIGHT / E[0] + 2 * HEIGHT / E[1]
     wanted = [share * FRICTION * PRESSURE for share in SHARES]
-    return faces, [tau * compliance for tau in wanted], [min(tau, FRICTION * PRESSURE) for tau in wanted]
+    return (
+        faces,
+        [tau * compliance for tau in wanted],
+        [min(tau, FRICTION * PRESSURE) for tau in wanted],
+    )
 
 
 def compared() -> list[tuple[str, float, float]]:
     """What CalculiX finds and what the law says, by name."""
-    joint = Joint(FACE, FACE | {"Rq": "0.7 um"}, materials=METALS, nominal_area="1 cm^2", friction=FRICTION)
-    card = joint.export("calculix", ("1 MPa", "50 MPa"), "JOINT", friction_pressure=f"{PRESSURE} MPa")
+    joint = Joint(
+        FACE,
+        FACE | {"Rq": "0.7 um"},
+        materials=METALS,
+        nominal_area="1 cm^2",
+        friction=FRICTION,
+    )
+    card = joint.export(
+        "calculix", ("1 MPa", "50 MPa"), "JOINT", friction_pressure=f"{PRESSURE} MPa"
+    )
     faces, displacements, shears = expected(joint)
-    closure = float(joint.surface.h_max - joint.at_pressure(f"{PRESSURE} MPa").mean_separation) * 1e-3
+    closure = (
+        float(joint.surface.h_max - joint.at_pressure(f"{PRESSURE} MPa").mean_separation)
+        * 1e-3
+    )
     _, pressed, *sheared = run(deck(card, closure, displacements))
-    rows = [(f"temperature of the {name} face", pressed[name], faces[name]) for name in faces]
+    rows = [
+        (f"temperature of the {name} face", pressed[name], faces[name]) for name in faces
+    ]
     names = ("half way to slip", "past slip")
     rows += [
-        (f"shear stress {name} [MPa]", s["shear"], tau) for name, s, tau in zip(names, sheared, shears, strict=True)
+        (f"shear stress {name} [MPa]", s["shear"], tau)
+        for name, s, tau in zip(names, sheared, shears, strict=True)
     ]
     return rows
 
 
 if __name__ == "__main__":
     for name, simulated, law in compared():
-        click.echo(f"{name}: CalculiX {simulated:.4g}, law {law:.4g}, difference {simulated / law - 1:+.2%}")
+        click.echo(
+            f"{name}: CalculiX {simulated:.4g}, law {law:.4g}, difference {simulated / law - 1:+.2%}"
+        )

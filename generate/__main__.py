@@ -13,8 +13,14 @@ from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 COMMANDS = {
-    **{name: f"generate.{name}" for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")},
-    **dict.fromkeys(("boundary_elements", "gaps", "grids", "light", "measured_maps"), "generate.boundary_elements.run"),
+    **{
+        name: f"generate.{name}"
+        for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")
+    },
+    **dict.fromkeys(
+        ("boundary_elements", "gaps", "grids", "light", "measured_maps"),
+        "generate.boundary_elements.run",
+    ),
     **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
     "edges": "generate.machined.edges",
     "formulas": "generate.formulas",
@@ -33,7 +39,9 @@ class Generator(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name in COMMANDS:
-            command: click.Command = getattr(importlib.import_module(COMMANDS[cmd_name]), cmd_name)
+            command: click.Command = getattr(
+                importlib.import_module(COMMANDS[cmd_name]), cmd_name
+            )
             return command
         return super().get_command(ctx, cmd_name)
 
@@ -47,10 +55,17 @@ class Generator(click.Group):
             sys.exit(1)
         except ModuleNotFoundError as fault:
             extras = "wheels" if fault.name == "ziglang" else "generate"
-            click.echo(f"generate: {fault}; install the extra: pip install -e '.[{extras}]'", err=True)
+            click.echo(
+                f"generate: {fault}; install the extra: pip install -e '.[{extras}]'",
+                err=True,
+            )
             sys.exit(2)
         except (click.ClickException, MbmaError, OSError, RuntimeError) as fault:
-            text = fault.format_message() if isinstance(fault, click.ClickException) else str(fault)
+            text = (
+                fault.format_message()
+                if isinstance(fault, click.ClickException)
+                else str(fault)
+            )
             click.echo(f"generate: {' '.join(text.split())}", err=True)
             sys.exit(2)
         sys.exit(code if isinstance(code, int) else 0)
@@ -63,7 +78,12 @@ def main() -> None:
 
 @main.command()
 @click.argument("names", nargs=-1, required=True, type=click.Choice([*PAGES, "all"]))
-@click.option("--out", type=click.Path(path_type=pathlib.Path, file_okay=False), default=ROOT, help="The checkout.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=pathlib.Path, file_okay=False),
+    default=ROOT,
+    help="The checkout.",
+)
 def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
     """Write the measured tables and the figures of pages of the documentation."""
     for name in PAGES if "all" in names else names:

@@ -21,12 +21,27 @@ from generate.boundary_elements.evidence import evidence
 from generate.files import ROOT
 from generate.page import table
 from generate.page import write as write_page
-from mbma_tables import Joint, MbmaError, Surface, contact, contact_law, flow_factors, island, sensitivity
+from mbma_tables import (
+    Joint,
+    MbmaError,
+    Surface,
+    contact,
+    contact_law,
+    flow_factors,
+    island,
+    sensitivity,
+)
 from mbma_tables.theories import THEORIES
 from mbma_tables.theories.calibrated.formulas import self_affine_law
 
 LONGEST = 10.0  # seconds of one request
-RANGES = ((0.05, 1.0), (np.log(3.1), np.log(1e5)), (1.0, 32.0), (-7.0, -0.5), (3.0, 9.0))  # of searches
+RANGES = (
+    (0.05, 1.0),
+    (np.log(3.1), np.log(1e5)),
+    (1.0, 32.0),
+    (-7.0, -0.5),
+    (3.0, 9.0),
+)  # of searches
 GAPS = 20  # of one surface
 ROUNDED = 4 * np.finfo(float).eps  # of a mean separation
 FORMATS = "{} | {:,} | {:,} | {} | {:.2g}"
@@ -54,30 +69,52 @@ def miss(found: Any, reference: Any, allowed: Any) -> np.ndarray:
     ratios = []
     for value, other in zip(found, reference, strict=True):
         seen = np.abs(other) > SMALLEST
-        ratios.append(np.abs(value[seen] / other[seen] - 1) / np.broadcast_to(allowed, seen.shape)[seen])
+        ratios.append(
+            np.abs(value[seen] / other[seen] - 1)
+            / np.broadcast_to(allowed, seen.shape)[seen]
+        )
     return np.concatenate(ratios)
 
 
 def mbma(surface: Surface, u: np.ndarray, rtol: float) -> np.ndarray:
     """MBMA by its table against every island solved."""
     found = contact(surface, mean_separation=u, rtol=rtol, theory="mbma")
-    exact = contact(surface, mean_separation=u, rtol=1e-10, theory="mbma", island_model="exact")
-    return miss((found.pressure, found.area), (exact.pressure, exact.area), found.error + exact.error)
+    exact = contact(
+        surface, mean_separation=u, rtol=1e-10, theory="mbma", island_model="exact"
+    )
+    return miss(
+        (found.pressure, found.area),
+        (exact.pressure, exact.area),
+        found.error + exact.error,
+    )
 
 
 def calibrated(surface: Surface, u: np.ndarray, rtol: float) -> np.ndarray:
     """The calibrated law's table against its own quadrature."""
     found = contact(surface, mean_separation=u, theory="calibrated")
-    pressure, area, _ = self_affine_law(surface.hurst, surface.zeta_1, surface.h_max).contact(u)
-    return miss((found.pressure, found.area), (pressure * surface.rms_gradient, area), found.error)
+    pressure, area, _ = self_affine_law(
+        surface.hurst, surface.zeta_1, surface.h_max
+    ).contact(u)
+    return miss(
+        (found.pressure, found.area), (pressure * surface.rms_gradient, area), found.error
+    )
 
 
-def law(surface: Surface, u: np.ndarray, rtol: float, theory: str, hardness: float = np.inf) -> np.ndarray:
+def law(
+    surface: Surface, u: np.ndarray, rtol: float, theory: str, hardness: float = np.inf
+) -> np.ndarray:
     """A law against the theory that it was made of."""
     made = contact_law(surface, theory, rtol=max(rtol, 1e-8), hardness=hardness)
-    gaps = u[(u > (made.lowest + surface.h_max) / 2) & (surface.h_max - u > 1e-6 * surface.h_max)]
+    gaps = u[
+        (u > (made.lowest + surface.h_max) / 2)
+        & (surface.h_max - u > 1e-6 * surface.h_max)
+    ]
     found = contact(surface, mean_separation=gaps, theory=theory, hardness=hardness)
-    return miss((made.pressure(gaps), made.area(gaps)), (found.pressure, found.area), made.error + found.error)
+    return miss(
+        (made.pressure(gaps), made.area(gaps)),
+        (found.pressure, found.area),
+        made.error + found.error,
+    )
 
 
 def inverse(surface: Surface, u: np.ndarray, rtol: float, **given: Any) -> np.ndarray:
@@ -111,14 +148,25 @@ def bound(what: str, seed: int, scale: float) -> list[Found]:
     ratio, examples, options = BOUNDS[what]
     count = refused = beyond = 0
     worst, where = 0.0, ""
-    phases, unchecked = [hypothesis.Phase.generate, hypothesis.Phase.target], list(hypothesis.HealthCheck)
-    options_of_search: dict[str, Any] = {"phases": phases, "suppress_health_check": unchecked, "database": None}
+    phases, unchecked = (
+        [hypothesis.Phase.generate, hypothesis.Phase.target],
+        list(hypothesis.HealthCheck),
+    )
+    options_of_search: dict[str, Any] = {
+        "phases": phases,
+        "suppress_health_check": unchecked,
+        "database": None,
+    }
 
     @hypothesis.seed(seed)
-    @hypothesis.settings(max_examples=max(int(scale * examples), 1), deadline=None, **options_of_search)
+    @hypothesis.settings(
+        max_examples=max(int(scale * examples), 1), deadline=None, **options_of_search
+    )
     # hurst, log_zeta, height, nearest and digits
     @hypothesis.given(*itertools.starmap(st.floats, RANGES))
-    def search(hurst: float, log_zeta: float, height: float, nearest: float, digits: float) -> None:
+    def search(
+        hurst: float, log_zeta: float, height: float, nearest: float, digits: float
+    ) -> None:
         nonlocal count, refused, beyond, worst, where
         surface = surface_of(hurst, log_zeta, height)
         u = surface.h_max * (1 - np.geomspace(10**nearest, 0.999, GAPS))
@@ -133,7 +181,10 @@ def bound(what: str, seed: int, scale: float) -> list[Found]:
         count += ratios.size
         beyond += int((~(ratios <= 1)).sum())
         if largest > worst:
-            worst, where = largest, f"{surface!r}, nearest={nearest:.4g}, digits={digits:.3g}"
+            worst, where = (
+                largest,
+                f"{surface!r}, nearest={nearest:.4g}, digits={digits:.3g}",
+            )
         hypothesis.target(min(np.log(max(largest, 1e-12)), 50.0))
 
     search()
@@ -142,14 +193,22 @@ def bound(what: str, seed: int, scale: float) -> list[Found]:
 
 def validity(seed: int, scale: float) -> list[Found]:
     """Answers that are `valid` outside the ranges of the simulated surfaces in docs/data, or without a scatter."""
-    rng, tested_ones = np.random.default_rng(seed), [one for one in evidence() if one.kind == "self_affine"]
+    rng, tested_ones = (
+        np.random.default_rng(seed),
+        [one for one in evidence() if one.kind == "self_affine"],
+    )
     areas = np.concatenate([one.area for one in tested_ones])
-    ends = {"hurst": [float(one.node[1]) for one in tested_ones], "zeta_1": [one.zeta_1 for one in tested_ones]}
+    ends = {
+        "hurst": [float(one.node[1]) for one in tested_ones],
+        "zeta_1": [one.zeta_1 for one in tested_ones],
+    }
     count, beyond, where = 0, 0, ""
     for _ in range(int(1000 * scale)):
         hurst, log_zeta = rng.uniform(0.02, 1.0), rng.uniform(np.log(3.1), np.log(1e4))
         # so flat that no rms gradient is above one, which no theory is valid for
-        surface = Surface(hurst, 1e-6, float(1e-6 * np.exp(log_zeta)), 1.0, rng.uniform(1.0, 20.0))
+        surface = Surface(
+            hurst, 1e-6, float(1e-6 * np.exp(log_zeta)), 1.0, rng.uniform(1.0, 20.0)
+        )
         theory = THEORIES[rng.integers(len(THEORIES))]
         u = surface.h_max * (1 - np.geomspace(1e-6, 0.99, GAPS))
         try:
@@ -158,15 +217,35 @@ def validity(seed: int, scale: float) -> list[Found]:
             continue
         tested = (found.area >= areas[areas > 0].min()) & (found.area <= areas.max())
         for name, seen in ends.items():
-            tested &= min(seen) * (1 - 1e-9) <= getattr(surface, name) <= max(seen) * (1 + 1e-9)
+            tested &= (
+                min(seen) * (1 - 1e-9) <= getattr(surface, name) <= max(seen) * (1 + 1e-9)
+            )
         spread = np.isfinite(found.area_scatter) & np.isfinite(found.scatter)
         wrong = np.asarray(found.valid) & (found.pressure > 0) & ~(tested & spread)
         count, beyond = count + wrong.size, beyond + int(wrong.sum())
-        where = where or (f"{theory}: {surface!r}, A/A0 = {found.area[wrong][0]:.3g}" if wrong.any() else "")
-    return [Found("`valid` outside the simulated ranges", count, 0, beyond, float(beyond), where)]
+        where = where or (
+            f"{theory}: {surface!r}, A/A0 = {found.area[wrong][0]:.3g}"
+            if wrong.any()
+            else ""
+        )
+    return [
+        Found(
+            "`valid` outside the simulated ranges", count, 0, beyond, float(beyond), where
+        )
+    ]
 
 
-NATURAL: list[Any] = [0.3, 1.0, 2, [0.5, 1.0], np.array([[0.2], [0.9]]), "1 um", "0.5 mm", "10 MPa", ["1 um", "2 um"]]
+NATURAL: list[Any] = [
+    0.3,
+    1.0,
+    2,
+    [0.5, 1.0],
+    np.array([[0.2], [0.9]]),
+    "1 um",
+    "0.5 mm",
+    "10 MPa",
+    ["1 um", "2 um"],
+]
 NUMBERS: list[Any] = [
     0, -1.0, 1e-300, 5e-324, 1e300, 10**400, np.nan, np.inf, -np.inf, True, None, "", "1e400 MPa", "-3 um", "5 parsec",
     "concrete", b"1", [], ["1 um", 2.0], ["1 um", "2 mm"], {}, object(), range(3), lambda: 1, "9" * 5000, 1 + 1j,
@@ -178,7 +257,14 @@ SURFACES: list[Any] = [
     Surface(0.8, 1.0, 100.0, 1.0, 3.0), Surface(0.5, 0.01, 2.0, 1.0, 3.5, unit="um"), Surface.named("concrete"),
     Surface([0.2, 0.8], 1.0, 50.0, 1.0, [3.0, 4.0]), "concrete", None, 3.0, [1, 2],
 ]  # fmt: skip
-METALS = ["steel 4140 hard", ("steel 4140 hard", "aluminium 6061 hard"), "unobtainium", ("steel 4140 hard",), 3, None]
+METALS = [
+    "steel 4140 hard",
+    ("steel 4140 hard", "aluminium 6061 hard"),
+    "unobtainium",
+    ("steel 4140 hard",),
+    3,
+    None,
+]
 KNOWN = ("separation", "mean_separation", "pressure", "area")
 OPTIONS: dict[str, list[Any]] = {
     "theory": ["mbma", "calibrated", "persson", "greenwood_williamson", "none", 3, None],
@@ -190,15 +276,27 @@ OPTIONS: dict[str, list[Any]] = {
     "variant": ["reported", "printed", "fitted", "none"],
     "outside": ["raise", "exact", "nan", "clamp"],
 }
-METHODS = ("pressure", "area", "stiffness", "energy", "at_pressure", "pressure_and_stiffness", "slope_error")
+METHODS = (
+    "pressure",
+    "area",
+    "stiffness",
+    "energy",
+    "at_pressure",
+    "pressure_and_stiffness",
+    "slope_error",
+)
 CALLS: dict[str, Callable[..., Any]] = {
     "contact": contact,
-    "law": lambda method, value, *given, **options: getattr(contact_law(*given, **options), method)(value),
+    "law": lambda method, value, *given, **options: getattr(
+        contact_law(*given, **options), method
+    )(value),
     "surface": Surface,
     "sensitivity": sensitivity,
     "flow_factors": flow_factors,
     "island": island,
-    "joint": lambda asked, *parts, **options: Joint(*parts, **options).at_pressure(asked).conductance(),
+    "joint": lambda asked, *parts, **options: (
+        Joint(*parts, **options).at_pressure(asked).conductance()
+    ),
 }
 PART = {"Rq": "0.4 um", "longest": "100 um", "shortest": "2 um", "hurst": 0.8}
 
@@ -213,35 +311,70 @@ def requests(rng: np.random.Generator) -> Iterator[tuple[str, Callable[[], Any]]
         return one(NATURAL if rng.random() < 0.7 else NUMBERS)
 
     def some(share: float, *names: str) -> dict[str, Any]:
-        return {name: one(OPTIONS[name]) for name in names or OPTIONS if rng.random() < share}
+        return {
+            name: one(OPTIONS[name]) for name in names or OPTIONS if rng.random() < share
+        }
 
     def surface() -> Any:
         return one(SURFACES[:3] if rng.random() < 0.8 else SURFACES)
 
     def answer(name: str, *given: Any, **options: Any) -> tuple[str, Callable[[], Any]]:
-        shown = [*map(reprlib.repr, given), *(f"{key}={reprlib.repr(value)}" for key, value in options.items())]
-        return f"{name}({', '.join(shown)})", functools.partial(CALLS[name], *given, **options)
+        shown = [
+            *map(reprlib.repr, given),
+            *(f"{key}={reprlib.repr(value)}" for key, value in options.items()),
+        ]
+        return f"{name}({', '.join(shown)})", functools.partial(
+            CALLS[name], *given, **options
+        )
 
     few = ("rtol", "hardness", "E_star", "materials")
     while True:
         known = {one(list(KNOWN)): number()}
         yield answer("contact", surface(), **some(0.12), **known)
-        yield answer("law", one(list(METHODS)), number(), surface(), one(OPTIONS["theory"][:4]), **some(0.15, *few))
-        yield answer("surface", *(one(NUMBERS) if rng.random() < 0.3 else x for x in (0.8, 1.0, 100.0, 1.0, 3.0)))
+        yield answer(
+            "law",
+            one(list(METHODS)),
+            number(),
+            surface(),
+            one(OPTIONS["theory"][:4]),
+            **some(0.15, *few),
+        )
+        yield answer(
+            "surface",
+            *(
+                one(NUMBERS) if rng.random() < 0.3 else x
+                for x in (0.8, 1.0, 100.0, 1.0, 3.0)
+            ),
+        )
         yield answer("sensitivity", surface(), **known)
         yield answer("flow_factors", surface(), number())
-        yield answer("island", surface(), number(), **some(0.15, "rtol", "E_star", "variant"))
+        yield answer(
+            "island", surface(), number(), **some(0.15, "rtol", "E_star", "variant")
+        )
         part = one([PART, PART | {one(list(PART)): number()}])
         area = one(["4 cm^2", "1 mm^2", number()])
-        yield answer("joint", one(["10 MPa", number()]), part, PART, materials=one(METALS), nominal_area=area)
+        yield answer(
+            "joint",
+            one(["10 MPa", number()]),
+            part,
+            PART,
+            materials=one(METALS),
+            nominal_area=area,
+        )
 
 
 def failures(seed: int, scale: float) -> list[Found]:
     """Warnings, untyped errors, values that are not finite, and requests of more than 10 s."""
     count, refused, longest, slowest = 0, 0, 0.0, ""
-    bad: dict[str, list[str]] = {"a warning": [], "an error of no type": [], f"more than {LONGEST:g} s": []}
+    bad: dict[str, list[str]] = {
+        "a warning": [],
+        "an error of no type": [],
+        f"more than {LONGEST:g} s": [],
+    }
     warned, untyped, slow = bad.values()
-    for given, call in itertools.islice(requests(np.random.default_rng(seed)), int(14000 * scale)):
+    for given, call in itertools.islice(
+        requests(np.random.default_rng(seed)), int(14000 * scale)
+    ):
         start = time.perf_counter()
         try:
             with warnings.catch_warnings():
@@ -258,7 +391,10 @@ def failures(seed: int, scale: float) -> list[Found]:
         if taken > LONGEST:
             slow.append(f"{given}: {taken:.2g} s")
     known = ((what, len(own), "\n  ".join(own)) for what, own in bad.items())
-    *few, last = (Found(f"random requests: {what}", count, refused, size, size, where) for what, size, where in known)
+    *few, last = (
+        Found(f"random requests: {what}", count, refused, size, size, where)
+        for what, size, where in known
+    )
     return [*few, last._replace(worst=longest, where=last.where or slowest)]
 
 
@@ -292,13 +428,23 @@ def routes(seed: int, scale: float) -> list[Found]:
     rows = []
     for name in asked_by:
         what = f"routes: joint and {name}"
-        rows.append(Found(what, counts[name], refused, beyond[name], worst[name], places[name]))
+        rows.append(
+            Found(what, counts[name], refused, beyond[name], worst[name], places[name])
+        )
     return rows
 
 
 @click.command()
-@click.option("--seed", type=int, default=1, show_default=True, help="Of the random numbers.")
-@click.option("--scale", type=float, default=1.0, show_default=True, help="Factor of the numbers of examples.")
+@click.option(
+    "--seed", type=int, default=1, show_default=True, help="Of the random numbers."
+)
+@click.option(
+    "--scale",
+    type=float,
+    default=1.0,
+    show_default=True,
+    help="Factor of the numbers of examples.",
+)
 @click.option("--only", default="", help="Checks whose names contain this text.")
 @click.option("--write", is_flag=True, help="Write the counts to docs/guarantees.md.")
 def audit(seed: int, scale: float, only: str, write: bool) -> None:
@@ -308,14 +454,23 @@ def audit(seed: int, scale: float, only: str, write: bool) -> None:
         "routes": routes, "requests": failures,
     }  # fmt: skip
     rows = []
-    for found in itertools.chain.from_iterable(check(seed, scale) for name, check in checks.items() if only in name):
+    for found in itertools.chain.from_iterable(
+        check(seed, scale) for name, check in checks.items() if only in name
+    ):
         rows.append(found)
-        click.echo(f"{found.what:58}{found.answers:8}{found.refused:7}{found.beyond:7}{found.worst:10.3g}")
+        click.echo(
+            f"{found.what:58}{found.answers:8}{found.refused:7}{found.beyond:7}{found.worst:10.3g}"
+        )
         if found.beyond or found.worst > 0.9:
             click.echo(f"  {found.where}")
     if write:
         block = f"```\npython -m generate audit --seed {seed} --scale {scale:g} --write\n```\n\n"
         header = "search | answers | refused | beyond | largest"
-        write_page("guarantees", {"audit": block + table(header, (found[:-1] for found in rows), FORMATS)}, {}, ROOT)
+        write_page(
+            "guarantees",
+            {"audit": block + table(header, (found[:-1] for found in rows), FORMATS)},
+            {},
+            ROOT,
+        )
     if any(found.beyond for found in rows):
         raise SystemExit(1)

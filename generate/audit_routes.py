@@ -28,7 +28,13 @@ THEORIES = ("mbma", "calibrated", "persson")
 ROUNDED = 1e-12
 # pressures over the smaller of the hardness and a quarter of E* times the rms gradient
 LIGHT, HEAVY, PRESSURES = 1e-3, 0.3, 5
-QUANTITIES = ("area", "mean_separation", "stiffness", "unloading_stiffness", "conductance")
+QUANTITIES = (
+    "area",
+    "mean_separation",
+    "stiffness",
+    "unloading_stiffness",
+    "conductance",
+)
 
 
 class Question:
@@ -44,7 +50,9 @@ class Question:
         }
         side = longest * 10 ** rng.uniform(1.0, 2.0)
         self.nominal_area = f"{side**2!r} um^2"
-        self.materials = [f"{METALS[number]} hard" for number in rng.integers(len(METALS), size=2)]
+        self.materials = [
+            f"{METALS[number]} hard" for number in rng.integers(len(METALS), size=2)
+        ]
         self.theory = THEORIES[rng.integers(len(THEORIES))]
         self.joint = Joint(
             self.face,
@@ -55,7 +63,10 @@ class Question:
         )
         self.surface: Any = self.joint.surface
         # "57.5 GPa"
-        self.E_star, self.hardness = str(self.joint.pair.E_star), str(self.joint.pair.hardness)
+        self.E_star, self.hardness = (
+            str(self.joint.pair.E_star),
+            str(self.joint.pair.hardness),
+        )
         flat = float(self.E_star.split()[0]) * float(self.surface.rms_gradient) / 4
         largest = min(flat, float(self.hardness.split()[0]))
         self.pressures = largest * np.geomspace(LIGHT, HEAVY, PRESSURES)
@@ -74,7 +85,10 @@ class Question:
     def misses(self, values: dict[str, Any]) -> list[FloatArray]:
         """Differences from the joint's contact over what rounding allows."""
         expected = self.values_of(self.answer)
-        return [np.abs(np.asarray(values[name], float) / expected[name] - 1) / ROUNDED for name in values]
+        return [
+            np.abs(np.asarray(values[name], float) / expected[name] - 1) / ROUNDED
+            for name in values
+        ]
 
 
 def by_contact(question: Question) -> list[FloatArray]:
@@ -121,7 +135,9 @@ def command(*words: str) -> dict[str, Any]:
 
 def by_joint_command(question: Question) -> list[FloatArray]:
     """`mbma joint FILE --json`."""
-    face = "".join(f"{name} = {json.dumps(value)}\n" for name, value in question.face.items())
+    face = "".join(
+        f"{name} = {json.dumps(value)}\n" for name, value in question.face.items()
+    )
     text = (
         f"materials = {json.dumps(question.materials)}\n"
         f"nominal_area = {json.dumps(question.nominal_area)}\n"
@@ -130,7 +146,9 @@ def by_joint_command(question: Question) -> list[FloatArray]:
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder, "joint.toml")
         path.write_text(text, encoding="utf-8")
-        pressures = ",".join(f"{pressure!r}GPa" for pressure in question.pressures.tolist())
+        pressures = ",".join(
+            f"{pressure!r}GPa" for pressure in question.pressures.tolist()
+        )
         columns = command("joint", str(path), "--pressure", pressures)
     return question.misses({name: columns[name] for name in QUANTITIES})
 
@@ -138,7 +156,15 @@ def by_joint_command(question: Question) -> list[FloatArray]:
 def by_contact_command(question: Question) -> list[FloatArray]:
     """`mbma contact --json`, the surface by its five numbers, in mm and MPa."""
     surface = question.surface.to("mm")
-    words = ["contact", "--theory", question.theory, "--length-unit", "mm", "--stress-unit", "MPa"]
+    words = [
+        "contact",
+        "--theory",
+        question.theory,
+        "--length-unit",
+        "mm",
+        "--stress-unit",
+        "MPa",
+    ]
     words += ["--E-star", question.E_star, "--hardness", question.hardness]
     for name in ("hurst", "q0", "q1", "h_rms", "h_max"):
         words += [f"--{name.replace('_', '-')}", repr(float(getattr(surface, name)))]
@@ -158,7 +184,9 @@ def by_contact_command(question: Question) -> list[FloatArray]:
     )
 
 
-def law_misses(question: Question, law: ContactLaw, values: dict[str, Any]) -> list[FloatArray]:
+def law_misses(
+    question: Question, law: ContactLaw, values: dict[str, Any]
+) -> list[FloatArray]:
     """Differences of a law's values at the contact's own gaps, over the errors that both state."""
     expected = question.values_of(question.answer) | {"pressure": question.pressures}
     gaps = np.asarray(question.answer.mean_separation)
@@ -170,7 +198,9 @@ def law_misses(question: Question, law: ContactLaw, values: dict[str, Any]) -> l
     }
     misses = []
     for name, found in values.items():
-        allowed = stated.get(name, law.error) + np.asarray(question.answer.error) + ROUNDED
+        allowed = (
+            stated.get(name, law.error) + np.asarray(question.answer.error) + ROUNDED
+        )
         misses.append(np.abs(np.asarray(found, float) / expected[name] - 1) / allowed)
     return misses
 
@@ -179,11 +209,17 @@ def by_law(question: Question) -> list[FloatArray]:
     """`Joint.law` at the gaps of the contact, and the gaps that it gives for the pressures."""
     law, answer = question.joint.law(), question.answer
     gaps = np.asarray(answer.mean_separation)
-    values = {"pressure": law.pressure(gaps), "area": law.area(gaps), "stiffness": law.stiffness(gaps)}
+    values = {
+        "pressure": law.pressure(gaps),
+        "area": law.area(gaps),
+        "stiffness": law.stiffness(gaps),
+    }
     misses = law_misses(question, law, values)
     # an error of the pressure moves the gap by as much over the slope
     by_pressure = np.asarray(law.at_pressure(question.pressures).mean_separation)
-    allowed = (law.error + answer.error) * question.pressures / answer.stiffness + ROUNDED * gaps
+    allowed = (
+        law.error + answer.error
+    ) * question.pressures / answer.stiffness + ROUNDED * gaps
     return [*misses, np.abs(by_pressure - gaps) / allowed]
 
 
@@ -192,8 +228,13 @@ def by_c(question: Question) -> list[FloatArray]:
     law, answer = question.joint.law(), question.answer
     gaps = np.asarray(answer.mean_separation)
     with tempfile.TemporaryDirectory() as folder:
-        source, library = pathlib.Path(folder, "joint.c"), pathlib.Path(folder, "joint.so")
-        source.write_text(str(question.joint.export("c-law", name="joint")), encoding="utf-8")
+        source, library = (
+            pathlib.Path(folder, "joint.c"),
+            pathlib.Path(folder, "joint.so"),
+        )
+        source.write_text(
+            str(question.joint.export("c-law", name="joint")), encoding="utf-8"
+        )
         line = ["cc", "-O1", "-shared", "-fPIC", str(source), "-o", str(library), "-lm"]
         subprocess.run(line, check=True, capture_output=True)
         compiled = ctypes.CDLL(str(library))
@@ -202,7 +243,9 @@ def by_c(question: Question) -> list[FloatArray]:
             function = compiled[f"joint_{name}"]
             function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
             overclosures = (float(question.surface.h_max) - gaps) / 1e3
-            return np.array([function(overclosure) for overclosure in overclosures.tolist()])
+            return np.array(
+                [function(overclosure) for overclosure in overclosures.tolist()]
+            )
 
         values = {
             "pressure": values_of("pressure") / 1e3,
@@ -227,4 +270,8 @@ ROUTES: dict[str, Callable[[Question], list[FloatArray]]] = {
 
 def routes_here() -> dict[str, Callable[[Question], list[FloatArray]]]:
     """All routes, but C where there is no compiler."""
-    return {name: route for name, route in ROUTES.items() if route is not by_c or shutil.which("cc")}
+    return {
+        name: route
+        for name, route in ROUTES.items()
+        if route is not by_c or shutil.which("cc")
+    }

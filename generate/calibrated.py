@@ -80,7 +80,9 @@ class Parts:
         flat = dataclasses.replace(CONSTANTS, weight_slope=0.0)
 
         def separation(weight: float, cubic: float) -> FloatArray:
-            law = Law(spectrum, None, dataclasses.replace(flat, weight=weight, cubic=cubic))
+            law = Law(
+                spectrum, None, dataclasses.replace(flat, weight=weight, cubic=cubic)
+            )
             u, _ = law.separation_persson(np.exp(GRID))
             return u
 
@@ -100,7 +102,9 @@ class Parts:
         log_force_at_end = float(log_force_at(np.log(one.h_max)))
         left = np.maximum(-np.expm1(log_force_at_end - log_force), LEAST)
         log_end_factor = 1.5 * np.log(left)
-        return np.asarray(log_force + log_end_factor - np.log(2 - left) - np.log(one.force))
+        return np.asarray(
+            log_force + log_end_factor - np.log(2 - left) - np.log(one.force)
+        )
 
 
 def fit(training: Sequence[Case], tail: bool = False) -> Constants:
@@ -117,7 +121,9 @@ def fit(training: Sequence[Case], tail: bool = False) -> Constants:
     if tail:
         return fitted(CONSTANTS, ("tail",), forces, **OPTIONS)
     with_area = fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas, **OPTIONS)
-    return fitted(with_area, ("weight", "weight_slope", "cubic", "tail"), forces, **OPTIONS)
+    return fitted(
+        with_area, ("weight", "weight_slope", "cubic", "tail"), forces, **OPTIONS
+    )
 
 
 def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
@@ -205,7 +211,9 @@ def summary(frame: pd.DataFrame) -> FloatArray:
     """
     statistics = (np.mean, np.std, _magnitude_of_nine_in_ten, np.size)
     contact = frame["contact"]
-    rows = [by_bin(contact, frame[quantity], EDGES, *statistics) for quantity in QUANTITIES]
+    rows = [
+        by_bin(contact, frame[quantity], EDGES, *statistics) for quantity in QUANTITIES
+    ]
     return np.array(rows)
 
 
@@ -272,7 +280,9 @@ def measure(forms: dict[str, pd.DataFrame]) -> list[dict[str, Any]]:
         frame = forms[form]
         of_kind = frame[frame["kind"].isin(kinds) & frame["waves"].between(low, high)]
         unseen = of_kind[of_kind["split"] != TRAINING]
-        inside = unseen[unseen["contact"].between(*contact) & np.isfinite(unseen[quantity])]
+        inside = unseen[
+            unseen["contact"].between(*contact) & np.isfinite(unseen[quantity])
+        ]
         relative = np.expm1(inside[quantity])
         spread = differences(of_kind, quantity, contact)
         is_large = unseen["points"] >= LARGE
@@ -299,7 +309,9 @@ def others(surfaces: Sequence[Case]) -> dict[str, FloatArray]:
     On all self-affine surfaces of two or more waves a side.
     """
     plain = [one for one in surfaces if one.kind == "self_affine" and one.gaussian]
-    variants = [Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")]
+    variants = [
+        Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")
+    ]
     # theories' scatter has one name on all surfaces of this kind
     self_affine = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
     summed: dict[str, FloatArray] = {}
@@ -311,7 +323,9 @@ def others(surfaces: Sequence[Case]) -> dict[str, FloatArray]:
             # a spline needs four loads
             if reached.sum() > 3:
                 curves[one.at(reached)] = curve
-        summed[theory.scatter_name(self_affine)] = summary(told([*curves], curves.__getitem__))
+        summed[theory.scatter_name(self_affine)] = summary(
+            told([*curves], curves.__getitem__)
+        )
     return summed
 
 
@@ -326,7 +340,9 @@ def by_split_and_label(forms: dict[str, pd.DataFrame]) -> Stated:
     return sets
 
 
-def coverage_of_forms(forms: dict[str, pd.DataFrame], stated: Stated) -> dict[str, list[float]]:
+def coverage_of_forms(
+    forms: dict[str, pd.DataFrame], stated: Stated
+) -> dict[str, list[float]]:
     """Shares of held-out errors by quantity, "(map)" behind those of the map's law."""
     shares = {}
     theories = (("spectrum", "calibrated", ""), ("map", "calibrated_map", " (map)"))
@@ -345,7 +361,9 @@ def fit_hardness(data: xr.Dataset, table: pathlib.Path | None) -> None:
 
 
 @click.command()
-@click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE)
+@click.argument(
+    "evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE
+)
 @click.option(
     "--table",
     type=click.Path(path_type=pathlib.Path),
@@ -392,7 +410,9 @@ def calibrated(
     }
     covered = coverage_of_forms(forms, stated)
     for name, values in {"constants": constants, "map_constants": map_constants}.items():
-        shown = ", ".join(f"{key} {value:.4g}" for key, value in dataclasses.asdict(values).items())
+        shown = ", ".join(
+            f"{key} {value:.4g}" for key, value in dataclasses.asdict(values).items()
+        )
         click.echo(f"{name}: {shown}")
     click.echo(f"{SHARES_HEAD} {covered}")
     if table is None:
@@ -408,7 +428,9 @@ def calibrated(
     stated_of_others = others(surfaces)
     sets |= {f"self-affine, {name}": values for name, values in stated_of_others.items()}
     stated |= stated_of_others
-    certified = write_table(table, constants, map_constants, EDGES, stated, sets, attributes)
+    certified = write_table(
+        table, constants, map_constants, EDGES, stated, sets, attributes
+    )
     click.echo(f"{table}: {certified}")
     # its gaps have changed with the constants
     click.echo(f"leakage: {write_leakage(table).attrs['coverage']}")

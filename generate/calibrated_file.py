@@ -49,10 +49,14 @@ HIGHEST = (2.5, 6.0)  # their h_max/h_rms
 NEAREST = 0.95  # of h_max: nearer to it force is a small difference
 PROCESSES = 2
 MIN_ERRORS = 5  # that state a scatter
-TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("laws.toml").read_text(encoding="utf-8"))
+TEXTS = tomllib.loads(
+    pathlib.Path(__file__).with_name("laws.toml").read_text(encoding="utf-8")
+)
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass of constants
 Variable = tuple[str | Sequence[str], ArrayLike, dict[str, Any]]
-Arrays = Mapping[str, tuple[str | Sequence[str], ArrayLike]]  # dimensions and values by name
+Arrays = Mapping[
+    str, tuple[str | Sequence[str], ArrayLike]
+]  # dimensions and values by name
 Stated = dict[str, FloatArray]  # statistics of errors by theory, or by set
 
 
@@ -96,7 +100,9 @@ def cross_validated(
     return constants_of_others
 
 
-def binned(area: FloatArray, values: FloatArray, edges: Sequence[float]) -> list[FloatArray]:
+def binned(
+    area: FloatArray, values: FloatArray, edges: Sequence[float]
+) -> list[FloatArray]:
     """Finite values at contacts between edges, bin by bin."""
     is_finite = np.isfinite(values)
     parts = []
@@ -237,7 +243,9 @@ def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "/")
                 # the first group makes the file
                 mode: Literal["a", "w"] = "a" if number else "w"
                 encoding = _encoding(part)
-                part.to_netcdf(name, mode, engine="netcdf4", group=part_name, encoding=encoding)
+                part.to_netcdf(
+                    name, mode, engine="netcdf4", group=part_name, encoding=encoding
+                )
 
     body = written_bytes(path.name, store)
     seal = SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n"
@@ -297,7 +305,9 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
         surface_of_point = np.zeros(u.size, np.int64)
         from_table = answer((surface_of_point, u))[[0, 2, 1]]
 
-        law = Law(Spectrum.self_affine(hurst, float(np.exp(log_zeta))), top, table.constants)
+        law = Law(
+            Spectrum.self_affine(hurst, float(np.exp(log_zeta))), top, table.constants
+        )
         force, stiffness = law.contact(u)[::2]
         by_quadrature = np.stack([force, stiffness, law.area(force)])
         misses.append(np.abs(from_table / by_quadrature - 1))
@@ -305,7 +315,9 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
     by_quantity = np.concatenate(misses, axis=1)
     named = dict(zip(("force", "stiffness", "area"), by_quantity, strict=True))
     largest = {f"largest_error_{name}": float(row.max()) for name, row in named.items()}
-    nearly_all = {f"p99_error_{name}": float(np.quantile(row, 0.99)) for name, row in named.items()}
+    nearly_all = {
+        f"p99_error_{name}": float(np.quantile(row, 0.99)) for name, row in named.items()
+    }
     return largest | nearly_all
 
 

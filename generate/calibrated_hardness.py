@@ -62,7 +62,9 @@ TURN = 0.01  # of ln A_el, for derivatives
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
 
 
-def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:
+def errors(
+    one: Capped, part: str, constants: cap.Constants, share: int = 0
+) -> FloatArray:
     """Errors of a part where the elastic contact is the simulated one.
 
     Errors of the elastic law so stay out of them.
@@ -80,8 +82,12 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
         return np.log(force / one.force)
     if part == "stiffness":
         _, elastic_stiffness = one.elastic
-        return np.log(elastic_stiffness * cap.frozen_factor(one.eta, constants) / one.frozen)
-    return cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
+        return np.log(
+            elastic_stiffness * cap.frozen_factor(one.eta, constants) / one.frozen
+        )
+    return (
+        cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
+    )
 
 
 def fitted_to(one: Capped) -> Any:
@@ -157,7 +163,9 @@ def errors_of(one: Capped, name: str, constants: cap.Constants) -> dict[str, Flo
     }
 
 
-def errors_of_other(one: Capped, name: str, constants: cap.Constants) -> dict[str, FloatArray]:
+def errors_of_other(
+    one: Capped, name: str, constants: cap.Constants
+) -> dict[str, FloatArray]:
     """Errors of force, area and frozen stiffness of a theory that is not the calibrated one."""
     surface = one.surface
     theory = get_theory(name)
@@ -199,7 +207,9 @@ def told(
     parts = []
     for one in seen:
         misses = errors_of(one, name, constants(one))
-        columns = {key: getattr(one, key) for key in ("kind", "split", "waves", "zeta_1", "eta")}
+        columns = {
+            key: getattr(one, key) for key in ("kind", "split", "waves", "zeta_1", "eta")
+        }
         columns |= {"contact": one.area}
         columns |= misses
         columns |= {"own": one.area * np.exp(misses["area"])}
@@ -219,7 +229,9 @@ def statistics(frame: pd.DataFrame) -> FloatArray:
         misses = inside[quantity].to_numpy()
         size = np.abs(misses)
         share_within = np.mean(size < BARS[quantity])
-        rows.append((np.mean(misses), np.std(misses), share_within, size.max(), misses.size))
+        rows.append(
+            (np.mean(misses), np.std(misses), share_within, size.max(), misses.size)
+        )
     return np.array(rows)
 
 
@@ -246,7 +258,9 @@ def weight_of_elastic(one: Capped, quantity: str, constants: cap.Constants) -> F
     return rate / force
 
 
-def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[str, list[float]]:
+def by_magnification(
+    seen: Sequence[Capped], constants: cap.Constants
+) -> dict[str, list[float]]:
     """Mean errors of the parts by zeta_1 at the hardness where they are largest.
 
     The elastic contact is the simulated one.
@@ -397,13 +411,19 @@ def write(
     weights = np.array([*scatter.weight.values()])
     arrays = {
         "accuracy": (("set", "form", "quantity", "statistic"), np.array(accuracy)),
-        "stated_scatter": (("theory", "quantity", "hardness", "contact"), rms_of_theories),
+        "stated_scatter": (
+            ("theory", "quantity", "hardness", "contact"),
+            rms_of_theories,
+        ),
         "elastic_weight": (("force_or_area", "hardness", "contact"), weights),
         "eta": ("hardness", scatter.eta),
         "contact": ("contact", np.exp(scatter.log_area)),
     }
 
-    made_of = {"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(contacts)}
+    made_of = {
+        "code_sha256": evidence.attrs.get("code_sha256", ""),
+        "contacts": len(contacts),
+    }
     facts = {
         "coverage": json.dumps(covered),
         "drift": json.dumps(by_magnification(self_affine, constants)),

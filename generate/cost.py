@@ -141,7 +141,9 @@ def newton_rows() -> Iterator[Row]:
     mu = islands["mu"][::4]
     ways: dict[str, dict[str, Any]] = {}
     for rtol in NEWTON_RTOLS:
-        ways[at("island", rtol)] = {"rtol": max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL)}
+        ways[at("island", rtol)] = {
+            "rtol": max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL)
+        }
     for nodes in NEWTON_NODES:
         ways[f"nodes={nodes}"] = {"rtol": 1e-11, "nodes": nodes}
     for name, options in ways.items():
@@ -198,7 +200,9 @@ def gaps_of(surface: Surface, count: int = GAPS) -> FloatArray:
 
 def fresh(surface: Surface) -> Surface:
     """The same surface up to rounding, of which nothing is cached."""
-    return dataclasses.replace(surface, q1=surface.q1 * (1 + next(MOVES) % 4096 * 2.0**-51))
+    return dataclasses.replace(
+        surface, q1=surface.q1 * (1 + next(MOVES) % 4096 * 2.0**-51)
+    )
 
 
 def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
@@ -235,7 +239,9 @@ def scene_rows() -> Iterator[Row]:
     gap = 0.9 * float(surface.h_max)
 
     def run_scene() -> Any:
-        return Scene(fresh(surface), effects=["pressure"], separations=gap, rtol=1e-4).run()
+        return Scene(
+            fresh(surface), effects=["pressure"], separations=gap, rtol=1e-4
+        ).run()
 
     def its_step() -> Any:
         return contact(fresh(surface), separation=gap, rtol=1e-4)
@@ -262,7 +268,14 @@ def gap_rows() -> Iterator[Row]:
             # less the call; noise makes no gap cheaper than one of many
             cost = max((of_surface - one + each) / GAPS, each)
             answers = [totals_of(answer) for answer in run(every=EVERY)]
-            yield Row(island_model, at("gap", rtol), "both", largest_error(answers), cost, islands)
+            yield Row(
+                island_model,
+                at("gap", rtol),
+                "both",
+                largest_error(answers),
+                cost,
+                islands,
+            )
 
 
 def laws_of(
@@ -368,7 +381,14 @@ def study() -> bytes:
 
     seconds = [seconds_of_work()]
     rows = list[Row]()
-    for part in (island_rows, scene_rows, gap_rows, law_rows, theory_rows, first_use_rows):
+    for part in (
+        island_rows,
+        scene_rows,
+        gap_rows,
+        law_rows,
+        theory_rows,
+        first_use_rows,
+    ):
         rows += part()
         seconds.append(seconds_of_work())
     facts = {

@@ -53,9 +53,15 @@ WAYS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("MBMA reported", "universal", MBMA | {"island_model": "universal"}),
     ("MBMA reported", "exact", MBMA | {"island_model": "exact"}),
     ("MBMA reported", "island4d", MBMA | {"island_model": "island4d"}),
-    *(("MBMA reported", name, {"rtol": 1e-4, "island_model": name}) for name in ISLAND_MODELS),
+    *(
+        ("MBMA reported", name, {"rtol": 1e-4, "island_model": name})
+        for name in ISLAND_MODELS
+    ),
     ("MBMA reported", "law", {"theory": "mbma"}),
-    *((f"MBMA {name}", "universal", MBMA | {"variant": name}) for name in ("printed", "fitted")),
+    *(
+        (f"MBMA {name}", "universal", MBMA | {"variant": name})
+        for name in ("printed", "fitted")
+    ),
     ("MBMA cover", "universal", MBMA | {"variant": COVER}),
 )
 HEAD = """\
@@ -108,7 +114,9 @@ def by_law(options: dict[str, Any]) -> tuple[float, float]:
     """Costs of a point of a law, and of making it."""
 
     def make() -> dict[Surface, Any]:
-        return {surface: contact_law(surface, rtol=LAW_RTOL, **options) for surface in TIMED}
+        return {
+            surface: contact_law(surface, rtol=LAW_RTOL, **options) for surface in TIMED
+        }
 
     laws = make()
 
@@ -189,7 +197,9 @@ def _missed(surface: pd.DataFrame) -> pd.DataFrame:
         gap = part["mean_separation"].to_numpy()
         is_open = gap > 0
         # gaps fall with the load, and interpolation wants them rising
-        log_force_at = PchipInterpolator(np.log(gap[is_open])[::-1], log_force[is_open][::-1])
+        log_force_at = PchipInterpolator(
+            np.log(gap[is_open])[::-1], log_force[is_open][::-1]
+        )
         of_area = np.log(part["area"] / touching)
         of_force = log_force_at(np.log(u)) - log_force
         parts.append(part.assign(touching=touching, area=of_area, force=of_force))

@@ -1,7 +1,8 @@
 """Deviations of theories from simulated contacts: every theory on every data set, and `python -m generate score`.
 
-Deviations are ln(theory/simulation) of three quantities: area at equal force, force at equal mean separation, stiffness
-at equal force. They are model errors: the theories are solved to 1e-6 or better, except for the map's law.
+Deviations are ln(theory/simulation) of three quantities: area at equal force, force at
+equal mean separation, stiffness at equal force. They are model errors: the theories are
+solved to 1e-6 or better, except for the map's law.
 """
 
 import dataclasses
@@ -15,8 +16,19 @@ import click
 import numpy as np
 from scipy.special import erf
 
-from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve, curves_of, evidence
-from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
+from generate.boundary_elements.evidence import (
+    MAX_AREA,
+    MIN_WAVES,
+    Case,
+    TheoryCurve,
+    curves_of,
+    evidence,
+)
+from generate.boundary_elements.surfaces import (
+    HELD_OUT_SPECTRUM,
+    HELD_OUT_SURFACE,
+    TRAINING,
+)
 from generate.calibrated import errors
 from generate.calibrated_file import QUANTITIES, rms
 from generate.files import DATA, ROOT, dataset, read_csv
@@ -25,11 +37,20 @@ from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.data import FILE
-from mbma_tables.theories.calibrated.formulas import CONSTANTS, YANG_PERSSON, Law, Spectrum
+from mbma_tables.theories.calibrated.formulas import (
+    CONSTANTS,
+    YANG_PERSSON,
+    Law,
+    Spectrum,
+)
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS
 from mbma_tables.theories.mbma.variants import REPORTED, Variant
 
-LOW, DEEP, HIGH = 0.01, 0.1, 0.97  # A/A0 of the simulations between which distances are summed up
+LOW, DEEP, HIGH = (
+    0.01,
+    0.1,
+    0.97,
+)  # A/A0 of the simulations between which distances are summed up
 RANGES = ((LOW, DEEP), (DEEP, HIGH))
 OTHERS = ROOT / "generate" / "theories_of_others.py"
 HEADER = "theory | area at given pressure | pressure at given gap | stiffness at given pressure | loads reached"
@@ -49,8 +70,14 @@ def _theory(theory: Any) -> Callable[[Case], Any]:
     return lambda one: TheoryCurve(theory, one.surface)
 
 
-def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[Case], Any]:
-    return _theory(theories.Mbma(island_model, variant, 1e-6, "nan" if island_model == "universal" else "raise"))
+def _mbma(
+    variant: str | Variant, island_model: str = "universal"
+) -> Callable[[Case], Any]:
+    return _theory(
+        theories.Mbma(
+            island_model, variant, 1e-6, "nan" if island_model == "universal" else "raise"
+        )
+    )
 
 
 def _map(one: Case) -> Any:
@@ -83,9 +110,13 @@ class DataSet:
     fitted: tuple[str, ...] = ()
 
 
-def distances(seen: Sequence[Case], theory: Callable[[Case], Any]) -> dict[str, FloatArray]:
+def distances(
+    seen: Sequence[Case], theory: Callable[[Case], Any]
+) -> dict[str, FloatArray]:
     """ln(theory/simulation) at every load of every surface, NaN where the theory does not reach it."""
-    parts = {name: [np.full(one.force.shape, np.nan) for one in seen] for name in QUANTITIES}
+    parts = {
+        name: [np.full(one.force.shape, np.nan) for one in seen] for name in QUANTITIES
+    }
     for number, one in enumerate(seen):
         with np.errstate(all="ignore"):
             try:
@@ -102,15 +133,34 @@ def distances(seen: Sequence[Case], theory: Callable[[Case], Any]) -> dict[str, 
 
 def held_out() -> list[Case]:
     """Self-affine surfaces of two or more longest waves a side that no fit saw."""
-    return [one for one in evidence() if one.kind == "self_affine" and one.gaussian and one.split != TRAINING]
+    return [
+        one
+        for one in evidence()
+        if one.kind == "self_affine" and one.gaussian and one.split != TRAINING
+    ]
 
 
-def _simulated(kind: str, rows: Any, h_max: float, spectrum: Spectrum | None = None, **more: Any) -> Case:
+def _simulated(
+    kind: str, rows: Any, h_max: float, spectrum: Spectrum | None = None, **more: Any
+) -> Case:
     """A surface of a file of numbers: rows of F/(A0 E* g), A/A0 and u/h_rms; of a self-affine one H and zeta_1."""
     hurst, zeta_1 = more.pop("hurst", 0.8), more.pop("zeta_1", 0.0)
     spectrum = spectrum or Spectrum.self_affine(hurst, zeta_1)
     force, area, u = (np.asarray(row, dtype=float) for row in rows)
-    return Case(kind, "", (kind, hurst, zeta_1, 0, 0.0), MIN_WAVES, 0, spectrum, spectrum, h_max, more, force, area, u)
+    return Case(
+        kind,
+        "",
+        (kind, hurst, zeta_1, 0, 0.0),
+        MIN_WAVES,
+        0,
+        spectrum,
+        spectrum,
+        h_max,
+        more,
+        force,
+        area,
+        u,
+    )
 
 
 def earlier() -> list[Case]:
@@ -119,7 +169,11 @@ def earlier() -> list[Case]:
     for (hurst, _, zeta_1, *_), own in read_csv("boundary_elements.csv").groupby(keys):
         rows = [own[name] for name in ("force", "area", "u_over_h_rms")]
         h_max = float(own["h_max_over_h_rms"].iloc[0])
-        found.append(_simulated("self_affine", rows, h_max, hurst=float(hurst), zeta_1=float(zeta_1)))
+        found.append(
+            _simulated(
+                "self_affine", rows, h_max, hurst=float(hurst), zeta_1=float(zeta_1)
+            )
+        )
     return found
 
 
@@ -141,7 +195,10 @@ def older(name: str, top: float | None = None) -> Case:
 def rolloff(number: int) -> Case:
     force, area, _, u = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",").T[:4]
     own = read_csv("rolloff_spectra.csv").query("map == @number")
-    spectrum, h_rms = Spectrum.from_shares(*own[["q", "variance"]].to_numpy().T), np.sqrt(own["variance"].sum())
+    spectrum, h_rms = (
+        Spectrum.from_shares(*own[["q", "variance"]].to_numpy().T),
+        np.sqrt(own["variance"].sum()),
+    )
     # wavenumbers over h_rms: their unit cancels
     rows = [force / (spectrum.gradient * h_rms), area, u / h_rms]
     return _simulated("plateau", rows, ROLLOFF[number] / h_rms, spectrum)
@@ -157,30 +214,51 @@ def measured(name: str, path: pathlib.Path = FILE) -> Case:
 
 def data_sets() -> dict[str, DataSet]:
 
-    def chosen(kinds: Sequence[str], splits: Sequence[str], low: int = MIN_WAVES, high: int = 99) -> list[Case]:
-        return [one for one in evidence() if one.kind in kinds and one.split in splits and low <= one.waves <= high]
+    def chosen(
+        kinds: Sequence[str], splits: Sequence[str], low: int = MIN_WAVES, high: int = 99
+    ) -> list[Case]:
+        return [
+            one
+            for one in evidence()
+            if one.kind in kinds and one.split in splits and low <= one.waves <= high
+        ]
 
     tested, plain = (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM), ("self_affine",)
     transformed = ("peaks", "valleys", "worn", "patchy")
     return {
         "spectra": DataSet("new spectra", chosen(plain, (HELD_OUT_SPECTRUM,))),
-        "surfaces": DataSet("new surfaces of fitted spectra", chosen(plain, (HELD_OUT_SURFACE,))),
-        "training": DataSet("the training set", chosen(plain, (TRAINING,)), ("calibrated", "calibrated, map")),
-        "one": DataSet("one longest wave a side", chosen(plain, (TRAINING, *tested), 1, 1)),
-        "plateau": DataSet("with plateau or instrument's filter", chosen(("plateau", "filtered"), tested)),
+        "surfaces": DataSet(
+            "new surfaces of fitted spectra", chosen(plain, (HELD_OUT_SURFACE,))
+        ),
+        "training": DataSet(
+            "the training set",
+            chosen(plain, (TRAINING,)),
+            ("calibrated", "calibrated, map"),
+        ),
+        "one": DataSet(
+            "one longest wave a side", chosen(plain, (TRAINING, *tested), 1, 1)
+        ),
+        "plateau": DataSet(
+            "with plateau or instrument's filter", chosen(("plateau", "filtered"), tested)
+        ),
         "stretched": DataSet("stretched", chosen(("stretched",), tested)),
         "transformed": DataSet("heights transformed", chosen(transformed, tested)),
         "earlier": DataSet("105 earlier surfaces", earlier(), ("MBMA fitted",)),
         "bem": DataSet("an older set, mean of 4", [older("bem")]),
         "gfmd": DataSet("molecular dynamics", [older("gfmd")]),
-        **{f"gfmd {top}": DataSet(f"the same, h_max {top} h_rms", [older("gfmd", top)]) for top in (3, 4)},
+        **{
+            f"gfmd {top}": DataSet(f"the same, h_max {top} h_rms", [older("gfmd", top)])
+            for top in (3, 4)
+        },
         "challenge": DataSet("contact challenge", [older("challenge")]),
         "rolloff": DataSet("two with plateau, by spectrum", [rolloff(0), rolloff(1)]),
         **{name: DataSet(title, [measured(name)]) for name, title in MEASURED.items()},
     }
 
 
-def summed_up(seen: Sequence[Case], found: FloatArray, low: float = LOW, high: float = HIGH) -> tuple[float, float]:
+def summed_up(
+    seen: Sequence[Case], found: FloatArray, low: float = LOW, high: float = HIGH
+) -> tuple[float, float]:
     """Root mean square of distances at contacts from `low` to `high`, and the share of these that is reached."""
     area = np.concatenate([one.area for one in seen])
     values = found[(area >= low) & (area <= high)]
@@ -203,15 +281,24 @@ def pocket_pressure(u: FloatArray, nu: float) -> FloatArray:
 def pocket_errors() -> list[list[Any]]:
     """Of both laws: name, median, 90% quantile and largest error [%] on held-out surfaces, number of surfaces."""
     seen = held_out()
-    found: dict[str, list[FloatArray]] = {"area at given pressure": [], "pressure at given separation": []}
+    found: dict[str, list[FloatArray]] = {
+        "area at given pressure": [],
+        "pressure at given separation": [],
+    }
     for one in seen:
         inside, spectrum = (one.area >= LOW) & (one.area <= HIGH), one.spectrum
         force, g = one.force[inside], float(spectrum.gradient)
         pressure = pocket_pressure(one.u[inside], float(spectrum.narrowness)) / g
-        laws = pocket_area(force, float(spectrum.alpha)) / one.area[inside], pressure / force
+        laws = (
+            pocket_area(force, float(spectrum.alpha)) / one.area[inside],
+            pressure / force,
+        )
         for misses, law in zip(found.values(), laws, strict=True):
             misses.append(100 * np.abs(law - 1))
-    return [[what, *np.quantile(np.concatenate(e), (0.5, 0.9, 1.0)), len(seen)] for what, e in found.items()]
+    return [
+        [what, *np.quantile(np.concatenate(e), (0.5, 0.9, 1.0)), len(seen)]
+        for what, e in found.items()
+    ]
 
 
 def theories_of(path: pathlib.Path) -> dict[str, Any]:
@@ -224,7 +311,8 @@ def theories_of(path: pathlib.Path) -> dict[str, Any]:
     found = {
         one.name: one
         for one in content.values()
-        if any(hasattr(one, function) for function in FUNCTIONS) and not isinstance(one, type | types.ModuleType)
+        if any(hasattr(one, function) for function in FUNCTIONS)
+        and not isinstance(one, type | types.ModuleType)
     }
     if own := {name: content[name] for name in FUNCTIONS if callable(content.get(name))}:
         found[content.get("name", path.stem)] = types.SimpleNamespace(**own)
@@ -240,19 +328,28 @@ def scores(theories: dict[str, Any]) -> str:
     """A table of theories, as objects or as functions of a `Case`, on all held-out self-affine surfaces."""
     seen, rows = held_out(), []
     for name, one in theories.items():
-        found = distances(seen, one if isinstance(one, types.FunctionType) else _theory(one))
-        sums = [[summed_up(seen, values, *ends) for ends in RANGES] for values in found.values()]
-        cells = [[rms for rms, _ in own] for own in sums] + [[reached for _, reached in sums[0]]]
+        found = distances(
+            seen, one if isinstance(one, types.FunctionType) else _theory(one)
+        )
+        sums = [
+            [summed_up(seen, values, *ends) for ends in RANGES]
+            for values in found.values()
+        ]
+        cells = [[rms for rms, _ in own] for own in sums] + [
+            [reached for _, reached in sums[0]]
+        ]
         rows.append([name, *(" / ".join(map(percent, values)) for values in cells)])
     return table(HEADER, rows)
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
+@click.argument(
+    "path", type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False)
+)
 def score(path: pathlib.Path) -> None:
     """Print how far the theories of the Python file PATH are from boundary elements.
 
-    Root mean squares of ln(theory/simulation) in percent, at 1-10% / 10-97% contact, on the surfaces of which none was
-    used in a fit; docs/data.md describes PATH.
+    Root mean squares of ln(theory/simulation) in percent, at 1-10% / 10-97% contact, on the
+    surfaces of which none was used in a fit; docs/data.md describes PATH.
     """
     click.echo(scores(theories_of(path)))

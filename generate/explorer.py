@@ -25,13 +25,35 @@ from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import REPORTED
 
 # with two numbers at a time, which browsers have learned by 2023
-ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", *c_code.FLAGS, "-s", "-msimd128")
+ZIG = (
+    "-m",
+    "ziglang",
+    "cc",
+    "-target",
+    "wasm32-wasi",
+    "-mexec-model=reactor",
+    *c_code.FLAGS,
+    "-s",
+    "-msimd128",
+)
 FUNCTIONS = (
-    *("mbma_total_of", "mbma_calibrated_of", "mbma_message", "mbma_spectrum_of", "mbma_surface_spectrum_of"),
+    *(
+        "mbma_total_of",
+        "mbma_calibrated_of",
+        "mbma_message",
+        "mbma_spectrum_of",
+        "mbma_surface_spectrum_of",
+    ),
     *("mbma_spectrum_contact_of", "mbma_spectrum_separation_of"),
 )
 LAW_FUNCTIONS = (
-    *("mbma_law_open", "mbma_law_at_overclosure", "mbma_law_and_slope", "mbma_law_overclosure", "mbma_law_flow"),
+    *(
+        "mbma_law_open",
+        "mbma_law_at_overclosure",
+        "mbma_law_and_slope",
+        "mbma_law_overclosure",
+        "mbma_law_flow",
+    ),
 )
 
 OPENINGS, STEPS = 5, 40
@@ -79,7 +101,12 @@ def explorer() -> None:
 
 
 def program() -> str | None:
-    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    return next(
+        filter(
+            None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+        ),
+        None,
+    )
 
 
 @contextlib.contextmanager
@@ -88,14 +115,18 @@ def browser() -> Iterator[Any]:
 
     with sync_playwright() as playwright:
         # as root, as often in CI, it only runs without a sandbox
-        opened = playwright.chromium.launch(executable_path=program(), args=["--no-sandbox"])
+        opened = playwright.chromium.launch(
+            executable_path=program(), args=["--no-sandbox"]
+        )
         yield opened
         opened.close()
 
 
 def visit(opened: Any, address: str, **options: Any) -> Any:
     """A tab with the page, once it has drawn; in a context of its own."""
-    tab = opened.new_context(**{"viewport": {"width": 1280, "height": 800}, **options}).new_page()
+    tab = opened.new_context(
+        **{"viewport": {"width": 1280, "height": 800}, **options}
+    ).new_page()
     tab.goto(address)
     tab.wait_for_selector("html[data-ready]", state="attached")
     return tab
@@ -103,22 +134,37 @@ def visit(opened: Any, address: str, **options: Any) -> Any:
 
 def measure() -> Measured:
     """docs/explorer.md: size and speed of the page, and its picture."""
-    text = explorer_page(Surface.named("concrete"), 13.3, "MPa", "calibrated", title="concrete road of Lorenz")
+    text = explorer_page(
+        Surface.named("concrete"),
+        13.3,
+        "MPa",
+        "calibrated",
+        title="concrete road of Lorenz",
+    )
     clocks, ready = dict[str, list[float]](), "document.documentElement.dataset.ready"
     with tempfile.TemporaryDirectory() as folder, browser() as opened:
         path = pathlib.Path(folder, "explorer.html")
         path.write_text(text, encoding="utf-8")
         openings = (visit(opened, path.as_uri()) for _ in range(OPENINGS))
-        clocks["opening to the first curves"] = [float(tab.evaluate(ready)) for tab in openings]
+        clocks["opening to the first curves"] = [
+            float(tab.evaluate(ready)) for tab in openings
+        ]
         for against in ("gap", "pressure"):
-            tab = visit(opened, f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson")
+            tab = visit(
+                opened,
+                f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson",
+            )
             tab.wait_for_timeout(1000)
             clock = [tab.evaluate(STEP, 400 + 10 * k) for k in range(STEPS)]
             clocks[f"a slider's step, three theories against {against}"] = clock
         tab = visit(opened, path.as_uri())
         tab.locator(".chart").first.hover(position={"x": 200, "y": 100})
         picture = tab.screenshot()
-    rows = [[name, statistics.median(clock), max(clock)] for name, clock in clocks.items()]
+    rows = [
+        [name, statistics.median(clock), max(clock)] for name, clock in clocks.items()
+    ]
     size = ["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", ""]
-    parts = {"numbers": table("quantity | median | largest", [size, *rows], "{} | {:.0f} ms")}
+    parts = {
+        "numbers": table("quantity | median | largest", [size, *rows], "{} | {:.0f} ms")
+    }
     return parts, {"docs/figures/explorer.png": picture}

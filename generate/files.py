@@ -23,7 +23,11 @@ SOLVER = (
     "mbma_tables.theories.mbma.half_space",
     "mbma_tables.theories.mbma.greenwood_tripp",
 )
-GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.theories.mbma.geometry", "mbma_tables.theories.mbma.island4d")
+GEOMETRY = (
+    "mbma_tables.surfaces.spectrum",
+    "mbma_tables.theories.mbma.geometry",
+    "mbma_tables.theories.mbma.island4d",
+)
 MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 

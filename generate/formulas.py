@@ -1,8 +1,8 @@
 """`python -m generate formulas`: fit the closed forms again, certify them on other samples.
 
-`theories/mbma/closed_forms.toml` is the one place where the forms are kept; its expressions are Python and
-C. docs/formula.md says how the terms were chosen. Samples are rounded, so that the same
-coefficients come out on all processors.
+`theories/mbma/closed_forms.toml` is the one place where the forms are kept; its expressions
+are Python and C. docs/formula.md says how the terms were chosen. Samples are rounded, so
+that the same coefficients come out on all processors.
 
 With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X,
 mu)), right as mu -> 0 whatever Q is. Log Q is its own limit at large X, which is the smooth sphere
@@ -198,7 +198,9 @@ def certificate(
         largest=float(f"{rounded_up:.3g}"),
         median=float(f"{np.median(error):.3g}"),
         points=error.size,
-        worst_at={name: float(f"{values[worst]:.4g}") for name, values in arguments.items()},
+        worst_at={
+            name: float(f"{values[worst]:.4g}") for name, values in arguments.items()
+        },
     )
 
 
@@ -266,7 +268,12 @@ def totals(count: int, seed: int, min_area: float = MIN_AREA) -> Samples:
     gap = np.maximum(rounded(top - r), -top)
     answer = contact(Surface(hurst, 1.0, zeta_1, 1.0, top), separation=gap)
     enough = answer.area > min_area
-    arguments = {"d_over_h_rms": gap, "h_max_over_h_rms": top, "zeta_1": zeta_1, "hurst": hurst}
+    arguments = {
+        "d_over_h_rms": gap,
+        "h_max_over_h_rms": top,
+        "zeta_1": zeta_1,
+        "hurst": hurst,
+    }
     results = {"pressure": np.asarray(answer.pressure), "area": np.asarray(answer.area)}
     return (
         {name: values[enough] for name, values in arguments.items()},
@@ -328,7 +335,9 @@ def samples_of_totals(
     on_branch = place > 1 - OVERLAP if branch == "far" else place < 1 + OVERLAP
     remainder = np.log(truth[function.result]) - values_of_steps["start"]
     target = rounded(remainder[on_branch])
-    on_samples = {letter: rounded(values_of_steps[letter][on_branch]) for letter in letters}
+    on_samples = {
+        letter: rounded(values_of_steps[letter][on_branch]) for letter in letters
+    }
     return on_samples, target, np.ones(target.size)
 
 
@@ -346,7 +355,9 @@ def coefficients(function: Function, name: str, text: str) -> FloatArray:
         values_of_steps, target, weight = samples_of_islands(function)
     else:
         letters = set[str]().union(*products)
-        values_of_steps, target, weight = samples_of_totals(function, name, start, letters)
+        values_of_steps, target, weight = samples_of_totals(
+            function, name, start, letters
+        )
 
     columns = []
     for product in products:
@@ -388,7 +399,9 @@ def refitted(function: Function, fits: Mapping[str, FloatArray], digits: int) ->
     """The steps of a function with these coefficients, of so many digits."""
     steps = {}
     for name, text in function.steps.items():
-        steps[name] = sum_text(text, rounded(fits[name], digits)) if name in fits else text
+        steps[name] = (
+            sum_text(text, rounded(fits[name], digits)) if name in fits else text
+        )
     return steps
 
 
@@ -409,15 +422,21 @@ def relative_errors(function: Function, steps: Steps, samples: Samples) -> Float
     return np.asarray(np.abs(value / truth[function.result] - 1))
 
 
-def shortest(function: Function, fits: Mapping[str, FloatArray], samples: Samples) -> Steps:
+def shortest(
+    function: Function, fits: Mapping[str, FloatArray], samples: Samples
+) -> Steps:
     """Steps with coefficients of the fewest digits whose largest error is about that of all."""
 
     def largest(digits: int) -> float:
-        return float(relative_errors(function, refitted(function, fits, digits), samples).max())
+        return float(
+            relative_errors(function, refitted(function, fits, digits), samples).max()
+        )
 
     slack = SLACK["totals" if function.form == "totals" else "phi"]
     allowed = slack * largest(MAX_DIGITS)
-    digits = next(digits for digits in itertools.count(MIN_DIGITS) if largest(digits) <= allowed)
+    digits = next(
+        digits for digits in itertools.count(MIN_DIGITS) if largest(digits) <= allowed
+    )
     return refitted(function, fits, digits)
 
 

@@ -16,8 +16,21 @@ from scipy.interpolate import RegularGridInterpolator
 
 from generate import files
 from generate.boundary_elements.evidence import Simulated, TheoryCurve, simulated
-from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.calibrated_file import FOLDS, bins, by_bin, fitted, law_table, rms, within, write_part
+from generate.boundary_elements.surfaces import (
+    HELD_OUT_SPECTRUM,
+    HELD_OUT_SURFACE,
+    TRAINING,
+)
+from generate.calibrated_file import (
+    FOLDS,
+    bins,
+    by_bin,
+    fitted,
+    law_table,
+    rms,
+    within,
+    write_part,
+)
 from generate.splines import coefficients
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
@@ -26,7 +39,13 @@ from mbma_tables.data import FILE
 from mbma_tables.quantities import effective_medium as leakage
 from mbma_tables.quantities.effective_medium import FlowConstants
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.calibrated.formulas import Constants, Law, Spectrum, force_at_area, light_factor
+from mbma_tables.theories.calibrated.formulas import (
+    Constants,
+    Law,
+    Spectrum,
+    force_at_area,
+    light_factor,
+)
 from mbma_tables.theories.calibrated.table import load
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma.theory import Mbma
@@ -91,7 +110,9 @@ class Case(Simulated):
         """
         if self.kind == "yielded":
             hardness = float(self.node[-1]) * self.spectrum.gradient
-            curve = TheoryCurve(Yielding(get_theory("calibrated"), hardness), self.surface)
+            curve = TheoryCurve(
+                Yielding(get_theory("calibrated"), hardness), self.surface
+            )
             return curve.area(self.force), curve.separation(self.force)
         law = Law(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)
@@ -173,7 +194,9 @@ class Flow:
         for row in np.flatnonzero(self.area < flow.threshold):
             leaves = share[row] > 0
             rising_cover = cover[row][leaves][::-1]
-            gap = np.interp(flow.threshold, rising_cover, self._gaps.mean[row][leaves][::-1])
+            gap = np.interp(
+                flow.threshold, rising_cover, self._gaps.mean[row][leaves][::-1]
+            )
             log_k[row] = 3 * np.log(max(gap, 1e-300))
         return log_k
 
@@ -325,7 +348,9 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
 
     Nothing was fitted to these.
     """
-    alike = [flow for flow in flows if flow.one.kind == "self_affine" and flow.one.isotropic]
+    alike = [
+        flow for flow in flows if flow.one.kind == "self_affine" and flow.one.isotropic
+    ]
     errors_of_theories = {}
     for theory in (Mbma(outside="nan"), Persson(), GreenwoodWilliamson()):
         parts = []
@@ -408,7 +433,9 @@ def dataset(surfaces: Sequence[Case], contact: Constants) -> xr.Dataset:
         "coverage": np.array(coverage(flows, constants, stated["calibrated"])),
     }
     constants_of_laws = {"flow": constants, "law": contact}
-    return law_table("leakage", NODES, COVERED, arrays, constants=constants_of_laws, facts=facts)
+    return law_table(
+        "leakage", NODES, COVERED, arrays, constants=constants_of_laws, facts=facts
+    )
 
 
 def certificate(
@@ -473,7 +500,9 @@ def write(path: pathlib.Path, evidence: pathlib.Path = FILE) -> xr.Dataset:
 
 
 @click.command()
-@click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE)
+@click.argument(
+    "evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=FILE
+)
 @click.option(
     "--table",
     type=click.Path(path_type=pathlib.Path),

@@ -1,8 +1,9 @@
 """Pages of the documentation: hand-written Markdown, with blocks and figures that programs fill.
 
-`PAGES` has for each page the function that measures it, as "module:function". It returns the text of the blocks between
-``<!-- measured: BLOCK -->`` and ``<!-- end -->`` of the page, and figures and data by their path in the checkout.
-``python -m generate pages NAME`` writes them.
+`PAGES` has for each page the function that measures it, as "module:function". It returns
+the text of the blocks between ``<!-- measured: BLOCK -->`` and ``<!-- end -->`` of the
+page, and figures and data by their path in the checkout. ``python -m generate pages NAME``
+writes them.
 """
 
 import contextlib
@@ -22,10 +23,16 @@ from mbma_tables.common.files import write_file
 from mbma_tables.common.plots import new_figure, to_picture
 
 PAGES = {
-    **{name: f"pages.library:{name}" for name in ("architecture", "formula", "readme", "tables", "theories")},
+    **{
+        name: f"pages.library:{name}"
+        for name in ("architecture", "formula", "readme", "tables", "theories")
+    },
     **{name: f"pages.laws:{name}" for name in ("calibrated", "leakage", "yielding")},
     **{name: f"pages.maps:{name}" for name in ("gallery", "machined", "maps")},
-    **{name: f"pages.simulations:{name}" for name in ("data", "fidelity", "joints", "lubrication", "rough_bodies")},
+    **{
+        name: f"pages.simulations:{name}"
+        for name in ("data", "fidelity", "joints", "lubrication", "rough_bodies")
+    },
     **{name: f"pages.{name}:measure" for name in ("cost", "stability")},
     "explorer": "explorer:measure",
 }
@@ -44,16 +51,27 @@ def fill(text: str, parts: Mapping[str, str]) -> str:
     """Replace the marked blocks of a page; marks and parts must have the same names."""
     found = [match[2] for match in MARKED.finditer(text)]
     if sorted(found) != sorted(parts):
-        raise click.ClickException(f"the page marks {sorted(found)}, measured were {sorted(parts)}")
+        raise click.ClickException(
+            f"the page marks {sorted(found)}, measured were {sorted(parts)}"
+        )
     return MARKED.sub(lambda match: f"{match[1]}\n{parts[match[2]]}\n\n{match[3]}", text)
 
 
-def write(name: str, parts: Mapping[str, str], files: Mapping[str, Any], out: pathlib.Path) -> list[pathlib.Path]:
+def write(
+    name: str, parts: Mapping[str, str], files: Mapping[str, Any], out: pathlib.Path
+) -> list[pathlib.Path]:
     """Write a page and its files, given as bytes or as figures, below a folder; returns their paths."""
     page = "README.md" if name == "readme" else f"docs/{name}.md"
-    contents = {page: fill((ROOT / page).read_text(encoding="utf-8"), parts).encode(), **files}
+    contents = {
+        page: fill((ROOT / page).read_text(encoding="utf-8"), parts).encode(),
+        **files,
+    }
     for place, content in contents.items():
-        write_file(out / place, content if isinstance(content, bytes) else svg(content), make_folders=True)
+        write_file(
+            out / place,
+            content if isinstance(content, bytes) else svg(content),
+            make_folders=True,
+        )
     return [out / place for place in contents]
 
 
@@ -69,8 +87,8 @@ def printed(command: str) -> str:
 def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> str:
     """A Markdown table, of names and formats of columns with bars between them; the last format holds for the rest.
 
-    Strings are copied, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple fills a format
-    of several fields.
+    Strings are copied, None leaves a cell empty, a number that is not finite becomes a
+    dash, and a tuple fills a format of several fields.
     """
     known = formats.split(" | ")
 
@@ -82,7 +100,11 @@ def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> st
             return "—"
         return known[min(column, len(known) - 1)].format(*values)
 
-    lines = [header.split(" | "), ["---"] * (header.count(" | ") + 1), *(map(cell, itertools.count(), r) for r in rows)]
+    lines = [
+        header.split(" | "),
+        ["---"] * (header.count(" | ") + 1),
+        *(map(cell, itertools.count(), r) for r in rows),
+    ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
@@ -93,7 +115,10 @@ def percent(value: float) -> str:
 
 def duration(seconds: float) -> str:
     """A time to two digits, in its unit."""
-    unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s), ("ns", 1e-9))
+    unit, size = next(
+        ((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s),
+        ("ns", 1e-9),
+    )
     return f"{float(f'{seconds / size:.2g}'):g} {unit}"
 
 
@@ -102,7 +127,9 @@ def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
     return " | ".join(form.format(100 * a, 100 * b) for a, b in itertools.pairwise(edges))
 
 
-def panels(rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any) -> tuple[Any, Any]:
+def panels(
+    rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any
+) -> tuple[Any, Any]:
     figure = new_figure(*size)
     return figure, figure.subplots(rows, columns, **options)
 

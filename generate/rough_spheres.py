@@ -1,7 +1,8 @@
 """``python -m generate rough_spheres``: boundary elements of rough spheres on a flat.
 
-Gaussian roughness on spheres of radius `RADIUS` against a rigid flat, on a half-space that is not periodic (Tamaas with
-the convolution of DC-FFT), E* = 1, lengths in sampling steps. Their rows are a group of docs/data/boundary_elements.nc.
+Gaussian roughness on spheres of radius `RADIUS` against a rigid flat, on a half-space that
+is not periodic (Tamaas with the convolution of DC-FFT), E* = 1, lengths in sampling steps.
+Their rows are a group of docs/data/boundary_elements.nc.
 """
 
 import itertools
@@ -18,7 +19,13 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 
 POINTS, SHORTEST, RADIUS, TOLERANCE = 320, 6.0, 3000.0, 1e-5
-HURSTS, LONGEST, HEIGHTS, EACH, FIRST_SEED = (0.5, 0.8), (24.0, 48.0), (0.1, 0.3, 1.0), 2, 71
+HURSTS, LONGEST, HEIGHTS, EACH, FIRST_SEED = (
+    (0.5, 0.8),
+    (24.0, 48.0),
+    (0.1, 0.3, 1.0),
+    2,
+    71,
+)
 SMOOTH_RADII = (10.0, 20.0, 35.0, 60.0)  # of Hertz's contact at the loads
 
 
@@ -35,14 +42,23 @@ def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
     for a in SMOOTH_RADII:
         force = 4 / 3 * a**3 / RADIUS
         found, pressure = contact.press(force / r.size), contact.traction
-        yield force, found["approach"], found["area"] * r.size, float(np.mean(pressure * r) / pressure.mean())
+        yield (
+            force,
+            found["approach"],
+            found["area"] * r.size,
+            float(np.mean(pressure * r) / pressure.mean()),
+        )
 
 
 @click.command()
 def rough_spheres() -> None:
     """Press rough spheres on a flat, for docs/rough_bodies.md: two minutes."""
     rows = []
-    for seed, design in enumerate(itertools.product(HURSTS, LONGEST, HEIGHTS, range(EACH)), FIRST_SEED):
-        rows += [[*design[:-1], seed, *row] for row in simulated(heights(*design[:-1], seed))]
+    for seed, design in enumerate(
+        itertools.product(HURSTS, LONGEST, HEIGHTS, range(EACH)), FIRST_SEED
+    ):
+        rows += [
+            [*design[:-1], seed, *row] for row in simulated(heights(*design[:-1], seed))
+        ]
     write_part(FILE, of_contacts("rough_spheres", np.transpose(rows)), "rough_spheres")
     click.echo(FILE)

@@ -55,6 +55,8 @@ def coefficients(values: FloatArray, degree: int, axes: int) -> FloatArray:
         # column by column: the sums do not depend on how a library blocks them
         for column in range(solved.shape[1]):
             right_side = solved[:, column]
-            solved[:, column] = scipy.linalg.lu_solve(factors, right_side, check_finite=False)
+            solved[:, column] = scipy.linalg.lu_solve(
+                factors, right_side, check_finite=False
+            )
         result = np.moveaxis(solved.reshape(-1, *moved.shape[1:]), 0, axis)
     return np.ascontiguousarray(result)

@@ -25,7 +25,9 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.theories.calibrated.formulas import Spectrum
 
 FORCES = np.geomspace(1e-7, 30.0, 400)
-BEFORE = 10.0  # range of ln s, below the first wavenumber, over which v is integrated, too
+BEFORE = (
+    10.0  # range of ln s, below the first wavenumber, over which v is integrated, too
+)
 STEPS = 60  # of the iteration for P
 
 
@@ -74,14 +76,20 @@ class Corrected:
         log_v = solution.y.T
         return np.asarray(erf(np.sqrt(2) * FORCES * np.exp(-log_v / 2)))
 
-    def at_pressure(self, surface: Any, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def at_pressure(
+        self, surface: Any, pressure: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """A/A0 and mean separation of a self-affine surface at F/(A0 E*)."""
         spectrum = Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
         cover = self.cover(np.append(spectrum.below, 1.0))
         # all wavenumbers are below the end of the spectrum
         area = cover[-1]
         P = cover[:-1]
-        energy = (spectrum.x * spectrum.variance) @ (P * self._weight(P)) / (4 * spectrum.gradient)
+        energy = (
+            (spectrum.x * spectrum.variance)
+            @ (P * self._weight(P))
+            / (4 * spectrum.gradient)
+        )
         # u is the integral of dU/F from F to infinity
         log_force = np.log(FORCES)
         slope = CubicSpline(log_force, energy).derivative()(log_force) / FORCES

@@ -27,15 +27,17 @@ def seconds_of_work() -> float:
 def measure(run: Callable[[], Any]) -> tuple[float, float]:
     """Cost of one call, whose first is not timed, and the seconds of the fixed work.
 
-    Both are timed in turns, each call against the work before and after it, and the median ratio is taken: a
-    machine that slows down for a while slows both.
+    Both are timed in turns, each call against the work before and after it, and the median
+    ratio is taken: a machine that slows down for a while slows both.
     """
     run()
     seconds_of_work()
     # short runs are repeated until the clock and its calls no longer count
     calls = max(1, math.ceil(2e-3 / max(seconds_of(run), 1e-7)))
     works, ratios, started = [seconds_of_work()], list[float](), time.process_time()
-    while len(ratios) < ROUNDS[1] and (len(ratios) < ROUNDS[0] or time.process_time() - started <= BUDGET):
+    while len(ratios) < ROUNDS[1] and (
+        len(ratios) < ROUNDS[0] or time.process_time() - started <= BUDGET
+    ):
         spent = seconds_of(run, calls)
         works.append(seconds_of_work())
         ratios.append(2 * spent / (works[-2] + works[-1]))

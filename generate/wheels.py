@@ -35,21 +35,52 @@ def faults(wheel: pathlib.Path, platform: str) -> Iterator[str]:
     if platform == SOURCE:
         with tarfile.open(wheel) as archive:
             held = {name.partition("/")[2] for name in archive.getnames()}
-        tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-        yield from (f"{name} is missing" for name in tracked.splitlines() if name[0] != "." and name not in held)
+        tracked = subprocess.run(
+            ["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True
+        ).stdout
+        yield from (
+            f"{name} is missing"
+            for name in tracked.splitlines()
+            if name[0] != "." and name not in held
+        )
         return
-    levels = ["plain", "x86_64_v3", "x86_64_v4"] if PLATFORMS[platform].startswith("x86_64") else ["plain"]
+    levels = (
+        ["plain", "x86_64_v3", "x86_64_v4"]
+        if PLATFORMS[platform].startswith("x86_64")
+        else ["plain"]
+    )
     suffix = ".pyd" if platform == "win_amd64" else ".abi3.so"
     with zipfile.ZipFile(wheel) as packed:
         names = packed.namelist()
-        (about,) = (packed.read(name).decode() for name in names if name.endswith(".dist-info/WHEEL"))
+        (about,) = (
+            packed.read(name).decode()
+            for name in names
+            if name.endswith(".dist-info/WHEEL")
+        )
     tag = f"cp311-abi3-{platform}"
-    if not wheel.name.endswith(f"-{tag}.whl") or f"Tag: {tag}\n" not in about or "Purelib: false" not in about:
+    if (
+        not wheel.name.endswith(f"-{tag}.whl")
+        or f"Tag: {tag}\n" not in about
+        or "Purelib: false" not in about
+    ):
         yield f"it is not tagged {tag}"
     expected = [f"mbma_tables/core/_{level}{suffix}" for level in levels]
-    if (found := sorted(name for name in names if name.endswith((".so", ".pyd", ".dylib", ".dll")))) != expected:
+    if (
+        found := sorted(
+            name for name in names if name.endswith((".so", ".pyd", ".dylib", ".dll"))
+        )
+    ) != expected:
         yield f"its modules are {found}, not {expected}"
-    audit = [sys.executable, "-m", "abi3audit", "--strict", "--verbose", "--assume-minimum-abi3", "3.11", str(wheel)]
+    audit = [
+        sys.executable,
+        "-m",
+        "abi3audit",
+        "--strict",
+        "--verbose",
+        "--assume-minimum-abi3",
+        "3.11",
+        str(wheel),
+    ]
     audited = subprocess.run(audit, capture_output=True, text=True)
     if audited.returncode:
         yield " ".join((audited.stdout + audited.stderr).split())
@@ -63,8 +94,13 @@ def build(platform: str, out: pathlib.Path) -> pathlib.Path:
         to = ["bdist_wheel", "--plat-name", platform, "--bdist-dir", f"{folder}/wheel"]
         to = [*(["sdist"] if platform == SOURCE else to), "--dist-dir", f"{folder}/dist"]
         # what zig makes of each platform's C library is kept, Windows' takes a minute
-        kept = {f"ZIG_{name}_CACHE_DIR": str(ROOT / "build" / "zig") for name in ("GLOBAL", "LOCAL")}
-        environment = kept | os.environ | {"MBMA_TABLES_TARGET": PLATFORMS.get(platform, "")}
+        kept = {
+            f"ZIG_{name}_CACHE_DIR": str(ROOT / "build" / "zig")
+            for name in ("GLOBAL", "LOCAL")
+        }
+        environment = (
+            kept | os.environ | {"MBMA_TABLES_TARGET": PLATFORMS.get(platform, "")}
+        )
         command = [sys.executable, "-W", "ignore", "setup.py", "--quiet", *where, *to]
         subprocess.run(command, cwd=ROOT, env=environment, check=True)
         (wheel,) = pathlib.Path(folder, "dist").iterdir()
@@ -73,8 +109,15 @@ def build(platform: str, out: pathlib.Path) -> pathlib.Path:
 
 
 @click.command()
-@click.argument("platforms", nargs=-1, type=click.Choice([*PLATFORMS, SOURCE, "all"]), required=True)
-@click.option("--out", type=click.Path(path_type=pathlib.Path, file_okay=False), default=ROOT / "dist", help="Folder.")
+@click.argument(
+    "platforms", nargs=-1, type=click.Choice([*PLATFORMS, SOURCE, "all"]), required=True
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=pathlib.Path, file_okay=False),
+    default=ROOT / "dist",
+    help="Folder.",
+)
 def wheels(platforms: tuple[str, ...], out: pathlib.Path) -> None:
     """Build wheels and the source distribution, and look into them; needs the extra "wheels"."""
     for platform in [*PLATFORMS, SOURCE] if "all" in platforms else platforms:

@@ -23,10 +23,21 @@ def end_with(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def results(label: str, work: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], workers: int = 1) -> Iterator[Any]:
+def results(
+    label: str,
+    work: Callable[..., Any],
+    jobs: Sequence[tuple[Any, ...]],
+    workers: int = 1,
+) -> Iterator[Any]:
     """``work(*job)`` of each job, in order, with a progress bar of that name where stderr is a terminal."""
     # started afresh: threads and forks do not mix
     start = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(workers, start, end_with, (os.getpid(),)) as pool:
-        found = itertools.starmap(work, jobs) if workers == 1 else pool.map(work, *zip(*jobs, strict=True))
+    with concurrent.futures.ProcessPoolExecutor(
+        workers, start, end_with, (os.getpid(),)
+    ) as pool:
+        found = (
+            itertools.starmap(work, jobs)
+            if workers == 1
+            else pool.map(work, *zip(*jobs, strict=True))
+        )
         yield from tqdm(found, label, len(jobs), disable=None)

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from mbma_tables.scenes.scene import Scene as Scene
     from mbma_tables.surfaces.surface import Surface as Surface
     from mbma_tables.theories.mbma import greenwood_tripp as greenwood_tripp
-    from mbma_tables.theories.mbma.greenwood_tripp import height_integral as height_integral
+    from mbma_tables.theories.mbma.greenwood_tripp import (
+        height_integral as height_integral,
+    )
     from mbma_tables.theories.mbma.island import Island as Island
     from mbma_tables.theories.mbma.island import island as island
     from mbma_tables.theories.mbma.tables import open_table as open_table

@@ -16,7 +16,8 @@ def main() -> None:
     except (KeyboardInterrupt, SystemExit) as end:
         if isinstance(end, SystemExit) and end.code != INTERRUPTED:
             raise
-        # Python would end by the signal instead where it fell into code that `exec` ran, such as a dataclass
+        # Python would end by the signal instead where it fell into code that `exec` ran,
+        # such as a dataclass
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError):
                 stream.flush()

@@ -25,7 +25,10 @@ def read_groups(path: pathlib.Path) -> dict[str, Any]:
     with HDF5_LOCK:
         with netCDF4.Dataset(path) as opened:
             names = ("/", *opened.groups)
-        return {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}
+        return {
+            name: xarray.load_dataset(path, group=name, engine="netcdf4")
+            for name in names
+        }
 
 
 def boundary_elements(path: os.PathLike[str] | str | None = None) -> xr.DataTree:
@@ -34,15 +37,16 @@ def boundary_elements(path: os.PathLike[str] | str | None = None) -> xr.DataTree
     Parameters
     ----------
     path : path-like, optional
-        The file ``boundary_elements.nc``; by default that of the clone or source distribution which contains the
-        package. Wheels do not contain it.
+        The file ``boundary_elements.nc``; by default that of the clone or source
+        distribution which contains the package. Wheels do not contain it.
 
     Returns
     -------
     xarray.DataTree
-        In memory. ``boundary_elements()["elastic"]`` has arrays of shape (surface, load): ``force`` over A0 E* g with
-        the rms gradient g, ``area`` over A0, ``mean_separation`` in h_rms, ``stiffness``, ``energy``, and what each
-        surface is made of. Attributes describe every variable and its unit.
+        In memory. ``boundary_elements()["elastic"]`` has arrays of shape (surface, load):
+        ``force`` over A0 E* g with the rms gradient g, ``area`` over A0,
+        ``mean_separation`` in h_rms, ``stiffness``, ``energy``, and what each surface is
+        made of. Attributes describe every variable and its unit.
 
     Raises
     ------

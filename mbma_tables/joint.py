@@ -54,7 +54,10 @@ Part = AnySurface | Mapping[str, Any]
 CONDUCTANCE = "W/(m^2 K)"
 FACES = ("part_a", "part_b")
 EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}'
-RANGE, POINTS = (1e-5, 0.3), 41  # pressures over the hardness, and their number, in pictures
+RANGE, POINTS = (
+    (1e-5, 0.3),
+    41,
+)  # pressures over the hardness, and their number, in pictures
 
 
 def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
@@ -79,17 +82,20 @@ class Joint(Displayed):
     Parameters
     ----------
     part_a, part_b : Surface or mapping
-        Roughness of each part: a surface (from a map, a profile, a spectrum or five numbers); the arguments of
-        `Surface.from_roughness` without a highest point; or those of `Surface.from_map`, with the file under "map".
-        Without `part_b` the other face is smooth.
+        Roughness of each part: a surface (from a map, a profile, a spectrum or five
+        numbers); the arguments of `Surface.from_roughness` without a highest point; or
+        those of `Surface.from_map`, with the file under "map". Without `part_b` the other
+        face is smooth.
     materials : str, Metal, mapping, or pair of them
-        Metals of the parts, from `mbma_tables.materials.METALS`, or the arguments of `materials.Metal` by name; one if
-        both are the same.
+        Metals of the parts, from `mbma_tables.materials.METALS`, or the arguments of
+        `materials.Metal` by name; one if both are the same.
     nominal_area : float or str, optional
-        A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`); needed for parts that are
-        mappings. Without it, surfaces keep their own highest point.
+        A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`);
+        needed for parts that are mappings. Without it, surfaces keep their own highest
+        point.
     hardness : float or str, optional
-        Of the softer metal, as for `contact`; by default that of `materials`, whose temper must then be named.
+        Of the softer metal, as for `contact`; by default that of `materials`, whose temper
+        must then be named.
     friction : float, optional
         Coefficient of friction, for friction cards of solvers.
     direction : {"along", "across"}, optional
@@ -112,8 +118,9 @@ class Joint(Displayed):
     Raises
     ------
     InputError, OutOfRangeError
-        For any argument that a result would refuse later: the names of gas, theory and metals, the hardness, the
-        numbers of a face, of which all that are missing are named at once.
+        For any argument that a result would refuse later: the names of gas, theory and
+        metals, the hardness, the numbers of a face, of which all that are missing are named
+        at once.
 
     Examples
     --------
@@ -133,7 +140,9 @@ class Joint(Displayed):
     part_a: Part
     part_b: Part | None = None
     _: dataclasses.KW_ONLY
-    materials: str | Metal | Mapping[str, Any] | Pair | Sequence[str | Metal | Mapping[str, Any]]
+    materials: (
+        str | Metal | Mapping[str, Any] | Pair | Sequence[str | Metal | Mapping[str, Any]]
+    )
     nominal_area: float | str | None = None
     hardness: float | str | None = None
     friction: float | None = None
@@ -158,7 +167,9 @@ class Joint(Displayed):
         area = None if drawn and len(faces) == 1 else self.nominal_area
         surface = equivalent(list(faces.values()), area)
         if surface.shape != ():
-            raise InputError(f"a joint is of one surface, got a batch of shape {surface.shape}")
+            raise InputError(
+                f"a joint is of one surface, got a batch of shape {surface.shape}"
+            )
         object.__setattr__(self, "surface", surface)
         object.__setattr__(self, "pair", pair(self.materials))
         self._check()
@@ -168,14 +179,18 @@ class Joint(Displayed):
         if isinstance(part, AnySurface):
             return part
         if not isinstance(part, Mapping):
-            raise InputError(f"{name} is a surface, or its numbers by name, such as {EXAMPLE}; got {part!r}")
+            raise InputError(
+                f"{name} is a surface, or its numbers by name, such as {EXAMPLE}; got {part!r}"
+            )
         try:
             if "map" in part:
                 options = {key: value for key, value in part.items() if key != "map"}
                 return Surface.from_map(part["map"], **options)
             if "nominal_area" in part:
                 raise InputError("nominal_area is of the joint: give it beside the parts")
-            made: AnySurface = Surface.from_roughness(**part, nominal_area=self.nominal_area)
+            made: AnySurface = Surface.from_roughness(
+                **part, nominal_area=self.nominal_area
+            )
         except TypeError as fault:
             raise InputError(f"{name}: {fault}") from None
         except OutOfRangeError as fault:
@@ -186,13 +201,19 @@ class Joint(Displayed):
 
     def _check(self) -> None:
         """Refuse at once what single results would refuse."""
-        checked_gas(self.gas, self.temperature, Units(stress="Pa").number("gas_pressure", self.gas_pressure))
+        checked_gas(
+            self.gas,
+            self.temperature,
+            Units(stress="Pa").number("gas_pressure", self.gas_pressure),
+        )
         checked_friction(self.friction)
         checked_direction(self.direction, self.surface)
         if self.hardness is not None:
             number = checked_hardness(hardness_in(Units(stress="GPa"), self.hardness))
             if number.ndim:
-                raise InputError(f"hardness of a joint is one number, got shape {number.shape}")
+                raise InputError(
+                    f"hardness of a joint is one number, got shape {number.shape}"
+                )
         if isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
             surface: Any = self.surface
@@ -280,9 +301,10 @@ class Joint(Displayed):
         Returns
         -------
         Sensitivity
-            With a row for each number of each face, "part_a.Rq", "part_a.longest"; Young's moduli of both bodies,
-            "part_a.E" and "part_b.E"; the nominal area, the hardness of the softer metal, and the pressure. Of a face
-            given by a spectrum or a map as for `sensitivity`: "part_a.heights", "part_a.lengths", its cut-offs.
+            With a row for each number of each face, "part_a.Rq", "part_a.longest"; Young's
+            moduli of both bodies, "part_a.E" and "part_b.E"; the nominal area, the hardness
+            of the softer metal, and the pressure. Of a face given by a spectrum or a map as
+            for `sensitivity`: "part_a.heights", "part_a.lengths", its cut-offs.
 
         Raises
         ------
@@ -312,7 +334,9 @@ class Joint(Displayed):
             self._unknowns(chosen),
             chosen,
             units,
-            moduli={f"{name}.E": metal.E for name, metal in zip(FACES, bodies, strict=True)},
+            moduli={
+                f"{name}.E": metal.E for name, metal in zip(FACES, bodies, strict=True)
+            },
             modulus_of=modulus_of,
             by="pressure",
             value=units.number("pressure", pressure),
@@ -326,29 +350,46 @@ class Joint(Displayed):
         alone = len(self._faces) == 1
         if alone:
             own = unknowns_of(self.surface, theory, unit)
-            if not overridden or isinstance(own, OfOneMap) or "nominal_area" in own.numbers:
+            if (
+                not overridden
+                or isinstance(own, OfOneMap)
+                or "nominal_area" in own.numbers
+            ):
                 labels = {name: f"part_a.{name}" for name in own.numbers}
                 if overridden:
                     labels["nominal_area"] = "nominal_area"
                 return dataclasses.replace(own, labels=labels)
-        faces = {name: unknowns_of(face, theory if alone else None, unit) for name, face in self._faces.items()}
+        faces = {
+            name: unknowns_of(face, theory if alone else None, unit)
+            for name, face in self._faces.items()
+        }
         numbers: dict[str, float] = {}
         one_sided: dict[str, float] = {}
         fixed: dict[str, dict[str, float]] = {}
         for part, face in faces.items():
             # the nominal area determines the highest point of Gaussian heights
-            fixed[part] = {name: number for name, number in face.numbers.items() if name in overridden}
+            fixed[part] = {
+                name: number
+                for name, number in face.numbers.items()
+                if name in overridden
+            }
             for name, number in face.numbers.items():
                 if name not in overridden:
                     numbers[f"{part}.{name}"] = number
             one_sided |= {f"{part}.{name}": sign for name, sign in face.one_sided.items()}
         if overridden:
-            numbers["nominal_area"] = Units(unit).number("nominal_area", self.nominal_area)
+            numbers["nominal_area"] = Units(unit).number(
+                "nominal_area", self.nominal_area
+            )
 
         def make(**given: Any) -> AnySurface:
             surfaces = []
             for part, face in faces.items():
-                own = {name: given[f"{part}.{name}"] for name in face.numbers if name not in fixed[part]}
+                own = {
+                    name: given[f"{part}.{name}"]
+                    for name in face.numbers
+                    if name not in fixed[part]
+                }
                 surfaces.append(face.make(**own, **fixed[part]))
             return equivalent(surfaces, given.get("nominal_area"))
 
@@ -378,33 +419,38 @@ class Joint(Displayed):
     ) -> str | bytes | list[pathlib.Path]:
         """The joint as input of a solver, as data or as code, for every target of laws of `mbma export`.
 
-        Conductance is that of the solid spots and of the gas in the gaps together in rows. Laws as code have that of
-        the solid spots, and their comments state that of the gas at some pressures.
+        Conductance is that of the solid spots and of the gas in the gaps together in rows.
+        Laws as code have that of the solid spots, and their comments state that of the gas
+        at some pressures.
 
         Parameters
         ----------
         target : str
-            A target of `mbma export` that accepts a law: rows such as "calculix", "abaqus", "csv", functions such as
-            "c-law", "modelica-law" and "fmu".
+            A target of `mbma export` that accepts a law: rows such as "calculix", "abaqus",
+            "csv", functions such as "c-law", "modelica-law" and "fmu".
         pressures : pair of float or str
             Smallest and largest pressure of rows; plain numbers in the unit of stress of the file.
         name : str, optional
-            Name of the surface interaction or of the functions, or what names begin with; formats without names have
-            it in their comments.
+            Name of the surface interaction or of the functions, or what names begin with;
+            formats without names have it in their comments.
         heat : bool
             Whether the conductance is also written.
         friction_pressure : float or str, optional
-            Pressure at which a friction card's tangential stiffness is computed; default: the geometric mean.
+            Pressure at which a friction card's tangential stiffness is computed; default:
+            the geometric mean.
         path : path-like, optional
-            File to write, and beside it those that belong to it, by the end that the target gives them.
+            File to write, and beside it those that belong to it, by the end that the target
+            gives them.
         quantity : str or sequence of str, optional
-            Of the rows, as for `mbma export --quantity`; several for targets "lsdyna", "getdp" and "moose-function".
-            Default: conductance, with the pressure in solvers that have both; without `heat` pressure.
+            Of the rows, as for `mbma export --quantity`; several for targets "lsdyna",
+            "getdp" and "moose-function". Default: conductance, with the pressure in solvers
+            that have both; without `heat` pressure.
         rows, rtol : int and float, optional
-            Number of rows, or their largest error of linear interpolation; by default as few rows as 1e-3 needs, or
-            as many as the program keeps.
+            Number of rows, or their largest error of linear interpolation; by default as
+            few rows as 1e-3 needs, or as many as the program keeps.
         length_unit, stress_unit : str, optional
-            Of the file: mm and MPa, with conductance in mW/(mm^2 K), or those that the program prescribes.
+            Of the file: mm and MPa, with conductance in mW/(mm^2 K), or those that the
+            program prescribes.
         leakage : bool
             Functions have the flow coefficient of the gaps, too.
         peklenik : float, optional
@@ -417,14 +463,15 @@ class Joint(Displayed):
         Returns
         -------
         str, bytes or list of pathlib.Path
-            Without a path the first file of the target, bytes of a binary format; with a path the paths of all files.
-            Solver input has a friction card if the joint has a coefficient of friction; functions contain the
-            tangential stiffness.
+            Without a path the first file of the target, bytes of a binary format; with a
+            path the paths of all files. Solver input has a friction card if the joint has a
+            coefficient of friction; functions contain the tangential stiffness.
 
         Raises
         ------
         InputError
-            For an option that the target does not take, and for a target that is several files without a path.
+            For an option that the target does not take, and for a target that is several
+            files without a path.
 
         Examples
         --------
@@ -491,36 +538,64 @@ class Joint(Displayed):
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""
-        held = self.quantities(self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist()))
-        return dataset_of({name: each._replace(dims=("pressure",)) for name, each in held.items()}, self.facts())
+        held = self.quantities(
+            self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist())
+        )
+        return dataset_of(
+            {name: each._replace(dims=("pressure",)) for name, each in held.items()},
+            self.facts(),
+        )
 
     def quantities(self, found: Contact) -> dict[str, Variable]:
         """Values, units, meanings and model uncertainties of a contact of this joint, by name."""
         units = found.units
         stiff, gap = units["stiffness"], units["mean_separation"]
-        sheared, solid = found.tangential(self.friction, direction=self.direction), found.conductance()
+        sheared, solid = (
+            found.tangential(self.friction, direction=self.direction),
+            found.conductance(),
+        )
         gas = found.gap_conductance(self.gas, self.temperature, self.gas_pressure)
         sd = "model uncertainty (1 sd) of ln"
         return {
-            "pressure": Variable(found.pressure, units["pressure"], "force over nominal area"),
+            "pressure": Variable(
+                found.pressure, units["pressure"], "force over nominal area"
+            ),
             "area": Variable(found.area, "1", "real over nominal contact area"),
             "area_scatter": Variable(found.area_scatter, "1", f"{sd} area"),
             "mean_separation": Variable(found.mean_separation, gap, "mean gap"),
-            "separation_scatter": Variable(found.separation_scatter, gap, "model uncertainty (1 sd) of the mean gap"),
+            "separation_scatter": Variable(
+                found.separation_scatter, gap, "model uncertainty (1 sd) of the mean gap"
+            ),
             "stiffness": Variable(found.stiffness, stiff, "-dp/du of loading"),
-            "stiffness_scatter": Variable(found.stiffness_scatter, "1", f"{sd} stiffness; not known where it yields"),
-            "unloading_stiffness": Variable(found.unloading_stiffness, stiff, "-dp/du of a small unloading"),
-            "tangential_stiffness": Variable(sheared.stiffness, stiff, "shear stress over displacement before slip"),
+            "stiffness_scatter": Variable(
+                found.stiffness_scatter, "1", f"{sd} stiffness; not known where it yields"
+            ),
+            "unloading_stiffness": Variable(
+                found.unloading_stiffness, stiff, "-dp/du of a small unloading"
+            ),
+            "tangential_stiffness": Variable(
+                sheared.stiffness, stiff, "shear stress over displacement before slip"
+            ),
             "unloading_stiffness_scatter": Variable(
                 found.unloading_stiffness_scatter,
                 "1",
                 f"{sd} unloading and tangential stiffness and of the solid's conductance",
             ),
             "conductance": Variable(solid, CONDUCTANCE, "thermal, of the solid spots"),
-            "gas_conductance": Variable(gas, CONDUCTANCE, f"thermal, of {self.gas} in the gaps"),
-            "total_conductance": Variable(solid + gas, CONDUCTANCE, "thermal, of both in parallel"),
-            "yielded": Variable(found.yielded, "1", "share of the contact area at the hardness"),
-            "valid": Variable(found.valid, "1", "whether contacts of this kind were compared with simulations"),
+            "gas_conductance": Variable(
+                gas, CONDUCTANCE, f"thermal, of {self.gas} in the gaps"
+            ),
+            "total_conductance": Variable(
+                solid + gas, CONDUCTANCE, "thermal, of both in parallel"
+            ),
+            "yielded": Variable(
+                found.yielded, "1", "share of the contact area at the hardness"
+            ),
+            "valid": Variable(
+                found.valid,
+                "1",
+                "whether contacts of this kind were compared with simulations",
+            ),
         }
 
     def plot(
@@ -535,7 +610,8 @@ class Joint(Displayed):
         path : str or path, optional
             File to save the figure to: "name.svg", .pdf, .png.
         pressures : pair of float or str, optional
-            Smallest and largest pressure, plain numbers in GPa; default: 1e-5 and 0.3 of the softer metal's hardness.
+            Smallest and largest pressure, plain numbers in GPa; default: 1e-5 and 0.3 of
+            the softer metal's hardness.
 
         Raises
         ------
@@ -545,27 +621,53 @@ class Joint(Displayed):
         if pressures is None:
             return super().plot(path)
         if not isinstance(pressures, tuple | list) or len(pressures) != 2:
-            raise InputError(f"pressures are the smallest and the largest, got {pressures!r}")
+            raise InputError(
+                f"pressures are the smallest and the largest, got {pressures!r}"
+            )
         low, high = (
-            float(positive_array("pressures", one_number("pressures", Units(stress="GPa").number("pressure", end))))
+            float(
+                positive_array(
+                    "pressures",
+                    one_number("pressures", Units(stress="GPa").number("pressure", end)),
+                )
+            )
             for end in pressures
         )
         if low >= high:
-            raise InputError(f"pressures are the smallest and the largest, got {pressures!r}")
+            raise InputError(
+                f"pressures are the smallest and the largest, got {pressures!r}"
+            )
         return saved(self._drawn(self.at_pressure(np.geomspace(low, high, POINTS))), path)
 
     def _range(self) -> Contact:
         """The contact at pressures from 1e-5 to 0.3 of the softer metal's hardness."""
-        hardness = self.hardness or self.pair.hardness or f"{self.pair.softer.hardness[0]} GPa"
-        return self.at_pressure(np.geomspace(*RANGE, POINTS) * float(hardness_in(Units(stress="GPa"), hardness)))
+        hardness = (
+            self.hardness or self.pair.hardness or f"{self.pair.softer.hardness[0]} GPa"
+        )
+        return self.at_pressure(
+            np.geomspace(*RANGE, POINTS)
+            * float(hardness_in(Units(stress="GPa"), hardness))
+        )
 
     def facts(self) -> dict[str, str]:
         """The arguments of the joint, by name, and what its faces assume beyond them."""
         a, b = self.pair.metals
-        hardness = self.hardness or self.pair.hardness or f"not known: name the temper of {self.pair.softer.name}"
+        hardness = (
+            self.hardness
+            or self.pair.hardness
+            or f"not known: name the temper of {self.pair.softer.name}"
+        )
         theory = chosen_theory(self.surface, self.theory).name
-        facts = {"metals": f"{a.name} on {b.name}", "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa"}
-        facts |= {"hardness": str(hardness), "theory": theory, "gas": self.gas, "surface": repr(self.surface)}
+        facts = {
+            "metals": f"{a.name} on {b.name}",
+            "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa",
+        }
+        facts |= {
+            "hardness": str(hardness),
+            "theory": theory,
+            "gas": self.gas,
+            "surface": repr(self.surface),
+        }
         assumed = assumptions(self.surface)
         if assumed:
             facts["assumed"] = "; ".join(assumed)
@@ -583,18 +685,35 @@ class Joint(Displayed):
         held = self.quantities(pressed)
         x, values = held["pressure"], {name: one.values for name, one in held.items()}
         scatter = dict.fromkeys(
-            ("unloading_stiffness", "tangential_stiffness", "conductance"), values["unloading_stiffness_scatter"]
+            ("unloading_stiffness", "tangential_stiffness", "conductance"),
+            values["unloading_stiffness_scatter"],
         )
-        scatter |= {"area": values["area_scatter"], "stiffness": values["stiffness_scatter"]}
-        scatter |= {"mean_separation": values["separation_scatter"] / values["mean_separation"]}
+        scatter |= {
+            "area": values["area_scatter"],
+            "stiffness": values["stiffness_scatter"],
+        }
+        scatter |= {
+            "mean_separation": values["separation_scatter"] / values["mean_separation"]
+        }
         panels = {
             "real contact area  A/A0": ("area",),
             f"mean gap [{held['mean_separation'].unit}]": ("mean_separation",),
-            f"stiffness [{held['stiffness'].unit}]": ("unloading_stiffness", "tangential_stiffness", "stiffness"),
-            f"thermal conductance [{CONDUCTANCE}]": ("total_conductance", "conductance", "gas_conductance"),
+            f"stiffness [{held['stiffness'].unit}]": (
+                "unloading_stiffness",
+                "tangential_stiffness",
+                "stiffness",
+            ),
+            f"thermal conductance [{CONDUCTANCE}]": (
+                "total_conductance",
+                "conductance",
+                "gas_conductance",
+            ),
         }
         lines = {
-            label: [(name.replace("_", " "), values[name], scatter.get(name)) for name in names]
+            label: [
+                (name.replace("_", " "), values[name], scatter.get(name))
+                for name in names
+            ]
             for label, names in panels.items()
         }
         return draw_panels(x.values, lines, f"pressure F/A0 [{x.unit}]")

@@ -2,9 +2,10 @@
 
 The constants of two bodies are joined into the one modulus that contact needs.
 
-Hardnesses are converted from Brinell, Vickers or Rockwell numbers to the mean pressure over the projected
-area, which is the pressure that counts here. A ground or polished face is harder than its bulk at depths of
-micrometres: measure it if it matters. The sources of the numbers are in tables/metals.csv.
+Hardnesses are converted from Brinell, Vickers or Rockwell numbers to the mean pressure over
+the projected area, which is the pressure that counts here. A ground or polished face is
+harder than its bulk at depths of micrometres: measure it if it matters. The sources of the
+numbers are in tables/metals.csv.
 """
 
 from __future__ import annotations
@@ -33,21 +34,41 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, factor, resolve
 
-ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
-ONE_TEMPER = 1.3  # largest ratio of tempers' hardnesses for which their geometric mean is used, within 14% of both
+# plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
+ELASTIC_PSI = 1.1
+# largest ratio of tempers' hardnesses for which their geometric mean is used, within 14% of
+# both
+ONE_TEMPER = 1.3
 TEMPERS = ("soft", "hard")
 # Vickers number of non-austenitic steels at Rockwell C numbers: ASTM E140 table 1, as printed at
 # mikipulley.co.jp/EN/Services/Tech_data/tech20.html
 HRC = (20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 68.0)
 HV_OF_HRC = (238.0, 266.0, 302.0, 345.0, 392.0, 446.0, 513.0, 595.0, 697.0, 832.0, 940.0)
-# Vickers number of unalloyed and low-alloy steels at Rockwell B numbers: ISO 18265 table A.1, DIN 50150 before, from
-# where on other prints and ASTM E140 agree within 6%
+# Vickers number of unalloyed and low-alloy steels at Rockwell B numbers: ISO 18265 table
+# A.1, DIN 50150 before, from where on other prints and ASTM E140 agree within 6%
 HRB = (71.2, 75.0, 78.7, 81.7, 85.0, 87.1, 89.5, 91.5, 93.5, 95.0, 96.7, 98.1, 99.5)
-HV_OF_HRB = (130.0, 140.0, 150.0, 160.0, 170.0, 180.0, 190.0, 200.0, 210.0, 220.0, 230.0, 240.0, 250.0)
+HV_OF_HRB = (
+    130.0,
+    140.0,
+    150.0,
+    160.0,
+    170.0,
+    180.0,
+    190.0,
+    200.0,
+    210.0,
+    220.0,
+    230.0,
+    240.0,
+    250.0,
+)
 ROCKWELL = {"HRC": (HRC, HV_OF_HRC), "HRB": (HRB, HV_OF_HRB)}
-BRINELL_LOAD = 30.0  # kgf per D^2 [mm^2] of Brinell numbers without one: steels, ISO 6506-1
+BRINELL_LOAD = (
+    30.0  # kgf per D^2 [mm^2] of Brinell numbers without one: steels, ISO 6506-1
+)
 BRINELL_DIAMETERS = (0.24, 0.6)  # of indentations over that of the ball, ISO 6506-1
-# number, scale, and of Brinell numbers the ball's diameter [mm] and force [kgf]; other loads do not matter
+# number, scale, and of Brinell numbers the ball's diameter [mm] and force [kgf]; other
+# loads do not matter
 _SCALE = re.compile(
     r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*(?:([0-9]+\.?[0-9]*)/([0-9]+\.?[0-9]*))?[0-9./]*\s*"
 )
@@ -62,7 +83,9 @@ def _poisson(name: str, value: ArrayLike) -> FloatArray:
     return ratio
 
 
-def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, nu2: ArrayLike) -> Any:
+def effective_modulus(
+    E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, nu2: ArrayLike
+) -> Any:
     """Effective modulus of two elastic bodies, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
 
     Parameters
@@ -75,13 +98,15 @@ def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, 
     Returns
     -------
     float, ndarray or str
-        E*, in the unit of E1 and E2; the arguments broadcast. A text with that unit where texts were given, which
-        `E_star=` takes as it is. Against a rigid body it is E1/(1 - nu1^2), the limit of large E2.
+        E*, in the unit of E1 and E2; the arguments broadcast. A text with that unit where
+        texts were given, which `E_star=` takes as it is. Against a rigid body it is E1/(1 -
+        nu1^2), the limit of large E2.
 
     Raises
     ------
     InputError, OutOfRangeError
-        For NaN, infinite or empty input, shapes that do not broadcast, and numbers outside these ranges.
+        For NaN, infinite or empty input, shapes that do not broadcast, and numbers outside
+        these ranges.
 
     Examples
     --------
@@ -99,7 +124,11 @@ def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, 
     broadcast_shape(E1=moduli[0], nu1=ratios[0], E2=moduli[1], nu2=ratios[1])
     a, b = ((1 - nu) * (1 + nu) / E for nu, E in zip(ratios, moduli, strict=True))
     found = (1 / (a + b))[()]
-    return found if unit is None or not isinstance(E1, str) else f"{one_number('E_star', found)} {unit}"
+    return (
+        found
+        if unit is None or not isinstance(E1, str)
+        else f"{one_number('E_star', found)} {unit}"
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,17 +143,19 @@ class Metal:
     nu : float
         Poisson's ratio, in (-1, 0.5].
     hardness : float or str, or pair of these
-        Mean pressure of an indentation, of soft and of hard tempers, or one for both: plain numbers in GPa, or texts
-        as for `hardness`, "200 HV".
+        Mean pressure of an indentation, of soft and of hard tempers, or one for both: plain
+        numbers in GPa, or texts as for `hardness`, "200 HV".
     conductivity : float or str, or pair of these
-        Thermal, lowest and highest, or one for both: plain numbers in W/(m K), or texts, "45 W/(m K)".
+        Thermal, lowest and highest, or one for both: plain numbers in W/(m K), or texts,
+        "45 W/(m K)".
     source : str, optional
         Titles and addresses of the pages on which the numbers were read.
 
     Raises
     ------
     InputError, OutOfRangeError
-        For constants that no metal has, such as a modulus in MPa; the message has the allowed range.
+        For constants that no metal has, such as a modulus in MPa; the message has the
+        allowed range.
 
     Examples
     --------
@@ -154,15 +185,21 @@ class Metal:
         _poisson("nu" + whose, ratio)
         tempers = []
         for each in _both("hardness" + whose, self.hardness):
-            number = hardness_in(Units(stress="GPa"), each) if isinstance(each, str) else each
+            number = (
+                hardness_in(Units(stress="GPa"), each) if isinstance(each, str) else each
+            )
             tempers.append(number_in(f"hardness{whose} in GPa", number, *HARDNESSES))
         conductivities = []
         for each in _both("conductivity" + whose, self.conductivity):
             number = _conductivity("conductivity" + whose, each)
-            conductivities.append(number_in(f"conductivity{whose} in W/(m K)", number, *CONDUCTIVITIES))
+            conductivities.append(
+                number_in(f"conductivity{whose} in W/(m K)", number, *CONDUCTIVITIES)
+            )
         for name, ends in (("hardness", tempers), ("conductivity", conductivities)):
             if ends[0] > ends[1]:
-                raise InputError(f"{name}{whose}: the lowest comes first, got {ends[0]:g} and {ends[1]:g}")
+                raise InputError(
+                    f"{name}{whose}: the lowest comes first, got {ends[0]:g} and {ends[1]:g}"
+                )
         own = {
             "E": float(modulus), "nu": float(ratio), "hardness": tuple(tempers), "conductivity": tuple(conductivities)
         }  # fmt: skip
@@ -175,7 +212,9 @@ def _both(name: str, value: Any) -> tuple[Any, Any]:
     if not isinstance(value, tuple | list | np.ndarray):
         return value, value
     if len(value) != 2:
-        raise InputError(f"{name} is one number, or the ends of a range, got {len(value)} numbers")
+        raise InputError(
+            f"{name} is one number, or the ends of a range, got {len(value)} numbers"
+        )
     return value[0], value[1]
 
 
@@ -241,8 +280,8 @@ HARDEST = max(metal.hardness[1] for metal in _METALS.values())
 def get(name: str) -> Metal:
     """Ranges of a metal's constants; `METALS` lists the names, after which "soft" or "hard" may name a temper.
 
-    Names in other standards, such as "S355J2", "1.4301", "6061-T6" or "GG25", are known too (`also` in
-    tables/metals.csv). Capitals, hyphens and the order of words do not count.
+    Names in other standards, such as "S355J2", "1.4301", "6061-T6" or "GG25", are known too
+    (`also` in tables/metals.csv). Capitals, hyphens and the order of words do not count.
 
     Raises
     ------
@@ -284,7 +323,9 @@ def get(name: str) -> Metal:
 def _alike(name: str) -> str:
     """Names of metals that share a word with a name or are spelt like it, or all of them."""
     words = _words(name)
-    spelt = difflib.get_close_matches(" ".join(words), [" ".join(known) for known in _NAMES], 3, 0.6)
+    spelt = difflib.get_close_matches(
+        " ".join(words), [" ".join(known) for known in _NAMES], 3, 0.6
+    )
     alike: dict[str, None] = {}
     for known, metal in _NAMES.items():
         if set(words) & set(known) - set(TEMPERS) or " ".join(known) in spelt:
@@ -318,11 +359,20 @@ class Pair:
     @property
     def conductivities(self) -> tuple[str, str]:
         """Thermal conductivities with their unit, geometric means of the ranges."""
-        a, b = (f"{math.sqrt(low * high):.6g} W/(m K)" for low, high in (metal.conductivity for metal in self.metals))
+        a, b = (
+            f"{math.sqrt(low * high):.6g} W/(m K)"
+            for low, high in (metal.conductivity for metal in self.metals)
+        )
         return a, b
 
 
-def pair(materials: str | Metal | Mapping[str, Any] | Pair | Sequence[str | Metal | Mapping[str, Any]]) -> Pair:
+def pair(
+    materials: str
+    | Metal
+    | Mapping[str, Any]
+    | Pair
+    | Sequence[str | Metal | Mapping[str, Any]],
+) -> Pair:
     """Two metals in contact: names, `Metal` objects or their constants by name, or one metal for both bodies.
 
     Examples
@@ -334,7 +384,9 @@ def pair(materials: str | Metal | Mapping[str, Any] | Pair | Sequence[str | Meta
     """
     if isinstance(materials, Pair):
         return materials
-    given: Sequence[Any] = materials if isinstance(materials, tuple | list) else [materials]
+    given: Sequence[Any] = (
+        materials if isinstance(materials, tuple | list) else [materials]
+    )
     if len(given) not in (1, 2):
         raise InputError(f"materials are one or two, got {len(given)}")
     return Pair((_metal(given[0]), _metal(given[-1])))
@@ -347,7 +399,11 @@ def _metal(given: Any) -> Metal:
     if not isinstance(given, Mapping):
         return get(given)
     fields = {field.name: field.default for field in dataclasses.fields(Metal)}
-    missing = [name for name, default in fields.items() if default is dataclasses.MISSING and name not in given]
+    missing = [
+        name
+        for name, default in fields.items()
+        if default is dataclasses.MISSING and name not in given
+    ]
     unknown = [str(name) for name in given if name not in fields]
     if missing or unknown:
         wrong = [f"{', '.join(missing)} missing"] if missing else []
@@ -362,13 +418,15 @@ def hardness(given: str) -> str:
     Parameters
     ----------
     given : str
-        A Vickers number, "200 HV", force over the faces of the pyramid: p_m = 9.80665 MPa HV/sin(68 deg). A
-        Rockwell number of steel, "58 HRC", from 20 to 68 by table 1 of ASTM E140, or "90 HRB", from 71.2 to 99.5
-        by table A.1 of ISO 18265 (other tables differ by up to 6%). A Brinell number, "200 HB" or "200 HBW":
-        force over the cap of the indentation, from 96 to 653 at 3000 kgf and a ball of 10 mm; with other balls
-        and loads [mm/kgf] after it, "95 HBW 10/500". A metal by name, with its temper where these differ by
-        more than a factor of 1.3, "aluminium 6061 hard"; or a pressure, "1.5 GPa", which of a metal that does
-        not harden is three times its yield stress (Tabor 1951).
+        A Vickers number, "200 HV", force over the faces of the pyramid: p_m = 9.80665 MPa
+        HV/sin(68 deg). A Rockwell number of steel, "58 HRC", from 20 to 68 by table 1 of
+        ASTM E140, or "90 HRB", from 71.2 to 99.5 by table A.1 of ISO 18265 (other tables
+        differ by up to 6%). A Brinell number, "200 HB" or "200 HBW": force over the cap of
+        the indentation, from 96 to 653 at 3000 kgf and a ball of 10 mm; with other balls
+        and loads [mm/kgf] after it, "95 HBW 10/500". A metal by name, with its temper where
+        these differ by more than a factor of 1.3, "aluminium 6061 hard"; or a pressure,
+        "1.5 GPa", which of a metal that does not harden is three times its yield stress
+        (Tabor 1951).
 
     Raises
     ------
@@ -404,17 +462,25 @@ def hardness(given: str) -> str:
     return text
 
 
-def _pressure_of_number(number: float, scale: str, ball: str | None, force: str | None) -> float:
+def _pressure_of_number(
+    number: float, scale: str, ball: str | None, force: str | None
+) -> float:
     """Mean pressure [GPa] of a hardness number, of a Brinell number with diameter [mm] and force [kgf] if given."""
     value = finite_array("hardness", number)
     if scale.startswith("HB"):
         load = BRINELL_LOAD
         if ball is not None and force is not None:
-            diameter, kilograms = positive_array("ball [mm]", float(ball)), positive_array("force [kgf]", float(force))
+            diameter, kilograms = (
+                positive_array("ball [mm]", float(ball)),
+                positive_array("force [kgf]", float(force)),
+            )
             load = float(kilograms / diameter**2)
         # depth h of the indentation: (d/D)^2 = 4 (h/D) (1 - h/D), h/D = load/(pi number)
         shallow, deep = ((1 - math.sqrt(1 - ratio**2)) / 2 for ratio in BRINELL_DIAMETERS)
-        least, most = math.ceil(load / (math.pi * deep)), math.floor(load / (math.pi * shallow))
+        least, most = (
+            math.ceil(load / (math.pi * deep)),
+            math.floor(load / (math.pi * shallow)),
+        )
         require(
             f"hardness [{scale}]", value, (value >= least) & (value <= most),
             f"from {least} to {most} at {load:g} kgf per square millimetre of the ball's diameter (ISO 6506-1); with "
@@ -435,8 +501,9 @@ def _pressure_of_number(number: float, scale: str, ball: str | None, force: str 
 def microhardness(surface: Any, c1: float | str, c2: float) -> str:
     """Hardness of a face at the size of its own contacts, with its unit: what ``hardness=`` takes.
 
-    H = c1 (1.62 sigma/m)^c2, sigma/m in micrometres, m the mean absolute slope of a profile: Yovanovich's, as in
-    M. Bahrami et al., Thermal contact resistance of nonconforming rough surfaces 2, J. Thermophys. Heat Tr. 18 (2004).
+    H = c1 (1.62 sigma/m)^c2, sigma/m in micrometres, m the mean absolute slope of a
+    profile: Yovanovich's, as in M. Bahrami et al., Thermal contact resistance of
+    nonconforming rough surfaces 2, J. Thermophys. Heat Tr. 18 (2004).
 
     Parameters
     ----------
@@ -454,9 +521,17 @@ def microhardness(surface: Any, c1: float | str, c2: float) -> str:
     """
     if surface.unit is None:
         raise InputError("microhardness depends on lengths: give the surface its unit")
-    one, index = positive_array("c1", Units(stress="GPa").number("pressure", c1)), finite_array("c2", c2)
+    one, index = (
+        positive_array("c1", Units(stress="GPa").number("pressure", c1)),
+        finite_array("c2", c2),
+    )
     require("c2", index, (index > -1) & (index <= 0), "in (-1, 0]")
-    indent = 1.62 * surface.h_rms / np.sqrt(2 * surface.m2 / math.pi) * factor(surface.unit, "um")
+    indent = (
+        1.62
+        * surface.h_rms
+        / np.sqrt(2 * surface.m2 / math.pi)
+        * factor(surface.unit, "um")
+    )
     return f"{one_number('hardness', one * indent**index):.6g} GPa"
 
 
@@ -478,7 +553,9 @@ def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair |
 
 
 def tangential_ratio(
-    nu: ArrayLike, E: Sequence[Any] | None = None, share: Callable[[FloatArray], Any] = lambda nu: 0.5
+    nu: ArrayLike,
+    E: Sequence[Any] | None = None,
+    share: Callable[[FloatArray], Any] = lambda nu: 0.5,
 ) -> Any:
     """kappa, normal over tangential stiffness of a stuck contact (Mindlin 1949).
 
@@ -494,8 +571,8 @@ def tangential_ratio(
     Returns
     -------
     float or ndarray
-        (1 - nu c)/(1 - nu), (2 - nu)/(2 (1 - nu)) if isotropic; of two bodies their compliances (1 - nu c)/G over
-        (1 - nu)/G, both added.
+        (1 - nu c)/(1 - nu), (2 - nu)/(2 (1 - nu)) if isotropic; of two bodies their
+        compliances (1 - nu c)/G over (1 - nu)/G, both added.
 
     Examples
     --------
@@ -505,10 +582,14 @@ def tangential_ratio(
     """
     ratio = _poisson("nu", nu)
     if (E is None) == (ratio.shape == (2,)) or (E is not None and len(E) != 2):
-        raise InputError("nu is one number, or two with E=(E1, E2), the moduli of the bodies")
+        raise InputError(
+            "nu is one number, or two with E=(E1, E2), the moduli of the bodies"
+        )
     above, below = 1 - ratio * share(ratio), 1 - ratio
     if E is None:
         return np.asarray(above / below)[()]
-    modulus = positive_array("E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values()))
+    modulus = positive_array(
+        "E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values())
+    )
     compliance = (1 + ratio) / modulus  # 1/(2 G)
     return (above * compliance).sum(axis=-1) / (below * compliance).sum()

@@ -8,8 +8,12 @@ from mbma_tables import Surface
 from mbma_tables.theories.mbma.variants import PRINTED, REPORTED
 
 # variants of one's own: other numbers, and other formulas
-OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
-LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
+OWN = dataclasses.replace(
+    PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5
+)
+LEVEL = dataclasses.replace(
+    REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False
+)
 
 
 def random_surfaces(

@@ -9,12 +9,14 @@ from hypothesis import settings
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
-# parallel workers share the cores, and threads of BLAS that wait for each other cost more than the work itself
+# parallel workers share the cores, and threads of BLAS that wait for each other cost more
+# than the work itself
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # simulations are not kept between tests
 os.environ["MBMA_TABLES_CACHE"] = "off"
 
-# tests and files that skipped, for want of a package or a program; CI runs them again where these are installed
+# tests and files that skipped, for want of a package or a program; CI runs them again where
+# these are installed
 skipped = []
 
 
@@ -44,7 +46,9 @@ def generations():
     from mbma_tables.core import GENERATIONS, core
 
     names = [name for name, least in GENERATIONS.items() if 0 < least <= core.generation]
-    return [importlib.import_module(f"mbma_tables.core._{name}") for name in names] or [core]
+    return [importlib.import_module(f"mbma_tables.core._{name}") for name in names] or [
+        core
+    ]
 
 
 @pytest.fixture(scope="session")

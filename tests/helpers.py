@@ -22,8 +22,12 @@ NUMBER = re.compile(r"-?\d+\.?\d*(?:e[+-]?\d+)?")
 
 def assert_same_output(output, shown, rtol=1e-3):
     """The same words, and numbers that agree; spaces do not count."""
-    assert NUMBER.sub("#", " ".join(output.split())) == NUMBER.sub("#", " ".join(shown.split()))
-    np.testing.assert_allclose(*(np.array(NUMBER.findall(text), float) for text in (output, shown)), rtol=rtol)
+    assert NUMBER.sub("#", " ".join(output.split())) == NUMBER.sub(
+        "#", " ".join(shown.split())
+    )
+    np.testing.assert_allclose(
+        *(np.array(NUMBER.findall(text), float) for text in (output, shown)), rtol=rtol
+    )
 
 
 def difference_weights(offsets):
@@ -33,7 +37,10 @@ def difference_weights(offsets):
 
 def with_slopes(law):
     """Pressure and area of a law, each with its slope by -d."""
-    return (law.pressure, lambda separation: law.stiffness(separation=separation) / 2), (law.area, law.area_slope)
+    return (law.pressure, lambda separation: law.stiffness(separation=separation) / 2), (
+        law.area,
+        law.area_slope,
+    )
 
 
 def random_map(points, low, high, power=1.8, seed=1, phases=False):
@@ -44,7 +51,9 @@ def random_map(points, low, high, power=1.8, seed=1, phases=False):
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
     noise /= np.abs(noise) if phases else 1
     q = np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points))
-    return np.fft.irfft2(np.where((q > low) & (q < high), noise * np.maximum(q, 1e-3) ** -power, 0))
+    return np.fft.irfft2(
+        np.where((q > low) & (q < high), noise * np.maximum(q, 1e-3) ** -power, 0)
+    )
 
 
 def topographies():
@@ -57,7 +66,9 @@ def topographies():
 def fresh(code, *arguments):
     """What `code` prints as JSON in a new interpreter."""
     command = [sys.executable, "-W", "error", "-c", code, *arguments]
-    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    return json.loads(
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    )
 
 
 def run(*arguments):
@@ -116,7 +127,11 @@ class Springs:
         return force, 0.1 * force
 
 
-WORDS = [*b' nan inf -1 1e400 [ ] { } = , # \n \x00 \xff \' " """ 1979-05-27T07:32:00Z \xef\xbb\xbf'.split(b" ")]
+WORDS = [
+    *b' nan inf -1 1e400 [ ] { } = , # \n \x00 \xff \' " """ 1979-05-27T07:32:00Z \xef\xbb\xbf'.split(
+        b" "
+    )
+]
 WORDS += [b"0" * 400, b"9" * 5000, b"0x" + b"f" * 9000, "\u202e\u00b2\u0663".encode()]
 WORDS += [3000 * word for word in (b"[", b'{"a":', b"a=", b"a.")]
 
@@ -137,7 +152,10 @@ def spoilt(content, rng):
             data[min(at, len(data) - 1)] = rng.integers(256)
         elif kind == 4:
             length = min(40, (to - at) // 2)
-            data[at : at + length], data[to - length : to] = data[to - length : to], data[at : at + length]
+            data[at : at + length], data[to - length : to] = (
+                data[to - length : to],
+                data[at : at + length],
+            )
         else:
             data = data[: max(at, 1)]
     return bytes(data)
@@ -146,7 +164,18 @@ def spoilt(content, rng):
 def compiled_law(source, *options, name="road"):
     """A law in C, compiled by gcc without a warning: its functions, by what they answer, of arrays."""
     library = source.with_suffix(".so")
-    command = ["gcc", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *options, "-shared", "-fPIC", str(source), "-lm"]
+    command = [
+        "gcc",
+        "-Wall",
+        "-Wextra",
+        "-Wpedantic",
+        "-Werror",
+        *options,
+        "-shared",
+        "-fPIC",
+        str(source),
+        "-lm",
+    ]
     subprocess.run([*command, "-o", str(library)], check=True)
     law = ctypes.CDLL(str(library))
 

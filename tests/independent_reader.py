@@ -25,7 +25,9 @@ def height_integral(n, x):
 def weights(u):
     """B-spline weights of the coefficients i ... i + 3."""
     v = 1 - u
-    return np.array([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6])
+    return np.array(
+        [v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6]
+    )
 
 
 def chebyshev(t):
@@ -54,9 +56,17 @@ class Reader:
     def __init__(self, path):
         with netCDF4.Dataset(path) as file:
             self.attributes = _attributes(file)
-            self.variables = {name: np.asarray(variable[...]) for name, variable in file.variables.items()}
-            self.described = {name: _attributes(variable) for name, variable in file.variables.items()}
-            self.dimensions = {name: list(variable.dimensions) for name, variable in file.variables.items()}
+            self.variables = {
+                name: np.asarray(variable[...])
+                for name, variable in file.variables.items()
+            }
+            self.described = {
+                name: _attributes(variable) for name, variable in file.variables.items()
+            }
+            self.dimensions = {
+                name: list(variable.dimensions)
+                for name, variable in file.variables.items()
+            }
         self.axes = self.dimensions.get("log_ratio_F")
 
     # hashes
@@ -70,13 +80,20 @@ class Reader:
         return digest.hexdigest()
 
     def attributes_sha256(self):
-        content = {"": {n: v for n, v in self.attributes.items() if n != "attributes_sha256"}}
+        content = {
+            "": {n: v for n, v in self.attributes.items() if n != "attributes_sha256"}
+        }
         for name, described in self.described.items():
             content[name] = {**described, "dimensions": self.dimensions[name]}
         return _json_digest(content)
 
     def configuration_sha256(self):
-        return _json_digest([json.loads(self.attributes[name]) for name in ("configuration", "variant_numbers")])
+        return _json_digest(
+            [
+                json.loads(self.attributes[name])
+                for name in ("configuration", "variant_numbers")
+            ]
+        )
 
     # lookup
 
@@ -85,7 +102,10 @@ class Reader:
         if not axis["first"] <= x <= axis["last"]:
             raise ValueError(f"{name} = {x} is not covered")
         ends = (axis["first"], axis["last"], x)
-        low, high, t = (math.log(e + axis["offset"]) if axis["transform"] == "log" else e for e in ends)
+        low, high, t = (
+            math.log(e + axis["offset"]) if axis["transform"] == "log" else e
+            for e in ends
+        )
         return (t - low) / ((high - low) / (nodes - 1))
 
     def spline(self, function, point):
@@ -100,30 +120,46 @@ class Reader:
 
     def answer(self, **arguments):
         """What conformance points hold: Phi or hat values, by F and A."""
-        return self.universal(**arguments) if self.attributes["mbma_kind"] == "universal" else self.island(**arguments)
+        return (
+            self.universal(**arguments)
+            if self.attributes["mbma_kind"] == "universal"
+            else self.island(**arguments)
+        )
 
     @staticmethod
     def rigid(X, mu):
-        return {"F": math.pi * mu * height_integral(2.5, -X) / 5, "A": math.pi * height_integral(2, -X) / 2}
+        return {
+            "F": math.pi * mu * height_integral(2.5, -X) / 5,
+            "A": math.pi * height_integral(2, -X) / 2,
+        }
 
     def cell(self, X, mu):
         """The cell of an island; on an edge, the first of its cells."""
-        X_low, X_high, mu_low, mu_high = (self.variables[f"{name}_{end}"] for name in ("X", "mu") for end in ENDS)
-        found = np.flatnonzero((X_low <= X) & (X_high >= X) & (mu_low <= mu) & (mu <= mu_high))
+        X_low, X_high, mu_low, mu_high = (
+            self.variables[f"{name}_{end}"] for name in ("X", "mu") for end in ENDS
+        )
+        found = np.flatnonzero(
+            (X_low <= X) & (X_high >= X) & (mu_low <= mu) & (mu <= mu_high)
+        )
         if found.size == 0:
             raise ValueError(f"X = {X}, mu = {mu} is not covered")
         return int(found[0])
 
     def universal(self, X, mu):
         cell = self.cell(X, mu)
-        X_low, X_high, low, high = (float(self.variables[f"{n}_{end}"][cell]) for n in ("X", "mu") for end in ENDS)
+        X_low, X_high, low, high = (
+            float(self.variables[f"{n}_{end}"][cell]) for n in ("X", "mu") for end in ENDS
+        )
         x = (2 * X - X_low - X_high) / (X_high - X_low)
         if low == 0:
             y = 2 * mu / high - 1
         else:
             a, b = math.sqrt(low), math.sqrt(high)
             y = (b + a) / (b - a) * (mu - a * b) / (mu + a * b)
-        sums = {f: chebyshev(x) @ self.variables[f"chebyshev_{f}"][cell] @ chebyshev(y) for f in "FA"}
+        sums = {
+            f: chebyshev(x) @ self.variables[f"chebyshev_{f}"][cell] @ chebyshev(y)
+            for f in "FA"
+        }
         return {"F": mu * float(sums["F"]), "A": float(sums["A"])}
 
     def band(self, spread, sphere, hurst):
@@ -141,7 +177,11 @@ class Reader:
         c = 0.75 * hurst / power
         m4_d, m4_u = c * (1 - inverse), c * (math.exp(power * w) - inverse)
         radius = 3 * math.sqrt(math.pi) / 8
-        return 8 / 3 * rate * sigma * radius * math.sqrt(2) / (m4_d * m4_u) ** 0.25, sigma, rate
+        return (
+            8 / 3 * rate * sigma * radius * math.sqrt(2) / (m4_d * m4_u) ** 0.25,
+            sigma,
+            rate,
+        )
 
     def island(self, delta_over_h_rms, zeta_d, zeta_u, hurst):
         spread, power = (zeta_u - zeta_d) / zeta_d, 4 - 2 * hurst
@@ -151,19 +191,33 @@ class Reader:
         inside = max(spread, self.described["spread"]["first"])
         share = mu / self.band(inside, sphere, hurst)[0]
         rigid = self.rigid(X, mu)
-        phi = {f: math.exp(share * self.spline(f, (X, inside, sphere, hurst))) * rigid[f] for f in rigid}
+        phi = {
+            f: math.exp(share * self.spline(f, (X, inside, sphere, hurst))) * rigid[f]
+            for f in rigid
+        }
         c, radius = 0.75 * hurst / power, 3 * math.sqrt(math.pi) / 8
         log_d, S, D = math.log(zeta_d), sigma * zeta_d**-hurst, rate * zeta_d**2
         R_d = radius / math.sqrt(c * math.expm1(power * log_d))
         R_u = radius / math.sqrt(c * math.expm1(power * (log_d + math.log1p(spread))))
-        return {"F": S * math.sqrt(2 * R_d * S) * phi["F"], "A": 2 * math.pi * D * R_u * R_d * S**2 * phi["A"]}
+        return {
+            "F": S * math.sqrt(2 * R_d * S) * phi["F"],
+            "A": 2 * math.pi * D * R_u * R_d * S**2 * phi["A"],
+        }
 
     def replay(self):
         """Largest of |own answer/stored - 1|/tolerance over the conformance points."""
         prefix, worst = "conformance_", 0.0
-        points = {n.removeprefix(prefix): values for n, values in self.variables.items() if n.startswith(prefix)}
-        known = [n for n in points if n != "tolerance" and n[:5] not in ("table", "exact")]
+        points = {
+            n.removeprefix(prefix): values
+            for n, values in self.variables.items()
+            if n.startswith(prefix)
+        }
+        known = [
+            n for n in points if n != "tolerance" and n[:5] not in ("table", "exact")
+        ]
         for k, tolerance in enumerate(points["tolerance"]):
-            for f, value in self.answer(**{name: float(points[name][k]) for name in known}).items():
+            for f, value in self.answer(
+                **{name: float(points[name][k]) for name in known}
+            ).items():
                 worst = max(worst, abs(value / points[f"table_{f}"][k] - 1) / tolerance)
         return worst

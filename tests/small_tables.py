@@ -75,14 +75,23 @@ def edited(path, source, edit):
 
 def copied(path, source, leave_out="", change_type=()):
     """At `path` a copy of the netCDF file `source`, less one variable or with one in another type, sealed."""
-    with netCDF4.Dataset("source", memory=unseal(source)) as old, netCDF4.Dataset(path, "w") as new:
+    with (
+        netCDF4.Dataset("source", memory=unseal(source)) as old,
+        netCDF4.Dataset(path, "w") as new,
+    ):
         for name, dimension in old.dimensions.items():
             new.createDimension(name, dimension.size)
         for name, variable in old.variables.items():
             if name != leave_out:
-                dtype = np.dtype(change_type[1] if change_type and change_type[0] == name else variable.dtype)
+                dtype = np.dtype(
+                    change_type[1]
+                    if change_type and change_type[0] == name
+                    else variable.dtype
+                )
                 order = "big" if dtype.byteorder == ">" else "little"
-                made = new.createVariable(name, dtype, variable.dimensions, fill_value=False, endian=order)
+                made = new.createVariable(
+                    name, dtype, variable.dimensions, fill_value=False, endian=order
+                )
                 made.setncatts({n: variable.getncattr(n) for n in variable.ncattrs()})
                 made[...] = variable[...]
         new.setncatts({n: old.getncattr(n) for n in old.ncattrs()})

@@ -37,7 +37,12 @@ def follows_conventions(path, folder, monkeypatch):
         if "cf:1.11" not in suite.CheckSuite.checkers:
             pytest.skip("compliance-checker has no test of CF 1.11")
         passed, failed = ComplianceChecker.run_checker(
-            str(path), ["cf:1.11"], 0, "strict", output_filename=str(folder / "said.txt"), output_format="text"
+            str(path),
+            ["cf:1.11"],
+            0,
+            "strict",
+            output_filename=str(folder / "said.txt"),
+            output_format="text",
         )
     assert (passed, failed) == (True, False), (folder / "said.txt").read_text()
 
@@ -61,7 +66,12 @@ OF_ROWS = {
 def test_rows_of_every_quantity_follow_the_conventions(quantity, tmp_path, monkeypatch):
     """Rows against pressure failed: CF takes a dimension of pressures for heights in the atmosphere."""
     law = describe_law(
-        Surface.named("concrete"), "13.3 MPa", quantity=quantity, theory="calibrated", rows=12, **OF_ROWS[quantity]
+        Surface.named("concrete"),
+        "13.3 MPa",
+        quantity=quantity,
+        theory="calibrated",
+        rows=12,
+        **OF_ROWS[quantity],
     )
     path = tmp_path / "law.nc"
     path.write_bytes(to_netcdf(law))

@@ -9,7 +9,16 @@ from scipy.interpolate import CubicSpline
 from mbma_tables import TableFileError, data
 from mbma_tables.data import boundary_elements
 
-GROUPS = ["elastic", "hardness", "leakage", "light_loads", "machined", "measured", "rough_spheres", "tangential"]
+GROUPS = [
+    "elastic",
+    "hardness",
+    "leakage",
+    "light_loads",
+    "machined",
+    "measured",
+    "rough_spheres",
+    "tangential",
+]
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +33,10 @@ def test_every_variable_of_every_group_is_described(tree):
         assert {"title", "source", "history"} <= set(group.attrs), name
         for key, variable in group.dataset.variables.items():
             assert "long_name" in variable.attrs, (name, key)
-            assert "units" in variable.attrs or "flag_meanings" in variable.attrs, (name, key)
+            assert "units" in variable.attrs or "flag_meanings" in variable.attrs, (
+                name,
+                key,
+            )
 
 
 def test_energy_gap_and_stiffness_agree(tree):
@@ -36,9 +48,13 @@ def test_energy_gap_and_stiffness_agree(tree):
     for number in range(elastic.sizes["surface"]):
         one = elastic.isel(surface=number).dropna("load", subset=["stiffness"])
         log_force = np.log(one.force.values)
-        integral = CubicSpline(log_force, one.force.values**2 / one.stiffness.values).antiderivative()(log_force)
+        integral = CubicSpline(
+            log_force, one.force.values**2 / one.stiffness.values
+        ).antiderivative()(log_force)
         ratio = np.diff(integral) / np.diff(one.energy.values)
-        ratios.append(np.log(ratio[(one.area.values[1:] > 0.01) & (one.area.values[:-1] < 0.9)]))
+        ratios.append(
+            np.log(ratio[(one.area.values[1:] > 0.01) & (one.area.values[:-1] < 0.9)])
+        )
     assert np.std(np.concatenate(ratios)) < 0.01
 
 
@@ -50,5 +66,7 @@ def test_a_copy_elsewhere_is_opened_and_checked(tree, tmp_path, monkeypatch):
     with pytest.raises(TableFileError, match="cut short"):
         boundary_elements(copy)
     monkeypatch.setattr(data, "FILE", tmp_path / "absent.nc")
-    with pytest.raises(TableFileError, match="wheels do not contain the BEM data set; give the path"):
+    with pytest.raises(
+        TableFileError, match="wheels do not contain the BEM data set; give the path"
+    ):
         boundary_elements()

@@ -37,7 +37,9 @@ def of_numbers():
 def of_spectrum():
     known = of_numbers()
     q = np.geomspace(NUMBERS["q0"], NUMBERS["q1"], 40)
-    return Surface.from_spectrum(q, known.power_spectrum(q), h_max=NUMBERS["h_max"], unit="um")
+    return Surface.from_spectrum(
+        q, known.power_spectrum(q), h_max=NUMBERS["h_max"], unit="um"
+    )
 
 
 def of_map():
@@ -61,7 +63,10 @@ def test_the_rule(expected, make):
         assert theory_name(surface, None, by) == expected
         assert theory_name(surface, "persson", by) == "persson"
         assert theory_name(surface, None, by, variant="printed") == "mbma"
-        assert theory_name(surface, None, by, island_model="exact", variant="reported") == "mbma"
+        assert (
+            theory_name(surface, None, by, island_model="exact", variant="reported")
+            == "mbma"
+        )
     assert theory_name(surface, None, "separation") == "mbma"
     assert theory_name(surface, "calibrated", "separation") == "calibrated"
 
@@ -76,7 +81,12 @@ def test_contact_sensitivity_and_scene_of_one_question(expected, make, by):
     named = contact(surface, **place, E_star=E_STAR, theory=expected)
     assert (found.area, found.pressure) == (named.area, named.pressure)
 
-    scene = Scene(surface, effects=["pressure", "area", "stiffness"], **{f"{by}s": [PLACES[by]]}, E_star=E_STAR)
+    scene = Scene(
+        surface,
+        effects=["pressure", "area", "stiffness"],
+        **{f"{by}s": [PLACES[by]]},
+        E_star=E_STAR,
+    )
     content = scene.run()
     assert content.attrs["theory"] == expected
     np.testing.assert_allclose(content["stiffness"].values, found.stiffness, rtol=1e-6)
@@ -109,7 +119,12 @@ def test_a_joint(expected, make):
     joint = Joint(surface, materials=metals)
     found = joint.at_pressure(PRESSURE)
     assert (found.theory, joint.facts()["theory"]) == (expected, expected)
-    assert found.area == contact(surface, pressure=PRESSURE, materials=metals, hardness=joint.hardness).area
+    assert (
+        found.area
+        == contact(
+            surface, pressure=PRESSURE, materials=metals, hardness=joint.hardness
+        ).area
+    )
     assert joint.table([PRESSURE]).attrs["theory"] == expected
     card = joint.export("csv", pressures=("100 MPa", "500 MPa"), heat=False)
     assert f"theory {expected!r}" in card
@@ -119,7 +134,11 @@ def test_a_joint(expected, make):
     ("expected", "options", "law_by"),
     [
         ("calibrated", ("--file", "numbers.toml"), ()),
-        ("corrected", ("--map", "map.npy", "--dx", "1um", "--periodic", "--length-unit", "um"), ()),
+        (
+            "corrected",
+            ("--map", "map.npy", "--dx", "1um", "--periodic", "--length-unit", "um"),
+            (),
+        ),
         ("mbma", ("--file", "numbers.toml"), ("--variant", "printed")),
     ],
 )
@@ -127,7 +146,9 @@ def test_the_command_line(expected, options, law_by, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("map.npy", heights())
     lines = [f"{name} = {value}" for name, value in NUMBERS.items()]
-    (tmp_path / "numbers.toml").write_text("\n".join(["[surface]", *lines, 'length_unit = "um"']))
+    (tmp_path / "numbers.toml").write_text(
+        "\n".join(["[surface]", *lines, 'length_unit = "um"'])
+    )
     joint = (*options, *law_by, "--E-star", "100GPa")
 
     for by, place in PLACES.items():
@@ -137,7 +158,9 @@ def test_the_command_line(expected, options, law_by, tmp_path, monkeypatch):
         assert found["theory"] == theory
         slopes = json.loads(run("sensitivity", *asked))
         assert slopes["theory"] == theory
-        assert slopes["answers"]["stiffness"] == pytest.approx(found["columns"]["stiffness"][0], rel=1e-6)
+        assert slopes["answers"]["stiffness"] == pytest.approx(
+            found["columns"]["stiffness"][0], rel=1e-6
+        )
     assert json.loads(run("curve", *joint, "--json"))["theory"] == expected
     # limits of validity are printed beside the file
     asked = ("export", "csv", *joint, "--pressures", "0.1GPa:0.3GPa", "--out", "law.csv")
@@ -150,25 +173,47 @@ def test_a_map_and_its_fit_by_one_theory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("map.npy", heights())
     options = ("--dx", "1um", "--periodic", "--length-unit", "um")
-    table = json.loads(run("fit", "map.npy", "--dx", "1", "--periodic", "--length-unit", "um", "--json"))
+    table = json.loads(
+        run("fit", "map.npy", "--dx", "1", "--periodic", "--length-unit", "um", "--json")
+    )
     assert table["theory"] == "corrected"
     areas = ",".join(map(str, table["columns"]["area"]))
-    found = json.loads(run("contact", "--map", "map.npy", *options, "--area", areas, "--json"))
+    found = json.loads(
+        run("contact", "--map", "map.npy", *options, "--area", areas, "--json")
+    )
     assert found["theory"] == "corrected"
-    np.testing.assert_allclose(found["columns"]["pressure"], table["columns"]["pressure"], rtol=1e-9)
+    np.testing.assert_allclose(
+        found["columns"]["pressure"], table["columns"]["pressure"], rtol=1e-9
+    )
 
 
 def test_parts_of_a_scene_that_only_mbma_has_make_it_mbmas():
     surface = of_numbers()
-    for part in ({"island_model": "exact"}, {"variant": "printed"}, {"without": ["subscale_area"]}):
-        assert Scene(surface, effects=["pressure"], pressures=[PRESSURE], E_star=E_STAR, **part).theory == "mbma"
-    assert Scene(surface, effects=["island_statistics"], pressures=[PRESSURE], E_star=E_STAR).theory == "mbma"
+    for part in (
+        {"island_model": "exact"},
+        {"variant": "printed"},
+        {"without": ["subscale_area"]},
+    ):
+        assert (
+            Scene(
+                surface, effects=["pressure"], pressures=[PRESSURE], E_star=E_STAR, **part
+            ).theory
+            == "mbma"
+        )
+    assert (
+        Scene(
+            surface, effects=["island_statistics"], pressures=[PRESSURE], E_star=E_STAR
+        ).theory
+        == "mbma"
+    )
 
 
 def test_the_page_starts_with_the_law_of_the_surface_and_does_not_simulate():
     for make in (of_numbers, of_spectrum, of_map):
         assert '"theory": "calibrated"' in explorer_page(make(), 100.0, "GPa")
-    assert '"theory": "mbma"' in explorer_page(of_numbers(), 100.0, "GPa", variant="printed")
+    assert '"theory": "mbma"' in explorer_page(
+        of_numbers(), 100.0, "GPa", variant="printed"
+    )
     with pytest.raises(InputError, match="five numbers"):
         explorer_page(of_spectrum(), 100.0, "GPa", variant="printed")
 

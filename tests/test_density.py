@@ -51,14 +51,22 @@ def test_a_comprehension_is_nested_with_two_loops_or_another_inside(source, nest
 
 @pytest.mark.parametrize(
     ("source", "packed"),
-    [("x, y = 1, 2", 1), ("x, y = y, x", 1), ("x, y = pair", 0), ("x = 1, 2", 0), ("x, y = [1, 2]", 0)],
+    [
+        ("x, y = 1, 2", 1),
+        ("x, y = y, x", 1),
+        ("x, y = pair", 0),
+        ("x = 1, 2", 0),
+        ("x, y = [1, 2]", 0),
+    ],
 )
 def test_packed_are_assignments_of_a_tuple_to_a_tuple(source, packed):
     assert density(source).packed == packed
 
 
 def test_names_that_hide_are_counted_where_they_are_assigned():
-    counts = density("found = pressure = area\nknown: int = found\nfor own in found:\n    gap = own.found\n")
+    counts = density(
+        "found = pressure = area\nknown: int = found\nfor own in found:\n    gap = own.found\n"
+    )
     assert (counts.names, counts.hiding_names) == (5, 3)
     assert counts.figures()["hiding [%]"] == 60
 
@@ -75,8 +83,20 @@ def test_a_table_has_a_row_for_each_folder_without_its_tests(tmp_path):
     assert empty.split() == ["empty", "0", *["0.0"] * 7]
     # 5 nodes of the first file; 12 of the second: the module, the assignment, two tuples and two
     # names with a context each, and two numbers
-    assert rows.split() == ["rows", "2", "8.5", "0.0", "0.0", "0.0", "500.0", "0.0", "0.0"]
+    assert rows.split() == [
+        "rows",
+        "2",
+        "8.5",
+        "0.0",
+        "0.0",
+        "0.0",
+        "500.0",
+        "0.0",
+        "0.0",
+    ]
 
 
 def test_counts_of_several_sources_add_up():
-    assert density("x = 1\n") + Density(lines=2, nested=3) == Density(lines=3, nodes=5, nested=3, names=1)
+    assert density("x = 1\n") + Density(lines=2, nested=3) == Density(
+        lines=3, nodes=5, nested=3, names=1
+    )

@@ -7,13 +7,25 @@ import numpy as np
 import pytest
 from helpers import refusals
 
-from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, sensitivity
+from mbma_tables import (
+    InputError,
+    MbmaError,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    island,
+    sensitivity,
+)
 from mbma_tables.common.plots import Curve, draw_compression, to_picture
 from mbma_tables.export.law_rows import describe_law
 
 ROAD = Surface.named("concrete")
 SPECTRUM = Surface.from_spectrum(
-    np.geomspace(1, 100, 40), 1e-3 * np.geomspace(1, 100, 40) ** -3.0, h_max=0.3, unit="um"
+    np.geomspace(1, 100, 40),
+    1e-3 * np.geomspace(1, 100, 40) ** -3.0,
+    h_max=0.3,
+    unit="um",
 )
 
 
@@ -28,7 +40,9 @@ DISPLAYED = (
 )
 
 
-@pytest.fixture(scope="module", params=DISPLAYED, ids=lambda make: f"{DISPLAYED.index(make)}")
+@pytest.fixture(
+    scope="module", params=DISPLAYED, ids=lambda make: f"{DISPLAYED.index(make)}"
+)
 def thing(request):
     return request.param()
 
@@ -50,7 +64,10 @@ def test_a_line_and_a_notebooks_table_with_a_small_picture(monkeypatch, thing):
 
 def test_without_xarray_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
-    for ask in (ROAD.to_dataset, Scene(ROAD, separations=[0.5], effects=["pressure"]).run):
+    for ask in (
+        ROAD.to_dataset,
+        Scene(ROAD, separations=[0.5], effects=["pressure"]).run,
+    ):
         with pytest.raises(MbmaError, match=r"this needs xarray: pip install xarray"):
             ask()
 
@@ -77,7 +94,17 @@ def test_every_variable_has_its_unit(thing):
 def test_a_dataset_holds_the_answers():
     answer = contact(ROAD, separation=[[0.8, 0.2], [0.1, 0.0]], E_star="13.3 MPa")
     found = answer.to_dataset()
-    for name in ("separation", "pressure", "area", "stiffness", "mean_pressure", "energy", "scatter", "valid", "error"):
+    for name in (
+        "separation",
+        "pressure",
+        "area",
+        "stiffness",
+        "mean_pressure",
+        "energy",
+        "scatter",
+        "valid",
+        "error",
+    ):
         np.testing.assert_array_equal(found[name], getattr(answer, name))
     assert found["stiffness"].dims == ("dim_0", "dim_1")
     assert (found["stiffness"].units, found["pressure"].units) == ("MPa/mm", "MPa")
@@ -96,11 +123,18 @@ def test_a_lazy_answer_stays_lazy():
     def fail(block):
         raise AssertionError("computed")
 
-    gaps = xr.DataArray(da.ones(6, chunks=3).map_blocks(fail, dtype=float, meta=np.empty(0)), dims="gap")
+    gaps = xr.DataArray(
+        da.ones(6, chunks=3).map_blocks(fail, dtype=float, meta=np.empty(0)), dims="gap"
+    )
     answer = contact(ROAD, separation=gaps)
     assert "{'gap': 6}" in repr(answer)
-    assert answer.to_dataset()["stiffness"].units == "1/mm" or answer.to_dataset()["stiffness"].dims == ("gap",)
-    assert "<table>" in Surface(xr.DataArray([0.5, 0.8], dims="site"), 1, 100, 1, 3)._repr_html_()
+    assert answer.to_dataset()["stiffness"].units == "1/mm" or answer.to_dataset()[
+        "stiffness"
+    ].dims == ("gap",)
+    assert (
+        "<table>"
+        in Surface(xr.DataArray([0.5, 0.8], dims="site"), 1, 100, 1, 3)._repr_html_()
+    )
 
 
 def test_batches_are_summed_up():
@@ -117,15 +151,27 @@ def test_batches_are_summed_up():
 
 test_misspelt_arguments_get_a_hint = refusals(
     lambda ask: ask(),
-    (lambda: contact(ROAD, u=0.3), "contact has no argument 'u': did you mean 'mean_separation'[?]"),
+    (
+        lambda: contact(ROAD, u=0.3),
+        "contact has no argument 'u': did you mean 'mean_separation'[?]",
+    ),
     (lambda: contact(ROAD, presure=0.3), "did you mean 'pressure'[?]"),
-    (lambda: contact_law(ROAD, theroy="persson"), "contact_law has no argument 'theroy': did you mean 'theory'[?]"),
+    (
+        lambda: contact_law(ROAD, theroy="persson"),
+        "contact_law has no argument 'theroy': did you mean 'theory'[?]",
+    ),
     (lambda: island(ROAD, dleta=0.1), "did you mean 'delta'[?]"),
     (lambda: sensitivity(ROAD, p=0.1), "did you mean 'pressure'[?]"),
     (lambda: describe_law(ROAD, 1.0, row=3), "did you mean 'rows'[?]"),
-    (lambda: Surface.from_map("x", detrnd="plane"), "Surface.from_map has no argument 'detrnd': did you mean"),
+    (
+        lambda: Surface.from_map("x", detrnd="plane"),
+        "Surface.from_map has no argument 'detrnd': did you mean",
+    ),
     (lambda: Surface.from_profile("x", shortcutoff=1), "did you mean 'short_cutoff'[?]"),
-    (lambda: Surface(0.8, 0.5, 100.0, hrms=0.2), "Surface has no argument 'hrms': did you mean 'h_rms'[?]"),
+    (
+        lambda: Surface(0.8, 0.5, 100.0, hrms=0.2),
+        "Surface has no argument 'hrms': did you mean 'h_rms'[?]",
+    ),
     (lambda: Surface.from_moments(H=0.7), "did you mean 'hurst'[?]"),
     (lambda: Surface.from_roughness(rq=0.7), "did you mean 'Rq'[?]"),
     (lambda: Surface.from_spectrum([1], [1], hmax=1), "did you mean 'h_max'[?]"),
@@ -139,18 +185,32 @@ AREA = np.array([0.0, 3e-5, 4e-4, 3e-2])
 
 
 def two_curves() -> list[Curve]:
-    return [Curve("first", GAP, FORCE, AREA), Curve("second", GAP[:3] + 0.5, 2 * FORCE[1:], AREA[1:])]
+    return [
+        Curve("first", GAP, FORCE, AREA),
+        Curve("second", GAP[:3] + 0.5, 2 * FORCE[1:], AREA[1:]),
+    ]
 
 
 def test_scatter_is_a_band_of_one_standard_deviation():
     scatter = np.array([np.nan, 0.7, 0.3, 0.1])
-    figure = draw_compression([Curve("law", GAP, FORCE, AREA, scatter, 0.1 * scatter), *two_curves()])
-    for axes, x, y, spread in ((figure.axes[0], GAP, FORCE, scatter), (figure.axes[1], FORCE, AREA, 0.1 * scatter)):
+    figure = draw_compression(
+        [Curve("law", GAP, FORCE, AREA, scatter, 0.1 * scatter), *two_curves()]
+    )
+    for axes, x, y, spread in (
+        (figure.axes[0], GAP, FORCE, scatter),
+        (figure.axes[1], FORCE, AREA, 0.1 * scatter),
+    ):
         (band,) = axes.collections
         corners = band.get_paths()[0].vertices
         for k in (1, 2, 3):
             for side in (1, -1):
-                assert np.isclose(corners, [x[k], y[k] * np.exp(side * spread[k])], rtol=1e-12).all(axis=1).any()
+                assert (
+                    np.isclose(
+                        corners, [x[k], y[k] * np.exp(side * spread[k])], rtol=1e-12
+                    )
+                    .all(axis=1)
+                    .any()
+                )
         assert corners[:, 0].min() >= x[1:].min()
     unknown = draw_compression([Curve("law", GAP, FORCE, AREA, np.full(4, np.nan))])
     assert not unknown.axes[0].collections
@@ -161,6 +221,9 @@ def test_scatter_is_a_band_of_one_standard_deviation():
 
 @pytest.mark.parametrize("outlines", [False, True])
 def test_drawings_repeat_with_letters_as_asked(outlines):
-    first, second = (to_picture(draw_compression(two_curves()), "svg", outlines=outlines) for _ in range(2))
+    first, second = (
+        to_picture(draw_compression(two_curves()), "svg", outlines=outlines)
+        for _ in range(2)
+    )
     assert first == second
     assert (b"<text" in first) != outlines

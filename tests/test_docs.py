@@ -23,16 +23,34 @@ from mbma_tables.common.table_schema import FORMAT_VERSIONS, KINDS
 from mbma_tables.theories.mbma.tables import shipped
 
 PATHS = [*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")]
-PAGES = {str(path.relative_to(ROOT)).removeprefix("docs/"): path.read_text(encoding="utf-8") for path in PATHS}
+PAGES = {
+    str(path.relative_to(ROOT)).removeprefix("docs/"): path.read_text(encoding="utf-8")
+    for path in PATHS
+}
 # code with the output below it, if shown; commands after "$" with theirs
-FENCE = re.compile(r"^```(python|\{code-cell\}|console)\n(.*?)^```\n(?:```text\n(.*?)^```)?", re.DOTALL | re.MULTILINE)
-BLOCKS = {name: blocks for name, text in PAGES.items() if (blocks := FENCE.findall(MARKED.sub("", text)))}
-MODULES = [m.name for m in pkgutil.walk_packages(mbma_tables.__path__, "mbma_tables.") if "__main__" not in m.name]
+FENCE = re.compile(
+    r"^```(python|\{code-cell\}|console)\n(.*?)^```\n(?:```text\n(.*?)^```)?",
+    re.DOTALL | re.MULTILINE,
+)
+BLOCKS = {
+    name: blocks
+    for name, text in PAGES.items()
+    if (blocks := FENCE.findall(MARKED.sub("", text)))
+}
+MODULES = [
+    m.name
+    for m in pkgutil.walk_packages(mbma_tables.__path__, "mbma_tables.")
+    if "__main__" not in m.name
+]
 README, TABLES = PAGES["README.md"], PAGES["tables.md"]
 
 
 @pytest.mark.parametrize(
-    "page", [pytest.param(name, marks=[] if name == "README.md" else pytest.mark.slow) for name in sorted(BLOCKS)]
+    "page",
+    [
+        pytest.param(name, marks=[] if name == "README.md" else pytest.mark.slow)
+        for name in sorted(BLOCKS)
+    ],
 )
 def test_a_page_runs_and_prints_what_it_shows(page, monkeypatch, capsys):
     for package in ("dask", "tamaas", "SurfaceTopography"):
@@ -52,14 +70,21 @@ def test_a_page_runs_and_prints_what_it_shows(page, monkeypatch, capsys):
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_of_docstrings(name):
     module = importlib.import_module(name)
-    found = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
+    found = doctest.testmod(
+        module, optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    )
     assert found.failed == 0
 
 
 def test_readme_quotes_the_audit():
-    rows = re.findall(r"\| (?:`error`|inverses)[^|]*\| ([\d,]+) \| [\d,]+ \| 0 \|", PAGES["guarantees.md"])
+    rows = re.findall(
+        r"\| (?:`error`|inverses)[^|]*\| ([\d,]+) \| [\d,]+ \| 0 \|",
+        PAGES["guarantees.md"],
+    )
     assert len(rows) == 10
-    assert f"compared {sum(int(row.replace(',', '')) for row in rows):,} answers" in README
+    assert (
+        f"compared {sum(int(row.replace(',', '')) for row in rows):,} answers" in README
+    )
 
 
 def test_every_place_has_the_same_version():
@@ -72,21 +97,40 @@ def test_every_place_has_the_same_version():
 
 def test_public_names_have_examples():
     finder = doctest.DocTestFinder()
-    public = ("Surface", "contact", "contact_law", "island", "open_table", "Scene", "height_integral")
-    assert [n for n in public if not any(test.examples for test in finder.find(getattr(mbma_tables, n), n))] == []
+    public = (
+        "Surface",
+        "contact",
+        "contact_law",
+        "island",
+        "open_table",
+        "Scene",
+        "height_integral",
+    )
+    assert [
+        n
+        for n in public
+        if not any(test.examples for test in finder.find(getattr(mbma_tables, n), n))
+    ] == []
 
 
 def test_links_and_figures_of_pages_exist():
     def anchors(page):
-        return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in re.findall(r"^#+ (.*)", page, re.M)}
+        return {
+            re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-")
+            for head in re.findall(r"^#+ (.*)", page, re.M)
+        }
 
     links = 0
     for path in PATHS:
-        for target in re.findall(r"\]\((?!https?:)([^)\s]*)\)", path.read_text(encoding="utf-8")):
+        for target in re.findall(
+            r"\]\((?!https?:)([^)\s]*)\)", path.read_text(encoding="utf-8")
+        ):
             file, _, anchor = target.partition("#")
             found, links = (path.parent / file).resolve() if file else path, links + 1
             assert found.exists(), f"{path.name}: {target}"
-            assert not anchor or anchor in anchors(found.read_text(encoding="utf-8")), f"{path.name}: {target}"
+            assert not anchor or anchor in anchors(found.read_text(encoding="utf-8")), (
+                f"{path.name}: {target}"
+            )
     assert links > 100
 
 
@@ -97,12 +141,16 @@ def functions_of(path):
         if isinstance(node, ast.FunctionDef):
             names.add(node.name)
         elif isinstance(node, ast.Assign):
-            names |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+            names |= {
+                target.id for target in node.targets if isinstance(target, ast.Name)
+            }
     return names
 
 
 def test_every_named_test_exists():
-    named = set(re.findall(r"`(tests/[a-z0-9_/]+(?:\.py)?)(?:::(\w+))?`", "".join(PAGES.values())))
+    named = set(
+        re.findall(r"`(tests/[a-z0-9_/]+(?:\.py)?)(?:::(\w+))?`", "".join(PAGES.values()))
+    )
     assert [path for path, _ in sorted(named) if not (ROOT / path).exists()] == []
     with_function = sorted(pair for pair in named if pair[1])
     assert len(with_function) > 40
@@ -122,16 +170,27 @@ def test_every_module_of_the_architecture_exists():
     text = PAGES["architecture.md"]
     named = set(re.findall(r"\b[a-z]+(?:/[a-z_0-9]+)+\.py", text))
     assert len(named) > 15
-    assert [name for name in sorted(named) if not (ROOT / "mbma_tables" / name).exists()] == []
+    assert [
+        name for name in sorted(named) if not (ROOT / "mbma_tables" / name).exists()
+    ] == []
     path = re.findall(r"^\d\. `(\S+)`", text, re.MULTILINE)
-    lines = [len((ROOT / "mbma_tables" / name).read_text(encoding="utf-8").splitlines()) for name in path]
+    lines = [
+        len((ROOT / "mbma_tables" / name).read_text(encoding="utf-8").splitlines())
+        for name in path
+    ]
     assert len(lines) == 7
     assert 1000 < sum(lines) < 1300
 
 
 def test_layers_of_the_table_are_those_of_the_import_contract():
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
-    layers = {name for layer in settings["contracts"][0]["layers"] for name in layer.split(" : ")}
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
+        "tool"
+    ]["importlinter"]
+    layers = {
+        name
+        for layer in settings["contracts"][0]["layers"]
+        for name in layer.split(" : ")
+    }
     assert {*library.rooms()[0], "__main__"} == layers
 
 
@@ -143,19 +202,31 @@ TAGS = re.findall(rf"\\tag{{({NUMBER})}}", PAGES["model.md"])
 def cited(path):
     """Numbers of equations in a file; a range stands for its members."""
     text = re.sub(r"\(|\)|\\\n", "", path.read_text(encoding="utf-8"))
-    for part in (part for listed in CITATION.findall(text) for part in re.split(r", and |, | and ", listed)):
+    for part in (
+        part
+        for listed in CITATION.findall(text)
+        for part in re.split(r", and |, | and ", listed)
+    ):
         ends = part.split("-")
-        yield from map(str, range(int(ends[0]), int(ends[1]) + 1)) if len(ends) == 2 else ends
+        yield from (
+            map(str, range(int(ends[0]), int(ends[1]) + 1)) if len(ends) == 2 else ends
+        )
 
 
 @pytest.mark.parametrize("package", ["mbma_tables", "generate"])
 def test_every_cited_equation_is_on_the_page_of_the_model_once(package):
     assert len(TAGS) == len(set(TAGS))
     assert {re.sub("[ab]", "", tag) for tag in TAGS} >= set(map(str, range(1, 52)))
-    paths = [path for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".toml")]
+    paths = [
+        path for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".toml")
+    ]
     found = {(path.name, number) for path in paths for number in cited(path)}
     assert found
-    assert {(name, number) for name, number in found if number not in TAGS and f"{number}a" not in TAGS} == set()
+    assert {
+        (name, number)
+        for name, number in found
+        if number not in TAGS and f"{number}a" not in TAGS
+    } == set()
 
 
 def test_measured_parts_are_what_the_table_files_hold():
@@ -169,7 +240,9 @@ def test_page_of_tables_names_what_files_hold():
     for kind in KINDS:
         with netCDF4.Dataset(shipped(kind)) as dataset:
             names |= set(dataset.ncattrs()) | set(dataset.variables)
-            names |= {n for variable in dataset.variables.values() for n in variable.ncattrs()}
+            names |= {
+                n for variable in dataset.variables.values() for n in variable.ncattrs()
+            }
         assert f"{FORMAT_VERSIONS[kind]} of `{kind}.nc`" in TABLES
     # f stands for F or A
     words = re.findall(r"`([a-z]+[0-9]*(?:_[a-zA-Z0-9]+)+)`", TABLES)
@@ -199,7 +272,12 @@ def test_pocket_laws_are_printed_as_they_are_computed():
     names |= {"p": 0.04, "alpha": 30.0, "nu": 0.6, "x": 1.3}
     for line in pocket.splitlines()[:4]:
         name, _, text = line.strip().partition(" = ")
-        text = text.replace("E* q0 h_rms ", "").replace("u/h_rms", "x").replace("(E* g)", "1").replace("ln(", "log(")
+        text = (
+            text.replace("E* q0 h_rms ", "")
+            .replace("u/h_rms", "x")
+            .replace("(E* g)", "1")
+            .replace("ln(", "log(")
+        )
         text = re.sub(r"\((x)\)\^(-[\d.]+) exp", r"\1**\2*exp", text)
         text = re.sub(r"([\d.]) (log|x|\()", r"\1*\2", text).replace("p/1 sqrt", "p*sqrt")
         names[name] = eval(text, {}, names)
@@ -211,10 +289,16 @@ def test_pocket_laws_are_printed_as_they_are_computed():
 def test_the_mean_gap_of_a_nominal_one_is_its_integral():
     """Patir and Cheng's h_T is the mean of h + delta where that is positive, delta Gaussian."""
     text = (ROOT / "docs" / "lubrication.md").read_text(encoding="utf-8")
-    (block,) = (part.split("```")[0] for part in text.split("```python\n") if part.startswith("import math"))
+    (block,) = (
+        part.split("```")[0]
+        for part in text.split("```python\n")
+        if part.startswith("import math")
+    )
     names: dict = {}
     exec(block.split("h = 0.6")[0], names)
     for h in (0.05, 0.6, 2.0):
         z = np.linspace(-h / 0.5, 12, 200001)
         density = np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi)
-        assert names["mean_gap"](h, 0.5) == pytest.approx(np.trapezoid((h + 0.5 * z) * density, z), rel=1e-8)
+        assert names["mean_gap"](h, 0.5) == pytest.approx(
+            np.trapezoid((h + 0.5 * z) * density, z), rel=1e-8
+        )

@@ -22,7 +22,13 @@ from mbma_tables import (
     open_table,
 )
 from mbma_tables.common.arguments import SHOWN, finite_array, require
-from mbma_tables.common.errors import ConvergenceError, InputError, MbmaError, NotSelfAffineError, OutOfRangeError
+from mbma_tables.common.errors import (
+    ConvergenceError,
+    InputError,
+    MbmaError,
+    NotSelfAffineError,
+    OutOfRangeError,
+)
 from mbma_tables.materials import effective_modulus
 
 
@@ -63,7 +69,10 @@ test_what_is_no_number_is_named = refusals(
     ],
 )
 def test_masked_entries_are_refused_not_uncovered(take):
-    with pytest.raises(InputError, match=r"has 1 masked entries among 3: leave them out with \.compressed\(\), or put"):
+    with pytest.raises(
+        InputError,
+        match=r"has 1 masked entries among 3: leave them out with \.compressed\(\), or put",
+    ):
         take(np.ma.masked_array([0.1, 0.2, 0.3], [False, True, False]))
     take(np.ma.masked_array([0.1, 0.2, 0.3], False))
 
@@ -81,13 +90,19 @@ def test_quantities_of_other_libraries_are_refused():
 
         given += [5 * pint.UnitRegistry().MPa, np.ones(2) * pint.UnitRegistry().MPa]
     for quantity in given:
-        with pytest.raises(InputError, match="pressure is a Quantity with a unit of its own: convert it"):
+        with pytest.raises(
+            InputError, match="pressure is a Quantity with a unit of its own: convert it"
+        ):
             contact(ROAD, pressure=quantity, E_star="1 GPa")
 
 
 def test_other_containers_of_xarray_and_hdf5_are_refused(tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
-        for value in (xr.Variable("t", [0.1]), xr.Dataset({"a": ("t", [0.1])}), file.create_dataset("x", data=[0.1])):
+        for value in (
+            xr.Variable("t", [0.1]),
+            xr.Dataset({"a": ("t", [0.1])}),
+            file.create_dataset("x", data=[0.1]),
+        ):
             message = f"x must be numbers, .* inside that {type(value).__name__}"
             with pytest.raises(InputError, match=message):
                 finite_array("x", value)
@@ -97,40 +112,71 @@ def test_other_containers_of_xarray_and_hdf5_are_refused(tmp_path):
 
 ROUGH = Surface(0.8, 0.5, 100.0, 0.2, 0.6)
 CALLS = {
-    "Surface": (Surface, {"hurst": 0.8, "q0": 0.5, "q1": 100.0, "h_rms": 0.2, "h_max": 0.6}),
-    "from_moments": (Surface.from_moments, {"hurst": 0.7, "m0": 0.071, "m2": 0.27, "m4": 62.0, "h_max": 1.1}),
+    "Surface": (
+        Surface,
+        {"hurst": 0.8, "q0": 0.5, "q1": 100.0, "h_rms": 0.2, "h_max": 0.6},
+    ),
+    "from_moments": (
+        Surface.from_moments,
+        {"hurst": 0.7, "m0": 0.071, "m2": 0.27, "m4": 62.0, "h_max": 1.1},
+    ),
     "power_spectrum": (ROUGH.power_spectrum, {"q": 1.0}),
     "height_integral": (functools.partial(height_integral, 1.5), {"x": 1.0}),
     "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
     "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
     **{
-        f"{theory} by {known}": (functools.partial(contact, ROUGH, theory=theory), {known: 0.1, "E_star": 1.0})
+        f"{theory} by {known}": (
+            functools.partial(contact, ROUGH, theory=theory),
+            {known: 0.1, "E_star": 1.0},
+        )
         for theory in ("mbma", "greenwood_williamson", "persson", "calibrated")
         for known in ("separation", "mean_separation", "pressure", "area")
     },
     "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),
-    "island4d": (open_table("island4d").lookup, {"delta_over_h_rms": 1.5, "zeta_d": 2.0, "zeta_u": 20.0, "hurst": 0.7}),
+    "island4d": (
+        open_table("island4d").lookup,
+        {"delta_over_h_rms": 1.5, "zeta_d": 2.0, "zeta_u": 20.0, "hurst": 0.7},
+    ),
     "law by separation": (contact_law(ROUGH, rtol=1e-3).pressure, {"separation": 0.3}),
-    "effective_modulus": (effective_modulus, {"E1": 1.0, "nu1": 0.3, "E2": 2.0, "nu2": 0.3}),
+    "effective_modulus": (
+        effective_modulus,
+        {"E1": 1.0, "nu1": 0.3, "E2": 2.0, "nu2": 0.3},
+    ),
 }
 
 
-@pytest.mark.parametrize(("call", "name"), [(call, name) for call, (_, good) in CALLS.items() for name in good])
+@pytest.mark.parametrize(
+    ("call", "name"), [(call, name) for call, (_, good) in CALLS.items() for name in good]
+)
 def test_every_argument_is_refused_by_name(call, name):
     function, good = CALLS[call]
-    for bad in (math.nan, math.inf, [0.5, -math.inf], [], "rough", None, [None], 1j, True):
+    for bad in (
+        math.nan,
+        math.inf,
+        [0.5, -math.inf],
+        [],
+        "rough",
+        None,
+        [None],
+        1j,
+        True,
+    ):
         # no pressure at all is another mistake
         if bad is not None or " by " not in call:
             with pytest.raises(InputError, match=f"^{name} "):
                 function(**{**good, name: bad})
 
 
-@pytest.mark.parametrize("call", [call for call, (_, good) in CALLS.items() if len(good) > 1])
+@pytest.mark.parametrize(
+    "call", [call for call, (_, good) in CALLS.items() if len(good) > 1]
+)
 def test_shapes_that_do_not_broadcast_are_listed(call):
     function, good = CALLS[call]
     first, second = list(good)[:2]
     shapes = {first: [good[first]] * 2, second: [good[second]] * 3}
-    with pytest.raises(InputError, match=rf"do not broadcast: .*{first} \(2,\).*{second} \(3,\)"):
+    with pytest.raises(
+        InputError, match=rf"do not broadcast: .*{first} \(2,\).*{second} \(3,\)"
+    ):
         function(**(good | shapes))
 
 
@@ -139,7 +185,10 @@ def test_out_of_range_entries_are_quoted():
     with pytest.raises(OutOfRangeError) as caught:
         require("x", value, value > 0, "positive")
     assert SHOWN == 3
-    assert str(caught.value) == "x must be positive, got -1 at (1,), -2 at (2,), -3 at (3,) and 1 more"
+    assert (
+        str(caught.value)
+        == "x must be positive, got -1 at (1,), -2 at (2,), -3 at (3,) and 1 more"
+    )
     assert caught.value.mask.tolist() == [False, True, True, True, True]
     with pytest.raises(OutOfRangeError, match=r"^x must be positive, got -1$"):
         require("x", np.array(-1.0), np.array(False), "positive")
@@ -155,26 +204,65 @@ BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
 
 test_natural_mistakes_have_a_message_with_the_remedy = refusals(
     lambda ask: ask(),
-    (lambda: contact("concrete", separation=1.0), "surface must be a Surface, got 'concrete'; a named"),
+    (
+        lambda: contact("concrete", separation=1.0),
+        "surface must be a Surface, got 'concrete'; a named",
+    ),
     (lambda: contact_law(None), "surface must be a Surface, got None"),
     (lambda: Surface.named([]), r"no surface is named \[\]; there are"),
-    (lambda: contact(ROAD, separation=1.0, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
-    (lambda: contact_law(ROAD, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
-    (lambda: flow_factors("concrete", 1.0), "surface must be a Surface, got 'concrete'; a named"),
-    (lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))), "rtol, outside take one value each"),
-    (lambda: contact(ROAD, separation=1.0, hardness=10**400), "hardness must be real numbers: entries of type obj"),
+    (
+        lambda: contact(ROAD, separation=1.0, theory=np.ones(3)),
+        r"theory must be one of .* got array\(\[1",
+    ),
+    (
+        lambda: contact_law(ROAD, theory=np.ones(3)),
+        r"theory must be one of .* got array\(\[1",
+    ),
+    (
+        lambda: flow_factors("concrete", 1.0),
+        "surface must be a Surface, got 'concrete'; a named",
+    ),
+    (
+        lambda: contact(ROAD, separation=1.0, rtol=np.ones((2, 3))),
+        "rtol, outside take one value each",
+    ),
+    (
+        lambda: contact(ROAD, separation=1.0, hardness=10**400),
+        "hardness must be real numbers: entries of type obj",
+    ),
     (
         lambda: contact(ROAD, pressure=1.0, E_star=5e-324, theory="mbma"),
         "pressure must be at most what theory .mbma. reaches",
     ),
-    (lambda: contact(ROAD, pressure=1.0, E_star=5e-324, hardness=1.0), "pressure must be at most what theory .calib"),
+    (
+        lambda: contact(ROAD, pressure=1.0, E_star=5e-324, hardness=1.0),
+        "pressure must be at most what theory .calib",
+    ),
     (lambda: island(ROAD, 5e-324), "delta must be at least 1e-250, got 5e-324"),
-    (lambda: Surface(0.8, 5e-324, 1.0, 1.0, 3.0), "q0 must be from 1e-50 to 1e\\+50: take another unit"),
-    (lambda: Surface(5e-324, 1.0, 10.0, 1.0, 3.0), r"hurst must be in \(0, 1\], got 5e-324"),
-    (lambda: contact(ROAD, separation="50 MPa"), "'MPa' is no known unit of length but one of stress"),
-    (lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
-    (lambda: contact(ROAD, separation=["1 um", "2"]), "separation: '2' has no unit beside others that have"),
-    (lambda: Surface.from_roughness(Rq=["1.6 um", 2.0], **BAND), "Rq: 2.0 has no unit beside others"),
+    (
+        lambda: Surface(0.8, 5e-324, 1.0, 1.0, 3.0),
+        "q0 must be from 1e-50 to 1e\\+50: take another unit",
+    ),
+    (
+        lambda: Surface(5e-324, 1.0, 10.0, 1.0, 3.0),
+        r"hurst must be in \(0, 1\], got 5e-324",
+    ),
+    (
+        lambda: contact(ROAD, separation="50 MPa"),
+        "'MPa' is no known unit of length but one of stress",
+    ),
+    (
+        lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"),
+        "pressure: 50 has no unit beside others",
+    ),
+    (
+        lambda: contact(ROAD, separation=["1 um", "2"]),
+        "separation: '2' has no unit beside others that have",
+    ),
+    (
+        lambda: Surface.from_roughness(Rq=["1.6 um", 2.0], **BAND),
+        "Rq: 2.0 has no unit beside others",
+    ),
 )
 
 
@@ -205,17 +293,24 @@ ROAD = Surface.named("concrete")
 test_odd_input_has_a_typed_error = refusals(
     lambda ask: ask(),
     (
-        lambda: contact(ROAD, pressure=0.1, E_star=13.0, theory="calibrated", hardness=[[1, 2], [3]]),
+        lambda: contact(
+            ROAD, pressure=0.1, E_star=13.0, theory="calibrated", hardness=[[1, 2], [3]]
+        ),
         "hardness must be real numbers",
     ),
     (lambda: mbma_tables.Scene(3), "surface must be a Surface, got 3"),
     (lambda: mbma_tables.Scene("concrete"), r"a named one is Surface\.named"),
     (lambda: mbma_tables.Scene(None), "surface must be a Surface, got None"),
-    (lambda: open_table(np.zeros(3)), "a table must be 'universal', 'island4d' or the path of a file"),
+    (
+        lambda: open_table(np.zeros(3)),
+        "a table must be 'universal', 'island4d' or the path of a file",
+    ),
     (lambda: open_table(3), "the path of a file, got 3"),
 )
 test_a_number_too_large_for_a_double_is_not_infinity = refusals(
-    lambda hardness: contact(ROAD, pressure="1 kPa", E_star="13 MPa", theory="calibrated", hardness=hardness),
+    lambda hardness: contact(
+        ROAD, pressure="1 kPa", E_star="13 MPa", theory="calibrated", hardness=hardness
+    ),
     ("1e400", "hardness = '1e400' is above the largest number"),
     ("1e400 GPa", "hardness = '1e400 GPa' is above the largest number"),
     ("1e306 GPa", "above the largest number of 64 bits in MPa"),

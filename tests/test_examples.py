@@ -24,7 +24,9 @@ NEEDS = {"scatter": "dask", "heat": "skfem", "newton": "skfem"}
 def load(name):
     if name in NEEDS:
         pytest.importorskip(NEEDS[name])
-    spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
+    spec = importlib.util.spec_from_file_location(
+        f"example_{name}", EXAMPLES / f"{name}.py"
+    )
     module = importlib.util.module_from_spec(spec)
     # dataclasses look their module up
     sys.modules[spec.name] = module
@@ -42,7 +44,10 @@ def direct(module, x):
     """log(pressure/LOAD) and log(conductance), contact by contact, written again from the statement."""
     h_rms, h_max = np.exp(x[0]), module.CREST * np.exp(x[0])
     face = Surface(x[1], module.Q0, np.exp(x[2]), h_rms, h_max)
-    both = [contact(face, mean_separation=x[3] * h_max + deeper, theory="calibrated") for deeper in (0, module.DEPTH)]
+    both = [
+        contact(face, mean_separation=x[3] * h_max + deeper, theory="calibrated")
+        for deeper in (0, module.DEPTH)
+    ]
     pressure = module.E_STAR * np.mean([half.pressure for half in both])
     return np.log([pressure / module.LOAD, np.mean([half.leakage.K for half in both])])
 
@@ -62,13 +67,22 @@ def test_seal_leaks_as_simulated(seal):
     pytest.importorskip("tamaas")
     module, found = seal
     simulated = module.simulate(found.best, found.result.x, 256, 7)
-    assert abs(np.log(np.exp(found.result.fun) / simulated)) < 3 * found.best.leakage.scatter[0, 1]
+    assert (
+        abs(np.log(np.exp(found.result.fun) / simulated))
+        < 3 * found.best.leakage.scatter[0, 1]
+    )
 
 
 def test_scatter_is_the_exact_island_model_sample_by_sample(tmp_path):
     module = load("scatter")
-    spread, lazy = module.main(tmp_path / "own.png", samples=20), module.sample_surfaces(20)
-    numbers = np.stack([getattr(lazy, name).compute() for name in ("hurst", "q1", "h_rms", "h_max")], axis=1)
+    spread, lazy = (
+        module.main(tmp_path / "own.png", samples=20),
+        module.sample_surfaces(20),
+    )
+    numbers = np.stack(
+        [getattr(lazy, name).compute() for name in ("hurst", "q1", "h_rms", "h_max")],
+        axis=1,
+    )
     for k, (hurst, q1, h_rms, h_max) in enumerate(numbers):
         own = Surface(hurst, module.Q0, q1, h_rms, h_max)
         exact = contact(own, separation=module.GAP, island_model="exact", rtol=1e-7)
@@ -77,7 +91,8 @@ def test_scatter_is_the_exact_island_model_sample_by_sample(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "size"), [("seal", "--cells=0"), ("conductance", "--points=40"), ("scatter", "--samples=50")]
+    ("name", "size"),
+    [("seal", "--cells=0"), ("conductance", "--points=40"), ("scatter", "--samples=50")],
 )
 def test_runs_as_a_script(name, size, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -91,8 +106,12 @@ def test_runs_as_a_script(name, size, tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bearing", "heat", "fracture"])
 def test_an_example_prints_what_its_page_shows(name, tmp_path):
-    ran = CliRunner().invoke(load(name).command, ["--out", str(tmp_path / "own.svg")], catch_exceptions=False)
-    shown = re.search(rf"`python examples/{name}\.py`.*?\n\n((?:    [^\n]*\n)+)", PAGE, re.S)[1]
+    ran = CliRunner().invoke(
+        load(name).command, ["--out", str(tmp_path / "own.svg")], catch_exceptions=False
+    )
+    shown = re.search(
+        rf"`python examples/{name}\.py`.*?\n\n((?:    [^\n]*\n)+)", PAGE, re.S
+    )[1]
     assert_same_output(ran.output, shown, rtol=0.02)
     assert b"<svg" in (tmp_path / "own.svg").read_bytes()
 
@@ -101,14 +120,26 @@ def test_a_short_smooth_bearing_is_ocvirks(monkeypatch):
     """Ocvirk 1953, half of Sommerfeld's film: W = eta U L^3 e sqrt(16 e^2 + pi^2 (1 - e^2))/(4 c^2 (1 - e^2)^2)."""
     module = load("bearing")
     monkeypatch.setattr(module, "LENGTH", 1e-3)
-    smooth = {"mean_separation": np.array([0.0, 1.0])} | dict.fromkeys(("phi_x", "phi_y"), np.ones(2))
+    smooth = {"mean_separation": np.array([0.0, 1.0])} | dict.fromkeys(
+        ("phi_x", "phi_y"), np.ones(2)
+    )
     smooth |= dict.fromkeys(("pressure", "area"), np.zeros(2))
     for e in (0.2, 0.5, 0.8):
         found = module.state(smooth, e, 1.0)
         shape = e * np.sqrt(16 * e**2 + np.pi**2 * (1 - e**2)) / (4 * (1 - e**2) ** 2)
-        assert found.load == pytest.approx(module.VISCOSITY * 1e-9 / module.CLEARANCE**2 * shape, rel=0.015)
+        assert found.load == pytest.approx(
+            module.VISCOSITY * 1e-9 / module.CLEARANCE**2 * shape, rel=0.015
+        )
         # Petroff's friction of the film that fills the gap
-        around = 2 * np.pi * module.RADIUS * 1e-3 * module.VISCOSITY / module.CLEARANCE / np.sqrt(1 - e**2)
+        around = (
+            2
+            * np.pi
+            * module.RADIUS
+            * 1e-3
+            * module.VISCOSITY
+            / module.CLEARANCE
+            / np.sqrt(1 - e**2)
+        )
         assert found.friction * found.load == pytest.approx(around, rel=1e-6)
 
 
@@ -119,8 +150,12 @@ def test_a_bearing_carries_its_load():
     assert slow.in_contact > 0.5 > fast.in_contact
     table = module.film_table()
     u = module.CLEARANCE * (1 - slow.eccentricity)
-    peak = contact(module.FACES, mean_separation=u, E_star=110e9, theory="calibrated").pressure
-    assert np.interp(u, table["mean_separation"], table["pressure"]) == pytest.approx(peak, rel=2e-3)
+    peak = contact(
+        module.FACES, mean_separation=u, E_star=110e9, theory="calibrated"
+    ).pressure
+    assert np.interp(u, table["mean_separation"], table["pressure"]) == pytest.approx(
+        peak, rel=2e-3
+    )
 
 
 def test_uniform_conductance_is_resistances_in_series():
@@ -128,16 +163,30 @@ def test_uniform_conductance_is_resistances_in_series():
     h, area = 2e4, np.pi * (module.RIM**2 - module.HOLE**2)
     own = module.resistance(np.full_like(module.top.global_coordinates()[0], h))
     k_1, k_2 = module.CONDUCTIVITY
-    assert own == pytest.approx((module.THICK / k_1 + 1 / h + module.THICK / k_2) / area, rel=1e-9)
+    assert own == pytest.approx(
+        (module.THICK / k_1 + 1 / h + module.THICK / k_2) / area, rel=1e-9
+    )
     r = np.linspace(module.HOLE, module.CONE, 4001)
-    assert np.trapezoid(2 * np.pi * r * module.pressure(r), r) == pytest.approx(module.FORCE, rel=1e-6)
+    assert np.trapezoid(2 * np.pi * r * module.pressure(r), r) == pytest.approx(
+        module.FORCE, rel=1e-6
+    )
 
 
 def test_a_well_draws_what_the_leakage_of_the_contact_lets_through():
     module = load("fracture")
     p = np.linspace(5e6, module.PORE, 401)
-    K = contact(module.FRACTURE, pressure=module.NORMAL - p, E_star=module.E_STAR, theory="calibrated").leakage.K
-    exact = 2 * np.pi * np.trapezoid(K, p) / (12 * module.VISCOSITY * np.log(module.EDGE / module.WELL))
+    K = contact(
+        module.FRACTURE,
+        pressure=module.NORMAL - p,
+        E_star=module.E_STAR,
+        theory="calibrated",
+    ).leakage.K
+    exact = (
+        2
+        * np.pi
+        * np.trapezoid(K, p)
+        / (12 * module.VISCOSITY * np.log(module.EDGE / module.WELL))
+    )
     assert module.drawn(module.aperture_table(), 5e6) == pytest.approx(exact, rel=3e-3)
 
 

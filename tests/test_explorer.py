@@ -19,14 +19,20 @@ from mbma_tables.export.text import page_file
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.sums import by_table
 
-QUANTITIES = {"gap": "mean_separation", "pressure": "pressure", "area": "area", "stiffness": "stiffness"}
+QUANTITIES = {
+    "gap": "mean_separation",
+    "pressure": "pressure",
+    "area": "area",
+    "stiffness": "stiffness",
+}
 NAMES = ("hurst", "q0", "q1", "h_rms", "h_max")
 GO = """(text) => new Promise((done) => {
   addEventListener("hashchange", () => setTimeout(done), { once: true });
   location.hash = text;
 })"""
 
-# the text of the button's file without its download: hundreds of those from one page are not reliable in a browser
+# the text of the button's file without its download: hundreds of those from one page are
+# not reliable in a browser
 CSV = """() => {
   const { createObjectURL } = URL, { click } = HTMLAnchorElement.prototype;
   let written;
@@ -86,14 +92,22 @@ def download(tab, button: str) -> str:
 def columns(tab) -> dict[str, np.ndarray]:
     rows = [line for line in tab.evaluate(CSV).splitlines() if not line.startswith("#")]
     head, *body = csv.reader(rows)
-    numbers = np.array([[float(cell) if cell else np.nan for cell in row] for row in body])
+    numbers = np.array(
+        [[float(cell) if cell else np.nan for cell in row] for row in body]
+    )
     return {name.split(" [")[0]: numbers[:, k] for k, name in enumerate(head)}
 
 
 def random_state(rng: np.random.Generator) -> dict:
     q0, h_rms = np.exp(rng.uniform(-8, 8, 2))
     hurst = rng.choice([1.0, rng.uniform(0.1, 1.0)], p=[0.1, 0.9])
-    numbers = (hurst, q0, q0 * np.exp(rng.uniform(np.log(5.2), np.log(5e4))), h_rms, h_rms * rng.uniform(2.0, 6.0))
+    numbers = (
+        hurst,
+        q0,
+        q0 * np.exp(rng.uniform(np.log(5.2), np.log(5e4))),
+        h_rms,
+        h_rms * rng.uniform(2.0, 6.0),
+    )
     return {
         **dict(zip(NAMES, map(float, numbers), strict=True)),
         "E_star": float(np.exp(rng.uniform(-5, 12))),
@@ -108,29 +122,76 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
     """Of the page's answers from the library's at the page's gaps, relative, in every quantity and theory."""
     surface, worst = Surface(*(state[name] for name in NAMES)), 0.0
     for theory in ("mbma", "calibrated", "persson"):
-        known = {name: found[f"{theory} {name}"] for name in ("gap", "pressure", "area", "stiffness")}
+        known = {
+            name: found[f"{theory} {name}"]
+            for name in ("gap", "pressure", "area", "stiffness")
+        }
         answered = np.flatnonzero(np.isfinite(known["gap"]))[rows]
         assert answered.size > 3
-        options = {"mean_separation": known["gap"][answered], "E_star": state["E_star"], "theory": theory}
-        expected = contact(surface, **options, **({"variant": state["variant"]} if theory == "mbma" else {}))
-        for name, scatter in {"pressure": expected.scatter, "area": expected.area_scatter}.items():
-            np.testing.assert_allclose(found[f"{theory} scatter of ln {name}"][answered], scatter, rtol=1e-6)
+        options = {
+            "mean_separation": known["gap"][answered],
+            "E_star": state["E_star"],
+            "theory": theory,
+        }
+        expected = contact(
+            surface,
+            **options,
+            **({"variant": state["variant"]} if theory == "mbma" else {}),
+        )
+        for name, scatter in {
+            "pressure": expected.scatter,
+            "area": expected.area_scatter,
+        }.items():
+            np.testing.assert_allclose(
+                found[f"{theory} scatter of ln {name}"][answered], scatter, rtol=1e-6
+            )
         force, area, stiffness = expected.pressure, expected.area, expected.stiffness
         if theory == "mbma":
             # islands summed gap by gap, as the page does it
-            sums, depth = np.empty((5, answered.size)), 2 * (surface.h_max - options["mean_separation"])
+            sums, depth = (
+                np.empty((5, answered.size)),
+                2 * (surface.h_max - options["mean_separation"]),
+            )
             how = Mbma(variant=state["variant"], rtol=1e-11).sums
-            by_table(surface, depth / surface.h_rms, np.arange(answered.size), how.model, how, sums)
+            by_table(
+                surface,
+                depth / surface.h_rms,
+                np.arange(answered.size),
+                how.model,
+                how,
+                sums,
+            )
             stress = state["E_star"] * surface.q0 * surface.s
-            force, area, stiffness = stress * sums[0], sums[1], 2 * stress / surface.h_rms * sums[2]
-            area = -np.expm1(-area) if state["variant"] == "fitted" else area  # the cover of its islands
-        for name, values in {"pressure": force, "area": area, "stiffness": stiffness}.items():
+            force, area, stiffness = (
+                stress * sums[0],
+                sums[1],
+                2 * stress / surface.h_rms * sums[2],
+            )
+            area = (
+                -np.expm1(-area) if state["variant"] == "fitted" else area
+            )  # the cover of its islands
+        for name, values in {
+            "pressure": force,
+            "area": area,
+            "stiffness": stiffness,
+        }.items():
             worst = max(worst, np.abs(known[name][answered] / values - 1).max())
-        conductance = 50 / 1e-3 / state["E_star"] * found[f"{theory} stiffness"]  # of 50 W/(m K), lengths in mm
-        np.testing.assert_allclose(found[f"{theory} conductance"], conductance, rtol=1e-12)
-        np.testing.assert_allclose(found[f"{theory} tangential"], found[f"{theory} stiffness"] * 1.4 / 1.7, rtol=1e-12)
+        conductance = (
+            50 / 1e-3 / state["E_star"] * found[f"{theory} stiffness"]
+        )  # of 50 W/(m K), lengths in mm
+        np.testing.assert_allclose(
+            found[f"{theory} conductance"], conductance, rtol=1e-12
+        )
+        np.testing.assert_allclose(
+            found[f"{theory} tangential"],
+            found[f"{theory} stiffness"] * 1.4 / 1.7,
+            rtol=1e-12,
+        )
     if state["against"] == "pressure":
-        pressures = np.nanmax([found[f"{theory} pressure"] for theory in ("mbma", "calibrated", "persson")], axis=0)
+        pressures = np.nanmax(
+            [found[f"{theory} pressure"] for theory in ("mbma", "calibrated", "persson")],
+            axis=0,
+        )
         assert np.allclose(np.diff(np.log(pressures)), np.log(1e5) / 99, rtol=1e-6)
     return worst
 
@@ -142,17 +203,25 @@ def test_curves_are_those_of_the_library(number, visit):
     for _ in range(number):
         state = random_state(rng)
         tab.evaluate(GO, urllib.parse.urlencode(state))
-        worst.append(largest_difference(state, columns(tab), slice(rng.integers(9), None, 9)))
+        worst.append(
+            largest_difference(state, columns(tab), slice(rng.integers(9), None, 9))
+        )
     assert max(worst) < 1e-9
 
 
-@pytest.mark.parametrize(("module", "texts"), [(MODULE, c_sources()[0]), (LAW_MODULE, law_sources())])
+@pytest.mark.parametrize(
+    ("module", "texts"), [(MODULE, c_sources()[0]), (LAW_MODULE, law_sources())]
+)
 def test_the_modules_are_of_this_c(module, texts):
-    assert page_file(module).endswith(digest_of(texts)), "run: python -m generate explorer"
+    assert page_file(module).endswith(digest_of(texts)), (
+        "run: python -m generate explorer"
+    )
 
 
 def test_one_file_of_at_most_four_megabytes_that_asks_for_nothing():
-    page = explorer_page(Surface.named("concrete"), title="</script><img src=x onerror=alert(1)>")
+    page = explorer_page(
+        Surface.named("concrete"), title="</script><img src=x onerror=alert(1)>"
+    )
     assert len(page.encode()) < 4e6
     assert "<img" not in page
     assert not re.search(r"<(link|script|img|iframe)[^>]*(src|href)=\"(?!data:)", page)
@@ -235,20 +304,39 @@ def test_bad_numbers_are_told_beside_their_field(visit):
 def test_a_hardness_is_that_of_the_library(visit, against, hardness):
     """In E* = 13.3 MPa on the road, whose rms gradient is near 1/2: plasticity indices from 100 to 1."""
     tab, road = visit(), Surface.named("concrete")
-    tab.evaluate(GO, urllib.parse.urlencode({"theory": "calibrated", "against": against, "hardness": hardness}))
+    tab.evaluate(
+        GO,
+        urllib.parse.urlencode(
+            {"theory": "calibrated", "against": against, "hardness": hardness}
+        ),
+    )
     found = columns(tab)
     gap = found["calibrated gap"]
     seen = np.isfinite(gap) & np.isfinite(found["calibrated area"])
     assert seen.sum() > 20
-    known = contact(road, mean_separation=gap[seen], E_star=13.3, theory="calibrated", hardness=hardness)
-    expected = {"pressure": known.pressure, "area": known.area, "stiffness": known.stiffness}
+    known = contact(
+        road,
+        mean_separation=gap[seen],
+        E_star=13.3,
+        theory="calibrated",
+        hardness=hardness,
+    )
+    expected = {
+        "pressure": known.pressure,
+        "area": known.area,
+        "stiffness": known.stiffness,
+    }
     expected |= {"conductance": 50 / 1e-3 / 13.3 * known.unloading_stiffness}
     expected |= {"tangential": known.tangential(nu=0.3).stiffness}
     for name, values in expected.items():
-        np.testing.assert_allclose(found[f"calibrated {name}"][seen], values, rtol=1e-5, err_msg=name)
+        np.testing.assert_allclose(
+            found[f"calibrated {name}"][seen], values, rtol=1e-5, err_msg=name
+        )
     assert "Python library" in tab.inner_text("#concerns")
     # the road's spectrum is within the tested range, and only the hardness is not judged
-    judged = {row.split("\t")[-1] for row in tab.locator("#readout tbody tr").all_inner_texts()}
+    judged = {
+        row.split("\t")[-1] for row in tab.locator("#readout tbody tr").all_inner_texts()
+    }
     assert "not known" in judged
     assert "yes" not in judged
     tab.fill("#hardness", "")
@@ -270,14 +358,20 @@ def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
     tab.fill("#spectrum", rows(SAMPLES, SPECTRUM))
     found, surface = columns(tab), Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1)
     for theory in ("calibrated", "persson"):
-        expected = contact(surface, mean_separation=found[f"{theory} gap"], E_star=13.3, theory=theory)
+        expected = contact(
+            surface, mean_separation=found[f"{theory} gap"], E_star=13.3, theory=theory
+        )
         for name, attribute in QUANTITIES.items():
             # the library's own law of a spectrum is within 1e-7
-            np.testing.assert_allclose(found[f"{theory} {name}"], getattr(expected, attribute), rtol=1e-7)
+            np.testing.assert_allclose(
+                found[f"{theory} {name}"], getattr(expected, attribute), rtol=1e-7
+            )
     # in SurfaceTopography's convention
     tab.fill("#spectrum", rows(SAMPLES, 4 * np.pi**2 * SPECTRUM))
     tab.select_option("#convention", "isotropic")
-    np.testing.assert_allclose(columns(tab)["calibrated pressure"], found["calibrated pressure"], rtol=1e-9)
+    np.testing.assert_allclose(
+        columns(tab)["calibrated pressure"], found["calibrated pressure"], rtol=1e-9
+    )
     tab.select_option("#theory", "mbma")
     assert "needs five numbers" in tab.inner_text("#error-theory")
 
@@ -286,7 +380,9 @@ def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
     from generate.explorer import visit
 
     path = tmp_path / "map.html"
-    surface = Surface.from_map((0.04 * random_map(64, 0.024, 0.239, seed=8)) ** 3, 1.0, periodic=True)
+    surface = Surface.from_map(
+        (0.04 * random_map(64, 0.024, 0.239, seed=8)) ** 3, 1.0, periodic=True
+    )
     path.write_text(explorer_page(surface), encoding="utf-8")
     tab = visit(opened, path.as_uri())
     assert "goes by its heights" in tab.inner_text("#origin")
@@ -305,11 +401,20 @@ def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tm
     if shutil.which("gcc") is None:
         pytest.skip("not installed: gcc")
     path, own = tmp_path / "page.c", tmp_path / "own.c"
-    path.write_text(download(visit(f"theory={theory}&h_rms=0.25"), "#law"), encoding="ascii")
+    path.write_text(
+        download(visit(f"theory={theory}&h_rms=0.25"), "#law"), encoding="ascii"
+    )
     compiled = functools.partial(compiled_law, name="law")
-    law, surface = compiled(path, "-std=c99"), dataclasses.replace(Surface.named("concrete"), h_rms=0.25)
-    c = float(surface.h_max) * np.exp(np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 300))
-    known = contact(surface, mean_separation=surface.h_max - c, E_star=13.3, theory=theory)
+    law, surface = (
+        compiled(path, "-std=c99"),
+        dataclasses.replace(Surface.named("concrete"), h_rms=0.25),
+    )
+    c = float(surface.h_max) * np.exp(
+        np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 300)
+    )
+    known = contact(
+        surface, mean_separation=surface.h_max - c, E_star=13.3, theory=theory
+    )
     np.testing.assert_allclose(law("pressure", c), known.pressure, rtol=3e-8)
     np.testing.assert_allclose(law("area", c), known.area, rtol=3e-8)
     np.testing.assert_allclose(law("tangent", c), known.stiffness, rtol=3e-6)
@@ -317,7 +422,9 @@ def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tm
     # the command in its header writes a law of the same functions
     command = re.search(r"mbma export (c-law .* --out) law.c", path.read_text())
     run("export", *command[1].split(), str(own))
-    np.testing.assert_allclose(compiled(own)("pressure", c[c > 1e-3]), law("pressure", c[c > 1e-3]), rtol=1e-6)
+    np.testing.assert_allclose(
+        compiled(own)("pressure", c[c > 1e-3]), law("pressure", c[c > 1e-3]), rtol=1e-6
+    )
     assert law("pressure", [-0.1, 0.0]).tolist() == [0.0, 0.0]
 
 
@@ -333,7 +440,9 @@ def test_numbers_under_the_cursor_by_keyboard(visit):
     rows = tab.locator("#readout tr")
     assert rows.count() == 3
     assert rows.nth(0).inner_text().startswith("u = 1.078 mm")
-    known = contact(Surface.named("concrete"), mean_separation=1.078, E_star=13.3, theory="calibrated")
+    known = contact(
+        Surface.named("concrete"), mean_separation=1.078, E_star=13.3, theory="calibrated"
+    )
     shown = float(rows.nth(1).locator("td").first.inner_text().split(" ±")[0])
     assert shown == pytest.approx(known.pressure, rel=1e-4)
     assert not known.valid
@@ -341,18 +450,31 @@ def test_numbers_under_the_cursor_by_keyboard(visit):
 
 
 def test_concerns_are_those_of_the_library(visit):
-    state = {"hurst": 0.15, "q0": 1.0, "q1": 500.0, "h_rms": 0.001, "h_max": 0.009, "theory": "calibrated"}
+    state = {
+        "hurst": 0.15,
+        "q0": 1.0,
+        "q1": 500.0,
+        "h_rms": 0.001,
+        "h_max": 0.009,
+        "theory": "calibrated",
+    }
     tab = visit(urllib.parse.urlencode(state))
     said = tab.inner_text("#concerns")
     gap = float(tab.locator("#readout th").first.inner_text().split()[2])
-    known = contact(Surface(*(state[name] for name in NAMES)), mean_separation=gap, theory="calibrated").reasons
+    known = contact(
+        Surface(*(state[name] for name in NAMES)),
+        mean_separation=gap,
+        theory="calibrated",
+    ).reasons
     assert len(known) > 2
     for reason in known:
         assert reason.split(" (")[0] in said.replace(" to 8", "")
 
 
 def test_where_a_theory_has_no_answer_the_page_says_why(visit):
-    steep = urllib.parse.urlencode({"hurst": 0.1, "q0": 1, "q1": 1e7, "h_rms": 1, "h_max": 3, "theory": "mbma"})
+    steep = urllib.parse.urlencode(
+        {"hurst": 0.1, "q0": 1, "q1": 1e7, "h_rms": 1, "h_max": 3, "theory": "mbma"}
+    )
     for state, key, why in (
         (steep, "Home", "mu is above the range"),
         ("theory=mbma&against=pressure", "End", "it does not reach such a pressure"),
@@ -365,7 +487,12 @@ def test_where_a_theory_has_no_answer_the_page_says_why(visit):
 def test_on_a_phone_and_in_the_dark(visit, tmp_path):
     from matplotlib import image
 
-    tab = visit(viewport={"width": 360, "height": 740}, color_scheme="dark", has_touch=True, is_mobile=True)
+    tab = visit(
+        viewport={"width": 360, "height": 740},
+        color_scheme="dark",
+        has_touch=True,
+        is_mobile=True,
+    )
     assert tab.evaluate("document.documentElement.scrollWidth") <= 360
     assert tab.locator("canvas").count() == 5
     tab.screenshot(path=str(tmp_path / "dark.png"))

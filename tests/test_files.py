@@ -23,7 +23,9 @@ def old(tmp_path):
 
 
 def unchanged(path):
-    return [p.name for p in path.parent.iterdir()] == [path.name] and path.read_bytes() == b"old"
+    return [p.name for p in path.parent.iterdir()] == [
+        path.name
+    ] and path.read_bytes() == b"old"
 
 
 def test_a_file_is_replaced_and_keeps_its_mode(old):
@@ -34,12 +36,19 @@ def test_a_file_is_replaced_and_keeps_its_mode(old):
     assert (old.parent / "b" / "c.txt").read_bytes() == b"deep"
 
 
-@pytest.mark.parametrize(("owner", "step"), [("os", "fsync"), ("shutil", "copymode"), ("os", "replace")])
+@pytest.mark.parametrize(
+    ("owner", "step"), [("os", "fsync"), ("shutil", "copymode"), ("os", "replace")]
+)
 @pytest.mark.parametrize(
     ("fault", "seen"),
-    [(OSError(errno.EIO, "Input/output error"), InputError), (KeyboardInterrupt(""), KeyboardInterrupt)],
+    [
+        (OSError(errno.EIO, "Input/output error"), InputError),
+        (KeyboardInterrupt(""), KeyboardInterrupt),
+    ],
 )
-def test_a_step_that_fails_leaves_the_old_file(old, owner, step, fault, seen, monkeypatch):
+def test_a_step_that_fails_leaves_the_old_file(
+    old, owner, step, fault, seen, monkeypatch
+):
     def fail(*_):
         raise fault
 
@@ -90,7 +99,9 @@ def test_links_are_followed(old):
     assert old.read_bytes() == read_file(link, 3) == b"new"
 
 
-@pytest.mark.parametrize("what", ["pipe", "/dev/zero", ".", "file/a.txt", "missing/a.txt"])
+@pytest.mark.parametrize(
+    "what", ["pipe", "/dev/zero", ".", "file/a.txt", "missing/a.txt"]
+)
 def test_only_regular_files_are_written_and_read(what, tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "file").write_bytes(b"")
@@ -110,7 +121,9 @@ def test_a_size_is_not_believed(tmp_path):
     assert read_file(path, 1000) == bytes(1000)
 
 
-@pytest.mark.parametrize("text", ["root:hunter2:0\n", "1.0 2.0\n3.0 hunter2\n", "1.0 hunter2 3.0\n"])
+@pytest.mark.parametrize(
+    "text", ["root:hunter2:0\n", "1.0 2.0\n3.0 hunter2\n", "1.0 hunter2 3.0\n"]
+)
 def test_errors_quote_no_contents(tmp_path, text):
     (tmp_path / "private.csv").write_text(text.replace(" ", ","))
     told = refused("fit", tmp_path / "private.csv")
@@ -119,13 +132,20 @@ def test_errors_quote_no_contents(tmp_path, text):
 
 
 def test_drafts_of_killed_runs_are_removed(tmp_path):
-    old, young, other = (tmp_path / name for name in (".a.nc.0123.draft", ".a.nc.4567.draft", ".b.nc.0123.draft"))
+    old, young, other = (
+        tmp_path / name
+        for name in (".a.nc.0123.draft", ".a.nc.4567.draft", ".b.nc.0123.draft")
+    )
     for draft in (old, young, other):
         draft.write_bytes(b"half")
     for draft in (old, other):
         os.utime(draft, (1e9, 1e9))
     write_file(tmp_path / "a.nc", b"whole")
-    assert sorted(path.name for path in tmp_path.iterdir()) == [young.name, other.name, "a.nc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        young.name,
+        other.name,
+        "a.nc",
+    ]
 
 
 def test_names_that_no_file_has():

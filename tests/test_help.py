@@ -9,13 +9,16 @@ import mbma_tables
 from mbma_tables import materials
 
 FUNCTIONS = {name: getattr(mbma_tables, name) for name in mbma_tables.__all__}
-FUNCTIONS |= {name: getattr(materials, name) for name in ("effective_modulus", "tangential_ratio")}
+FUNCTIONS |= {
+    name: getattr(materials, name) for name in ("effective_modulus", "tangential_ratio")
+}
 METHODS = {
     f"{name}.{method}": function
     for name, kind in FUNCTIONS.items()
     if inspect.isclass(kind)
     for method, function in inspect.getmembers(kind, callable)
-    if not method.startswith("_") and str(getattr(function, "__module__", "")).startswith("mbma_tables")
+    if not method.startswith("_")
+    and str(getattr(function, "__module__", "")).startswith("mbma_tables")
 }
 LONGEST = 1200  # characters: fifteen lines of a terminal
 

@@ -41,7 +41,12 @@ def invariant(count, **strategies):
             met = []
 
             # shrinking a failure through laws would take minutes
-            @settings(deadline=None, derandomize=True, max_examples=count * SCALE, phases=[Phase.generate])
+            @settings(
+                deadline=None,
+                derandomize=True,
+                max_examples=count * SCALE,
+                phases=[Phase.generate],
+            )
             @given(**strategies)
             def holds(**numbers):
                 met.append(check(**numbers))
@@ -62,7 +67,13 @@ def gaps_of(surface, shares):
 
 
 def in_unit(surface, unit):
-    return Surface(surface.hurst, surface.q0 / unit, surface.q1 / unit, surface.h_rms * unit, surface.h_max * unit)
+    return Surface(
+        surface.hurst,
+        surface.q0 / unit,
+        surface.q1 / unit,
+        surface.h_rms * unit,
+        surface.h_max * unit,
+    )
 
 
 def lost_digits(surface, gap):
@@ -70,46 +81,88 @@ def lost_digits(surface, gap):
     return 20 * EPS * surface.h_max / (surface.h_max - gap)
 
 
-DIMENSIONS = {"s": 1, "m0": 2, "m2": 0, "m4": -2, "alpha": 0, "rms_gradient": 0, "zeta_1": 0}
+DIMENSIONS = {
+    "s": 1,
+    "m0": 2,
+    "m2": 0,
+    "m4": -2,
+    "alpha": 0,
+    "rms_gradient": 0,
+    "zeta_1": 0,
+}
 DIMENSIONS |= {"summit_density": -2, "summit_radius": 1, "summit_sigma": 1}
 ISLAND_DIMENSIONS = {"R_d": 1, "R_u": 1, "D": -2, "sigma": 1, "h_d": 1, "area": 2}
 ISLAND_DIMENSIONS |= dict.fromkeys(("zeta_d", "zeta_u", "eta", "X", "mu", "error"), 0)
 
 
 @invariant(
-    12, surface=surfaces, share=depths, variant=variants, power=st.integers(-40, 40), stress=st.integers(-40, 40)
+    12,
+    surface=surfaces,
+    share=depths,
+    variant=variants,
+    power=st.integers(-40, 40),
+    stress=st.integers(-40, 40),
 )
-def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, power, stress):
+def test_units_that_are_powers_of_two_change_no_bit(
+    surface, share, variant, power, stress
+):
     unit, modulus = 2.0**power, 2.0**stress
     other, gap = in_unit(surface, unit), gaps_of(surface, share)
     for name, degree in DIMENSIONS.items():
         assert getattr(other, name) == getattr(surface, name) * unit**degree, name
     one_island = island(surface, surface.h_max - gap, variant=variant)
-    other_island = island(other, (surface.h_max - gap) * unit, variant=variant, E_star=modulus)
+    other_island = island(
+        other, (surface.h_max - gap) * unit, variant=variant, E_star=modulus
+    )
     assert other_island.force == one_island.force * modulus * unit**2
     for name, degree in ISLAND_DIMENSIONS.items():
-        assert getattr(other_island, name) == getattr(one_island, name) * unit**degree, name
+        assert getattr(other_island, name) == getattr(one_island, name) * unit**degree, (
+            name
+        )
     for island_model in ("universal", "rigid"):
         asked = {"island_model": island_model, "variant": variant}
         one = contact(surface, separation=gap, **asked)
         found = contact(other, separation=gap * unit, E_star=modulus, **asked)
-        assert (found.pressure, found.area, found.error) == (one.pressure * modulus, one.area, one.error)
+        assert (found.pressure, found.area, found.error) == (
+            one.pressure * modulus,
+            one.area,
+            one.error,
+        )
         assert found.stiffness == one.stiffness * modulus / unit
 
 
 @invariant(12, surface=surfaces, variant=variants)
-def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(surface, variant):
+def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(
+    surface, variant
+):
     law = contact_law(surface, rtol=1e-6, variant=variant)
-    gaps = gaps_of(surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:]))
+    gaps = gaps_of(
+        surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:])
+    )
     found = Mbma(variant=variant).totals(surface, gaps, slopes=True)
     cell = 1.001 * surface.h_max / 199
-    some, delta, asked = gaps[1::8], surface.h_max - gaps[1::8], {"variant": variant, "island_model": "rigid"}
+    some, delta, asked = (
+        gaps[1::8],
+        surface.h_max - gaps[1::8],
+        {"variant": variant, "island_model": "rigid"},
+    )
     for elastic, rigid, load in (
-        (contact(surface, separation=some, variant=variant), contact(surface, separation=some, **asked), "pressure"),
-        (island(surface, delta, variant=variant), island(surface, delta, **asked), "force"),
+        (
+            contact(surface, separation=some, variant=variant),
+            contact(surface, separation=some, **asked),
+            "pressure",
+        ),
+        (
+            island(surface, delta, variant=variant),
+            island(surface, delta, **asked),
+            "force",
+        ),
     ):
         for name in (load, "area"):
-            assert (getattr(elastic, name) <= getattr(rigid, name) * (1 + rigid.error + elastic.error)).all()
+            assert (
+                getattr(elastic, name)
+                <= getattr(rigid, name) * (1 + rigid.error + elastic.error)
+            ).all()
     for values, slopes, turn in (
         (found.pressure, found.pressure_slope, law.turning_point),
         (found.area, found.area_slope, law.area_turning_point),
@@ -121,30 +174,47 @@ def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(sur
         first = values[gaps > end]
         assert (np.diff(first) >= -found.error[1 : first.size] * first[1:]).all()
         if turn is not None and turn - cell > -surface.h_max:
-            # the law did not make it up: the first of the totals' slopes that is not falling lies there
+            # the law did not make it up: the first of the totals' slopes that is not
+            # falling lies there
             assert abs(gaps[np.flatnonzero(slopes >= 0)[0]] - turn) <= cell
 
 
 @invariant(20, surface=plain_surfaces, variant=variants)
 def test_first_contact_is_a_power_law(surface, variant):
     """F ~ l^(7/2) and A ~ l^(10/3); what is missing goes with l."""
-    gaps = surface.h_max - surface.h_rms * surface.zeta_1**-surface.hurst * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
+    gaps = (
+        surface.h_max
+        - surface.h_rms
+        * surface.zeta_1** -surface.hurst
+        * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
+    )
     depth = surface.h_max - gaps
     found = contact(surface, separation=gaps, variant=variant, rtol=1e-11)
     for values, exponent in ((found.pressure, 3.5), (found.area, 10 / 3)):
         slope = np.diff(np.log(values))[::2] / np.diff(np.log(depth))[::2]
         assert abs(slope[0] - exponent) < 1e-2
         # a thousandth of the depth, a thousandth of the difference but for the second order
-        assert abs(slope[1] - exponent) <= abs(slope[0] - exponent) / 100 + 1e-8 + lost_digits(surface, gaps[-1])
+        assert abs(slope[1] - exponent) <= abs(
+            slope[0] - exponent
+        ) / 100 + 1e-8 + lost_digits(surface, gaps[-1])
 
 
 @invariant(
-    12, surface=surfaces, shares=st.lists(depths, min_size=1, max_size=30), variant=variants, digits=st.integers(2, 9)
+    12,
+    surface=surfaces,
+    shares=st.lists(depths, min_size=1, max_size=30),
+    variant=variants,
+    digits=st.integers(2, 9),
 )
 def test_a_law_and_its_inverse(surface, shares, variant, digits):
     law = contact_law(surface, rtol=10.0**-digits, variant=variant)
     for name, value, slope, turn in (
-        ("pressure", law.pressure, lambda separation: law.stiffness(separation=separation) / 2, law.turning_point),
+        (
+            "pressure",
+            law.pressure,
+            lambda separation: law.stiffness(separation=separation) / 2,
+            law.turning_point,
+        ),
         ("area", law.area, law.area_slope, law.area_turning_point),
     ):
         span = law.h_max - (-law.h_max if turn is None else turn)
@@ -180,25 +250,44 @@ def test_no_entry_knows_the_others(island_model, seed):
     asked = {"island_model": island_model, "rtol": 1e-4}
 
     def totals(chosen):
-        return contact(Surface(*some_of(numbers, chosen)), separation=gaps[chosen], E_star=E_star[chosen], **asked)
+        return contact(
+            Surface(*some_of(numbers, chosen)),
+            separation=gaps[chosen],
+            E_star=E_star[chosen],
+            **asked,
+        )
 
     def islands(chosen):
-        return island(Surface(*some_of(numbers, chosen)), 0.1 + 0.2 * E_star[chosen], **asked)
+        return island(
+            Surface(*some_of(numbers, chosen)), 0.1 + 0.2 * E_star[chosen], **asked
+        )
 
     for answer, names in (
         (totals, ("pressure", "area", "error")),
         (islands, ("force", "area", "error", "X", "mu", "eta")),
     ):
-        whole, mixed, folded = answer(np.arange(30)), answer(order), answer(order.reshape(5, 6))
+        whole, mixed, folded = (
+            answer(np.arange(30)),
+            answer(order),
+            answer(order.reshape(5, 6)),
+        )
         for name in names:
-            np.testing.assert_array_equal(getattr(mixed, name), getattr(whole, name)[order])
-            np.testing.assert_array_equal(getattr(folded, name), getattr(whole, name)[order].reshape(5, 6))
+            np.testing.assert_array_equal(
+                getattr(mixed, name), getattr(whole, name)[order]
+            )
+            np.testing.assert_array_equal(
+                getattr(folded, name), getattr(whole, name)[order].reshape(5, 6)
+            )
         for k in rng.integers(30, size=(3, 1)):
             alone = answer(k)
             if answer is totals and island_model == "universal":
                 for name in names[:2]:
                     one, among = getattr(alone, name), getattr(whole, name)[k]
-                    assert (np.abs(one - among) <= (alone.error + whole.error[k]) * among).all()
+                    assert (
+                        np.abs(one - among) <= (alone.error + whole.error[k]) * among
+                    ).all()
                 continue
             for name in names:
-                np.testing.assert_array_equal(getattr(alone, name), getattr(whole, name)[k])
+                np.testing.assert_array_equal(
+                    getattr(alone, name), getattr(whole, name)[k]
+                )

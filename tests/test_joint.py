@@ -28,17 +28,35 @@ EXAMPLE = pathlib.Path(__file__).parents[1] / "examples" / "joint.toml"
 
 @pytest.fixture(scope="module")
 def joint():
-    return Joint(FACE, FACE | {"Rq": "0.7 um"}, materials=METALS, nominal_area="4 cm^2", friction=0.2)
+    return Joint(
+        FACE,
+        FACE | {"Rq": "0.7 um"},
+        materials=METALS,
+        nominal_area="4 cm^2",
+        friction=0.2,
+    )
 
 
 def test_a_joint_is_the_contact_of_the_combined_surface(joint):
-    a, b = (Surface.from_roughness(**FACE | {"Rq": Rq}, nominal_area="4 cm^2") for Rq in ("0.4 um", "0.7 um"))
-    known = contact(a.combined(b, "4 cm^2"), pressure=["1 MPa", "50 MPa"], materials=METALS, theory="calibrated")
+    a, b = (
+        Surface.from_roughness(**FACE | {"Rq": Rq}, nominal_area="4 cm^2")
+        for Rq in ("0.4 um", "0.7 um")
+    )
+    known = contact(
+        a.combined(b, "4 cm^2"),
+        pressure=["1 MPa", "50 MPa"],
+        materials=METALS,
+        theory="calibrated",
+    )
     table = joint.table(["1 MPa", "50 MPa"])
     np.testing.assert_array_equal(table["area"], known.area)
     np.testing.assert_array_equal(table["conductance"], known.conductance())
-    np.testing.assert_array_equal(table["total_conductance"], known.conductance() + known.gap_conductance("air"))
-    np.testing.assert_array_equal(table["tangential_stiffness"], known.tangential().stiffness)
+    np.testing.assert_array_equal(
+        table["total_conductance"], known.conductance() + known.gap_conductance("air")
+    )
+    np.testing.assert_array_equal(
+        table["tangential_stiffness"], known.tangential().stiffness
+    )
     assert table["pressure"].attrs["units"] == "GPa"
     assert table["conductance"].attrs["units"] == "W/(m^2 K)"
     assert joint.surface.h_rms == pytest.approx(np.hypot(0.4, 0.7), rel=1e-6)
@@ -46,13 +64,20 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
 
 def test_its_law_and_sensitivity(joint):
     law, found = joint.law(), joint.at_pressure("10 MPa")
-    assert float(law.at_pressure(0.01).mean_separation) == pytest.approx(float(found.mean_separation), rel=1e-5)
+    assert float(law.at_pressure(0.01).mean_separation) == pytest.approx(
+        float(found.mean_separation), rel=1e-5
+    )
     slopes = joint.sensitivity("10 MPa").slopes
     assert slopes["hardness"]["area"] == pytest.approx(-0.75, abs=0.02)
-    # a longer wavelength of the drawing at the same Rq lowers the gap; one that is cut off takes height away
+    # a longer wavelength of the drawing at the same Rq lowers the gap; one that is cut off
+    # takes height away
     faces = [{**FACE, "Rq": Rq, "longest": "501 um"} for Rq in ("0.4 um", "0.7 um")]
-    longer = Joint(*faces, materials=METALS, nominal_area="4 cm^2", theory=joint.theory).at_pressure("10 MPa")
-    by_both = sum(slopes[f"{part}.longest"]["mean_separation"] for part in ("part_a", "part_b"))
+    longer = Joint(
+        *faces, materials=METALS, nominal_area="4 cm^2", theory=joint.theory
+    ).at_pressure("10 MPa")
+    by_both = sum(
+        slopes[f"{part}.longest"]["mean_separation"] for part in ("part_a", "part_b")
+    )
     by_hand = np.log(longer.mean_separation / found.mean_separation) / np.log(501 / 500)
     assert by_both == pytest.approx(by_hand, abs=0.01)
 
@@ -72,10 +97,14 @@ def pressed_again(factors, theory, unit, size, answers):
     faces = []
     for end, Rq in (("a", 0.4), ("b", 0.7)):
         lengths = {"Rq": Rq, "longest": 500.0, "shortest": 8.0}
-        face = {name: f"{size * factor[f'part_{end}.{name}'] * number!r} {unit}" for name, number in lengths.items()}
+        face = {
+            name: f"{size * factor[f'part_{end}.{name}'] * number!r} {unit}"
+            for name, number in lengths.items()
+        }
         faces.append(face | {"hurst": 0.8 * factor[f"part_{end}.hurst"]})
     metals = [
-        dataclasses.replace(metal, E=metal.E * factor[f"part_{end}.E"]) for end, metal in (("a", STEEL), ("b", LIGHT))
+        dataclasses.replace(metal, E=metal.E * factor[f"part_{end}.E"])
+        for end, metal in (("a", STEEL), ("b", LIGHT))
     ]
     described = Joint(
         *faces,
@@ -94,7 +123,12 @@ def pressed_again(factors, theory, unit, size, answers):
 
 @pytest.mark.parametrize(
     ("theory", "unit", "size"),
-    [("calibrated", "um", 1.0), ("calibrated", "mm", 1e-3), ("persson", "um", 1.0), ("mbma", "um", 1.0)],
+    [
+        ("calibrated", "um", 1.0),
+        ("calibrated", "mm", 1e-3),
+        ("persson", "um", 1.0),
+        ("mbma", "um", 1.0),
+    ],
 )
 @pytest.mark.slow
 def test_sensitivities_are_differences_of_joints_described_anew(theory, unit, size):
@@ -105,13 +139,20 @@ def test_sensitivities_are_differences_of_joints_described_anew(theory, unit, si
     assert set(slopes) == set(ROWS)
     step = 0.005
     for row in ROWS:
-        up, down = (pressed_again({row: math.exp(sign * step)}, theory, unit, size, answers) for sign in (1, -1))
+        up, down = (
+            pressed_again({row: math.exp(sign * step)}, theory, unit, size, answers)
+            for sign in (1, -1)
+        )
         known = [slopes[row][name] for name in answers]
-        np.testing.assert_allclose(known, (up - down) / (2 * step), atol=1e-3, err_msg=row)
+        np.testing.assert_allclose(
+            known, (up - down) / (2 * step), atol=1e-3, err_msg=row
+        )
 
 
 def test_a_smooth_other_face_and_other_metals():
-    copper = Joint(FACE, materials="copper C11000 hard", nominal_area="1 cm^2", gas="vacuum")
+    copper = Joint(
+        FACE, materials="copper C11000 hard", nominal_area="1 cm^2", gas="vacuum"
+    )
     table = copper.table("10 MPa")
     assert float(table["gas_conductance"][0]) == 0
     assert copper.surface.h_rms == 0.4
@@ -133,15 +174,21 @@ def test_what_is_missing_is_named(tmp_path):
 
 
 def test_untempered_metals_are_not_valid():
-    found = Joint(FACE, materials=("steel 4140", "aluminium 6061"), nominal_area="4 cm^2").at_pressure("50 MPa")
+    found = Joint(
+        FACE, materials=("steel 4140", "aluminium 6061"), nominal_area="4 cm^2"
+    ).at_pressure("50 MPa")
     assert not found.valid
     assert any("hardness=" in reason for reason in found.reasons)
 
 
 def test_parts_may_be_maps(tmp_path):
-    np.save(tmp_path / "face.npy", random_map(64, 0.03, 0.2) / random_map(64, 0.03, 0.2).std())
+    np.save(
+        tmp_path / "face.npy", random_map(64, 0.03, 0.2) / random_map(64, 0.03, 0.2).std()
+    )
     part = '{map = "face.npy", dx = 1.0, periodic = true, unit = "um"}'
-    (tmp_path / "joint.toml").write_text(f'materials = "steel 1020"\nhardness = "1.5 GPa"\npart_a = {part}\n')
+    (tmp_path / "joint.toml").write_text(
+        f'materials = "steel 1020"\nhardness = "1.5 GPa"\npart_a = {part}\n'
+    )
     mapped = Joint.from_toml(tmp_path / "joint.toml")
     assert mapped.surface.bearing is not None
     assert mapped.at_pressure("5 MPa").area > 0
@@ -150,12 +197,24 @@ def test_parts_may_be_maps(tmp_path):
 def test_command(tmp_path, capsys):
     picture = tmp_path / "joint.svg"
     with pytest.raises(SystemExit) as end:
-        main(["joint", str(EXAMPLE), "--pressure", "10MPa", "--csv", "--plot", str(picture)])
+        main(
+            [
+                "joint",
+                str(EXAMPLE),
+                "--pressure",
+                "10MPa",
+                "--csv",
+                "--plot",
+                str(picture),
+            ]
+        )
     assert end.value.code == 0
     assert picture.stat().st_size > 10_000
     head, row = capsys.readouterr().out.splitlines()[-2:]
     found = dict(zip(head.split(","), row.split(","), strict=True))
-    assert float(found["area"]) == float(Joint.from_toml(EXAMPLE).at_pressure("10 MPa").area)
+    assert float(found["area"]) == float(
+        Joint.from_toml(EXAMPLE).at_pressure("10 MPa").area
+    )
     assert found["valid"] == "yes"
 
 
@@ -183,7 +242,9 @@ def test_friction_cards_have_the_stiffness_before_slip(joint):
     mu, slope = map(float, card.split("*FRICTION\n")[1].splitlines()[0].split(","))
     assert (mu, slope) == (0.2, pytest.approx(stick[1], rel=1e-6))
     assert f"{stick[0]:.4g}.0 at 1.0," in " ".join(card.replace("\n**", "").split())
-    own = joint.export("abaqus", ("1 MPa", "49 MPa"), heat=False, friction_pressure="1 MPa")
+    own = joint.export(
+        "abaqus", ("1 MPa", "49 MPa"), heat=False, friction_pressure="1 MPa"
+    )
     slip, mu = own.split("*FRICTION, ELASTIC SLIP=")[1].splitlines()[:2]
     assert float(mu) * 1.0 / float(slip) == pytest.approx(stick[0], rel=1e-6)
     # rows of the tangential stiffness, for programs of data
@@ -194,7 +255,14 @@ def test_friction_cards_have_the_stiffness_before_slip(joint):
     assert np.interp(7.0, rows.x, rows.y) == pytest.approx(stick[1], rel=1e-2)
     with pytest.raises(InputError, match="takes no friction"):
         targets.targets()["lsdyna"].files(
-            describe_law(joint.surface, "57 GPa", stress_unit="MPa", friction=0.2, kappa=1.2, friction_pressure=1.0)
+            describe_law(
+                joint.surface,
+                "57 GPa",
+                stress_unit="MPa",
+                friction=0.2,
+                kappa=1.2,
+                friction_pressure=1.0,
+            )
         )
     with pytest.raises(InputError, match="friction needs kappa"):
         describe_law(joint.surface, "57 GPa", stress_unit="MPa", friction=0.2)
@@ -203,7 +271,11 @@ def test_friction_cards_have_the_stiffness_before_slip(joint):
 @pytest.mark.skipif(shutil.which("cc") is None, reason="not installed: cc")
 def test_functions_of_yielded_joints(joint, tmp_path):
     (tmp_path / "bolt.c").write_text(joint.export("c-law", name="bolt"))
-    subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-w", "bolt.c", "-lm", "-o", "bolt.so"], cwd=tmp_path, check=True)
+    subprocess.run(
+        ["cc", "-O1", "-shared", "-fPIC", "-w", "bolt.c", "-lm", "-o", "bolt.so"],
+        cwd=tmp_path,
+        check=True,
+    )
     bolt = ctypes.CDLL(str(tmp_path / "bolt.so"))
     found = joint.at_pressure("10 MPa")
     c = 1e-3 * float(joint.surface.h_max - found.mean_separation)  # mm of um
@@ -228,35 +300,53 @@ def test_functions_of_yielded_joints(joint, tmp_path):
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="not installed: ccx")
 def test_two_heated_and_sheared_blocks_in_calculix():
-    for name, simulated, law in runpy.run_path(str(EXAMPLE.with_name("two_blocks.py")))["compared"]():
+    for name, simulated, law in runpy.run_path(str(EXAMPLE.with_name("two_blocks.py")))[
+        "compared"
+    ]():
         assert simulated == pytest.approx(law, rel=0.01), name
 
 
 def test_parts_with_a_lay_have_a_direction():
     rng = np.random.default_rng(2)
     q = np.hypot(4 * np.fft.fftfreq(64)[:, None], np.fft.fftfreq(64)[None])
-    heights = np.fft.ifft2(np.where((q > 0.03) & (q < 0.3), np.fft.fft2(rng.normal(size=(64, 64))), 0)).real
+    heights = np.fft.ifft2(
+        np.where((q > 0.03) & (q < 0.3), np.fft.fft2(rng.normal(size=(64, 64))), 0)
+    ).real
     ground = Surface.from_map(heights / heights.std(), 1.0, periodic=True, unit="um")
     given = {"materials": "steel 1020", "hardness": "1.5 GPa", "friction": 0.2}
     with pytest.raises(InputError, match="give direction"):
         Joint(ground, **given).table("60 MPa")
     along, across = (Joint(ground, **given, direction=way) for way in ("along", "across"))
-    stiff = [float(one.table("60 MPa")["tangential_stiffness"][0]) for one in (along, across)]
+    stiff = [
+        float(one.table("60 MPa")["tangential_stiffness"][0]) for one in (along, across)
+    ]
     assert stiff[0] < stiff[1]
     cards = [
-        one.export("calculix", ("10 MPa", "100 MPa"), heat=False, friction_pressure="60 MPa") for one in (along, across)
+        one.export(
+            "calculix", ("10 MPa", "100 MPa"), heat=False, friction_pressure="60 MPa"
+        )
+        for one in (along, across)
     ]
-    slopes = [float(card.split("*FRICTION\n")[1].splitlines()[0].split(",")[1]) for card in cards]
+    slopes = [
+        float(card.split("*FRICTION\n")[1].splitlines()[0].split(",")[1])
+        for card in cards
+    ]
     np.testing.assert_allclose(slopes, 1e6 * np.array(stiff), rtol=1e-3)
     # rows follow the ratio of each contact area; functions, which have one ratio, leave it out
-    rows = json.loads(along.export("json", ("30 MPa", "100 MPa"), quantity="tangential_stiffness"))["columns"]
-    assert np.interp(60, rows["pressure"], rows["tangential_stiffness"]) == pytest.approx(1e6 * stiff[0], rel=1.5e-3)
+    rows = json.loads(
+        along.export("json", ("30 MPa", "100 MPa"), quantity="tangential_stiffness")
+    )["columns"]
+    assert np.interp(60, rows["pressure"], rows["tangential_stiffness"]) == pytest.approx(
+        1e6 * stiff[0], rel=1.5e-3
+    )
     assert "without tangential stiffness" in along.export("c-law")
 
 
 def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     answer, calls = Calibrated.answer, []
-    monkeypatch.setattr(Calibrated, "answer", lambda *given: calls.append(1) or answer(*given))
+    monkeypatch.setattr(
+        Calibrated, "answer", lambda *given: calls.append(1) or answer(*given)
+    )
     contact(joint.surface, pressure="10 MPa", materials=METALS, theory="calibrated")
     plain = len(calls)
     found = joint.at_pressure("10 MPa")
@@ -267,9 +357,19 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     # a law as code makes the elastic one for an unloading stiffness alone
     made = []
     law = contact_law(joint.surface, E_star=1.0, theory="calibrated", hardness=0.05)
-    monkeypatch.setattr("mbma_tables.export.exported_law.contact_law", lambda *given, **options: law)
-    law = dataclasses.replace(law, elastic=lambda: made.append(1) or contact_law(joint.surface, theory="calibrated"))
-    given = {"length_unit": "um", "stress_unit": "GPa", "theory": "calibrated", "hardness": 0.05}
+    monkeypatch.setattr(
+        "mbma_tables.export.exported_law.contact_law", lambda *given, **options: law
+    )
+    law = dataclasses.replace(
+        law,
+        elastic=lambda: made.append(1) or contact_law(joint.surface, theory="calibrated"),
+    )
+    given = {
+        "length_unit": "um",
+        "stress_unit": "GPa",
+        "theory": "calibrated",
+        "hardness": 0.05,
+    }
     law_text("c-law", joint.surface, 1.0, **given)
     assert not made
     law_text("c-law", joint.surface, 1.0, kappa=1.2, **given)
@@ -294,7 +394,10 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
         ({"materials": "steel 4141"}, "steel 4140"),
         ({"nominal_area": "-4 cm^2"}, "nominal_area must be positive"),
         ({"part_b": "face.sur"}, "part_b is a surface, or its numbers by name"),
-        ({"part_b": {"Ra": "1.6 um"}}, r"part_b: roughness has Ra, .*missing: hurst.*two of longest, shortest"),
+        (
+            {"part_b": {"Ra": "1.6 um"}},
+            r"part_b: roughness has Ra, .*missing: hurst.*two of longest, shortest",
+        ),
         ({"part_b": FACE | {"Rqq": "1.6 um"}}, "part_b: .*no argument 'Rqq'"),
         ({"part_b": FACE | {"hurst": 2.0}}, "part_b: hurst must be"),
         ({"part_b": FACE | {"nominal_area": 4}}, "nominal_area is of the joint"),
@@ -302,13 +405,20 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     ids=str,
 )
 def test_a_joint_is_checked_when_it_is_described(changed, match):
-    described = {"part_a": FACE, "materials": METALS, "nominal_area": "4 cm^2", "theory": "calibrated"}
+    described = {
+        "part_a": FACE,
+        "materials": METALS,
+        "nominal_area": "4 cm^2",
+        "theory": "calibrated",
+    }
     with pytest.raises(InputError, match=match):
         Joint(**described | changed)
 
 
 def test_all_numbers_that_a_face_lacks_are_named_at_once():
-    with pytest.raises(InputError, match=r"hurst.*two of longest.*one of h_max, Sp, nominal_area"):
+    with pytest.raises(
+        InputError, match=r"hurst.*two of longest.*one of h_max, Sp, nominal_area"
+    ):
         Joint({"Ra": "1.6 um"}, materials=METALS)
 
 
@@ -324,8 +434,16 @@ def test_a_nominal_area_is_of_a_map_too():
 
 def test_a_joint_names_what_its_faces_assume(joint):
     """All that a face given by numbers assumes is in the text, the table and the command, each line once."""
-    faces = [Surface.from_roughness(**FACE | {"Rq": Rq}, nominal_area="4 cm^2") for Rq in ("0.4 um", "0.7 um")]
-    expected = {line for face in faces for record in face.provenance for line in record.get("assumed", ())}
+    faces = [
+        Surface.from_roughness(**FACE | {"Rq": Rq}, nominal_area="4 cm^2")
+        for Rq in ("0.4 um", "0.7 um")
+    ]
+    expected = {
+        line
+        for face in faces
+        for record in face.provenance
+        for line in record.get("assumed", ())
+    }
     assert any("heights are Gaussian" in line for line in expected)
     assumed = joint.facts()["assumed"]
     for line in expected:
@@ -353,9 +471,15 @@ def test_results_without_units_are_displayed():
 
 def test_forces_are_pressures_on_the_nominal_area(joint, capsys):
     table = joint.table([joint.pressure_of("4 kN"), joint.pressure_of(40e3)])
-    np.testing.assert_allclose(table["pressure"], [0.01, 0.1], rtol=1e-12)  # GPa on 4 cm^2
+    np.testing.assert_allclose(
+        table["pressure"], [0.01, 0.1], rtol=1e-12
+    )  # GPa on 4 cm^2
     assert joint.pressure_of("10 lbf") == joint.pressure_of(44.482216152605)
-    for force, match in (("-4 kN", "force must be positive"), ("4 kg", "unit of force"), ("many", "force must be")):
+    for force, match in (
+        ("-4 kN", "force must be positive"),
+        ("4 kg", "unit of force"),
+        ("many", "force must be"),
+    ):
         with pytest.raises(InputError, match=match):
             joint.pressure_of(force)
     with pytest.raises(SystemExit) as end:
@@ -365,7 +489,8 @@ def test_forces_are_pressures_on_the_nominal_area(joint, capsys):
     with pytest.raises(SystemExit):
         main(["joint", str(EXAMPLE), "--pressure", "10MPa", "--csv"])
     assert [float(x) for x in by_force.split(",")[:3]] == pytest.approx(
-        [float(x) for x in capsys.readouterr().out.splitlines()[-1].split(",")[:3]], rel=1e-12
+        [float(x) for x in capsys.readouterr().out.splitlines()[-1].split(",")[:3]],
+        rel=1e-12,
     )
 
 
@@ -380,15 +505,21 @@ def test_a_picture_has_the_pressures_that_were_asked_for(joint, tmp_path):
 
 
 def test_metals_of_ones_own_in_a_file(tmp_path):
-    text = EXAMPLE.read_text().replace('"steel 4140 hard", "aluminium', '"6061-T6", "aluminium')
+    text = EXAMPLE.read_text().replace(
+        '"steel 4140 hard", "aluminium', '"6061-T6", "aluminium'
+    )
     own = 'name = "own", E = "69 GPa", nu = 0.33, hardness = "0.95 GPa", conductivity = "160 W/(m K)"'
-    (tmp_path / "joint.toml").write_text(text.replace('"aluminium 6061 hard"', f"{{{own}}}"))
+    (tmp_path / "joint.toml").write_text(
+        text.replace('"aluminium 6061 hard"', f"{{{own}}}")
+    )
     read = Joint.from_toml(tmp_path / "joint.toml")
     assert [metal.name for metal in read.pair.metals] == ["aluminium 6061 hard", "own"]
     assert read.pair.softer.E == 69.0
 
 
-@pytest.mark.parametrize(("gas", "molar_mass"), [("nitrogen", 28.0134), ("argon", 39.948)])
+@pytest.mark.parametrize(
+    ("gas", "molar_mass"), [("nitrogen", 28.0134), ("argon", 39.948)]
+)
 def test_gases_against_kinetic_theory(gas, molar_mass):
     """Conductivity over viscosity and heat capacity (Eucken's factor), accommodation by Song and Yovanovich (1987)."""
     data = GASES[gas]
@@ -408,8 +539,14 @@ def test_gases_against_kinetic_theory(gas, molar_mass):
 
 def test_a_subroutine_without_friction_says_so():
     face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
-    given = {"materials": "copper C11000 hard", "nominal_area": "4 cm^2", "theory": "calibrated"}
+    given = {
+        "materials": "copper C11000 hard",
+        "nominal_area": "4 cm^2",
+        "theory": "calibrated",
+    }
     note = "the joint's friction, 0.2, is left out: the faces slide freely"
     for friction in (0.2, None):
         text = Joint(face, friction=friction, **given).export("abaqus-uinter", heat=False)
-        assert (note in " ".join(text.replace("\n *", " ").split())) == (friction is not None)
+        assert (note in " ".join(text.replace("\n *", " ").split())) == (
+            friction is not None
+        )

@@ -18,8 +18,12 @@ ratios = st.floats(-0.99, 0.5)
 
 def test_textbook_values():
     # steel on steel, E/(2 (1 - nu^2)); rubber at nu = 1/2 on a body 1e9 times stiffer, 4 E/3
-    assert effective_modulus(210.0, 0.3, 210.0, 0.3) == pytest.approx(210 / 1.82, rel=1e-15)
-    assert effective_modulus(3.0, 0.5, 3e9, 0.0) == pytest.approx(4 / (1 + 4e-9 / 3), rel=1e-15)
+    assert effective_modulus(210.0, 0.3, 210.0, 0.3) == pytest.approx(
+        210 / 1.82, rel=1e-15
+    )
+    assert effective_modulus(3.0, 0.5, 3e9, 0.0) == pytest.approx(
+        4 / (1 + 4e-9 / 3), rel=1e-15
+    )
 
 
 @given(moduli, ratios, moduli, ratios)
@@ -50,7 +54,8 @@ test_out_of_range = refusals(
 )
 
 
-# tensile strength of the hardest temper [MPa]: data sheets of the tempers, Callister's table B.4 for gold
+# tensile strength of the hardest temper [MPa]: data sheets of the tempers, Callister's
+# table B.4 for gold
 TENSILE = {
     "steel 1020": 460, "steel 4140": 1965, "stainless steel 304": 1180, "aluminium 1100": 130, "aluminium 6061": 310,
     "aluminium 7075": 572, "copper C11000": 360, "brass C26000": 640, "titanium Ti-6Al-4V": 1170,
@@ -60,23 +65,43 @@ TENSILE = {
 ELSEWHERE = {
     "steel 1020": (203, 0.29, 52),  # ASME B31.1 at Engineering ToolBox; MakeItFrom
     "steel 4140": (205, 0.29, 43),  # the same
-    "steel 52100": (200, 0.285, 50),  # dhanlaxmimetals.com; unitedmetalsc.com.my; material-properties.org, high carbon
+    "steel 52100": (
+        200,
+        0.285,
+        50,
+    ),  # dhanlaxmimetals.com; unitedmetalsc.com.my; material-properties.org, high carbon
     "stainless steel 304": (197, 0.305, 15),  # Miki Pulley; Engineering ToolBox
     "cast iron, grey": (100, 0.26, 46),  # Miki Pulley; formulafactory.tools; MakeItFrom
-    "aluminium 1100": (69, 0.33, 220),  # Callister's table B.2; MakeItFrom, 1200; CRC at 273 K
+    "aluminium 1100": (
+        69,
+        0.33,
+        220,
+    ),  # Callister's table B.2; MakeItFrom, 1200; CRC at 273 K
     "aluminium 6061": (69, 0.33, 167),  # ecoursesbook.com; MatWeb, T6
     "aluminium 7075": (72, 0.33, 130),  # Miki Pulley; ecoursesbook.com
     "copper C11000": (110, 0.34, 393),  # Aurubis, Cu-ETP; electrical-contacts-wiki.com
     "brass C26000": (110, 0.33, 120),  # MakeItFrom; ecoursesbook.com
-    "titanium grade 2": (105, 0.34, 16),  # Superior Tube; formulafactory.tools; alloyfyi.com
+    "titanium grade 2": (
+        105,
+        0.34,
+        16,
+    ),  # Superior Tube; formulafactory.tools; alloyfyi.com
     "titanium Ti-6Al-4V": (113.8, 0.33, None),  # ecoursesbook.com
     "magnesium AZ31B": (45, 0.35, 100),  # MakeItFrom; Engineers Edge
     "silver": (82, 0.37, None),  # electrical-contacts-wiki.com
     "steel S235": (203, 0.29, 52),  # those of low-carbon steel above
     "steel S355": (203, 0.29, 52),
-    "steel C45": (201, 0.27, 50.9),  # a179.net/2012/01/08/sae-1045-steel-properties; szrtjs.com, 0.269
+    "steel C45": (
+        201,
+        0.27,
+        50.9,
+    ),  # a179.net/2012/01/08/sae-1045-steel-properties; szrtjs.com, 0.269
     "copper CuCr1Zr": (120, 0.34, 320),  # MakeItFrom, C18100
-    "gold": (79, 0.42, 317),  # electrical-contacts-wiki.com; Engineers Edge, 183 Btu/(h ft F)
+    "gold": (
+        79,
+        0.42,
+        317,
+    ),  # electrical-contacts-wiki.com; Engineers Edge, 183 Btu/(h ft F)
 }
 
 
@@ -85,38 +110,70 @@ def test_metals_agree_with_other_pages(name):
     metal, (E, nu, conductivity) = materials.get(name), ELSEWHERE[name]
     assert pytest.approx(E, rel=0.1) == metal.E
     assert metal.nu == pytest.approx(nu, abs=0.021)
-    assert conductivity is None or 0.9 * metal.conductivity[0] < conductivity < 1.1 * metal.conductivity[1]
+    assert (
+        conductivity is None
+        or 0.9 * metal.conductivity[0] < conductivity < 1.1 * metal.conductivity[1]
+    )
     assert 0 < metal.hardness[0] <= metal.hardness[1]
-    # plasticity: the pressure of an indentation is about three flow stresses; here within a factor of 1.5
+    # plasticity: the pressure of an indentation is about three flow stresses; here within a
+    # factor of 1.5
     assert name not in TENSILE or 2 < 1e3 * metal.hardness[1] / TENSILE[name] < 4.5
 
 
 def test_brinell_and_vickers_numbers_from_the_indentation():
     ball = 10.0  # mm
-    for name, numbers, force in (("steel 4140", (200, 578), 3000), ("aluminium 6061", (30, 95), 500)):
-        depth = force / (np.pi * ball * np.array(numbers))  # number is force over the cap's area, pi D depth
+    for name, numbers, force in (
+        ("steel 4140", (200, 578), 3000),
+        ("aluminium 6061", (30, 95), 500),
+    ):
+        depth = force / (
+            np.pi * ball * np.array(numbers)
+        )  # number is force over the cap's area, pi D depth
         pressure = force * 9.80665 / (np.pi * depth * (ball - depth)) / 1e3
         np.testing.assert_allclose(materials.get(name).hardness, pressure, atol=0.0051)
     diagonal = np.sqrt(1.8544 / np.array((55.0, 200.0)))  # mm, at 1 kgf, ISO 6507
-    np.testing.assert_allclose(materials.get("brass C26000").hardness, 9.80665e-3 / (diagonal**2 / 2), atol=0.0051)
+    np.testing.assert_allclose(
+        materials.get("brass C26000").hardness,
+        9.80665e-3 / (diagonal**2 / 2),
+        atol=0.0051,
+    )
 
 
-# table 1 of ASTM E140 at numbers between those of the module, as printed in two manuals of hardness testers
-@pytest.mark.parametrize(("rockwell", "vickers"), [(42, 412), (48, 484), (53, 560), (58, 653), (62, 746), (66, 865)])
+# table 1 of ASTM E140 at numbers between those of the module, as printed in two manuals of
+# hardness testers
+@pytest.mark.parametrize(
+    ("rockwell", "vickers"),
+    [(42, 412), (48, 484), (53, 560), (58, 653), (62, 746), (66, 865)],
+)
 def test_rockwell_numbers(rockwell, vickers):
-    both = (float(materials.hardness(text).removesuffix(" GPa")) for text in (f"{rockwell} HRC", f"{vickers}HV"))
+    both = (
+        float(materials.hardness(text).removesuffix(" GPa"))
+        for text in (f"{rockwell} HRC", f"{vickers}HV")
+    )
     assert next(both) == pytest.approx(next(both), rel=0.008)
 
 
-# Vickers numbers at Rockwell B numbers, as printed of DIN 50150 at 51tongren.cn/en/technical.asp?plt=4, and of
-# ASTM E140 table 2
+# Vickers numbers at Rockwell B numbers, as printed of DIN 50150 at
+# 51tongren.cn/en/technical.asp?plt=4, and of ASTM E140 table 2
 @pytest.mark.parametrize(
     ("rockwell", "vickers"),
-    [(73, 140), (80, 160), (89.6, 195), (95, 220), (98.4, 240), (75, 137), (90, 185), (95, 210)],
+    [
+        (73, 140),
+        (80, 160),
+        (89.6, 195),
+        (95, 220),
+        (98.4, 240),
+        (75, 137),
+        (90, 185),
+        (95, 210),
+    ],
 )
 def test_rockwell_b_numbers(rockwell, vickers):
     """Tables differ by 6% or less, as the docstring states."""
-    both = (float(materials.hardness(text).removesuffix(" GPa")) for text in (f"{rockwell} HRB", f"{vickers}HV"))
+    both = (
+        float(materials.hardness(text).removesuffix(" GPa"))
+        for text in (f"{rockwell} HRB", f"{vickers}HV")
+    )
     assert next(both) == pytest.approx(next(both), rel=0.06)
 
 
@@ -151,11 +208,15 @@ def test_names_of_metals_in_other_standards_and_spellings(typed, name):
 
 def test_a_name_that_begins_with_a_digit_is_a_hardness_too():
     assert materials.hardness("6061-T6") == materials.hardness("aluminium 6061 hard")
-    assert materials.hardness("304") == "304"  # a plain number, in the unit of the modulus
+    assert (
+        materials.hardness("304") == "304"
+    )  # a plain number, in the unit of the modulus
 
 
 def test_unknown_metals_are_answered_with_the_alike():
-    with pytest.raises(InputError, match="give aluminium 1100, aluminium 6061, aluminium 7075, perhaps") as told:
+    with pytest.raises(
+        InputError, match="give aluminium 1100, aluminium 6061, aluminium 7075, perhaps"
+    ) as told:
         materials.get("aluminum")
     assert "gold" not in str(told.value)
     with pytest.raises(InputError, match="copper C11000, copper CuCr1Zr"):
@@ -165,7 +226,12 @@ def test_unknown_metals_are_answered_with_the_alike():
 def test_constants_of_a_metal_in_units_and_in_the_wrong_ones():
     typed = materials.Metal("own", "210e3 MPa", 0.3, ("200 HV", "58 HRC"), "45 W/(m K)")
     assert typed == materials.Metal("own", 210, 0.3, (2.11536, 6.9405), (45, 45))
-    assert materials.pair({"name": "own", "E": "210 GPa", "nu": 0.3, "hardness": 2, "conductivity": 45}).softer.E == 210
+    assert (
+        materials.pair(
+            {"name": "own", "E": "210 GPa", "nu": 0.3, "hardness": 2, "conductivity": 45}
+        ).softer.E
+        == 210
+    )
     given = {"name": "S", "E": 210.0, "nu": 0.3, "hardness": 2.0, "conductivity": 45.0}
     for changed, match in (
         ({"E": 210e3}, r"from 0\.01 to 2000 GPa"),
@@ -196,7 +262,9 @@ def test_hardnesses_that_are_refused():
         with pytest.raises(InputError, match=message):
             contact(FACE, pressure="1 MPa", E_star="100 GPa", hardness=text)
     for names in ((), ("silver",) * 3, 5, ("silver", 5), {"a": 1}):
-        with pytest.raises(InputError, match=r"one or two|no metal is named|a metal has name"):
+        with pytest.raises(
+            InputError, match=r"one or two|no metal is named|a metal has name"
+        ):
             materials.pair(names)
     with pytest.raises(InputError, match="steel 4140"):
         materials.get("steel 4141")
@@ -213,8 +281,12 @@ def test_metals_named_answer_as_their_numbers_do():
     for name in ("area", "mean_separation", "stiffness", "unloading_stiffness"):
         np.testing.assert_allclose(getattr(named, name), getattr(plain, name), rtol=1e-12)
     steel, aluminium = "42.7 W/(m K)", f"{(154 * 180) ** 0.5} W/(m K)"
-    np.testing.assert_allclose(named.conductance(), plain.conductance(steel, aluminium), rtol=1e-5)
-    law = contact_law(FACE, materials=("steel 4140 hard", "aluminium 6061 hard"), theory="calibrated")
+    np.testing.assert_allclose(
+        named.conductance(), plain.conductance(steel, aluminium), rtol=1e-5
+    )
+    law = contact_law(
+        FACE, materials=("steel 4140 hard", "aluminium 6061 hard"), theory="calibrated"
+    )
     np.testing.assert_allclose(law.at_pressure("100 MPa").area, named.area[1], rtol=1e-4)
     with pytest.raises(InputError, match="E_star and materials"):
         contact(FACE, materials="silver", E_star="100 GPa", **asked)
@@ -229,7 +301,10 @@ def test_metals_that_yield_are_not_valid_without_a_hardness():
     assert at(materials="steel 1020").valid  # one temper: it yields by default
     assert at(materials="steel 1020").yielded > 0.9
     (reason,) = at(materials="steel 4140").reasons
-    assert reason == "steel 4140 yields here: give hardness= of its temper, '2.06 GPa' to '5.76 GPa'"
+    assert (
+        reason
+        == "steel 4140 yields here: give hardness= of its temper, '2.06 GPa' to '5.76 GPa'"
+    )
     assert at(materials="steel 4140", hardness="200 HV").valid
     assert not at(materials=("steel 52100", "silver"), hardness=np.inf).valid
     (reason,) = at(materials=("steel 52100", "silver"), hardness=np.inf).reasons
@@ -238,13 +313,17 @@ def test_metals_that_yield_are_not_valid_without_a_hardness():
     polished = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5).scaled(1.0, "um")
     for gradient, elastic in ((0.07, True), (0.08, False)):
         height = gradient / float(polished.rms_gradient)
-        face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=height, h_max=3.5 * height, unit="um")
+        face = Surface(
+            hurst=0.8, q0=0.06, q1=3.0, h_rms=height, h_max=3.5 * height, unit="um"
+        )
         assert at(face, materials="steel 52100", hardness=np.inf).valid == elastic
     # no material named: above what any of them bears
     assert not at(E_star="115 GPa").valid
     assert at(E_star="115 GPa", hardness=np.inf).valid
     assert at(E_star="50 GPa").valid
-    assert contact(FACE, pressure=1e-3, theory="calibrated").valid  # over E*: no stress is known
+    assert contact(
+        FACE, pressure=1e-3, theory="calibrated"
+    ).valid  # over E*: no stress is known
     labelled = at(materials="steel 4140", pressure=xr.DataArray([0.05, 0.1], dims="load"))
     assert not labelled.valid.values.any()
     assert [text[:17] for text in labelled.reasons] == ["steel 4140 yields"]
@@ -253,22 +332,38 @@ def test_metals_that_yield_are_not_valid_without_a_hardness():
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_sensitivities_hold_the_hardness(theory):
     numbers = {"pressure": 0.1, "E_star": 115.0, "hardness": 3.0}
-    found = sensitivity(FACE, pressure="0.1 GPa", E_star="115 GPa", hardness="3 GPa", theory=theory)
+    found = sensitivity(
+        FACE, pressure="0.1 GPa", E_star="115 GPa", hardness="3 GPa", theory=theory
+    )
     for name in numbers:
         both = []
         for factor in (0.999, 1.001):
             own = numbers | {name: numbers[name] * factor}
             one = contact(FACE, **own | {"E_star": f"{own['E_star']} GPa"}, theory=theory)
-            both.append([one.area, one.mean_separation, one.stiffness, one.unloading_stiffness / own["E_star"]])
+            both.append(
+                [
+                    one.area,
+                    one.mean_separation,
+                    one.stiffness,
+                    one.unloading_stiffness / own["E_star"],
+                ]
+            )
         slope = np.diff(np.log(both), axis=0)[0] / np.log(1.001 / 0.999)
-        known = [found.slopes[name][answer] for answer in ("area", "mean_separation", "stiffness", "conductance")]
+        known = [
+            found.slopes[name][answer]
+            for answer in ("area", "mean_separation", "stiffness", "conductance")
+        ]
         np.testing.assert_allclose(known, slope, atol=1e-4)
 
 
 def test_scenes_and_rows_take_every_hardness():
     given = {"E_star": "115 GPa", "theory": "calibrated"}
     scene = Scene(
-        surface=FACE, pressures=["10 MPa", "50 MPa"], effects={"pressure", "area", "yield"}, hardness="40 HRC", **given
+        surface=FACE,
+        pressures=["10 MPa", "50 MPa"],
+        effects={"pressure", "area", "yield"},
+        hardness="40 HRC",
+        **given,
     )
     known = contact(FACE, pressure=["10 MPa", "50 MPa"], hardness="392 HV", **given)
     np.testing.assert_allclose(scene.run()["area"], known.area, rtol=1e-4)
@@ -278,22 +373,33 @@ def test_scenes_and_rows_take_every_hardness():
 
 def test_a_hardness_in_the_shell():
     asked = "--hurst 0.8 --q0 0.06/um --q1 3/um --h-rms 1um --h-max 3.5um --E-star 115GPa -p 50MPa --theory calibrated"
-    for text, valid in (("40 HRC", "yes"), ("steel 4140 hard", "yes"), ("inf", "yes"), (None, "no")):
+    for text, valid in (
+        ("40 HRC", "yes"),
+        ("steel 4140 hard", "yes"),
+        ("inf", "yes"),
+        (None, "no"),
+    ):
         given = ["--hardness", text] if text else []
         answer = json.loads(run("contact", *asked.split(), "--json", *given))["columns"]
         assert answer["valid"] == [valid], text
         cap = {} if text is None else {"hardness": np.inf if text == "inf" else text}
-        known = contact(FACE, pressure="50 MPa", E_star="115 GPa", theory="calibrated", **cap)
+        known = contact(
+            FACE, pressure="50 MPa", E_star="115 GPa", theory="calibrated", **cap
+        )
         assert answer["area"] == [pytest.approx(float(known.area), rel=1e-12)]
 
 
 def test_microhardness_of_the_contacts_of_a_face():
-    face = Surface.from_roughness(Rq="1 um", longest="250 um", shortest="4 um", hurst=0.8, nominal_area="4 cm^2")
+    face = Surface.from_roughness(
+        Rq="1 um", longest="250 um", shortest="4 um", hurst=0.8, nominal_area="4 cm^2"
+    )
     hard = float(materials.microhardness(face, 5.0, -0.2).split()[0])
     slope = np.sqrt(2 * face.m2 / np.pi)
     assert hard == pytest.approx(5.0 * (1.62 / slope) ** -0.2, rel=1e-5)
     # the same face in other units, and an index of none
-    assert materials.microhardness(face.to("mm"), "5000 MPa", -0.2) == materials.microhardness(face, "5 GPa", -0.2)
+    assert materials.microhardness(
+        face.to("mm"), "5000 MPa", -0.2
+    ) == materials.microhardness(face, "5 GPa", -0.2)
     assert materials.microhardness(face, "5 GPa", 0.0) == "5 GPa"
     for c1, c2, match in (("5 GPa", 0.1, "c2"), (-1.0, -0.1, "c1")):
         with pytest.raises(OutOfRangeError, match=match):

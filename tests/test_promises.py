@@ -42,12 +42,20 @@ def heights():
     """A small periodic map of random waves."""
     noise = np.fft.rfft2(np.random.default_rng(5).standard_normal((32, 32)))
     q = np.hypot(np.fft.fftfreq(32)[:, None], np.fft.rfftfreq(32))
-    return np.fft.irfft2(np.where((q > 0.05) & (q < 0.15), noise * np.maximum(q, 1e-3) ** -1.8, 0))
+    return np.fft.irfft2(
+        np.where((q > 0.05) & (q < 0.15), noise * np.maximum(q, 1e-3) ** -1.8, 0)
+    )
 
 
 def by_pressure(theory, **options):
     found = contact(ROUGH, pressure=PRESSURES, E_star="100 GPa", theory=theory, **options)
-    return [found.mean_separation, found.area, found.stiffness, found.error, found.scatter]
+    return [
+        found.mean_separation,
+        found.area,
+        found.stiffness,
+        found.error,
+        found.scatter,
+    ]
 
 
 def of_a_law():
@@ -56,7 +64,9 @@ def of_a_law():
 
 
 def of_a_joint():
-    joint = Joint(FACE, FACE, materials=METALS, nominal_area="4 cm^2", theory="calibrated")
+    joint = Joint(
+        FACE, FACE, materials=METALS, nominal_area="4 cm^2", theory="calibrated"
+    )
     found = joint.at_pressure(PRESSURES)
     return [found.area, found.mean_separation, found.stiffness, found.conductance()]
 
@@ -67,13 +77,19 @@ def of_flow_factors():
 
 
 def of_a_map():
-    found = contact(Surface.from_map(heights(), 1.0), area=[0.02, 0.2], theory="simulated")
+    found = contact(
+        Surface.from_map(heights(), 1.0), area=[0.02, 0.2], theory="simulated"
+    )
     return [found.pressure, found.mean_separation, found.stiffness]
 
 
 def of_a_sensitivity():
     found = sensitivity(ROUGH, pressure=1e-3, theory="calibrated")
-    return [found.slopes[name][answer] for name in found.slopes for answer in found.slopes[name]]
+    return [
+        found.slopes[name][answer]
+        for name in found.slopes
+        for answer in found.slopes[name]
+    ]
 
 
 # by name, so that a new process can ask it too
@@ -92,7 +108,9 @@ QUESTIONS = {
 def bits(name):
     """The answer to a question in hexadecimal digits."""
     ask, given, options = QUESTIONS[name]
-    return [np.asarray(values, float).tobytes().hex() for values in ask(*given, **options)]
+    return [
+        np.asarray(values, float).tobytes().hex() for values in ask(*given, **options)
+    ]
 
 
 HERE = {}
@@ -117,7 +135,9 @@ def everything_imported():
 
 
 # the module itself imports what it asks with; nothing else comes before the first question
-ALONE = "import json, sys, test_promises; print(json.dumps(test_promises.bits(sys.argv[1])))"
+ALONE = (
+    "import json, sys, test_promises; print(json.dumps(test_promises.bits(sys.argv[1])))"
+)
 AFTER_ALL = """
 import json, test_promises
 test_promises.everything_imported()
@@ -127,10 +147,16 @@ print(json.dumps({name: test_promises.bits(name) for name in reversed(test_promi
 
 def new_process(code, *arguments, folder, paths=()):
     """What code prints as JSON in a new interpreter in another folder, with these paths before all others."""
-    places = [*map(str, paths), str(pathlib.Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
+    places = [
+        *map(str, paths),
+        str(pathlib.Path(__file__).parent),
+        os.environ.get("PYTHONPATH", ""),
+    ]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, places))}
     command = [sys.executable, "-P", "-W", "error", "-c", code, *arguments]
-    ran = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    ran = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     return json.loads(ran.stdout)
 
@@ -155,7 +181,9 @@ def test_an_answer_does_not_depend_on_the_name_of_the_librarys_folder(tmp_path):
     tables = pathlib.Path(shipped_file("universal.nc")).parent
     for name in ("my contacts (β)", "mbma_tables"):
         copy = tmp_path / name
-        shutil.copytree(PACKAGE, copy / "mbma_tables", ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            PACKAGE, copy / "mbma_tables", ignore=shutil.ignore_patterns("__pycache__")
+        )
         if tables.parent != PACKAGE:
             shutil.copytree(tables, copy / "tables")
         where = "import json, mbma_tables; print(json.dumps(mbma_tables.__file__))"
@@ -165,11 +193,22 @@ def test_an_answer_does_not_depend_on_the_name_of_the_librarys_folder(tmp_path):
 
 
 def asked_law(law):
-    return [law.pressure(1.5), law.area(1.5), law.stiffness(1.5), law.at_pressure("10 MPa").area]
+    return [
+        law.pressure(1.5),
+        law.area(1.5),
+        law.stiffness(1.5),
+        law.at_pressure("10 MPa").area,
+    ]
 
 
 def asked_contact(found):
-    return [found.pressure, found.area, found.mean_separation, found.stiffness, found.leakage.K]
+    return [
+        found.pressure,
+        found.area,
+        found.mean_separation,
+        found.stiffness,
+        found.leakage.K,
+    ]
 
 
 def asked_joint(joint):
@@ -194,7 +233,9 @@ def asked_theory(theory):
 def asked_own_table(theory):
     surface = Surface.from_map(heights(), 1.0)
     elastic = contact(surface, area=[0.02, 0.2], theory=theory)
-    yielded = contact(surface, pressure=np.asarray(elastic.pressure), theory=theory, hardness=5.0)
+    yielded = contact(
+        surface, pressure=np.asarray(elastic.pressure), theory=theory, hardness=5.0
+    )
     return [elastic.pressure, yielded.area]
 
 
@@ -224,7 +265,9 @@ def made_law():
 
 
 def made_law_that_yields():
-    return contact_law(ROUGH, "calibrated", rtol=RTOL, E_star="100 GPa", hardness="1.5 GPa")
+    return contact_law(
+        ROUGH, "calibrated", rtol=RTOL, E_star="100 GPa", hardness="1.5 GPa"
+    )
 
 
 def made_joint():
@@ -246,7 +289,10 @@ OBJECTS = {
     "law": (made_law, asked_law),
     "law that yields": (made_law_that_yields, asked_law),
     "joint": (made_joint, asked_joint),
-    **{name: (functools.partial(get_theory, name), asked_theory) for name in sorted(THEORIES)},
+    **{
+        name: (functools.partial(get_theory, name), asked_theory)
+        for name in sorted(THEORIES)
+    },
     "own table": (made_own_table, asked_own_table),
 }
 UNPICKLED = """
@@ -282,15 +328,28 @@ def test_a_worker_of_dask_has_the_bits_of_this_process(theory, hardness):
     dask, xr = pytest.importorskip("dask"), pytest.importorskip("xarray")
     gaps = xr.DataArray(np.linspace(0.5, 3.0, 24), dims="gap")
     eager = contact(ROUGH, mean_separation=gaps, theory=theory, hardness=hardness)
-    lazy = contact(ROUGH, mean_separation=gaps.chunk(gap=8), theory=theory, hardness=hardness)
+    lazy = contact(
+        ROUGH, mean_separation=gaps.chunk(gap=8), theory=theory, hardness=hardness
+    )
     with dask.config.set(scheduler="processes", num_workers=2):
         found = dask.compute(lazy.pressure, lazy.area)
     for values, expected in zip(found, (eager.pressure, eager.area), strict=True):
         np.testing.assert_array_equal(values, expected)
 
 
-QUANTITIES = ("pressure", "area", "separation", "mean_separation", "stiffness", "error", "scatter", "valid")
-HARDNESSES = pytest.mark.parametrize("hardness", [np.inf, 0.05], ids=["elastic", "yields"])
+QUANTITIES = (
+    "pressure",
+    "area",
+    "separation",
+    "mean_separation",
+    "stiffness",
+    "error",
+    "scatter",
+    "valid",
+)
+HARDNESSES = pytest.mark.parametrize(
+    "hardness", [np.inf, 0.05], ids=["elastic", "yields"]
+)
 
 
 @HARDNESSES
@@ -299,7 +358,9 @@ HARDNESSES = pytest.mark.parametrize("hardness", [np.inf, 0.05], ids=["elastic",
 def test_numbers_lists_arrays_and_labels_have_the_same_bits(theory, given, hardness):
     """Each kind of argument, alone and among others, of any shape."""
     xr = pytest.importorskip("xarray")
-    first = contact(ROUGH, mean_separation=np.linspace(0.4, 3.0, 12), theory=theory, hardness=hardness)
+    first = contact(
+        ROUGH, mean_separation=np.linspace(0.4, 3.0, 12), theory=theory, hardness=hardness
+    )
     asked = np.asarray(getattr(first, given))
 
     def answers(values):
@@ -317,14 +378,24 @@ def test_numbers_lists_arrays_and_labels_have_the_same_bits(theory, given, hardn
     for kind, values in kinds.items():
         found = answers(values)
         for name in QUANTITIES:
-            expected, value = np.asarray(getattr(whole, name)), np.asarray(getattr(found, name))
-            np.testing.assert_array_equal(value.ravel(), expected, err_msg=f"{kind}: {name}")
+            expected, value = (
+                np.asarray(getattr(whole, name)),
+                np.asarray(getattr(found, name)),
+            )
+            np.testing.assert_array_equal(
+                value.ravel(), expected, err_msg=f"{kind}: {name}"
+            )
     for place in (0, 5, 11):
         for number in (float(asked[place]), asked[place], np.array(asked[place])):
             found = answers(number)
             for name in QUANTITIES:
-                expected, value = np.asarray(getattr(whole, name))[place], getattr(found, name)
-                np.testing.assert_array_equal(value, expected, err_msg=f"{type(number)}: {name}")
+                expected, value = (
+                    np.asarray(getattr(whole, name))[place],
+                    getattr(found, name),
+                )
+                np.testing.assert_array_equal(
+                    value, expected, err_msg=f"{type(number)}: {name}"
+                )
 
 
 def test_an_island_and_a_lookup_are_the_same_of_a_number_and_of_an_array():

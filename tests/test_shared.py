@@ -27,14 +27,25 @@ def arrays_in(value):
         seen[id(part)] = part
         if isinstance(part, np.ndarray):
             yield path, part
-        names = part if isinstance(part, dict) else getattr(part, "__dict__", range(len(parts_of(part))))
-        pending += [(f"{path}.{name}", inner) for name, inner in zip(names, parts_of(part), strict=False)]
+        names = (
+            part
+            if isinstance(part, dict)
+            else getattr(part, "__dict__", range(len(parts_of(part))))
+        )
+        pending += [
+            (f"{path}.{name}", inner)
+            for name, inner in zip(names, parts_of(part), strict=False)
+        ]
 
 
 def caches():
     """Every cache of the package's modules by name."""
     for module in pkgutil.walk_packages(mbma_tables.__path__, "mbma_tables."):
-        if module.name.endswith("__main__") or "abi3" in module.name or ".core._" in module.name:
+        if (
+            module.name.endswith("__main__")
+            or "abi3" in module.name
+            or ".core._" in module.name
+        ):
             continue
         for name, value in vars(importlib.import_module(module.name)).items():
             if isinstance(value, functools._lru_cache_wrapper):
@@ -43,7 +54,11 @@ def caches():
 
 def kept_in(cache):
     """What a cache without or with a limit keeps."""
-    (kept,) = (part for part in gc.get_referents(cache) if isinstance(part, dict) and part is not vars(cache))
+    (kept,) = (
+        part
+        for part in gc.get_referents(cache)
+        if isinstance(part, dict) and part is not vars(cache)
+    )
     for value in kept.values():
         bounded = type(value).__name__ == "_lru_list_elem"
         yield from gc.get_referents(value) if bounded else [value]
@@ -52,9 +67,14 @@ def kept_in(cache):
 def test_arrays_of_everything_that_is_kept_are_read_only():
     for theory in THEORIES:
         hardness = np.inf if theory == "greenwood_williamson" else 0.05
-        found = contact(SURFACE, mean_separation=[0.5, 1.0], theory=theory, hardness=hardness)
+        found = contact(
+            SURFACE, mean_separation=[0.5, 1.0], theory=theory, hardness=hardness
+        )
         contact(SURFACE, pressure=found.pressure, theory=theory, hardness=hardness)
-        assert contact(SURFACE, mean_separation=[0.5, 1.0], theory=theory).leakage is not None
+        assert (
+            contact(SURFACE, mean_separation=[0.5, 1.0], theory=theory).leakage
+            is not None
+        )
     open_table("island4d").lookup(1.0, 3.0, 20.0, 0.8)
     assert greenwood_tripp.solve(2.0, 1.0).error < 1e-10
     number = 0
@@ -71,7 +91,11 @@ def test_a_shared_table_cannot_be_scaled():
     before = contact(SURFACE, separation=1.0, theory="mbma").pressure
     for kind in ("universal", "island4d"):
         content = open_table(kind).content
-        arrays = [content.coefficients, content.local_error, *content.conformance.values()]
+        arrays = [
+            content.coefficients,
+            content.local_error,
+            *content.conformance.values(),
+        ]
         arrays += [values for _, values, _ in content.auxiliary.values()]
         for array in arrays:
             with pytest.raises(ValueError, match="read-only"):

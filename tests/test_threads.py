@@ -21,18 +21,31 @@ def questions():
 
     def phi(seed):
         rng = np.random.default_rng(seed)
-        X, mu = rng.uniform(X_axis.low, X_axis.high, ENTRIES), 10 ** rng.uniform(-12, np.log10(mu_axis.high), ENTRIES)
+        X, mu = (
+            rng.uniform(X_axis.low, X_axis.high, ENTRIES),
+            10 ** rng.uniform(-12, np.log10(mu_axis.high), ENTRIES),
+        )
         return list(model.answer(X, mu))
 
     def laws(seed):
         d = np.random.default_rng(seed).uniform(-3, 3, ENTRIES)
-        p, area, slope = (value(separation=d) for value in (law.pressure, law.area, law.stiffness))
-        return [p, area, slope, law.pressure(separation=float(d[0])), law.separation(pressure=p[:200])]
+        p, area, slope = (
+            value(separation=d) for value in (law.pressure, law.area, law.stiffness)
+        )
+        return [
+            p,
+            area,
+            slope,
+            law.pressure(separation=float(d[0])),
+            law.separation(pressure=p[:200]),
+        ]
 
     def totals(seed):
         # 31 islands or more a gap
         rng = np.random.default_rng(seed)
-        many = Surface(rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0)
+        many = Surface(
+            rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0
+        )
         found = contact(many, separation=rng.uniform(-3, 3, 60), rtol=1e-6)
         return [found.pressure, found.area, found.stiffness, found.error]
 
@@ -40,17 +53,27 @@ def questions():
 
 
 def test_sixteen_threads_give_the_bits_of_one(questions):
-    alone = {(question, seed): question(seed) for question in questions for seed in range(ROUNDS)}
+    alone = {
+        (question, seed): question(seed)
+        for question in questions
+        for seed in range(ROUNDS)
+    }
     barrier, keys = Barrier(THREADS), list(alone)
 
     def work(thread):
         barrier.wait()
         # every thread in an order of its own, so that unlike questions meet
-        order = [keys[place] for place in np.random.default_rng(1000 + thread).permutation(len(keys))]
+        order = [
+            keys[place]
+            for place in np.random.default_rng(1000 + thread).permutation(len(keys))
+        ]
         return [
             (question.__name__, seed)
             for question, seed in order
-            if not all(np.array_equal(a, b) for a, b in zip(question(seed), alone[question, seed], strict=True))
+            if not all(
+                np.array_equal(a, b)
+                for a, b in zip(question(seed), alone[question, seed], strict=True)
+            )
         ]
 
     with ThreadPoolExecutor(THREADS) as pool:

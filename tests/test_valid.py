@@ -1,7 +1,8 @@
 """A valid answer of each kind of input lies within its stated model uncertainty of simulations of that kind.
 
-The simulations are the boundary elements of docs/data.md that no fit saw. Each kind has its own share of errors within
-two standard deviations; the least is that of docs/fidelity.md, docs/yield.md, docs/leakage.md and docs/machined.md.
+The simulations are the boundary elements of docs/data.md that no fit saw. Each kind has its
+own share of errors within two standard deviations; the least is that of docs/fidelity.md,
+docs/yield.md, docs/leakage.md and docs/machined.md.
 """
 
 import numpy as np
@@ -11,7 +12,8 @@ from mbma_tables import Joint, Surface, contact
 from mbma_tables.data import boundary_elements
 
 HELD_OUT = ("held_out_surface", "held_out_spectrum")
-GRADIENT = 1e-3  # q0 h_rms of the surfaces here: slopes are small, as theories and simulations take them
+# q0 h_rms of the surfaces here: slopes are small, as theories and simulations take them
+GRADIENT = 1e-3
 SIDE = 4  # longest wavelengths a side, fewer of which are not valid
 WITHIN_TWO = 0.92  # least share of errors within two standard deviations
 
@@ -32,14 +34,20 @@ def held_out(group):
     """Numbers of the held-out self-affine surfaces of a group, and their rows of simulated loads."""
     kind = names_of(group["kind"])
     split = names_of(group["split"])
-    rows = (kind == "self_affine") & np.isin(split, HELD_OUT) & (group["waves"].values >= SIDE)
+    rows = (
+        (kind == "self_affine")
+        & np.isin(split, HELD_OUT)
+        & (group["waves"].values >= SIDE)
+    )
     assert rows.any(), (sorted(set(kind)), sorted(set(split)))
     return np.flatnonzero(rows)
 
 
 def five_numbers(group, row):
     """The surface of a row by its five numbers."""
-    numbers = {name: float(group[name].values[row]) for name in ("hurst", "zeta_1", "h_max")}
+    numbers = {
+        name: float(group[name].values[row]) for name in ("hurst", "zeta_1", "h_max")
+    }
     q1 = GRADIENT * numbers["zeta_1"]
     return Surface(numbers["hurst"], GRADIENT, q1, 1.0, numbers["h_max"])
 
@@ -79,7 +87,12 @@ def test_valid_contacts_that_yield(simulations):
             reached = np.isfinite(force) & np.isfinite(simulated) & (force < eta)
             if not reached.any() or not np.isfinite(eta):
                 continue
-            pressed = contact(surface, pressure=force[reached] * gradient, hardness=eta * gradient, theory="calibrated")
+            pressed = contact(
+                surface,
+                pressure=force[reached] * gradient,
+                hardness=eta * gradient,
+                theory="calibrated",
+            )
             deviations.append(np.log(pressed.area / simulated[reached])[pressed.valid])
             scatters.append(pressed.area_scatter[pressed.valid])
     share, number = within(deviations, scatters)
@@ -98,7 +111,9 @@ def test_valid_leakage(simulations):
         flow = np.sqrt(group["flow"].values[row, loads].prod(axis=-1))
         pressed = contact(surface, pressure=force[loads] * gradient, theory="calibrated")
         valid = pressed.leakage.valid & (flow > 0)
-        deviations.append(np.log(pressed.leakage.K / np.where(flow > 0, flow, 1.0))[valid])
+        deviations.append(
+            np.log(pressed.leakage.K / np.where(flow > 0, flow, 1.0))[valid]
+        )
         scatters.append(pressed.leakage.scatter[valid])
     share, number = within(deviations, scatters)
     assert number > 50
@@ -122,7 +137,9 @@ def test_valid_contacts_of_machined_maps(simulations, theory, quantity):
 def test_a_trace_is_never_valid():
     """No coverage was shown on traces of the families of machined surfaces."""
     heights = np.random.default_rng(1).standard_normal(4096).cumsum()
-    trace = Surface.from_profile(1e-3 * (heights - np.linspace(heights[0], heights[-1], 4096)), dx=1.0)
+    trace = Surface.from_profile(
+        1e-3 * (heights - np.linspace(heights[0], heights[-1], 4096)), dx=1.0
+    )
     pressed = contact(trace, area=[0.01, 0.1], theory="calibrated")
     assert not pressed.valid.any()
     assert any("trace" in reason for reason in pressed.reasons)
@@ -132,9 +149,17 @@ def test_a_joint_is_valid_where_the_contact_of_its_surface_is():
     """Two faces are one surface with the sum of their spectra."""
     face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
     for metal in ("copper C11000 hard", "steel 52100 hard"):
-        joint = Joint(face, face | {"longest": "60 um"}, materials=metal, nominal_area="4 cm^2", theory="calibrated")
+        joint = Joint(
+            face,
+            face | {"longest": "60 um"},
+            materials=metal,
+            nominal_area="4 cm^2",
+            theory="calibrated",
+        )
         pressures = ["0.01 MPa", "1 MPa", "30 MPa", "300 MPa"]
         pressed = joint.at_pressure(pressures)
-        alone = contact(joint.surface, pressure=pressures, materials=metal, theory="calibrated")
+        alone = contact(
+            joint.surface, pressure=pressures, materials=metal, theory="calibrated"
+        )
         np.testing.assert_array_equal(pressed.valid, alone.valid)
         assert pressed.reasons.keys() == alone.reasons.keys()

@@ -34,7 +34,16 @@ PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check")
 
 
 def wheel_of(source, folder, **options):
-    run(*PIP, "wheel", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source), **options)
+    run(
+        *PIP,
+        "wheel",
+        "--no-deps",
+        "--no-build-isolation",
+        "-w",
+        str(folder),
+        str(source),
+        **options,
+    )
     (wheel,) = folder.glob("*.whl")
     assert wheel.stat().st_size < 9e6
     assert "-cp311-abi3-" in wheel.name
@@ -44,15 +53,38 @@ def wheel_of(source, folder, **options):
 @pytest.fixture(scope="module")
 def site(source, tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    run(*PIP, "install", "--no-deps", "--target", str(folder / "site"), str(wheel_of(source, folder)))
+    run(
+        *PIP,
+        "install",
+        "--no-deps",
+        "--target",
+        str(folder / "site"),
+        str(wheel_of(source, folder)),
+    )
     return folder / "site"
 
 
 def test_installed_wheel_runs_the_readme_command(site, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(site)}
-    where = run(sys.executable, "-c", "import mbma_tables; print(mbma_tables.__file__)", cwd=tmp_path, env=environment)
+    where = run(
+        sys.executable,
+        "-c",
+        "import mbma_tables; print(mbma_tables.__file__)",
+        cwd=tmp_path,
+        env=environment,
+    )
     assert pathlib.Path(where.stdout.strip()).is_relative_to(site)
-    curve = ("-m", "mbma_tables", "curve", "--surface", "concrete", "--points", "5", "--plot", "concrete.png")
+    curve = (
+        "-m",
+        "mbma_tables",
+        "curve",
+        "--surface",
+        "concrete",
+        "--points",
+        "5",
+        "--plot",
+        "concrete.png",
+    )
     shown = run(sys.executable, *curve, cwd=tmp_path, env=environment)
     assert "concrete road of Lorenz" in shown.stdout
     assert (tmp_path / "concrete.png").read_bytes().startswith(b"\x89PNG")
@@ -83,7 +115,9 @@ def asked(source, **environment):
         "import build_backend as b; asked = b.get_requires_for_build_wheel(); "
         "assert asked == b.get_requires_for_build_editable(); print(*asked)"
     )
-    said = run(sys.executable, "-c", program, cwd=source, env={**os.environ, **environment}).stdout.splitlines()
+    said = run(
+        sys.executable, "-c", program, cwd=source, env={**os.environ, **environment}
+    ).stdout.splitlines()
     return [one for one in said[-1:] if "ziglang" in one]
 
 
@@ -95,7 +129,9 @@ def test_without_a_compiler(source, tmp_path):
     assert not asked(source, CC="cc")
     wheel = wheel_of(source, tmp_path, env={**os.environ, **hidden})
     run(*PIP, "install", "--no-deps", "--target", str(tmp_path / "site"), str(wheel))
-    program = "import mbma_tables.core as c; print(c.__file__, c.core.island_geometry.__name__)"
+    program = (
+        "import mbma_tables.core as c; print(c.__file__, c.core.island_geometry.__name__)"
+    )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
     said = run(sys.executable, "-c", program, cwd=tmp_path, env=environment).stdout
     assert said.startswith(str(tmp_path))

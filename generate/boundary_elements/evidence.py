@@ -28,7 +28,9 @@ MAX_AREA = 0.98  # beyond, gaps are a few points
 LEVELS = np.geomspace(1e-5, 1.0, 400)  # u/h_max of a law's curve
 PRESSURES = np.geomspace(1e-5, 10.0, 400)  # F/(A0 E* g), likewise
 # u/h_max at which a theory's curve is known
-DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
+DEPTHS = np.concatenate(
+    [1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]]
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,17 +62,22 @@ class Simulated:
             return Surface(float(self.node[1]), 1.0, self.zeta_1, 1.0, self.h_max)
         x, variance = self.own_spectrum.x, self.own_spectrum.variance
         middle = np.sqrt(x[1:] * x[:-1])
-        edges = np.concatenate([[x[0] ** 2 / middle[0]], middle, [x[-1] ** 2 / middle[-1]]])
+        edges = np.concatenate(
+            [[x[0] ** 2 / middle[0]], middle, [x[-1] ** 2 / middle[-1]]]
+        )
         level = variance / (np.pi * np.diff(edges**2))
         q, C = np.repeat(edges, 2)[1:-1], np.repeat(level, 2)
         # of the mean square wavenumber that it has
-        return MeasuredSurface(q, matched(q, C, 1.0, self.own_spectrum.gradient**2), self.h_max)
+        return MeasuredSurface(
+            q, matched(q, C, 1.0, self.own_spectrum.gradient**2), self.h_max
+        )
 
 
 class TheoryCurve:
     """A theory on a surface: forces over A0 E* g, lengths over h_rms; NaN where the theory does not reach.
 
-    A theory has an ``answer`` at mean separations, or an ``at_pressure``, which returns A/A0 and the mean separation.
+    A theory has an ``answer`` at mean separations, or an ``at_pressure``, which returns
+    A/A0 and the mean separation.
     """
 
     def __init__(self, theory: Any, surface: AnySurface) -> None:
@@ -90,16 +97,30 @@ class TheoryCurve:
         self._log_area = np.log(area[kept])
 
     def area(self, force: FloatArray) -> FloatArray:
-        return np.asarray(np.exp(PchipInterpolator(self._log_force, self._log_area, extrapolate=False)(np.log(force))))
+        return np.asarray(
+            np.exp(
+                PchipInterpolator(self._log_force, self._log_area, extrapolate=False)(
+                    np.log(force)
+                )
+            )
+        )
 
     def separation(self, force: FloatArray) -> FloatArray:
-        return np.asarray(PchipInterpolator(self._log_force, self._u, extrapolate=False)(np.log(force)))
+        return np.asarray(
+            PchipInterpolator(self._log_force, self._u, extrapolate=False)(np.log(force))
+        )
 
     def force(self, u: FloatArray) -> FloatArray:
         if hasattr(self._theory, "answer"):
             gap = np.minimum(u * self._h_rms, self._surface.h_max)
             return np.asarray(self._theory.answer(self._surface, gap)[0] / self._g)
-        return np.asarray(np.exp(PchipInterpolator(self._u[::-1], self._log_force[::-1], extrapolate=False)(u)))
+        return np.asarray(
+            np.exp(
+                PchipInterpolator(
+                    self._u[::-1], self._log_force[::-1], extrapolate=False
+                )(u)
+            )
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,21 +131,29 @@ class Case(Simulated):
     u: FloatArray
 
     def at(self, kept: Any) -> Self:
-        return dataclasses.replace(self, force=self.force[kept], area=self.area[kept], u=self.u[kept])
+        return dataclasses.replace(
+            self, force=self.force[kept], area=self.area[kept], u=self.u[kept]
+        )
 
     def law(self, constants: Constants) -> Law:
         return Law(self.spectrum, self.h_max, constants)
 
     def map_law(self, constants: Constants, map_constants: MapConstants) -> MapLaw:
-        return MapLaw(self.own_spectrum, **self.curves, constants=constants, map_constants=map_constants)
+        return MapLaw(
+            self.own_spectrum,
+            **self.curves,
+            constants=constants,
+            map_constants=map_constants,
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Capped(Simulated):
     """One surface at one hardness: what was found, and the elastic contact of the same surface, simulated and by laws.
 
-    Loads are in rows as simulated; `bare` has the surface's forces, areas, mean gaps and stiffnesses if elastic.
-    `curves` have force, stiffness and Q of each form of the elastic law at `LEVELS`.
+    Loads are in rows as simulated; `bare` has the surface's forces, areas, mean gaps and
+    stiffnesses if elastic. `curves` have force, stiffness and Q of each form of the elastic
+    law at `LEVELS`.
     """
 
     eta: float
@@ -143,7 +172,9 @@ class Capped(Simulated):
     @functools.cached_property
     def elastic_area(self) -> FloatArray:
         """Simulated, at these forces."""
-        known = PchipInterpolator(np.log(self.bare["force"]), np.log(erfinv(self.bare["area"])))
+        known = PchipInterpolator(
+            np.log(self.bare["force"]), np.log(erfinv(self.bare["area"]))
+        )
         return np.asarray(erf(np.exp(known(np.log(self.force)))))
 
     @functools.cached_property
@@ -154,7 +185,9 @@ class Capped(Simulated):
         for name, beyond, end in zip(("force", "frozen"), *laws, strict=True):
             known = PchipInterpolator(u[::-1], np.log(self.bare[name][::-1]))
             inside = np.exp(known(np.maximum(self.u, u[-1])))
-            found.append(np.where(self.u > u[-1], inside, beyond * self.bare[name][-1] / end[0]))
+            found.append(
+                np.where(self.u > u[-1], inside, beyond * self.bare[name][-1] / end[0])
+            )
         return found[0], found[1]
 
     @functools.cached_property
@@ -171,12 +204,22 @@ class Capped(Simulated):
 def simulated(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, Simulated]]:
     """Surfaces of a file by `python -m generate`, refinements left out."""
     kinds = data.kind.attrs["flag_meanings"].split()
-    for one in (data.isel(surface=number) for number in np.flatnonzero(data.split.values < SPLITS.index(REFINEMENT))):
+    for one in (
+        data.isel(surface=number)
+        for number in np.flatnonzero(data.split.values < SPLITS.index(REFINEMENT))
+    ):
         kind, hurst, zeta_1 = kinds[int(one.kind)], float(one.hurst), float(one.zeta_1)
         share, x = one.band_variance.values, one.band_q.values
         own = Spectrum.from_shares(x[share > 0], share[share > 0])
-        spectrum = Spectrum.self_affine(hurst, zeta_1) if kind in ("self_affine", "yielded") else own
-        node, waves = (kind, hurst, zeta_1, int(one.waves), float(one["shape"])), int(one.waves)
+        spectrum = (
+            Spectrum.self_affine(hurst, zeta_1)
+            if kind in ("self_affine", "yielded")
+            else own
+        )
+        node, waves = (
+            (kind, hurst, zeta_1, int(one.waves), float(one["shape"])),
+            int(one.waves),
+        )
         split, points, h_max = SPLITS[int(one.split)], int(one.points), float(one.h_max)
         yield one, Simulated(kind, split, node, waves, points, spectrum, own, h_max)
 
@@ -184,16 +227,26 @@ def simulated(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, Simulated]]:
 def curves_of(one: xr.Dataset) -> dict[str, Any]:
     """What a map's law knows of a surface beside its spectrum."""
     names = ("mean_height", "top_gradient", "tension_force", "tension")
-    return {name: one[name].values.astype(float) for name in names} | {"anisotropy": float(one.anisotropy)}
+    return {name: one[name].values.astype(float) for name in names} | {
+        "anisotropy": float(one.anisotropy)
+    }
 
 
 def cases(data: xr.Dataset) -> list[Case]:
     """Surfaces of a file by `python -m generate boundary_elements`, refinements left out."""
     found = []
     for one, known in simulated(data):
-        seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < MAX_AREA)
-        force, area, u = (one[name].values[seen] for name in ("force", "area", "mean_separation"))
-        found.append(Case(**vars(known), curves=curves_of(one), force=force, area=area, u=u))
+        seen = (
+            np.isfinite(one.force.values)
+            & (one.area.values > 0)
+            & (one.area.values < MAX_AREA)
+        )
+        force, area, u = (
+            one[name].values[seen] for name in ("force", "area", "mean_separation")
+        )
+        found.append(
+            Case(**vars(known), curves=curves_of(one), force=force, area=area, u=u)
+        )
     return found
 
 
@@ -205,19 +258,35 @@ def evidence() -> tuple[Case, ...]:
 def capped(data: xr.Dataset) -> list[Capped]:
     """Surfaces of a file by `python -m generate boundary_elements --of hardness`, refinements left out."""
     found = []
-    names = {"force": "force", "area": "area", "yielded": "area_yielded", "u": "mean_separation"}
+    names = {
+        "force": "force",
+        "area": "area",
+        "yielded": "area_yielded",
+        "u": "mean_separation",
+    }
     names |= {"planes": "plane_separation", "frozen": "frozen_stiffness"}
     for one, known in simulated(data):
         curves, u = curves_of(one), known.h_max * LEVELS[:-1]
-        law, by_map = Law(known.spectrum, known.h_max), Curve(MapLaw(known.own_spectrum, **curves), known.h_max)
+        law, by_map = (
+            Law(known.spectrum, known.h_max),
+            Curve(MapLaw(known.own_spectrum, **curves), known.h_max),
+        )
         heights = hardness.BearingCurve(curves["mean_height"], known.h_max)
         force, _, stiffness = by_map.answer(u)
         levels = {
-            "calibrated": (*law.contact(u)[::2], hardness.bearing_share(u, known.h_max)[0]),
+            "calibrated": (
+                *law.contact(u)[::2],
+                hardness.bearing_share(u, known.h_max)[0],
+            ),
             "calibrated_map": (force, stiffness, heights(u)[0]),
         }
         rows = {own: one[name].values.astype(float) for own, name in names.items()}
-        fixed: dict[str, Any] = {"law": law, "map_curve": by_map, "heights": heights, "curves": levels}
+        fixed: dict[str, Any] = {
+            "law": law,
+            "map_curve": by_map,
+            "heights": heights,
+            "curves": levels,
+        }
         fixed["bare"] = {own: values[-1] for own, values in rows.items()}
         for row, eta in enumerate(data.eta.values[:-1]):
             loads = {own: values[row] for own, values in rows.items()}

@@ -1,6 +1,7 @@
 """`python -m generate boundary_elements`, `grids`, `measured_maps`, `light` and `gaps`: simulated maps.
 
-Campaigns are run, or what there is of them gathered into one netCDF file; `variables.toml` describes its variables.
+Campaigns are run, or what there is of them gathered into one netCDF file; `variables.toml`
+describes its variables.
 """
 
 import dataclasses
@@ -29,7 +30,15 @@ from generate.boundary_elements.solve import (
     pressed,
     simulate_to,
 )
-from generate.boundary_elements.surfaces import CAMPAIGNS, HELD_OUT_SPECTRUM, SPLITS, Recipe, Task, campaign, heights
+from generate.boundary_elements.surfaces import (
+    CAMPAIGNS,
+    HELD_OUT_SPECTRUM,
+    SPLITS,
+    Recipe,
+    Task,
+    campaign,
+    heights,
+)
 from generate.calibrated_file import Variable, attributes, rms, variable, write_part
 from generate.timing import seconds_of_work
 from generate.workers import results
@@ -45,26 +54,47 @@ from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories.simulated.boundary_elements import LOADS
 from mbma_tables.theories.simulated.boundary_elements import Contact as YieldingContact
 
-TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("variables.toml").read_text(encoding="utf-8"))
+TEXTS = tomllib.loads(
+    pathlib.Path(__file__).with_name("variables.toml").read_text(encoding="utf-8")
+)
 DIMENSIONS = ("surface", "load", "quantile", "top", "band", "band_or_end", "axis")
 COORDINATES: dict[str, Any] = {"quantile": QUANTILES, "top": FRACTIONS, "eta": HARDNESSES}
-BITS = {"band_energy": 10, "residual": 4, "seconds": 7}  # of mantissas that are kept; of others 24, of force 53
+BITS = {
+    "band_energy": 10,
+    "residual": 4,
+    "seconds": 7,
+}  # of mantissas that are kept; of others 24, of force 53
 LOADED = {"band_energy", "flow"}
 
 
-def run(tasks: Sequence[Task], folder: pathlib.Path, workers: int = 1, solve: Solve = SOLVERS["elastic"]) -> None:
+def run(
+    tasks: Sequence[Task],
+    folder: pathlib.Path,
+    workers: int = 1,
+    solve: Solve = SOLVERS["elastic"],
+) -> None:
     """Solve what `folder` does not hold yet, one file a surface; those that fail are named at the end."""
     folder.mkdir(parents=True, exist_ok=True)
-    missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
+    missing = [
+        task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()
+    ]
     work = functools.partial(simulate_to, solve=solve, folder=folder)
-    if failures := [*filter(None, results("surfaces", work, [(recipe,) for recipe in missing], workers))]:
-        raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
+    if failures := [
+        *filter(
+            None, results("surfaces", work, [(recipe,) for recipe in missing], workers)
+        )
+    ]:
+        raise RuntimeError(
+            f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}"
+        )
 
 
 def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
     """One number or curve of all surfaces; NaN where a surface has fewer loads."""
     of_hardness = kind == "hardness" and name in TEXTS["hardness"]
-    dimension = "hardness" if of_hardness else next(d for d in DIMENSIONS if name in TEXTS[d])
+    dimension = (
+        "hardness" if of_hardness else next(d for d in DIMENSIONS if name in TEXTS[d])
+    )
     own = [np.asarray(content[name]) for content in found]
     dims = [] if dimension == "surface" else [dimension]
     if dimension == "load" or name in LOADED:
@@ -77,16 +107,27 @@ def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Varia
         values = np.array(own)
     if name in BITS:
         mantissa, exponent = np.frexp(values)
-        values = np.ldexp(np.round(mantissa * 2.0 ** BITS[name]) / 2.0 ** BITS[name], exponent)
-    number = "f8" if dimension == "surface" or (dimension == "load" and name == "force") else "f4"
-    labels = {"long_name": TEXTS[dimension][name], "units": "s" if name == "seconds" else "1"}
+        values = np.ldexp(
+            np.round(mantissa * 2.0 ** BITS[name]) / 2.0 ** BITS[name], exponent
+        )
+    number = (
+        "f8"
+        if dimension == "surface" or (dimension == "load" and name == "force")
+        else "f4"
+    )
+    labels = {
+        "long_name": TEXTS[dimension][name],
+        "units": "s" if name == "seconds" else "1",
+    }
     return xr.Variable(["surface", *dims], values.astype(number), labels)
 
 
 def stiffness(data: xr.Dataset) -> FloatArray:
     """-dF/du of every surface by a spline; NaN without a gap."""
     found = np.full(data.force.shape, np.nan, "f4")
-    for row, force, u in zip(found, data.force.values, data.mean_separation.values, strict=True):
+    for row, force, u in zip(
+        found, data.force.values, data.mean_separation.values, strict=True
+    ):
         known = u > 0
         log_u = CubicSpline(np.log(force[known]), np.log(u[known]))
         row[known] = -force[known] / (u[known] * log_u.derivative()(np.log(force[known])))
@@ -95,7 +136,9 @@ def stiffness(data: xr.Dataset) -> FloatArray:
 
 def of_recipes(recipes: Sequence[Recipe]) -> dict[str, Variable]:
     return {
-        name: variable("surface", np.array([getattr(recipe, name) for recipe in recipes]), meaning)
+        name: variable(
+            "surface", np.array([getattr(recipe, name) for recipe in recipes]), meaning
+        )
         for name, meaning in TEXTS["recipe"].items()
     }
 
@@ -107,7 +150,10 @@ def group(kind: str, variables: Any, **made_by: str) -> xr.Dataset:
 def of_contacts(kind: str, columns: Iterable[Any]) -> xr.Dataset:
     """A group of a row a contact, its columns as `variables.toml` lists them."""
     texts = TEXTS["groups"][kind]["columns"].items()
-    return group(kind, {n: variable("contact", v, m) for (n, m), v in zip(texts, columns, strict=True)})
+    return group(
+        kind,
+        {n: variable("contact", v, m) for (n, m), v in zip(texts, columns, strict=True)},
+    )
 
 
 def surfaces(data: xr.Dataset) -> list[xr.Dataset]:
@@ -117,10 +163,14 @@ def surfaces(data: xr.Dataset) -> list[xr.Dataset]:
 def _flags(values: Sequence[str], meanings: Sequence[str], name: str) -> xr.Variable:
     attributes = {"long_name": name, "flag_values": np.arange(len(meanings), dtype="i1")}
     numbers = np.array([list(meanings).index(value) for value in values], "i1")
-    return xr.Variable("surface", numbers, attributes | {"flag_meanings": " ".join(meanings)})
+    return xr.Variable(
+        "surface", numbers, attributes | {"flag_meanings": " ".join(meanings)}
+    )
 
 
-def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") -> xr.Dataset:
+def dataset(
+    tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic"
+) -> xr.Dataset:
     solved, found = [], []
     for task in tasks:
         path = folder / f"{task.recipe.name}.npz"
@@ -132,7 +182,9 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") 
         raise InputError(f"no surface of this campaign is in {folder}")
     texts, recipes = TEXTS["files"][kind], [task.recipe for task in solved]
     data = xr.Dataset({name: collected(name, found, kind) for name in texts["numbers"]})
-    data["kind"] = _flags([r.kind for r in recipes], sorted({r.kind for r in recipes}), "family of surfaces")
+    data["kind"] = _flags(
+        [r.kind for r in recipes], sorted({r.kind for r in recipes}), "family of surfaces"
+    )
     meaning = "what a fit may see: the training set and no other"
     data["split"] = _flags([task.split for task in solved], SPLITS, meaning)
     data.update(of_recipes(recipes))
@@ -141,46 +193,99 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") 
         if dimension in data.dims:
             data[name] = variable(dimension, np.array(COORDINATES[name]), meaning)
     if kind == "elastic":
-        data["stiffness"] = variable(data.force.dims, stiffness(data), TEXTS["load"]["stiffness"])
-    made_by = {what: ", ".join(sorted({str(content[what]) for content in found})) for what in ("engine", "numpy")}
+        data["stiffness"] = variable(
+            data.force.dims, stiffness(data), TEXTS["load"]["stiffness"]
+        )
+    made_by = {
+        what: ", ".join(sorted({str(content[what]) for content in found}))
+        for what in ("engine", "numpy")
+    }
     common = TEXTS["files"]
-    texts = common | texts | {name: common[name] + texts[name] for name in ("modules", "comment")}
+    texts = (
+        common
+        | texts
+        | {name: common[name] + texts[name] for name in ("modules", "comment")}
+    )
     texts["command"] = f"boundary_elements --of {kind} --collect"
-    data.attrs = attributes(texts, made_by) | {"surfaces_planned": len(tasks), "surfaces_solved": len(found)}
+    data.attrs = attributes(texts, made_by) | {
+        "surfaces_planned": len(tasks),
+        "surfaces_solved": len(found),
+    }
     return data
 
 
 @click.command()
-@click.option("--of", "kind", type=click.Choice(list(SOLVERS)), default="elastic", show_default=True)
-@click.option("--folder", type=click.Path(path_type=pathlib.Path), help="One file a surface.  [default: its kind]")
-@click.option("--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write into this file, no runs.")
-@click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
-@click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
+@click.option(
+    "--of", "kind", type=click.Choice(list(SOLVERS)), default="elastic", show_default=True
+)
+@click.option(
+    "--folder",
+    type=click.Path(path_type=pathlib.Path),
+    help="One file a surface.  [default: its kind]",
+)
+@click.option(
+    "--collect",
+    "target",
+    type=click.Path(path_type=pathlib.Path),
+    help="Write into this file, no runs.",
+)
+@click.option(
+    "--points",
+    type=click.IntRange(64),
+    default=1024,
+    show_default=True,
+    help="Largest grid to run.",
+)
+@click.option(
+    "--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes."
+)
 def boundary_elements(
-    kind: str, folder: pathlib.Path | None, target: pathlib.Path | None, points: int, workers: int
+    kind: str,
+    folder: pathlib.Path | None,
+    target: pathlib.Path | None,
+    points: int,
+    workers: int,
 ) -> None:
     """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
 
-    Of hardness, a solver of its own caps pressures at seven hardnesses: half an hour, no Tamaas. Of leakage, Reynolds'
-    equation is solved on the gaps: half an hour.
+    Of hardness, a solver of its own caps pressures at seven hardnesses: half an hour, no
+    Tamaas. Of leakage, Reynolds' equation is solved on the gaps: half an hour.
 
-    Stopped and called again, it goes on where it was. Small grids come first, every kind of surface in turn.
+    Stopped and called again, it goes on where it was. Small grids come first, every kind of
+    surface in turn.
     """
     folder = folder or pathlib.Path("boundary_elements", kind)
     tasks = [task for task in campaign(kind) if task.recipe.points <= points]
     if target is not None:
         data = dataset(tasks, folder, kind)
         write_part(target, data, kind)
-        click.echo(f"{target}: {data.sizes['surface']} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
+        click.echo(
+            f"{target}: {data.sizes['surface']} of {len(tasks)} surfaces, {target.stat().st_size} bytes"
+        )
         return
     run(tasks, folder, workers, SOLVERS[kind])
 
 
 DATA = pathlib.Path("docs/data")
-CHOSEN = ((0.3, 12.0), (0.9, 12.0))  # H and zeta_1 of held-out spectra, their first surfaces
+CHOSEN = (
+    (0.3, 12.0),
+    (0.9, 12.0),
+)  # H and zeta_1 of held-out spectra, their first surfaces
 GRIDS = (32, 64, 128, 256, 512, 1024)  # points a side; 60 of the shortest waves
 STARTS = ("cold", "continued")
-COLUMNS = ("hurst", "zeta_1", "waves", "seed", "points", "start", "force", "area", "mean_separation", "seconds", "cost")
+COLUMNS = (
+    "hurst",
+    "zeta_1",
+    "waves",
+    "seed",
+    "points",
+    "start",
+    "force",
+    "area",
+    "mean_separation",
+    "seconds",
+    "cost",
+)
 HEAD = """\
 # Held-out surfaces of the group elastic on grids of 32 to 1024 points a side, by python -m generate grids.
 # force in A0 E* g, g the rms gradient of the finest grid; area A/A0, corrected for its perimeter; separation in h_rms.
@@ -188,8 +293,17 @@ HEAD = """\
 """
 LARGEST = 256  # points a side of measured maps that are kept, from the middle
 
-LIGHT_LOADS = np.geomspace(2e-5, 0.012, 40)  # F/(A0 E* g): from first contact, a few points of the grid, to 3% contact
-LIGHT_BANDS = ((1, 8), (1, 32), (2, 16), (4, 10), (8, 5), (16, 3.2))  # longest wavelengths a side, and q1/q0
+LIGHT_LOADS = np.geomspace(
+    2e-5, 0.012, 40
+)  # F/(A0 E* g): from first contact, a few points of the grid, to 3% contact
+LIGHT_BANDS = (
+    (1, 8),
+    (1, 32),
+    (2, 16),
+    (4, 10),
+    (8, 5),
+    (16, 3.2),
+)  # longest wavelengths a side, and q1/q0
 LIGHT_HURSTS, LIGHT_SEEDS = (0.5, 0.8), (1, 2, 3, 4, 5)
 LIGHT_BINS = (2e-4, 5e-4, 1e-3, 3e-3, 1e-2)  # A/A0
 
@@ -202,7 +316,9 @@ PLAIN = "self_affine"
 PATH: Any = click.Path(path_type=pathlib.Path)
 
 
-def solve(recipe: Recipe, grid: int, finest: int, start: str) -> Iterator[tuple[Any, ...]]:
+def solve(
+    recipe: Recipe, grid: int, finest: int, start: str
+) -> Iterator[tuple[Any, ...]]:
     """Rows of one surface on one grid, whose heights are those of the finest at every second, fourth, ... point."""
     fine = heights(dataclasses.replace(recipe, points=finest))
     known = bearing(fine, recipe.sizes)
@@ -211,35 +327,70 @@ def solve(recipe: Recipe, grid: int, finest: int, start: str) -> Iterator[tuple[
     for force in LOADS[::2]:
         # cold by an engine made for the load, continued from the pressures of the load below
         before, started = seconds_of_work(), time.process_time()
-        found = (Contact(surface, recipe.sizes) if start == "cold" else engine).press(force)
+        found = (Contact(surface, recipe.sizes) if start == "cold" else engine).press(
+            force
+        )
         seconds = time.process_time() - started
         cost = 2 * seconds / (before + seconds_of_work())
-        node = (recipe.hurst, recipe.zeta_1, recipe.waves, recipe.seed, grid, start, force)
+        node = (
+            recipe.hurst,
+            recipe.zeta_1,
+            recipe.waves,
+            recipe.seed,
+            grid,
+            start,
+            force,
+        )
         yield (*node, found["area"], found["mean_separation"] / length, seconds, cost)
 
 
 @click.command()
-@click.option("--out", "target", type=PATH, default=DATA / "boundary_element_grids.csv", show_default=True)
+@click.option(
+    "--out",
+    "target",
+    type=PATH,
+    default=DATA / "boundary_element_grids.csv",
+    show_default=True,
+)
 def grids(target: pathlib.Path) -> None:
     """Solve held-out surfaces on ever finer grids, loads cold and continued: half an hour."""
-    held = [task.recipe for task in campaign() if task.split == HELD_OUT_SPECTRUM and task.recipe.kind == PLAIN]
-    surfaces = [next(one for one in held if (one.hurst, one.zeta_1) == chosen) for chosen in CHOSEN]
+    held = [
+        task.recipe
+        for task in campaign()
+        if task.split == HELD_OUT_SPECTRUM and task.recipe.kind == PLAIN
+    ]
+    surfaces = [
+        next(one for one in held if (one.hurst, one.zeta_1) == chosen)
+        for chosen in CHOSEN
+    ]
     rows = list[tuple[Any, ...]]()
-    for grid, recipe, start in tqdm(list(itertools.product(GRIDS, surfaces, STARTS)), disable=None):
+    for grid, recipe, start in tqdm(
+        list(itertools.product(GRIDS, surfaces, STARTS)), disable=None
+    ):
         rows += solve(recipe, grid, GRIDS[-1], start)
-    text = pd.DataFrame(rows, columns=COLUMNS).to_csv(index=False, float_format="%.8g", lineterminator="\n")
+    text = pd.DataFrame(rows, columns=COLUMNS).to_csv(
+        index=False, float_format="%.8g", lineterminator="\n"
+    )
     write_file(target, (HEAD + text).encode())
     click.echo(f"{target}: {len(rows)} loads")
 
 
 def middle(treated: Treated) -> Treated:
     """At most `LARGEST` points a side from the middle of a map."""
-    kept = tuple(slice((n - min(n, LARGEST)) // 2, (n + min(n, LARGEST)) // 2) for n in treated.heights.shape)
+    kept = tuple(
+        slice((n - min(n, LARGEST)) // 2, (n + min(n, LARGEST)) // 2)
+        for n in treated.heights.shape
+    )
     return dataclasses.replace(treated, heights=treated.heights[kept])
 
 
 @click.command()
-@click.argument("maps", nargs=-1, required=True, type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False))
+@click.argument(
+    "maps",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=pathlib.Path, exists=True, dir_okay=False),
+)
 @click.option("--data", type=PATH, default=FILE, show_default=True)
 def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
     """Simulate measured maps for docs/fidelity.md, read by SurfaceTopography: a few minutes each."""
@@ -250,11 +401,18 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
         sizes = surface.shape[0] * treated.steps[0], surface.shape[1] * treated.steps[1]
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
-        solved.append(pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi))
+        solved.append(
+            pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi)
+        )
         click.echo(f"{path}: h_rms {surface.std():.4g} {treated.unit}")
-    found = {name: collected(name, solved, "elastic") for name in TEXTS["files"]["elastic"]["numbers"]}
+    found = {
+        name: collected(name, solved, "elastic")
+        for name in TEXTS["files"]["elastic"]["numbers"]
+    }
     own = group("measured", found, engine=str(solved[0]["engine"])).assign_coords(
-        surface=variable("surface", [path.stem for path in maps], "name of the map's file")
+        surface=variable(
+            "surface", [path.stem for path in maps], "name of the map's file"
+        )
     )
     write_part(data, own, "measured")
 
@@ -276,13 +434,20 @@ def light_contacts(recipe: Recipe) -> FloatArray:
 
 def compared(one: xr.Dataset) -> FloatArray:
     """A/A0, ln of simulated over the law's stiffness between loads, and of force at equal u; shape (3, loads - 1)."""
-    h_max, area, u = float(one.h_max), *(one[name].values.astype(float) for name in ("area", "mean_separation"))
+    h_max, area, u = (
+        float(one.h_max),
+        *(one[name].values.astype(float) for name in ("area", "mean_separation")),
+    )
     face = Surface(float(one.hurst), 1.0, float(one.zeta_1), 1.0, h_max)
     scale = float(face.rms_gradient)
-    known = contact(face, pressure=LIGHT_LOADS * scale, theory="calibrated").mean_separation
+    known = contact(
+        face, pressure=LIGHT_LOADS * scale, theory="calibrated"
+    ).mean_separation
     with np.errstate(invalid="ignore", divide="ignore"):
         stiffness = np.log(np.diff(known) / np.diff(u))
-        by_gap = contact(face, mean_separation=np.nan_to_num(u), theory="calibrated").pressure
+        by_gap = contact(
+            face, mean_separation=np.nan_to_num(u), theory="calibrated"
+        ).pressure
         force = np.log(LIGHT_LOADS * scale / by_gap)
     return np.stack([np.sqrt(area[1:] * area[:-1]), stiffness, force[1:]])
 
@@ -293,9 +458,18 @@ def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
     over, texts = ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
     design = itertools.product(LIGHT_BANDS, LIGHT_HURSTS, LIGHT_SEEDS)
-    recipes = [Recipe(PLAIN, hurst, zeta_1, waves, seed, 256) for (waves, zeta_1), hurst, seed in design]
-    h_max, area, u = np.array([light_contacts(recipe) for recipe in tqdm(recipes, disable=None)]).swapaxes(0, 1)
-    columns = {"h_max": ("surface", h_max[:, 0]), "force": ("load", LIGHT_LOADS), "area": (over, area.astype("f4"))}
+    recipes = [
+        Recipe(PLAIN, hurst, zeta_1, waves, seed, 256)
+        for (waves, zeta_1), hurst, seed in design
+    ]
+    h_max, area, u = np.array(
+        [light_contacts(recipe) for recipe in tqdm(recipes, disable=None)]
+    ).swapaxes(0, 1)
+    columns = {
+        "h_max": ("surface", h_max[:, 0]),
+        "force": ("load", LIGHT_LOADS),
+        "area": (over, area.astype("f4")),
+    }
     columns["mean_separation"] = over, u.astype("f4")
     found = {name: variable(*column, texts[name]) for name, column in columns.items()}
     write_part(data, group("light_loads", of_recipes(recipes) | found), "light_loads")
@@ -305,25 +479,42 @@ def light(data: pathlib.Path) -> None:
 def gap_errors(kind: str) -> pd.DataFrame:
     """ln(law/simulation) at `JUMPS`, a row a contact: with the simulated contact, with one gap for all, of the chain.
 
-    The chain, from pressure and hardness by the calibrated law, is that of self-affine surfaces, else NaN.
+    The chain, from pressure and hardness by the calibrated law, is that of self-affine
+    surfaces, else NaN.
     """
     found, recipes = [], [Recipe(*row) for row in CAMPAIGNS["gaps"][kind]]
     for recipe, eta in itertools.product(recipes, GAP_HARDNESSES[kind]):
         surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
         h_rms = float(surface.std())
-        like = Surface(recipe.hurst, recipe.q0, recipe.q0 * recipe.zeta_1, h_rms, known["h_max"] * h_rms)
+        like = Surface(
+            recipe.hurst,
+            recipe.q0,
+            recipe.q0 * recipe.zeta_1,
+            h_rms,
+            known["h_max"] * h_rms,
+        )
         solved = YieldingContact(surface, recipe.sizes, hardness=eta)
         for load in (load_at(area, eta) for area in AREAS):
-            row: dict[str, Any] = {"area": solved.press(load)["area"], "waves": recipe.waves}
+            row: dict[str, Any] = {
+                "area": solved.press(load)["area"],
+                "waves": recipe.waves,
+            }
             assert solved.pressure is not None
             open_, gap = solved.pressure <= 0, solved.gap / h_rms
             simulated = np.array([(open_ / (gap + jump)).mean() for jump in JUMPS])
             laws = {"law": mean_inverse(gap.mean(), 1 - open_.mean(), JUMPS, 1.0, eta)}
-            laws |= {"one gap": 1 / (gap.mean() + JUMPS), "chain": np.full(JUMPS.size, np.nan)}
+            laws |= {
+                "one gap": 1 / (gap.mean() + JUMPS),
+                "chain": np.full(JUMPS.size, np.nan),
+            }
             if recipe.kind == PLAIN:
                 own = contact(like, pressure=load, theory="calibrated", hardness=eta)
-                laws["chain"] = mean_inverse(float(own.mean_separation) / h_rms, float(own.area), JUMPS, 1.0, eta)
-            found.append(row | {name: np.log(value / simulated) for name, value in laws.items()})
+                laws["chain"] = mean_inverse(
+                    float(own.mean_separation) / h_rms, float(own.area), JUMPS, 1.0, eta
+                )
+            found.append(
+                row | {name: np.log(value / simulated) for name, value in laws.items()}
+            )
     return pd.DataFrame(found)
 
 
@@ -332,11 +523,24 @@ def gaps() -> None:
     """Print errors of a gas's conductance against gaps of boundary elements, for docs/joints.md: six minutes."""
     for kind in GAP_HARDNESSES:
         known = gap_errors(kind)
-        light, many = known["area"] < LIGHT, (known["waves"] >= MANY) & (known["area"] < HEAVY)
-        law, one, chain = (100 * np.stack(known[name]) for name in ("law", "one gap", "chain"))
-        click.echo(f"{kind}: M/h_rms; root mean square and largest error; largest of k/(u + M) below 5% contact;")
-        click.echo("mean and standard deviation of the chain, from three long waves a side on, below 30% contact [%]")
+        light, many = (
+            known["area"] < LIGHT,
+            (known["waves"] >= MANY) & (known["area"] < HEAVY),
+        )
+        law, one, chain = (
+            100 * np.stack(known[name]) for name in ("law", "one gap", "chain")
+        )
+        click.echo(
+            f"{kind}: M/h_rms; root mean square and largest error; largest of k/(u + M) below 5% contact;"
+        )
+        click.echo(
+            "mean and standard deviation of the chain, from three long waves a side on, below 30% contact [%]"
+        )
         for k, jump in enumerate(JUMPS):
             told = rms(law[:, k]), np.abs(law[:, k]).max(), np.abs(one[light, k]).max()
             of_chain = np.nanmean(chain[many, k]), np.nanstd(chain[many, k])
-            click.echo(" ".join([f"{jump:5g}", *(f"{value:6.1f}" for value in (*told, *of_chain))]))
+            click.echo(
+                " ".join(
+                    [f"{jump:5g}", *(f"{value:6.1f}" for value in (*told, *of_chain))]
+                )
+            )

@@ -1,6 +1,7 @@
 """One surface pressed flat: contact by Tamaas, with a hardness or with flow by the library's own boundary elements.
 
-Tamaas has pressures capped at a hardness too (KatoSaturated), but its iteration always runs to its limit.
+Tamaas has pressures capped at a hardness too (KatoSaturated), but its iteration always runs
+to its limit.
 """
 
 import importlib.metadata
@@ -28,21 +29,81 @@ from mbma_tables.theories.simulated.reynolds import flow_conductance
 # beyond LOADS, where heavy tails of the gradient keep gaps open
 HIGHER_LOADS = (1.5, 2.1, 3.0)
 FULL = 0.96
-QUANTITIES = ("area", "area_raw", "mean_separation", "energy", "pressure_weighted_height", "residual", "seconds")
+QUANTITIES = (
+    "area",
+    "area_raw",
+    "mean_separation",
+    "energy",
+    "pressure_weighted_height",
+    "residual",
+    "seconds",
+)
 
 HARDNESSES = (0.025, 0.05, 0.1, 0.2, 0.4, 0.8, np.inf)  # eta = p_m/(E* g)
-AREAS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1, 0.18, 0.3, 0.45, 0.6, 0.75, 0.9)  # that loads aim at
+AREAS = (
+    0.003,
+    0.006,
+    0.012,
+    0.025,
+    0.05,
+    0.1,
+    0.18,
+    0.3,
+    0.45,
+    0.6,
+    0.75,
+    0.9,
+)  # that loads aim at
 CAPPED = (
-    *("area", "area_raw", "area_yielded", "area_yielded_raw", "mean_separation", "plane_separation", "energy"),
+    *(
+        "area",
+        "area_raw",
+        "area_yielded",
+        "area_yielded_raw",
+        "mean_separation",
+        "plane_separation",
+        "energy",
+    ),
     *("frozen_stiffness", "residual", "iterations", "seconds"),
 )
-# of flow, F/(A0 E* g): 0.5% to 42% contact, where the last cells are blocked; and of the largest grids
-FLOW_LOADS = (0.0025, 0.005, 0.01, 0.02, 0.035, 0.055, 0.08, 0.105, 0.13, 0.155, 0.18, 0.2, 0.22)
+# of flow, F/(A0 E* g): 0.5% to 42% contact, where the last cells are blocked; and of the
+# largest grids
+FLOW_LOADS = (
+    0.0025,
+    0.005,
+    0.01,
+    0.02,
+    0.035,
+    0.055,
+    0.08,
+    0.105,
+    0.13,
+    0.155,
+    0.18,
+    0.2,
+    0.22,
+)
 FEW_LOADS = (0.005, 0.02, 0.055, 0.08, 0.105, 0.13, 0.155)
-FLOW_AREAS = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)  # that loads of surfaces that yield aim at
+FLOW_AREAS = (
+    0.01,
+    0.03,
+    0.06,
+    0.1,
+    0.15,
+    0.2,
+    0.25,
+    0.3,
+    0.35,
+    0.4,
+)  # that loads of surfaces that yield aim at
 LARGE = 1024
 OF_FLOW = ("area", "area_raw", "mean_separation", "residual", "seconds")
-LENGTHS = ("mean_separation", "plane_separation", "energy", "pressure_weighted_height")  # in h_rms
+LENGTHS = (
+    "mean_separation",
+    "plane_separation",
+    "energy",
+    "pressure_weighted_height",
+)  # in h_rms
 
 MAX_ITERATIONS = 50_000  # surfaces stretched 1:16 take 4,000
 Solve = Callable[[Any], dict[str, Any]]  # of a recipe, what is kept of its simulation
@@ -51,14 +112,18 @@ Solve = Callable[[Any], dict[str, Any]]  # of a recipe, what is kept of its simu
 class Contact:
     """A map against a rigid plane: Polonsky and Keer's conjugate gradients as Tamaas has them, E* = 1.
 
-    Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact. The map is
-    not periodic if "dcfft", a convolution, is its `operator`.
+    Each load starts from the pressures of the one before; `gap` has the last one's gaps,
+    zero in contact. The map is not periodic if "dcfft", a convolution, is its `operator`.
     """
 
     gap: FloatArray
 
     def __init__(
-        self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE, operator: str = ""
+        self,
+        surface: FloatArray,
+        sizes: tuple[float, float],
+        tolerance: float = TOLERANCE,
+        operator: str = "",
     ) -> None:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
         tamaas = needed("tamaas")
@@ -86,17 +151,25 @@ class Contact:
             residual = self._solver.solve(force)
         except (ArithmeticError, RuntimeError) as fault:
             # of a single element in contact, for instance
-            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}") from None
+            raise ConvergenceError(
+                f"boundary elements at F/(A0 E*) = {force:g} fail: {fault}"
+            ) from None
         if not residual <= self._tolerance:
-            raise ConvergenceError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
+            raise ConvergenceError(
+                f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}"
+            )
         seconds = time.process_time() - started
         pressure, moved = self.traction, np.asarray(self.model.displacement)
         if self._operator:
             self.model.operators[self._operator](pressure, moved)
         touching = pressure > 0
-        edges = sum(int(np.count_nonzero(touching != np.roll(touching, 1, axis))) for axis in (0, 1))
+        edges = sum(
+            int(np.count_nonzero(touching != np.roll(touching, 1, axis)))
+            for axis in (0, 1)
+        )
         raw = float(touching.mean())
-        # the engine moves the whole surface by the gap; elastic energy has the displacement about its mean
+        # the engine moves the whole surface by the gap; elastic energy has the displacement
+        # about its mean
         gap = moved - self.surface
         self.gap = np.where(touching, 0.0, np.maximum(gap - gap[touching].mean(), 0.0))
         return {
@@ -115,12 +188,19 @@ def engine() -> str:
     return f"Tamaas {importlib.metadata.version('tamaas')}"
 
 
-def kept(results: list[dict[str, float]], names: tuple[str, ...], h_rms: float) -> dict[str, FloatArray]:
+def kept(
+    results: list[dict[str, float]], names: tuple[str, ...], h_rms: float
+) -> dict[str, FloatArray]:
     """Quantities of loads by name, lengths in h_rms."""
-    return {name: np.array([r[name] for r in results]) / (h_rms if name in LENGTHS else 1) for name in names}
+    return {
+        name: np.array([r[name] for r in results]) / (h_rms if name in LENGTHS else 1)
+        for name in names
+    }
 
 
-def prepared(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> tuple[FloatArray, Any, dict[str, Any]]:
+def prepared(
+    unscaled: FloatArray, sizes: tuple[float, float], q0: float
+) -> tuple[FloatArray, Any, dict[str, Any]]:
     """A map at rms gradient 1, so that mean pressure is F/(A0 E* g), its spectrum, and what laws may know, in h_rms."""
     surface = unscaled / bearing(unscaled, sizes).gradient
     known, (power, q, band) = bearing(surface, sizes), radial_bands(surface, sizes)
@@ -129,7 +209,10 @@ def prepared(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> tup
     per_variance, h_rms = 1 / np.where(variance > 0, variance, np.nan), known.h_rms
     plain = ("top_gradient", "tension_force", "tension", "anisotropy", "slope_kurtosis")
     curves: dict[str, Any] = {name: getattr(known, name) for name in plain}
-    curves |= {name: getattr(known, name) / h_rms for name in ("h_max", "quantiles", "mean_height")}
+    curves |= {
+        name: getattr(known, name) / h_rms
+        for name in ("h_max", "quantiles", "mean_height")
+    }
     return (
         surface,
         band,
@@ -151,7 +234,9 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
     return pressed(heights(recipe), recipe.sizes, recipe.q0)
 
 
-def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict[str, Any]:
+def pressed(
+    unscaled: FloatArray, sizes: tuple[float, float], q0: float
+) -> dict[str, Any]:
     """All that is kept of one periodic map: lengths in h_rms, force in A0 E* g, energy in A0 E* g h_rms."""
     surface, band, curves = prepared(unscaled, sizes, q0)
     h_rms = float(surface.std())
@@ -164,9 +249,16 @@ def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict
         if force > LOADS[-1] and rows[-1]["area"] > FULL:
             break
         rows.append(contact.press(force))
-        # elastic energy by bands, sum |p_q|^2/|q|: longer waves than the surface has, its bands, shorter ones
-        modes = np.abs(np.fft.rfft2(contact.traction) / surface.size) ** 2 * weights / wavenumber
-        shares.append(np.bincount(band.ravel(), modes.ravel(), bearing_curve.BANDS + 2) / h_rms)
+        # elastic energy by bands, sum |p_q|^2/|q|: longer waves than the surface has, its
+        # bands, shorter ones
+        modes = (
+            np.abs(np.fft.rfft2(contact.traction) / surface.size) ** 2
+            * weights
+            / wavenumber
+        )
+        shares.append(
+            np.bincount(band.ravel(), modes.ravel(), bearing_curve.BANDS + 2) / h_rms
+        )
     forces = np.array((*LOADS, *HIGHER_LOADS)[: len(rows)])
     found = {"force": forces, "band_energy": np.array(shares), "engine": engine()}
     return curves | kept(rows, QUANTITIES, h_rms) | found
@@ -186,7 +278,11 @@ def simulate_capped(recipe: Recipe) -> dict[str, Any]:
     found = []
     for eta, loads in zip(HARDNESSES, forces, strict=True):
         contact = boundary_elements.Contact(surface, recipe.sizes, hardness=eta)
-        results = [contact.press(force) | {"frozen_stiffness": contact.frozen_stiffness() * h_rms} for force in loads]
+        results = [
+            contact.press(force)
+            | {"frozen_stiffness": contact.frozen_stiffness() * h_rms}
+            for force in loads
+        ]
         found.append(kept(results, CAPPED, h_rms))
     rows = {name: np.array([row[name] for row in found]) for name in CAPPED}
     return known | rows | {"force": forces, "engine": "conjugate gradients here"}
@@ -207,11 +303,19 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
         flows.append(flow_conductance(contact.gap / h_rms, recipe.sizes))
         if not flows[-1].any():
             break
-    found = {"engine": engine(), "force": np.array(loads[: len(flows)]), "flow": np.array(flows)}
+    found = {
+        "engine": engine(),
+        "force": np.array(loads[: len(flows)]),
+        "flow": np.array(flows),
+    }
     return known | kept(rows, OF_FLOW, h_rms) | found
 
 
-SOLVERS: dict[str, Solve] = {"elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow}
+SOLVERS: dict[str, Solve] = {
+    "elastic": simulate,
+    "hardness": simulate_capped,
+    "leakage": solve_flow,
+}
 
 
 def simulate_to(recipe: Recipe, solve: Solve, folder: pathlib.Path) -> str | None:

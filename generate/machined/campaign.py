@@ -36,7 +36,15 @@ SMOOTHEST = 2  # its number: of the longest shortest wavelength
 EVERY = 3  # part that is pressed with a hardness, too
 FORMS = ("calibrated", "corrected", "simulated")
 TEXTS = campaigns.TEXTS["groups"]["machined"]
-AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)  # of the quick law, which never refuses them
+AREAS = (
+    0.003,
+    0.025,
+    0.067,
+    0.14,
+    0.39,
+    0.58,
+    0.78,
+)  # of the quick law, which never refuses them
 STEP = 1.03  # of pressure, of the stiffness
 OPEN = 0.45  # A/A0 up to which flow is solved
 ANSWERS = (
@@ -97,7 +105,15 @@ def solved(part: Part) -> dict[str, Any]:
         stiffness = pressure * (STEP - 1) / (pressed["mean_separation"] - slightly_closer)
         contact_numbers = (pressed["area"], pressed["mean_separation"], pressed["energy"])
         rows.append((pressure, *contact_numbers, stiffness, *flow))
-    names = ("pressure", "area", "mean_separation", "energy", "stiffness", "flow_x", "flow_y")
+    names = (
+        "pressure",
+        "area",
+        "mean_separation",
+        "energy",
+        "stiffness",
+        "flow_x",
+        "flow_y",
+    )
     columns: dict[str, Any] = dict(zip(names, np.array(rows).T, strict=True))
     columns["engine"] = f"Tamaas {importlib.metadata.version('tamaas')}"
     return columns
@@ -119,7 +135,9 @@ def answered(part: Part, theory: str, folder: pathlib.Path) -> dict[str, FloatAr
         except OutOfRangeError:
             rows[[ANSWERS.index("valid"), ANSWERS.index("flow_valid")], k] = 0
             continue
-        stiffness = pressure * (STEP - 1) / (answer.mean_separation - closer.mean_separation)
+        stiffness = (
+            pressure * (STEP - 1) / (answer.mean_separation - closer.mean_separation)
+        )
         leakage = answer.leakage
         # the calibrated law solves no map, so it has no sensitivity to the grid
         sensitivity: float | FloatArray = np.nan
@@ -164,16 +182,28 @@ def yielded(part: Part) -> dict[str, FloatArray]:
             row = engine.press(load)
             share = row["area_yielded"] / row["area"]
             stiffness = engine.frozen_stiffness()
-            answers[0, :, k, place] = row["area"], row["mean_separation"], share, stiffness
+            answers[0, :, k, place] = (
+                row["area"],
+                row["mean_separation"],
+                share,
+                stiffness,
+            )
         # the map simulated by the library
-        simulated = contact(surface, pressure=force[k], hardness=hardness, theory="simulated")
+        simulated = contact(
+            surface, pressure=force[k], hardness=hardness, theory="simulated"
+        )
         answers[1, :, k] = [getattr(simulated, name) for name in QUANTITIES]
         slope[k] = simulated.stiffness
         # the law of hardness
         law = Yielding(of_map("simulated", surface), hardness)
         u, lighter = law.pressed(surface, force[k])
         loaded = law.loaded(surface, u, lighter)
-        answers[2, :, k] = loaded.answer.area, u, loaded.yielded, loaded.unloading_stiffness
+        answers[2, :, k] = (
+            loaded.answer.area,
+            u,
+            loaded.yielded,
+            loaded.unloading_stiffness,
+        )
     columns = {}
     for name, by_way in zip(QUANTITIES, np.swapaxes(answers, 0, 1), strict=True):
         columns[f"hard_{name}"] = by_way
@@ -196,7 +226,9 @@ def gathered(folder: pathlib.Path) -> xr.Dataset:
         values = np.array([columns[f"hard_{name}"] for columns in hard.values()], "f4")
         # force and slope are those of all ways
         ways = ("way",) if values.ndim == 4 else ()
-        data[f"hard_{name}"] = variable(("yielding", *ways, "eta", "hard_load"), values, meaning)
+        data[f"hard_{name}"] = variable(
+            ("yielding", *ways, "eta", "hard_load"), values, meaning
+        )
     numbers = numbers_of_surfaces(complete)
     for name, meaning in TEXTS["surface"].items():
         data[name] = variable("surface", np.array(numbers[name], float), meaning)
@@ -222,7 +254,9 @@ def coordinates(complete: list[Part], yielding: list[str]) -> dict[str, Variable
     return variables
 
 
-def add_columns(data: xr.Dataset, form: str, folder: pathlib.Path, complete: list[Part]) -> None:
+def add_columns(
+    data: xr.Dataset, form: str, folder: pathlib.Path, complete: list[Part]
+) -> None:
     """Add what files of a theory hold, or of the truth, whose form is empty."""
     files = [dict(np.load(folder / form / f"{part.name}.npz")) for part in complete]
     if not form:
@@ -253,8 +287,12 @@ def numbers_of_surfaces(complete: list[Part]) -> dict[str, list[float]]:
     default="machined",
     show_default=True,
 )
-@click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option("--out", type=click.Path(path_type=pathlib.Path), default=FILE, show_default=True)
+@click.option(
+    "--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes."
+)
+@click.option(
+    "--out", type=click.Path(path_type=pathlib.Path), default=FILE, show_default=True
+)
 def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     """Press maps of machined surfaces by boundary elements (Tamaas): an hour on one core.
 
@@ -262,7 +300,9 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     their own: remove these to ask a changed library again.
     """
     solvers: dict[str, Solve] = {"hardness": yielded, "": solved}
-    solvers |= {form: functools.partial(answered, theory=form, folder=folder) for form in FORMS}
+    solvers |= {
+        form: functools.partial(answered, theory=form, folder=folder) for form in FORMS
+    }
     for name, solve in solvers.items():
         chosen = yielding_parts() if solve is yielded else parts()
         # a campaign asks of a recipe no more than its name

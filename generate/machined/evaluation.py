@@ -44,7 +44,9 @@ def errors(data: xr.Dataset, form: str, quantity: str) -> FloatArray:
         return np.asarray(missed * data.stiffness / data.pressure, float)[..., None]
     names = ("flow_x", "flow_y") if quantity == "flow" else (quantity,)
     with np.errstate(all="ignore"):
-        ratios = [np.log(data[f"{form}_{name}"].values / data[name].values) for name in names]
+        ratios = [
+            np.log(data[f"{form}_{name}"].values / data[name].values) for name in names
+        ]
         ratio = np.stack(ratios, axis=-1)
     return np.where(np.isfinite(ratio), ratio, np.nan)
 
@@ -93,7 +95,9 @@ def of_sensitivity(data: xr.Dataset, form: str) -> FloatArray:
     return np.asarray((filled / TYPICAL) ** POWER)
 
 
-def by_area(data: xr.Dataset, form: str, quantity: str, rows: NDArray[np.int_]) -> FloatArray:
+def by_area(
+    data: xr.Dataset, form: str, quantity: str, rows: NDArray[np.int_]
+) -> FloatArray:
     """One constant for each load of the truth: it covers valid errors of surfaces `rows`."""
     counted = seen(data, form, quantity) & valid(data, form, quantity)[..., None]
     error = np.abs(errors(data, form, quantity)) / of_sensitivity(data, form)[..., None]
@@ -104,7 +108,9 @@ def by_area(data: xr.Dataset, form: str, quantity: str, rows: NDArray[np.int_]) 
     return np.array(constants)
 
 
-def scatter(data: xr.Dataset, form: str, quantity: str, rows: NDArray[np.bool_]) -> FloatArray:
+def scatter(
+    data: xr.Dataset, form: str, quantity: str, rows: NDArray[np.bool_]
+) -> FloatArray:
     """Standard deviations of all surfaces, (surfaces, loads), by constants fitted to `rows`."""
     if form != "calibrated" or quantity == "flow":
         constants = by_area(data, form, quantity, np.flatnonzero(rows))
@@ -121,7 +127,9 @@ def scatter(data: xr.Dataset, form: str, quantity: str, rows: NDArray[np.bool_])
     for alike in (of_valid, ~of_valid):
         fitted = counted & alike & np.isfinite(gaussian)
         # the smallest constant that covers as many errors as it should
-        factors = [reached(error[fitted] / np.hypot(gaussian[fitted], trial)) for trial in trials]
+        factors = [
+            reached(error[fitted] / np.hypot(gaussian[fitted], trial)) for trial in trials
+        ]
         added[alike] = trials[np.argmax(np.array(factors) <= 1)]
     return np.asarray(np.hypot(gaussian, added))
 
@@ -143,7 +151,9 @@ def left_out(data: xr.Dataset, form: str, quantity: str) -> dict[str, FloatArray
             family = families[parts == part][0]
             ratios[family].append(ratio[of_part & np.isfinite(ratio)])
     # a family without a valid answer has no ratio
-    return {family: np.concatenate([np.empty(0), *each]) for family, each in ratios.items()}
+    return {
+        family: np.concatenate([np.empty(0), *each]) for family, each in ratios.items()
+    }
 
 
 def halves(values: FloatArray) -> str:
@@ -164,7 +174,9 @@ def by_family(data: xr.Dataset, form: str) -> str:
             cells.append(halves(errors(of_family, form, quantity)[counted]))
         cells.append(f"{of_family[f'{form}_valid'].values.mean():.0%}")
         lines.append(cells)
-    header = "family (maps) | ln A | ln F at equal u | ln stiffness | ln flow, A < 20% | valid"
+    header = (
+        "family (maps) | ln A | ln F at equal u | ln stiffness | ln flow, A < 20% | valid"
+    )
     return table(header, lines)
 
 
@@ -187,7 +199,9 @@ def shares(ratios: Iterable[FloatArray]) -> list[str]:
     cells = []
     for ratio in ratios:
         if ratio.size:
-            cells.append(f"{np.mean(ratio < 1):.2f}, {np.mean(ratio < 2):.2f} ({ratio.size})")
+            cells.append(
+                f"{np.mean(ratio < 1):.2f}, {np.mean(ratio < 2):.2f} ({ratio.size})"
+            )
         else:
             cells.append("")
     return cells
@@ -203,7 +217,9 @@ def yielding(data: xr.Dataset) -> str:
     slope = data.hard_stiffness.values / data.hard_pressure.values
     lines = []
     names = {1: "simulation", 2: "law of hardness on the simulated elastic contact"}
-    for (k, eta), (way, name) in itertools.product(enumerate(data.eta.values), names.items()):
+    for (k, eta), (way, name) in itertools.product(
+        enumerate(data.eta.values), names.items()
+    ):
         deviations = (
             np.log(area[:, way, k] / area[:, 0, k]),
             (u[:, way, k] - u[:, 0, k]) * slope[:, k],

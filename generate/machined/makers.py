@@ -15,7 +15,11 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray
 
 GRADIENT = 0.1
-SHORTEST = (4.8, 6.0, 8.0)  # wavelengths; the last one has enough steps for half of the grid
+SHORTEST = (
+    4.8,
+    6.0,
+    8.0,
+)  # wavelengths; the last one has enough steps for half of the grid
 Rng = np.random.Generator
 
 

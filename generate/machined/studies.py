@@ -162,8 +162,8 @@ def recipes_of_rows() -> list[tuple[float | bool, ...]]:
 def tangential() -> None:
     """Stiffness ratios of stuck contacts by boundary elements, for docs/joints.md: two minutes a set of surfaces.
 
-    The constants of `mbma_tables.quantities.lay` are fitted to the first set; the second has other seeds,
-    Hurst exponents and lays.
+    The constants of `mbma_tables.quantities.lay` are fitted to the first set; the second
+    has other seeds, Hurst exponents and lays.
     """
     rows_of_sets = {kind: tangential_rows(kind) for kind in SETS}
     anisotropy, area, nu, *shares_c = np.concatenate([*rows_of_sets.values()], axis=1)
@@ -171,7 +171,9 @@ def tangential() -> None:
     columns = [*np.transpose(recipes_of_rows()), anisotropy, area, nu, *stiffness_ratios]
     write_part(FILE, of_contacts("tangential", columns), "tangential")
     fitted = least_squares(tangential_errors, CONSTANTS, args=(rows_of_sets["fitted"],)).x
-    click.echo(f"constants {' '.join(f'{value:.3f}' for value in fitted)}; kept {CONSTANTS}")
+    click.echo(
+        f"constants {' '.join(f'{value:.3f}' for value in fitted)}; kept {CONSTANTS}"
+    )
     for kind, rows in rows_of_sets.items():
         off = np.abs(tangential_errors(np.array(CONSTANTS), rows))
         # errors are those along, then those across
@@ -207,7 +209,9 @@ def film_rows() -> FloatArray:
         for (area, gap), phi in zip(gaps, phi_of_map, strict=True):
             u = gap.mean()
             K, couette = flow_and_couette(gap, (POINTS, POINTS))
-            rows.append((lay, gamma, u / h_rms, area, *K / u**3, *(u - couette) / h_rms, *phi))
+            rows.append(
+                (lay, gamma, u / h_rms, area, *K / u**3, *(u - couette) / h_rms, *phi)
+            )
     return np.array(rows).T
 
 
@@ -230,7 +234,11 @@ def film() -> None:
             medium = ratio[:, chosen] * wide_gap(u)[chosen]
             if high > 0:
                 # in contact: the medium's ratio of both axes at the simulated mean of both
-                medium = ratio[:, chosen] * isotropic / np.sqrt(ratio[0, chosen] * ratio[1, chosen])
+                medium = (
+                    ratio[:, chosen]
+                    * isotropic
+                    / np.sqrt(ratio[0, chosen] * ratio[1, chosen])
+                )
             errors = {
                 "phi": np.log(medium / flow[:, chosen]),
                 "whole phi of the map": np.log(whole / flow)[:, chosen],

@@ -39,7 +39,9 @@ HEAD = """\
 # boundary elements on measured maps (Tamaas), plane removed, continued by mirror images, waves below
 # four sampling steps removed; force over A0 E*, lengths in the map's unit
 """
-GAPS = np.append(np.geomspace(1e-6, 0.1, 90)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
+GAPS = np.append(
+    np.geomspace(1e-6, 0.1, 90)[:-1], np.linspace(0.1, 0.995, 300)
+)  # u/h_max
 KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")
 GRADIENT = 0.1  # of surfaces: theories are for small ones
 # contacts that are summed up: as far as islands do not lie on one another, and all
@@ -66,13 +68,19 @@ BARS: dict[str, dict[str, Any]] = {
 
 def path_of(name: str) -> pathlib.Path | None:
     """The file, in the repository or in the folder that MBMA_REFERENCE_MAPS names; None if in neither."""
-    places = (ROOT / FOLDER / name, pathlib.Path(os.environ.get("MBMA_REFERENCE_MAPS", ""), name))
+    places = (
+        ROOT / FOLDER / name,
+        pathlib.Path(os.environ.get("MBMA_REFERENCE_MAPS", ""), name),
+    )
     return next(filter(pathlib.Path.is_file, places), None)
 
 
 def read_rows() -> dict[str, FloatArray]:
     """Boundary elements by map: `COLUMNS`, shape (4, n), lengths in the file's unit."""
-    return {str(name): own[COLUMNS].to_numpy().T for name, own in read_csv(ROOT / ROWS).groupby("map")}
+    return {
+        str(name): own[COLUMNS].to_numpy().T
+        for name, own in read_csv(ROOT / ROWS).groupby("map")
+    }
 
 
 def refined(treated: Treated, surface: MeasuredSurface) -> FloatArray:
@@ -97,21 +105,44 @@ def gallery() -> Measured:
             continue
         treated, surface = measured(path, options)
         if label not in rows and treated.heights.ndim == 2:
-            rows[label] = BoundaryElements.of(surface).rows if label == name else refined(treated, surface)
-            frames = [pd.DataFrame(own.T, columns=COLUMNS).assign(map=of) for of, own in sorted(rows.items())]
+            rows[label] = (
+                BoundaryElements.of(surface).rows
+                if label == name
+                else refined(treated, surface)
+            )
+            frames = [
+                pd.DataFrame(own.T, columns=COLUMNS).assign(map=of)
+                for of, own in sorted(rows.items())
+            ]
             # at once: what comes after may be stopped
-            write_file(ROOT / ROWS, to_csv(HEAD, pd.concat(frames)[["map", *COLUMNS]], "%.9g"))
+            write_file(
+                ROOT / ROWS, to_csv(HEAD, pd.concat(frames)[["map", *COLUMNS]], "%.9g")
+            )
         if name in EXAMPLES:
-            found = dict(zip(["pressure", *COLUMNS[1:]], rows[name], strict=True)) if name in rows else None
-            picture = draw(treated, surface, curves(surface), name, "pressure  F/(A0 E*)", found)
+            found = (
+                dict(zip(["pressure", *COLUMNS[1:]], rows[name], strict=True))
+                if name in rows
+                else None
+            )
+            picture = draw(
+                treated, surface, curves(surface), name, "pressure  F/(A0 E*)", found
+            )
             files[f"docs/figures/gallery_{path.stem}.svg"] = picture
-            shown = " ".join(f"--{key.replace('_', '-')} {value}" for key, value in options.items())
-            parts[path.stem.replace("-", "_")] = printed(f"mbma fit {FOLDER}/{name} {shown}")
+            shown = " ".join(
+                f"--{key.replace('_', '-')} {value}" for key, value in options.items()
+            )
+            parts[path.stem.replace("-", "_")] = printed(
+                f"mbma fit {FOLDER}/{name} {shown}"
+            )
     return parts, files
 
 
 def ratios(
-    theory: Theory, surface: MeasuredSurface, force: FloatArray, area: FloatArray, u: FloatArray
+    theory: Theory,
+    surface: MeasuredSurface,
+    force: FloatArray,
+    area: FloatArray,
+    u: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """A theory's area at a force and force at a separation over simulated ones; NaN where it does not reach them."""
     fine = answer_where_finite(theory, surface, np.append(u, GAPS * float(surface.h_max)))
@@ -120,25 +151,53 @@ def ratios(
     loads, areas = loads[order], np.maximum.accumulate(areas[order])
     # between gaps, a force that vanishes cannot be interpolated
     held = loads > 0
-    own = np.interp(np.log(force), np.log(loads[held]), np.log(areas[held]), np.nan, np.nan)
+    own = np.interp(
+        np.log(force), np.log(loads[held]), np.log(areas[held]), np.nan, np.nan
+    )
     return np.exp(own) / area, fine.pressure[: u.size] / force
 
 
 def simulated() -> Iterator[Seen]:
     """Held-out surfaces by name, as maps, with F/(A0 E*), A/A0 and u of boundary elements."""
-    pairs = ((one, known) for one, known in simulated_surfaces(dataset("elastic")) if known.kind in KINDS)
-    for one, known in sorted(pairs, key=lambda pair: (KINDS.index(pair[1].kind), pair[1].node[-1])):
+    pairs = (
+        (one, known)
+        for one, known in simulated_surfaces(dataset("elastic"))
+        if known.kind in KINDS
+    )
+    for one, known in sorted(
+        pairs, key=lambda pair: (KINDS.index(pair[1].kind), pair[1].node[-1])
+    ):
         if known.split == TRAINING:
             continue
         shape, points = float(one["shape"]), known.points
-        recipe = Recipe(known.kind, float(one.hurst), known.zeta_1, known.waves, int(one.seed), points, shape)
+        recipe = Recipe(
+            known.kind,
+            float(one.hurst),
+            known.zeta_1,
+            known.waves,
+            int(one.seed),
+            points,
+            shape,
+        )
         # of the map as it is, whose h_rms is 1
         scale = GRADIENT * float(one.q0_h_rms) / recipe.q0
-        surface = Surface.from_map(scale * heights(recipe), *(side / points for side in recipe.sizes), periodic=True)
+        surface = Surface.from_map(
+            scale * heights(recipe),
+            *(side / points for side in recipe.sizes),
+            periodic=True,
+        )
         assert isinstance(surface, MeasuredSurface)
         rows = np.stack([one.force * GRADIENT, one.area, one.mean_separation * scale])
-        name = f"stretched 1:{shape:g}" if known.kind == "stretched" else f"{known.kind} {shape:g}"
-        yield name, surface, rows[:, np.isfinite(rows).all(axis=0) & (one.area.values > 0)]
+        name = (
+            f"stretched 1:{shape:g}"
+            if known.kind == "stretched"
+            else f"{known.kind} {shape:g}"
+        )
+        yield (
+            name,
+            surface,
+            rows[:, np.isfinite(rows).all(axis=0) & (one.area.values > 0)],
+        )
 
 
 def summary(simulations: list[Seen]) -> list[Any]:
@@ -152,14 +211,20 @@ def summary(simulations: list[Seen]) -> list[Any]:
             try:
                 # a map's curve may end before full contact
                 reached = u >= theory.interval(surface)[0]
-                valid[reached] = contact(surface, mean_separation=u[reached], theory=theory).valid
+                valid[reached] = contact(
+                    surface, mean_separation=u[reached], theory=theory
+                ).valid
                 found.append(np.stack([*ratios(theory, surface, force, area, u), valid]))
             except MbmaError:
                 found.append(np.full((3, u.size), np.nan))
         *columns, valid = np.concatenate(found, axis=1)
         for column in columns:
             known = column[np.isfinite(column) & (column > 0)]
-            cells.append((np.exp(np.mean(np.log(known))), known.min(), known.max()) if known.size else "-")
+            cells.append(
+                (np.exp(np.mean(np.log(known))), known.min(), known.max())
+                if known.size
+                else "-"
+            )
         answered = valid[np.isfinite(valid)]
         cells.append(f"{answered.mean():.0%}" if answered.size else "-")
     return cells
@@ -181,9 +246,15 @@ def maps() -> Measured:
             for key in ("anisotropy", "slope_kurtosis", "skewness")
         )
         rows.append([f"{name} ({len(own)})", stretch, kurtosis, skewness, *summary(own)])
-    columns = (f"{name}: {what}" for name in ("MBMA", "calibrated") for what in ("area", "force", "valid"))
+    columns = (
+        f"{name}: {what}"
+        for name in ("MBMA", "calibrated")
+        for what in ("area", "force", "valid")
+    )
     header = f"surfaces (number) | anisotropy | kurtosis of slopes | skewness | {' | '.join(columns)}"
-    shapes = table(header, rows, "{} | {:.1f} | {:.1f} | {:.1f} | {:.2f} ({:.2f} to {:.2f})")
+    shapes = table(
+        header, rows, "{} | {:.1f} | {:.1f} | {:.1f} | {:.2f} ({:.2f} to {:.2f})"
+    )
     return {"shapes": shapes, "extrapolation": printed(EXTRAPOLATION)}, {}
 
 
@@ -192,13 +263,20 @@ def draw_families() -> Any:
     for axis, family in itertools.zip_longest(axes.ravel(), makers.FAMILIES):
         axis.set_axis_off()
         if family:
-            axis.imshow(makers.heights(makers.Part(family, 1))[::4, ::4].T, origin="lower", interpolation="none")
+            axis.imshow(
+                makers.heights(makers.Part(family, 1))[::4, ::4].T,
+                origin="lower",
+                interpolation="none",
+            )
             axis.set_title(family)
     return figure
 
 
 def machined() -> Measured:
     data = dataset("machined")
-    parts = {form: by_family(data, form) for form in FORMS} | {"yielding": yielding(data), "coverage": covered(data)}
+    parts = {form: by_family(data, form) for form in FORMS} | {
+        "yielding": yielding(data),
+        "coverage": covered(data),
+    }
     parts |= {f"left_out_{form}": families_left_out(data, form) for form in FORMS}
     return parts, {"docs/figures/machined.svg": draw_families()}

@@ -1,6 +1,7 @@
 """docs/stability.md: corners of parameter space, counted and drawn.
 
-The reference is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter tolerance.
+The reference is mpmath at 40 digits or more where a closed form exists, else the exact
+solver at a tighter tolerance.
 """
 
 import functools
@@ -25,11 +26,16 @@ from mbma_tables.theories.mbma.tables import get_model
 from mbma_tables.theories.mbma.variants import get_variant
 
 ULP = np.finfo(float).eps
-ISLAND_MODELS, VARIANTS = ("exact", "universal", "formula", "rigid"), ("reported", "printed")
+ISLAND_MODELS, VARIANTS = (
+    ("exact", "universal", "formula", "rigid"),
+    ("reported", "printed"),
+)
 
 # islands
 X_CORNERS = np.concatenate([-np.geomspace(40, 0.5, 9), [0.0], np.geomspace(0.5, 1e4, 19)])
-MU_CORNERS = np.concatenate([[0.0], 10.0 ** np.array([-300, -200, -100, -30, -16]), np.geomspace(1e-12, 1e12, 25)])
+MU_CORNERS = np.concatenate(
+    [[0.0], 10.0 ** np.array([-300, -200, -100, -30, -16]), np.geomspace(1e-12, 1e12, 25)]
+)
 RIGID_MU = 1e-13  # below it mu Q is less than 1e-9 up to X = 1e4
 SOLVED, ISLAND_TRUTH = 1e-9, 1e-11
 
@@ -45,7 +51,9 @@ TOTAL_BANDS = (3.0000001, 3.1, 10.0, 216.0, 1e4, 1e6, 1e8)
 TOTAL_HURSTS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
 TOP, TOTAL_TRUTH = 3.0, 1e-10
 
-Way = Callable[..., tuple[Sequence[Any], float]]  # values, and a bound on their relative error
+Way = Callable[
+    ..., tuple[Sequence[Any], float]
+]  # values, and a bound on their relative error
 
 
 class Outcome(NamedTuple):
@@ -65,7 +73,9 @@ def relative_error(found: float, truth: Any) -> float:
     return abs(float(found / truth - 1))
 
 
-def outcome(answer: Callable[[], tuple[Sequence[Any], float]], truth: Sequence[Any] | None) -> Outcome:
+def outcome(
+    answer: Callable[[], tuple[Sequence[Any], float]], truth: Sequence[Any] | None
+) -> Outcome:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -82,7 +92,9 @@ def outcome(answer: Callable[[], tuple[Sequence[Any], float]], truth: Sequence[A
 
 
 def counted(
-    ways: Mapping[str, Way], corners: Iterable[tuple[Any, ...]], truth: Callable[..., Sequence[Any]]
+    ways: Mapping[str, Way],
+    corners: Iterable[tuple[Any, ...]],
+    truth: Callable[..., Sequence[Any]],
 ) -> dict[str, list[Outcome]]:
     """Every way at every corner; rigid spheres do not claim to be elastic ones, and have no truth."""
     found: dict[str, list[Outcome]] = {name: [] for name in ways}
@@ -102,7 +114,9 @@ def islands() -> dict[str, list[Outcome]]:
     def ask(name: str, X: float, mu: float) -> tuple[Sequence[Any], float]:
         model = get_model(name, 10 * SOLVED, get_variant("reported"))
         found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
-        return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
+        return (float(found.phi_F[0]), float(found.phi_A[0])), float(
+            found.error[0]
+        ) + ISLAND_TRUTH + 1e-14
 
     def truth(X: float, mu: float) -> Sequence[Any]:
         if mu > RIGID_MU:
@@ -110,7 +124,9 @@ def islands() -> dict[str, list[Outcome]]:
             return solved.phi_F, solved.phi_A
         with mp.workdps(40):
             # of a rigid sphere, by parabolic cylinder functions
-            force, area = (height_integral(mp.mpf(n), -mp.mpf(float(X))) for n in (2.5, 2))
+            force, area = (
+                height_integral(mp.mpf(n), -mp.mpf(float(X))) for n in (2.5, 2)
+            )
             return mp.pi / 5 * force * mp.mpf(float(mu)), mp.pi / 2 * area
 
     ways = {f"islands by {name}": functools.partial(ask, name) for name in ISLAND_MODELS}
@@ -120,35 +136,71 @@ def islands() -> dict[str, list[Outcome]]:
 def island_geometry() -> dict[str, list[Outcome]]:
     """Geometry by the library and by the paper's formulas as printed, against 60 digits."""
 
-    def library(approach: float, zeta_1: float, hurst: float, variant: str) -> tuple[Sequence[Any], float]:
-        found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), get_variant(variant))
+    def library(
+        approach: float, zeta_1: float, hurst: float, variant: str
+    ) -> tuple[Sequence[Any], float]:
+        found = geometry(
+            np.array([approach]),
+            np.array([hurst]),
+            np.array([zeta_1]),
+            get_variant(variant),
+        )
         return [float(found[name][0]) for name in FIELDS], math.inf
 
-    def exact(approach: float, zeta_1: float, hurst: float, variant: str, *arithmetic: Any) -> Sequence[Any]:
+    def exact(
+        approach: float, zeta_1: float, hurst: float, variant: str, *arithmetic: Any
+    ) -> Sequence[Any]:
         density = float(divisor(variant)) if arithmetic else divisor(variant)
         found = exact_island(approach, hurst, zeta_1, density, *arithmetic)
         return [found[name] for name in FIELDS]
 
     others = [own for own in itertools.product(HURSTS, VARIANTS) if own != MAPPED]
-    corners = [(*place, *own) for own in (MAPPED, *others) for place in itertools.product(APPROACHES, BANDS)]
-    for zeta_1, (hurst, variant) in itertools.product(map(float, BANDS), (MAPPED, *others)):
+    corners = [
+        (*place, *own)
+        for own in (MAPPED, *others)
+        for place in itertools.product(APPROACHES, BANDS)
+    ]
+    for zeta_1, (hurst, variant) in itertools.product(
+        map(float, BANDS), (MAPPED, *others)
+    ):
         # one ulp around the floors of zeta_d and zeta_u
-        floors = itertools.product(map(float, kinks(hurst, zeta_1, get_variant(variant))), (-1, 0, 1))
-        corners += [(kink * (1 + side * ULP), zeta_1, hurst, variant) for kink, side in floors]
+        floors = itertools.product(
+            map(float, kinks(hurst, zeta_1, get_variant(variant))), (-1, 0, 1)
+        )
+        corners += [
+            (kink * (1 + side * ULP), zeta_1, hurst, variant) for kink, side in floors
+        ]
     ways: dict[str, Way] = {"geometry, library": library}
-    ways["geometry, the paper's formulas as printed"] = lambda *corner: (exact(*corner, DOUBLES), math.inf)
+    ways["geometry, the paper's formulas as printed"] = lambda *corner: (
+        exact(*corner, DOUBLES),
+        math.inf,
+    )
     return counted(ways, corners, exact)
 
 
 def totals() -> dict[str, list[Outcome]]:
     """Totals of every island model at corners of surfaces and gaps, both variants, against the exact one at 1e-10."""
 
-    def ask(name: str, variant: str, hurst: float, zeta_1: float, depth: float, rtol: float = 1e-8) -> Any:
+    def ask(
+        name: str,
+        variant: str,
+        hurst: float,
+        zeta_1: float,
+        depth: float,
+        rtol: float = 1e-8,
+    ) -> Any:
         surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
-        found = contact(surface, separation=TOP - depth, island_model=name, variant=variant, rtol=rtol)
-        return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
+        found = contact(
+            surface, separation=TOP - depth, island_model=name, variant=variant, rtol=rtol
+        )
+        return (float(found.pressure), float(found.area)), float(
+            found.error
+        ) + TOTAL_TRUTH
 
-    exact, found = functools.partial(ask, "exact", rtol=TOTAL_TRUTH), dict[str, list[Outcome]]()
+    exact, found = (
+        functools.partial(ask, "exact", rtol=TOTAL_TRUTH),
+        dict[str, list[Outcome]](),
+    )
     # the four-number table is of one variant
     for names, variants in ((ISLAND_MODELS, VARIANTS), (["island4d"], VARIANTS[:1])):
         ways = {f"totals by {name}": functools.partial(ask, name) for name in names}
@@ -160,10 +212,23 @@ def totals() -> dict[str, list[Outcome]]:
 def draw(found: Mapping[str, Sequence[Outcome]]) -> Any:
     """Maps of error: geometry by the paper's formulas as printed and by the library."""
     figure, axes = panels(1, 2, (10, 4.2), sharey=True)
-    for panel, name in zip(axes, ("geometry, the paper's formulas as printed", "geometry, library"), strict=True):
-        errors = np.array([one.error for one in found[name][: APPROACHES.size * BANDS.size]])
+    for panel, name in zip(
+        axes,
+        ("geometry, the paper's formulas as printed", "geometry, library"),
+        strict=True,
+    ):
+        errors = np.array(
+            [one.error for one in found[name][: APPROACHES.size * BANDS.size]]
+        )
         errors = np.maximum(errors, 1e-16).reshape(APPROACHES.size, BANDS.size)
-        mesh = panel.pcolormesh(BANDS, APPROACHES, errors, norm=LogNorm(1e-16, 1.0), shading="nearest", rasterized=True)
+        mesh = panel.pcolormesh(
+            BANDS,
+            APPROACHES,
+            errors,
+            norm=LogNorm(1e-16, 1.0),
+            shading="nearest",
+            rasterized=True,
+        )
         panel.set(xscale="log", yscale="log", xlabel="zeta_1", title=name)
     axes[0].set_ylabel("delta/h_rms")
     figure.colorbar(mesh, ax=axes, label="largest relative error")
@@ -174,11 +239,25 @@ def row(name: str, outcomes: Sequence[Outcome]) -> list[Any]:
     """Sums over corners, and the largest error where one was compared."""
     refused, not_finite, warned, errors, beyond = zip(*outcomes, strict=True)
     largest = max((error for error in errors if not math.isnan(error)), default=math.nan)
-    return [name, len(outcomes), sum(refused), sum(not_finite), sum(warned), largest, sum(beyond)]
+    return [
+        name,
+        len(outcomes),
+        sum(refused),
+        sum(not_finite),
+        sum(warned),
+        largest,
+        sum(beyond),
+    ]
 
 
 def measure() -> Measured:
     found = islands() | island_geometry() | totals()
     header = "corners | tried | refused | not finite | warnings | largest error of answers | beyond their bound"
-    text = table(header, itertools.starmap(row, found.items()), "{} | {} | {} | {} | {} | {:.1e} | {}")
-    return {"corners": text.replace("—", "-")}, {"docs/figures/stability.svg": draw(found)}
+    text = table(
+        header,
+        itertools.starmap(row, found.items()),
+        "{} | {} | {} | {} | {} | {:.1e} | {}",
+    )
+    return {"corners": text.replace("—", "-")}, {
+        "docs/figures/stability.svg": draw(found)
+    }

@@ -31,7 +31,9 @@ def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> Floa
     if refinement > 1:
         for nodes in np.unique(solved.nodes):
             same = solved.nodes == nodes
-            finer = greenwood_tripp.solve(X[same], mu[same], rtol=rtol, nodes=refinement * int(nodes))
+            finer = greenwood_tripp.solve(
+                X[same], mu[same], rtol=rtol, nodes=refinement * int(nodes)
+            )
             found[same] = np.stack([finer.phi_F, finer.phi_A], axis=-1)
     return found
 
@@ -42,39 +44,55 @@ class Kind:
     def __init__(self, configuration: Configuration, workers: int = 1) -> None:
         self.configuration, self.workers = configuration, workers
         # accuracy of the islands that the table is made of: far below its target
-        self.rtol = max(SOLVER_SHARE * configuration.target, greenwood_tripp.MIN_SOLVER_RTOL)
+        self.rtol = max(
+            SOLVER_SHARE * configuration.target, greenwood_tripp.MIN_SOLVER_RTOL
+        )
 
-    def phi(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+    def phi(
+        self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1
+    ) -> FloatArray:
         """`phi` of arrays of any one shape, shape (..., 2)."""
         flat = [np.ascontiguousarray(array, dtype=float).ravel() for array in (X, mu)]
         parts = (slice(k, k + CHUNK) for k in range(0, flat[0].size, CHUNK))
         jobs = [(flat[0][part], flat[1][part], rtol, refinement) for part in parts]
-        return np.concatenate([*results(label, phi, jobs, self.workers)]).reshape((*np.shape(X), 2))
+        return np.concatenate([*results(label, phi, jobs, self.workers)]).reshape(
+            (*np.shape(X), 2)
+        )
 
-    def log_ratio(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+    def log_ratio(
+        self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1
+    ) -> FloatArray:
         """log(Phi/Phi_rigid) of arrays of any one shape, shape (..., 2)."""
         rigid = np.moveaxis(greenwood_tripp.rigid_sphere(X, mu), 0, -1)
         return np.asarray(np.log(self.phi(label, X, mu, rtol, refinement) / rigid))
 
-    def visited_surfaces(self, count: int, ranges: dict[str, tuple[float, float]]) -> list[FloatArray]:
+    def visited_surfaces(
+        self, count: int, ranges: dict[str, tuple[float, float]]
+    ) -> list[FloatArray]:
         """delta/h_rms, H and zeta_1 of `count` islands, low-discrepancy over the ranges."""
         low, high = np.array(list(ranges.values())).T
         draws = qmc.Halton(3, seed=self.configuration.seed + 7).random(count)
         hurst, zeta_1, approach = qmc.scale(draws, low, high).T
         return [10**approach, hurst, 10**zeta_1]
 
-    def enough(self, count: int, first: int, drawn: Callable[[int], list[FloatArray]]) -> list[FloatArray]:
+    def enough(
+        self, count: int, first: int, drawn: Callable[[int], list[FloatArray]]
+    ) -> list[FloatArray]:
         """Coordinates of at least `count` islands within the table's axes, of ever more random ones."""
         draw, places = first, drawn(first)
         while places[0].size < count:
             draw *= 2
             if draw > MAX_DRAWS * count:
                 kind = self.configuration.kind
-                raise UncertifiedError(f"{kind}: hardly a surface visits these axes, so there is nothing to certify")
+                raise UncertifiedError(
+                    f"{kind}: hardly a surface visits these axes, so there is nothing to certify"
+                )
             places = drawn(draw)
         return places
 
-    def certificate(self, errors: FloatArray, places: dict[str, FloatArray]) -> dict[str, Any]:
+    def certificate(
+        self, errors: FloatArray, places: dict[str, FloatArray]
+    ) -> dict[str, Any]:
         """Errors (points, 2) at places by name as attributes; the second half of the points is visited by surfaces."""
         own, half = self.configuration, self.configuration.certificate_points // 2
         if errors.max() > own.target:
@@ -90,14 +108,18 @@ class Kind:
                 f"median_error_{function}": float(np.median(values)),
                 f"visited_largest_error_{function}": float(visited.max()),
                 f"visited_p99_error_{function}": float(np.percentile(visited, 99)),
-                f"largest_error_{function}_at": ", ".join(f"{n} = {float(x[worst]):.6g}" for n, x in places.items()),
+                f"largest_error_{function}_at": ", ".join(
+                    f"{n} = {float(x[worst]):.6g}" for n, x in places.items()
+                ),
             }
         return result
 
     def require(self, rules: dict[str, Any]) -> None:
         for rule, kept in rules.items():
             if not kept:
-                raise UncertifiedError(f"{self.configuration.kind}: the table breaks: {rule}")
+                raise UncertifiedError(
+                    f"{self.configuration.kind}: the table breaks: {rule}"
+                )
 
     def check(self, content: TableContent) -> None:
         raise NotImplementedError
@@ -112,15 +134,23 @@ class Kind:
 
 
 def conformance(
-    arguments: dict[str, FloatArray], X: FloatArray, mu: FloatArray, table: FloatArray, scales: Any, conditioning: Any
+    arguments: dict[str, FloatArray],
+    X: FloatArray,
+    mu: FloatArray,
+    table: FloatArray,
+    scales: Any,
+    conditioning: Any,
 ) -> dict[str, FloatArray]:
     """Points to replay: arguments as stored, the table's answers, the exact ones, and a tolerance for both.
 
-    `scales` turns Phi_F and Phi_A into the stored answers, `conditioning` magnifies rounding of the arguments.
+    `scales` turns Phi_F and Phi_A into the stored answers, `conditioning` magnifies
+    rounding of the arguments.
     """
     solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     exact, stored = scales * np.stack([solved.phi_F, solved.phi_A]), dict(arguments)
     for number, function in enumerate(FUNCTIONS):
         stored |= {f"table_{function}": table[number], f"exact_{function}": exact[number]}
     # rounding of the arguments enters through X, whose digits cancel for a small sigma
-    return stored | {"tolerance": CONFORMANCE_TOLERANCE * np.broadcast_to(1.0 + conditioning, X.shape)}
+    return stored | {
+        "tolerance": CONFORMANCE_TOLERANCE * np.broadcast_to(1.0 + conditioning, X.shape)
+    }

@@ -21,13 +21,29 @@ KINDS: dict[str, type[Universal | Island4d]] = {UNIVERSAL: Universal, ISLAND4D: 
 @click.command()
 @click.argument("what", type=click.Choice([*KINDS, "heights", "all"]))
 @click.option(
-    "--config", type=click.Path(path_type=pathlib.Path), help="TOML file that changes the shipped configuration."
+    "--config",
+    type=click.Path(path_type=pathlib.Path),
+    help="TOML file that changes the shipped configuration.",
 )
 @click.option("--target", type=float, help="Largest relative error on held-out points.")
-@click.option("--out", type=click.Path(path_type=pathlib.Path), help="File (for all: folder); default tables/.")
-@click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=pathlib.Path),
+    help="File (for all: folder); default tables/.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(1),
+    default=os.cpu_count() or 1,
+    show_default=True,
+    help="Processes.",
+)
 def tables(
-    what: str, config: pathlib.Path | None, target: float | None, out: pathlib.Path | None, workers: int
+    what: str,
+    config: pathlib.Path | None,
+    target: float | None,
+    out: pathlib.Path | None,
+    workers: int,
 ) -> None:
     """Make a table, the coefficients of the height integrals (heights), or all of them in order."""
     if what in ("all", "heights") and (config is not None or target is not None):
@@ -36,7 +52,10 @@ def tables(
     for own in (load(kind, config, target) for kind in KINDS if what in (kind, "all")):
         path = out if out and what != "all" else (out or TABLES) / f"{own.kind}.nc"
         # the shipped folder takes only what is certified on enough points
-        if path.resolve().parent == TABLES.resolve() and own.certificate_points < MIN_SHIPPED_POINTS:
+        if (
+            path.resolve().parent == TABLES.resolve()
+            and own.certificate_points < MIN_SHIPPED_POINTS
+        ):
             raise InputError(
                 f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in {TABLES}, "
                 f"got {own.certificate_points}; give another place with --out"
@@ -50,5 +69,9 @@ def tables(
         content = KINDS[configuration.kind](configuration, workers).build()
         path.parent.mkdir(parents=True, exist_ok=True)
         write_table(path, content)
-        errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
-        click.echo(f"{path}: {content.size}; largest held-out error {errors}; {path.stat().st_size} bytes")
+        errors = ", ".join(
+            f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A")
+        )
+        click.echo(
+            f"{path}: {content.size}; largest held-out error {errors}; {path.stat().st_size} bytes"
+        )

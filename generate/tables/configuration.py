@@ -18,7 +18,12 @@ from mbma_tables.theories.mbma.variants import get_variant
 HERE = pathlib.Path(__file__).parent
 # ranges within which the solver reaches its tightest tolerance, whatever the other axes
 SCHEMAS = json.loads((HERE / "configuration.schema.json").read_text(encoding="utf-8"))
-RANGE = {"low": 0.0, "high": 0.0, "offset": 0.0, "nodes": 2}  # of an axis; the universal table has cells, no nodes
+RANGE = {
+    "low": 0.0,
+    "high": 0.0,
+    "offset": 0.0,
+    "nodes": 2,
+}  # of an axis; the universal table has cells, no nodes
 MIN_NODES = 8  # of an axis
 MIN_SHIPPED_POINTS = 5000  # of the certificate of a table in the shipped folder
 
@@ -35,20 +40,29 @@ class Configuration:
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of a table's file on what was wanted; the digest has the variant's numbers, too."""
-        ranges = {name: {key: getattr(axis, key) for key in RANGE} for name, axis in self.axes.items()}
+        ranges = {
+            name: {key: getattr(axis, key) for key in RANGE}
+            for name, axis in self.axes.items()
+        }
         own, numbers = (
             vars(self) | {"axes": ranges},
             get_variant(self.variant).recorded if self.kind == ISLAND4D else [],
         )
         text, digest = json.dumps(own, sort_keys=True), digest_json([own, numbers])
-        return {"target": self.target, "configuration": text, "configuration_sha256": digest}
+        return {
+            "target": self.target,
+            "configuration": text,
+            "configuration_sha256": digest,
+        }
 
 
-def load(kind: str, path: pathlib.Path | None = None, target: float | None = None) -> Configuration:
+def load(
+    kind: str, path: pathlib.Path | None = None, target: float | None = None
+) -> Configuration:
     """The configuration of a kind of table: the shipped one, changed by a TOML file and by `target`.
 
-    Where the file does not count the nodes of an axis, they follow the target: the error of a spline of degree k is of
-    order nodes^-(k + 1).
+    Where the file does not count the nodes of an axis, they follow the target: the error of
+    a spline of degree k is of order nodes^-(k + 1).
     """
     given = read_toml(HERE / f"{kind}.toml", "configuration")
     own = {} if path is None else read_toml(path, "configuration")
@@ -59,13 +73,21 @@ def load(kind: str, path: pathlib.Path | None = None, target: float | None = Non
         merged, axes = given | own, dict[str, Axis]()
         finer = (given["target"] / merged["target"]) ** (1 / (DEGREE + 1))
         for name, entry in given["axes"].items():
-            nodes = {"nodes": max(MIN_NODES, math.ceil(finer * entry["nodes"]))} if kind == ISLAND4D else {}
-            chosen: dict[str, Any] = RANGE | entry | nodes | own.get("axes", {}).get(name, {})
+            nodes = (
+                {"nodes": max(MIN_NODES, math.ceil(finer * entry["nodes"]))}
+                if kind == ISLAND4D
+                else {}
+            )
+            chosen: dict[str, Any] = (
+                RANGE | entry | nodes | own.get("axes", {}).get(name, {})
+            )
             axes[name] = Axis(name, TEXTS["axes"][name], dict(AXES[kind])[name], **chosen)  # type: ignore[arg-type]
         found = Configuration(**merged | {"axes": axes})
         count = math.prod(axis.nodes for axis in axes.values())
         if count > found.max_nodes:
-            raise InputError(f"the axes have {count} nodes, max_nodes allows {found.max_nodes}; raise it or the target")
+            raise InputError(
+                f"the axes have {count} nodes, max_nodes allows {found.max_nodes}; raise it or the target"
+            )
         for name, axis in axes.items():
             with np.errstate(all="ignore"):
                 if not (np.diff(axis.values) > 0).all():

@@ -8,11 +8,17 @@ import mpmath
 
 DIGITS = 60
 # the functions of mpmath that are used below, in double precision
-DOUBLES = types.SimpleNamespace(mpf=float, sqrt=math.sqrt, cbrt=math.cbrt, log=math.log, pi=math.pi)
+DOUBLES = types.SimpleNamespace(
+    mpf=float, sqrt=math.sqrt, cbrt=math.cbrt, log=math.log, pi=math.pi
+)
 
 
 def exact_island(
-    approach: float, hurst: float, zeta_1: float, density_divisor: mpmath.mpf, mp: Any = mpmath
+    approach: float,
+    hurst: float,
+    zeta_1: float,
+    density_divisor: mpmath.mpf,
+    mp: Any = mpmath,
 ) -> dict[str, mpmath.mpf]:
     """Geometry of the island at delta = approach * h_rms; `density_divisor` as in D = m4/(divisor m2).
 
@@ -31,7 +37,9 @@ def exact_island(
             # (31): the spectrum 2 H zeta^(-1-2H), the mean of cos^2 is 1/2, of cos^4 3/8
             power = order - 2 * h
             factor = {0: 2 * h, 2: h, 4: mp.mpf(3) / 4 * h}[order]
-            return factor * (mp.log(high / low) if power == 0 else (high**power - low**power) / power)
+            return factor * (
+                mp.log(high / low) if power == 0 else (high**power - low**power) / power
+            )
 
         def summits(low: Any, high: Any) -> tuple[Any, Any]:
             # (2): density, and standard deviation of heights
@@ -49,10 +57,34 @@ def exact_island(
         h_d = mp.sqrt(zeta_d ** (-2 * h) - e)  # (B.3)
         h_u = mp.sqrt(zeta_u ** (-2 * h) - e)  # (B.12)
         # (39), phi = 0.05
-        eta = mp.mpf(3) / 4 * mp.cbrt(mp.pi * D_top) * mp.cbrt(1.5 * R_top) ** 2 * mp.cbrt(20 * h_u / R_u)
-        X, mu = (delta / s - h_d) / sigma, mp.mpf(8) / 3 * D * sigma * mp.sqrt(2 * R_u * R_d)
-        found = {"zeta_d": zeta_d, "zeta_u": zeta_u, "R_d": R_d, "R_u": R_u, "D": D, "sigma": sigma, "h_d": h_d}
-        found |= {"h_u": h_u, "eta": eta, "X": X, "mu": mu, "D_d": D_d, "sigma_d": sigma_d}
+        eta = (
+            mp.mpf(3)
+            / 4
+            * mp.cbrt(mp.pi * D_top)
+            * mp.cbrt(1.5 * R_top) ** 2
+            * mp.cbrt(20 * h_u / R_u)
+        )
+        X, mu = (
+            (delta / s - h_d) / sigma,
+            mp.mpf(8) / 3 * D * sigma * mp.sqrt(2 * R_u * R_d),
+        )
+        found = {
+            "zeta_d": zeta_d,
+            "zeta_u": zeta_u,
+            "R_d": R_d,
+            "R_u": R_u,
+            "D": D,
+            "sigma": sigma,
+            "h_d": h_d,
+        }
+        found |= {
+            "h_u": h_u,
+            "eta": eta,
+            "X": X,
+            "mu": mu,
+            "D_d": D_d,
+            "sigma_d": sigma_d,
+        }
         return found | {"width": mp.log(zeta_u / zeta_d)}
 
 

@@ -5,7 +5,8 @@
     sphere  (1.25/zeta_d)^(4 - 2H), on which mu depends smoothly and little
     hurst   H
 
-with sigma of Eq. (32) in units of s: the first parameter is read at zeta_1 without bound, where s is h_rms.
+with sigma of Eq. (32) in units of s: the first parameter is read at zeta_1 without bound,
+where s is h_rms.
 """
 
 import json
@@ -19,21 +20,44 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 from generate.splines import coefficients, padding
-from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance
+from generate.tables.certificate import (
+    CONFORMANCE_POINTS,
+    Kind,
+    UncertifiedError,
+    conformance,
+)
 from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.table_schema import DEGREE, FUNCTIONS, ISLAND4D, Axis, TableContent, error_cell
+from mbma_tables.common.table_schema import (
+    DEGREE,
+    FUNCTIONS,
+    ISLAND4D,
+    Axis,
+    TableContent,
+    error_cell,
+)
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.theories.mbma import greenwood_tripp
 from mbma_tables.theories.mbma.geometry import geometry
 from mbma_tables.theories.mbma.greenwood_tripp import height_integral
-from mbma_tables.theories.mbma.island4d import SPHERE_FLOOR, band_fields, spline_of, to_axes
+from mbma_tables.theories.mbma.island4d import (
+    SPHERE_FLOOR,
+    band_fields,
+    spline_of,
+    to_axes,
+)
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
-VISITED = {"hurst": (0.3, 1.0), "log10_zeta_1": (math.log10(3.001), 4.0), "log10_approach": (-8.0, 1.0)}
+VISITED = {
+    "hurst": (0.3, 1.0),
+    "log10_zeta_1": (math.log10(3.001), 4.0),
+    "log10_approach": (-8.0, 1.0),
+}
 COVER_TRIALS = 4096
 BLAS_THREADS = 2  # as when the shipped table was made
-ERROR_CELLS = 32  # of the error field along an axis; as many as the table's where those are fewer
+ERROR_CELLS = (
+    32  # of the error field along an axis; as many as the table's where those are fewer
+)
 LOCAL_FLOOR = 0.8  # smallest bound, in units of the islands' tolerance
 LOCAL_FACTOR = 2.5  # bound over the largest error at the middles of the cells nearby
 
@@ -41,7 +65,9 @@ LOCAL_FACTOR = 2.5  # bound over the largest error at the middles of the cells n
 def from_axes(sphere: Any, hurst: Any) -> Any:
     """zeta_d at a coordinate of the axis `sphere`; infinite at 0."""
     with np.errstate(divide="ignore"):
-        return SPHERE_FLOOR * np.asarray(sphere, dtype=float) ** (-1 / (4 - 2 * np.asarray(hurst)))
+        return SPHERE_FLOOR * np.asarray(sphere, dtype=float) ** (
+            -1 / (4 - 2 * np.asarray(hurst))
+        )
 
 
 def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
@@ -73,7 +99,9 @@ class Island4d(Kind):
             coefficients=coefs,
             local_error=self.local_errors(axes, coefs),
             auxiliary=self.auxiliary(axes, values),
-            conformance=self.conformance(axes, coefs, self.held_out(axes, CONFORMANCE_POINTS, own.seed + 303)),
+            conformance=self.conformance(
+                axes, coefs, self.held_out(axes, CONFORMANCE_POINTS, own.seed + 303)
+            ),
             attributes=self.attributes() | certified | own.attributes(),
         )
         return self.checked(content)
@@ -81,37 +109,58 @@ class Island4d(Kind):
     def held_out(self, axes: tuple[Axis, ...], count: int, seed: int) -> list[FloatArray]:
         """Coordinates of certificate points: half over the whole box, half where surfaces really go."""
         box = qmc.Halton(len(axes), seed=seed).random(count // 2)
-        spread = [axis.coordinate(d * (axis.nodes - 1)) for axis, d in zip(axes, box.T, strict=True)]
-        return [np.concatenate(pair) for pair in zip(spread, self.manifold(count - count // 2), strict=True)]
+        spread = [
+            axis.coordinate(d * (axis.nodes - 1))
+            for axis, d in zip(axes, box.T, strict=True)
+        ]
+        return [
+            np.concatenate(pair)
+            for pair in zip(spread, self.manifold(count - count // 2), strict=True)
+        ]
 
     def certify(self, axes: tuple[Axis, ...], coefs: FloatArray) -> dict[str, Any]:
         """Errors on held-out points, solved on twice the nodes that made the table."""
-        places = self.held_out(axes, self.configuration.certificate_points, self.configuration.seed + 101)
+        places = self.held_out(
+            axes, self.configuration.certificate_points, self.configuration.seed + 101
+        )
         positions = [axis.position(x) for axis, x in zip(axes, places, strict=True)]
         if any((p == np.round(p)).any() for p in positions):
             raise UncertifiedError("island4d: a held-out point lies on a node")
-        truth = self.log_ratio("certificate", *self.arguments(*places), rtol=self.rtol, refinement=2)
+        truth = self.log_ratio(
+            "certificate", *self.arguments(*places), rtol=self.rtol, refinement=2
+        )
         errors = np.abs(np.expm1(evaluate(coefs, positions) - truth))
-        return self.certificate(errors, {axis.name: x for axis, x in zip(axes, places, strict=True)})
+        return self.certificate(
+            errors, {axis.name: x for axis, x in zip(axes, places, strict=True)}
+        )
 
     def local_errors(self, axes: tuple[Axis, ...], coefs: FloatArray) -> FloatArray:
         """Bounds on the error over a coarser grid, from the middle of every cell of the table."""
         cells = tuple(error_cells(axis) for axis in axes)
-        middles = np.meshgrid(*(np.arange(axis.nodes - 1) + 0.5 for axis in axes), indexing="ij")
+        middles = np.meshgrid(
+            *(np.arange(axis.nodes - 1) + 0.5 for axis in axes), indexing="ij"
+        )
         positions = [middle.ravel() for middle in middles]
         places = [axis.coordinate(p) for axis, p in zip(axes, positions, strict=True)]
         rtol = max(0.1 * self.rtol, greenwood_tripp.MIN_SOLVER_RTOL)
         truth = self.log_ratio("local error", *self.arguments(*places), rtol=rtol)
-        where = tuple(error_cell(a, c, p) for a, c, p in zip(axes, cells, positions, strict=True))
+        where = tuple(
+            error_cell(a, c, p) for a, c, p in zip(axes, cells, positions, strict=True)
+        )
         field = np.zeros((*cells, 2))
         np.maximum.at(field, where, np.abs(np.expm1(evaluate(coefs, positions) - truth)))
         # a neighbour's worst point may lie just across the border
-        spread = scipy.ndimage.maximum_filter(field, size=(*(3 for _ in axes), 1), mode="nearest")
+        spread = scipy.ndimage.maximum_filter(
+            field, size=(*(3 for _ in axes), 1), mode="nearest"
+        )
         return np.asarray(LOCAL_FACTOR * spread + LOCAL_FLOOR * self.rtol)
 
     def arguments(self, *coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """X and mu at coordinates of the axes: X is one of them, mu follows from the other three."""
-        X, spread, sphere, hurst = (np.ascontiguousarray(c, dtype=float) for c in np.broadcast_arrays(*coordinates))
+        X, spread, sphere, hurst = (
+            np.ascontiguousarray(c, dtype=float)
+            for c in np.broadcast_arrays(*coordinates)
+        )
         return X, band_fields(spread, sphere, hurst, self.variant)[0]
 
     def manifold(self, count: int) -> list[FloatArray]:
@@ -126,29 +175,57 @@ class Island4d(Kind):
     def _visited(self, draw: int) -> tuple[list[FloatArray], NDArray[np.bool_]]:
         """Coordinates of islands of random surfaces, and which of them the axes cover."""
         own = self.configuration.axes["hurst"]
-        approach, hurst, zeta_1 = self.visited_surfaces(draw, VISITED | {"hurst": (own.low, own.high)})
+        approach, hurst, zeta_1 = self.visited_surfaces(
+            draw, VISITED | {"hurst": (own.low, own.high)}
+        )
         fields = geometry(approach, hurst, zeta_1, self.variant)
         spread = np.expm1(np.log(fields["zeta_u"]) - np.log(fields["zeta_d"]))
-        places = [fields["X"], spread, (SPHERE_FLOOR / fields["zeta_d"]) ** (4 - 2 * hurst), hurst]
+        places = [
+            fields["X"],
+            spread,
+            (SPHERE_FLOOR / fields["zeta_d"]) ** (4 - 2 * hurst),
+            hurst,
+        ]
         pairs = zip(self.configuration.axes.values(), places, strict=True)
-        return places, np.all([(place > axis.low) & (place < axis.high) for axis, place in pairs], axis=0)
+        return places, np.all(
+            [(place > axis.low) & (place < axis.high) for axis, place in pairs], axis=0
+        )
 
     def auxiliary(self, axes: tuple[Axis, ...], log_ratio: FloatArray) -> dict[str, Any]:
         """Values at the nodes, the raw parameters there, and coordinates of coefficients and of the error's cells."""
         _, spread, sphere, hurst = (axis.values for axis in axes)
-        mu, sigma, _, _ = band_fields(*np.meshgrid(spread, sphere, hurst, indexing="ij"), self.variant)
-        names, inverse = tuple(axis.name for axis in axes), 1 / from_axes(sphere[:, None], hurst)
+        mu, sigma, _, _ = band_fields(
+            *np.meshgrid(spread, sphere, hurst, indexing="ij"), self.variant
+        )
+        names, inverse = (
+            tuple(axis.name for axis in axes),
+            1 / from_axes(sphere[:, None], hurst),
+        )
         found: dict[str, Any] = {
             "mu": (names[1:], mu, label(TEXTS["axes"]["mu"])),
-            "sigma": (names[1:], sigma, label("standard deviation of summit heights over s, times zeta_d^hurst")),
-            "inverse_zeta_d": (names[2:], inverse, label("1/zeta_d; zeta_u = zeta_d (1 + spread)")),
+            "sigma": (
+                names[1:],
+                sigma,
+                label("standard deviation of summit heights over s, times zeta_d^hurst"),
+            ),
+            "inverse_zeta_d": (
+                names[2:],
+                inverse,
+                label("1/zeta_d; zeta_u = zeta_d (1 + spread)"),
+            ),
         }
         for number, f in enumerate(FUNCTIONS):
             text = f"natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes"
             found[f"log_ratio_{f}"] = (names, log_ratio[..., number], label(text))
         for axis in axes:
-            cells, cell, knot = error_cells(axis), f"{axis.name}_cell", f"{axis.name}_knot"
-            middles = axis.coordinate((np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells))
+            cells, cell, knot = (
+                error_cells(axis),
+                f"{axis.name}_cell",
+                f"{axis.name}_knot",
+            )
+            middles = axis.coordinate(
+                (np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells)
+            )
             knots = np.arange(-padding(DEGREE), axis.nodes + padding(DEGREE), dtype=float)
             text = f"middle of the error field's cells along {axis.name}, as {axis.name}"
             found[cell] = ((cell,), middles, label(text))
@@ -157,7 +234,11 @@ class Island4d(Kind):
         return found
 
     def attributes(self) -> dict[str, Any]:
-        sigma = f"sqrt((1 - {BROADENING}/alpha) m0)" if self.variant.summit_sigma else "sqrt(m0)"
+        sigma = (
+            f"sqrt((1 - {BROADENING}/alpha) m0)"
+            if self.variant.summit_sigma
+            else "sqrt(m0)"
+        )
         axes, (places, _) = self.configuration.axes, self._visited(COVER_TRIALS)
         # by trial; smaller spreads are covered too
         left = any(
@@ -170,40 +251,68 @@ class Island4d(Kind):
             "spreads below the first are answered to first order in mu"
         )
         return {
-            **about(ISLAND4D, floor=SPHERE_FLOOR, divisor=self.variant.density_divisor, sigma=sigma),
+            **about(
+                ISLAND4D,
+                floor=SPHERE_FLOOR,
+                divisor=self.variant.density_divisor,
+                sigma=sigma,
+            ),
             "variant": self.variant.name,
             "variant_numbers": json.dumps(self.variant.recorded),
             "covers": covers,
         }
 
-    def conformance(self, axes: tuple[Axis, ...], coefs: FloatArray, places: list[FloatArray]) -> dict[str, FloatArray]:
+    def conformance(
+        self, axes: tuple[Axis, ...], coefs: FloatArray, places: list[FloatArray]
+    ) -> dict[str, FloatArray]:
         """Points to replay near coordinates of the axes: the four raw numbers, and what these as stored give."""
         X, spread, sphere, hurst = places
         zeta_d = from_axes(sphere, hurst)
         sigma = band_fields(spread, sphere, hurst, self.variant)[1]
         delta, zeta_u = (X * sigma + 1) * zeta_d**-hurst, zeta_d * (1 + spread)
-        raw = {"delta_over_h_rms": delta, "zeta_d": zeta_d, "zeta_u": zeta_u, "hurst": hurst}
+        raw = {
+            "delta_over_h_rms": delta,
+            "zeta_d": zeta_d,
+            "zeta_u": zeta_u,
+            "hurst": hurst,
+        }
         found = to_axes(delta, zeta_d, zeta_u, hurst, self.variant)
-        scales, rigid = np.stack([found.force, found.area]), greenwood_tripp.rigid_sphere(found.X, found.mu)
+        scales, rigid = (
+            np.stack([found.force, found.area]),
+            greenwood_tripp.rigid_sphere(found.X, found.mu),
+        )
         positions = [axis.position(x) for axis, x in zip(axes, found[:4], strict=True)]
         table = scales * np.exp(evaluate(coefs, positions).T) * rigid
-        return conformance(raw, found.X, found.mu, table, scales, 1e-4 * (1 + found.X) / found.sigma)
+        return conformance(
+            raw, found.X, found.mu, table, scales, 1e-4 * (1 + found.X) / found.sigma
+        )
 
     def check(self, content: TableContent) -> None:
         places = [np.arange(2 * (axis.nodes - 1) + 1) / 2 for axis in content.axes[:2]]
-        places += [np.minimum(np.arange(axis.nodes - 0.5), axis.nodes - 1) for axis in content.axes[2:]]
+        places += [
+            np.minimum(np.arange(axis.nodes - 0.5), axis.nodes - 1)
+            for axis in content.axes[2:]
+        ]
         grid = np.meshgrid(*places, indexing="ij")
-        ratio = evaluate(content.coefficients, [g.ravel() for g in grid]).reshape(*grid[0].shape, 2)
+        ratio = evaluate(content.coefficients, [g.ravel() for g in grid]).reshape(
+            *grid[0].shape, 2
+        )
         X = content.axes[0].coordinate(places[0])[:, None, None, None]
-        _, mu = self.arguments(*(axis.coordinate(g) for axis, g in zip(content.axes, grid, strict=True)))
+        _, mu = self.arguments(
+            *(axis.coordinate(g) for axis, g in zip(content.axes, grid, strict=True))
+        )
         force = ratio[..., 0] + np.log(height_integral(2.5, -X)) + np.log(mu)
         area = ratio[..., 1] + np.log(height_integral(2.0, -X))
         rules = {
             "force and area finite": np.isfinite(force).all() and np.isfinite(area).all(),
-            "force and area no larger than a rigid sphere's": (ratio <= self.configuration.target).all(),
+            "force and area no larger than a rigid sphere's": (
+                ratio <= self.configuration.target
+            ).all(),
             "force increasing in X": (np.diff(force, axis=0) > 0).all(),
             "area increasing in X": (np.diff(area, axis=0) > 0).all(),
             "force increasing with the spread": (np.diff(force, axis=1) > 0).all(),
-            "rigid limit at the smallest spread": (np.abs(ratio[:, 0]) <= 100 * mu[:, 0, ..., None]).all(),
+            "rigid limit at the smallest spread": (
+                np.abs(ratio[:, 0]) <= 100 * mu[:, 0, ..., None]
+            ).all(),
         }
         self.require(rules)

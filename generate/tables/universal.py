@@ -8,28 +8,48 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
-from generate.tables.certificate import CONFORMANCE_POINTS, Kind, UncertifiedError, conformance, phi
+from generate.tables.certificate import (
+    CONFORMANCE_POINTS,
+    Kind,
+    UncertifiedError,
+    conformance,
+    phi,
+)
 from generate.tables.writing import about, label
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.table_schema import BUCKET_BITS, CELL_EDGES, UNIVERSAL, X_STEPS, TableContent
+from mbma_tables.common.table_schema import (
+    BUCKET_BITS,
+    CELL_EDGES,
+    UNIVERSAL,
+    X_STEPS,
+    TableContent,
+)
 from mbma_tables.theories.mbma import greenwood_tripp
 from mbma_tables.theories.mbma.geometry import geometry
 from mbma_tables.theories.mbma.universal import TERMS, UniversalModel, fractions_of_mu
 from mbma_tables.theories.mbma.variants import VARIANTS
 
-VISITED = {"hurst": (0.05, 1.0), "log10_zeta_1": (0.4786, 8.0), "log10_approach": (-7.0, 1.0)}
+VISITED = {
+    "hurst": (0.05, 1.0),
+    "log10_zeta_1": (0.4786, 8.0),
+    "log10_approach": (-7.0, 1.0),
+}
 
 AIM = 0.5  # of the target, for the tests of a cell
 AIM_IN_X = 0.4  # of that, for a line along X
 LOCAL_FACTOR = 1.5  # bound over the largest error at the tests of a cell
 DIGITS = 40  # binary ones of a coefficient, counted from the first of its cell's mean
-FIRST_BUCKETS = 8 * 64  # eighths of octaves below the largest mu, at most, where the first cell ends
+FIRST_BUCKETS = (
+    8 * 64
+)  # eighths of octaves below the largest mu, at most, where the first cell ends
 SMALLEST_MU = 1e-30  # what is solved at mu = 0
 LINES = (0.0, 1e-2, 1.0, 10.0, 100.0, 1e4)  # mu that decide widths in X
 
 NODES: FloatArray = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
-FIT: FloatArray = np.asarray(np.linalg.inv(chebyshev.chebvander(NODES, TERMS - 1)), dtype=float)
+FIT: FloatArray = np.asarray(
+    np.linalg.inv(chebyshev.chebvander(NODES, TERMS - 1)), dtype=float
+)
 # where the first term that is left out is largest, corners and edges included
 TESTS: FloatArray = np.cos(np.pi * np.arange(TERMS + 1) / TERMS)
 AT_TESTS: FloatArray = np.asarray(chebyshev.chebvander(TESTS, TERMS - 1), dtype=float)
@@ -71,7 +91,11 @@ class Strip:
     def cell(self, low: float, high: float) -> tuple[FloatArray, FloatArray]:
         """Coefficients over a range of mu, as they are stored, and the largest errors at the tests."""
         ends = np.array(low), np.array(high)
-        series = FIT @ values(X_at(NODES, self.low, self.high), mu_at(NODES, *ends), self.rtol) @ FIT.T
+        series = (
+            FIT
+            @ values(X_at(NODES, self.low, self.high), mu_at(NODES, *ends), self.rtol)
+            @ FIT.T
+        )
         last = 2.0 ** (np.floor(np.log2(np.abs(series[:, :1, :1]))) - DIGITS)
         series = np.round(series / last) * last
         exact = values(X_at(TESTS, self.low, self.high), mu_at(TESTS, *ends), self.rtol)
@@ -86,34 +110,53 @@ class Strip:
         rows: list[FloatArray] = []
         edge, length, low = 0, 0, 0.0
         while low < self.mu_high:
-            # an edge by its bits; the first cell is searched by halves, others start from the one before
+            # an edge by its bits; the first cell is searched by halves, others start from
+            # the one before
             best, least, most = None, edge + 1 if edge else last - FIRST_BUCKETS, last
             trial = last if edge == 0 else min(edge + length, last)
             while least <= trial <= most:
-                high = min(float(np.int64(trial << BUCKET_BITS).view(np.float64)), self.mu_high)
+                high = min(
+                    float(np.int64(trial << BUCKET_BITS).view(np.float64)), self.mu_high
+                )
                 series, errors = self.cell(low, high)
                 if errors.max() <= self.aim:
                     best, least = (trial, high, series, errors), trial + 1
                 else:
                     most = trial - 1
-                trial = (least + most + 1) // 2 if edge == 0 else trial + 1 if best else trial - 1
+                trial = (
+                    (least + most + 1) // 2
+                    if edge == 0
+                    else trial + 1
+                    if best
+                    else trial - 1
+                )
             if best is None:
                 return None
             length, edge = best[0] - edge, best[0]
-            rows.append(np.concatenate([[self.low, self.high, low, best[1]], best[3], best[2].ravel()]))
+            rows.append(
+                np.concatenate(
+                    [[self.low, self.high, low, best[1]], best[3], best[2].ravel()]
+                )
+            )
             low = best[1]
         return np.array(rows)
 
 
-def cells_of(low: float, high: float, mu_high: float, aim: float, rtol: float) -> FloatArray:
+def cells_of(
+    low: float, high: float, mu_high: float, aim: float, rtol: float
+) -> FloatArray:
     """Rows of `Strip.cells`, of halves of the strip where it is too wide."""
     rows = Strip(low, high, mu_high, aim, rtol).cells()
     if rows is not None:
         return rows
     middle = low + (math.ceil((high - low) * X_STEPS) // 2) / X_STEPS
     if middle == low:
-        raise UncertifiedError(f"universal: no cell of X in [{low:g}, {high:g}] is short enough in mu for {aim:.1e}")
-    return np.concatenate([cells_of(*ends, mu_high, aim, rtol) for ends in ((low, middle), (middle, high))])
+        raise UncertifiedError(
+            f"universal: no cell of X in [{low:g}, {high:g}] is short enough in mu for {aim:.1e}"
+        )
+    return np.concatenate(
+        [cells_of(*ends, mu_high, aim, rtol) for ends in ((low, middle), (middle, high))]
+    )
 
 
 class Universal(Kind):
@@ -141,7 +184,10 @@ class Universal(Kind):
         return strips
 
     def build(self) -> TableContent:
-        own, jobs = self.configuration, [dataclasses.astuple(strip) for strip in self.strips()]
+        own, jobs = (
+            self.configuration,
+            [dataclasses.astuple(strip) for strip in self.strips()],
+        )
         rows = np.concatenate([*results("cells", cells_of, jobs, self.workers)])
         if len(rows) * TERMS**2 > own.max_nodes:
             raise UncertifiedError(
@@ -154,16 +200,25 @@ class Universal(Kind):
             axes=tuple(own.axes.values()),
             coefficients=np.ascontiguousarray(series),
             local_error=LOCAL_FACTOR * rows[:, 4:6] + self.rtol,
-            auxiliary={n: (("cell",), r, label(t)) for (n, t), r in zip(CELL_EDGES.items(), rows.T, strict=False)},
+            auxiliary={
+                n: (("cell",), r, label(t))
+                for (n, t), r in zip(CELL_EDGES.items(), rows.T, strict=False)
+            },
             conformance={},
             attributes={},
         )
         X, mu = self.held_out(content, CONFORMANCE_POINTS, own.seed + 303)
         table = np.stack(UniversalModel(content).answer(X, mu)[:2])
         points = conformance({"X": X, "mu": mu}, X, mu, table, 1.0, 0.0)
-        known = about(UNIVERSAL) | {"variant": "any", "variant_numbers": "[]"} | own.attributes()
+        known = (
+            about(UNIVERSAL)
+            | {"variant": "any", "variant_numbers": "[]"}
+            | own.attributes()
+        )
         attributes = known | self.certify(content)
-        return self.checked(dataclasses.replace(content, conformance=points, attributes=attributes))
+        return self.checked(
+            dataclasses.replace(content, conformance=points, attributes=attributes)
+        )
 
     def held_out(self, content: TableContent, count: int, seed: int) -> list[FloatArray]:
         """(X, mu) of points: half anywhere in any cell, half where surfaces really go."""
@@ -171,13 +226,20 @@ class Universal(Kind):
         which, x, y = qmc.Halton(3, seed=seed).random(count // 2).T
         X_low, X_high, mu_low, mu_high = edges[:, (which * edges.shape[1]).astype(int)]
         box = [X_at(2 * x - 1, X_low, X_high), mu_at(2 * y - 1, mu_low, mu_high)]
-        return [np.concatenate(pair) for pair in zip(box, self.manifold(count - count // 2), strict=True)]
+        return [
+            np.concatenate(pair)
+            for pair in zip(box, self.manifold(count - count // 2), strict=True)
+        ]
 
     def certify(self, content: TableContent) -> dict[str, Any]:
         """Errors on held-out points, solved on twice the nodes that made the table."""
-        X, mu = self.held_out(content, self.configuration.certificate_points, self.configuration.seed + 101)
+        X, mu = self.held_out(
+            content, self.configuration.certificate_points, self.configuration.seed + 101
+        )
         truth = self.phi("certificate", X, mu, rtol=self.rtol, refinement=2)
-        errors = np.abs(np.stack(UniversalModel(content).answer(X, mu)[:2], axis=-1) / truth - 1)
+        errors = np.abs(
+            np.stack(UniversalModel(content).answer(X, mu)[:2], axis=-1) / truth - 1
+        )
         return self.certificate(errors, {"X": X, "mu": mu})
 
     def manifold(self, count: int) -> list[FloatArray]:
@@ -186,9 +248,17 @@ class Universal(Kind):
 
         def drawn(draw: int) -> list[FloatArray]:
             approach, hurst, zeta_1 = self.visited_surfaces(draw, VISITED)
-            fields = [geometry(approach, hurst, zeta_1, variant) for variant in VARIANTS.values()]
+            fields = [
+                geometry(approach, hurst, zeta_1, variant)
+                for variant in VARIANTS.values()
+            ]
             X, mu = (np.concatenate([f[name] for f in fields]) for name in ("X", "mu"))
-            inside = (axes["X"].low < X) & (axes["X"].high > X) & (mu > 0) & (mu < axes["mu"].high)
+            inside = (
+                (axes["X"].low < X)
+                & (axes["X"].high > X)
+                & (mu > 0)
+                & (mu < axes["mu"].high)
+            )
             return [X[inside], mu[inside]]
 
         X, mu = self.enough(count, 4 * count, drawn)
@@ -196,20 +266,35 @@ class Universal(Kind):
         return [X[chosen], mu[chosen]]
 
     def check(self, content: TableContent) -> None:
-        X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1][:, None] for name in CELL_EDGES)
+        X_low, X_high, mu_low, mu_high = (
+            content.auxiliary[name][1][:, None] for name in CELL_EDGES
+        )
         x, y = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(-0.99, 0.99, 5)]))
         X, mu = X_at(x, X_low, X_high).ravel(), mu_at(y, mu_low, mu_high).ravel()
         answer = UniversalModel(content).answer
         found = np.stack(answer(X, mu)[:2])
-        beside = X_at(x + 1e-3, X_low, X_high).ravel(), mu_at(y + 1e-3, mu_low, mu_high).ravel()
-        more_X, more_mu = (np.stack(answer(*place)[:2]) for place in ((beside[0], mu), (X, beside[1])))
+        beside = (
+            X_at(x + 1e-3, X_low, X_high).ravel(),
+            mu_at(y + 1e-3, mu_low, mu_high).ravel(),
+        )
+        more_X, more_mu = (
+            np.stack(answer(*place)[:2]) for place in ((beside[0], mu), (X, beside[1]))
+        )
         rigid = greenwood_tripp.rigid_sphere(X, mu)
         rigid_limit = X, np.full(X.size, SMALLEST_MU)
-        limit = np.stack(answer(*rigid_limit)[:2]) / greenwood_tripp.rigid_sphere(*rigid_limit) - 1
+        limit = (
+            np.stack(answer(*rigid_limit)[:2])
+            / greenwood_tripp.rigid_sphere(*rigid_limit)
+            - 1
+        )
         target = self.configuration.target
         rules = {
-            "force and area finite and positive": (np.isfinite(found) & (found > 0)).all(),
-            "force and area no larger than a rigid sphere's": (found <= (1 + target) * rigid).all(),
+            "force and area finite and positive": (
+                np.isfinite(found) & (found > 0)
+            ).all(),
+            "force and area no larger than a rigid sphere's": (
+                found <= (1 + target) * rigid
+            ).all(),
             "force increasing in X": (more_X > found)[0].all(),
             "area increasing in X": (more_X > found)[1].all(),
             "force increasing in mu": (more_mu > found)[0].all(),

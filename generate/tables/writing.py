@@ -19,14 +19,29 @@ from mbma_tables.common.table_schema import check_content
 
 CONVENTIONS = "CF-1.11"
 ANSWERS = {schema.UNIVERSAL: "Phi_{f}", schema.ISLAND4D: "{f}_hat"}
-TEXTS = tomllib.loads(pathlib.Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
-OF_WRITING = ("out_of_range", "error_field", "spline_weights", "height_integrals", "certificate")
+TEXTS = tomllib.loads(
+    pathlib.Path(__file__).with_name("texts.toml").read_text(encoding="utf-8")
+)
+OF_WRITING = (
+    "out_of_range",
+    "error_field",
+    "spline_weights",
+    "height_integrals",
+    "certificate",
+)
 
 
 def about(kind: str, **numbers: Any) -> dict[str, str]:
     """What a table of a kind says of itself, the steps of a lookup numbered and filled with numbers."""
-    own = {name: text for name, text in TEXTS[kind].items() if name not in (*OF_WRITING, "lookup")}
-    lines = {f"lookup_{number:02d}": line.format(**numbers) for number, line in enumerate(TEXTS[kind]["lookup"], 1)}
+    own = {
+        name: text
+        for name, text in TEXTS[kind].items()
+        if name not in (*OF_WRITING, "lookup")
+    }
+    lines = {
+        f"lookup_{number:02d}": line.format(**numbers)
+        for number, line in enumerate(TEXTS[kind]["lookup"], 1)
+    }
     return own | {"symbols": TEXTS["symbols"]} | lines
 
 
@@ -35,9 +50,17 @@ def label(text: str) -> dict[str, Any]:
 
 
 def _fill(dataset: netCDF4.Dataset, content: schema.TableContent) -> None:
-    packed: dict[str, Any] = {"zlib": True, "complevel": 6, "shuffle": True, "endian": "little", "fill_value": False}
+    packed: dict[str, Any] = {
+        "zlib": True,
+        "complevel": 6,
+        "shuffle": True,
+        "endian": "little",
+        "fill_value": False,
+    }
 
-    def add(name: str, dimensions: tuple[str, ...], values: Any, attributes: dict[str, Any]) -> None:
+    def add(
+        name: str, dimensions: tuple[str, ...], values: Any, attributes: dict[str, Any]
+    ) -> None:
         for dimension, size in zip(dimensions, np.shape(values), strict=True):
             if dimension not in dataset.dimensions:
                 dataset.createDimension(dimension, size)
@@ -54,19 +77,34 @@ def _fill(dataset: netCDF4.Dataset, content: schema.TableContent) -> None:
             (schema.COEFFICIENTS[content.kind], over_coefficients, content.coefficients),
             ("error", over_cells, content.local_error),
         ):
-            text = TEXTS["meaning"][what].format(f=function, chebyshev=("Phi_F/mu", "Phi_A")[number])
+            text = TEXTS["meaning"][what].format(
+                f=function, chebyshev=("Phi_F/mu", "Phi_A")[number]
+            )
             add(f"{what}_{function}", over, array[..., number], label(text))
-    beside = " ".join(n for n, entry in content.auxiliary.items() if set(entry[0]) < set(names))
+    beside = " ".join(
+        n for n, entry in content.auxiliary.items() if set(entry[0]) < set(names)
+    )
     for name, (over, values, attributes) in content.auxiliary.items():
-        add(name, over, values, attributes | ({"coordinates": beside} if over == names and beside else {}))
+        add(
+            name,
+            over,
+            values,
+            attributes | ({"coordinates": beside} if over == names and beside else {}),
+        )
     for name, values in content.conformance.items():
-        what, _, function = name.rpartition("_") if name[-2:] in ("_F", "_A") else (name, "", "")
-        text = TEXTS["meaning"].get(f"conformance_{what}", f"argument {name} of the conformance points")
+        what, _, function = (
+            name.rpartition("_") if name[-2:] in ("_F", "_A") else (name, "", "")
+        )
+        text = TEXTS["meaning"].get(
+            f"conformance_{what}", f"argument {name} of the conformance points"
+        )
         text = text.format(answer=ANSWERS[content.kind].format(f=function))
         add(f"conformance_{name}", ("conformance",), values, label(text))
 
 
-def write_table(path: os.PathLike[str] | str, content: schema.TableContent) -> pathlib.Path:
+def write_table(
+    path: os.PathLike[str] | str, content: schema.TableContent
+) -> pathlib.Path:
     target = pathlib.Path(path)
     check_content(content)
     digest = digest_arrays(content.arrays())
@@ -76,12 +114,18 @@ def write_table(path: os.PathLike[str] | str, content: schema.TableContent) -> p
         "source_sha256": source_digest(MODULES[content.kind]),
         "source_modules": " ".join(MODULES[content.kind]),
         "versions": json.dumps(versions(), sort_keys=True),
-        **{name: value for name, value in content.attributes.items() if name != "attributes_sha256"},
+        **{
+            name: value
+            for name, value in content.attributes.items()
+            if name != "attributes_sha256"
+        },
         "mbma_kind": content.kind,
         "format_version": schema.FORMAT_VERSIONS[content.kind],
         "data_version": digest[:12],
         **TEXTS["documentation"],
-        **{name: text for name, text in TEXTS[content.kind].items() if name in OF_WRITING},
+        **{
+            name: text for name, text in TEXTS[content.kind].items() if name in OF_WRITING
+        },
         **({"spline_degree": schema.DEGREE} if content.kind == schema.ISLAND4D else {}),
         "values_sha256": digest,
     }
@@ -94,7 +138,9 @@ def write_table(path: os.PathLike[str] | str, content: schema.TableContent) -> p
 
     try:
         body = written_bytes(target.name, write)
-        write_file(target, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
+        write_file(
+            target, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n"
+        )
     except (InputError, OSError) as fault:
         raise TableFileError(f"cannot write {target}: {fault}") from None
     return target

@@ -1,7 +1,8 @@
 """The command line `mbma`: results as tables, JSON, CSV or pictures.
 
-Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Modules that
-need scipy are imported by the commands that use them, so that ``--help`` is fast.
+Bad input ends with one or two lines on stderr and exit code 2, before anything is written.
+Modules that need scipy are imported by the commands that use them, so that ``--help`` is
+fast.
 """
 
 import functools
@@ -52,7 +53,11 @@ class Program(click.Group):
             click.echo("mbma: interrupted", err=True)
             sys.exit(INTERRUPTED)
         except (click.ClickException, MbmaError, OSError) as fault:
-            text = fault.format_message() if isinstance(fault, click.ClickException) else str(fault)
+            text = (
+                fault.format_message()
+                if isinstance(fault, click.ClickException)
+                else str(fault)
+            )
             said = visible(" ".join(text.split()))
             if isinstance(fault, click.UsageError) and fault.ctx is not None:
                 said += f"\n(see '{fault.ctx.command_path} --help')"
@@ -63,9 +68,16 @@ class Program(click.Group):
         sys.exit(code if isinstance(code, int) else 0)
 
 
-@click.group("mbma", cls=Program, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    "mbma",
+    cls=Program,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(
-    __version__, prog_name="mbma", message=f"%(prog)s %(version)s, core {core.__name__.rpartition('.')[2].lstrip('_')}"
+    __version__,
+    prog_name="mbma",
+    message=f"%(prog)s %(version)s, core {core.__name__.rpartition('.')[2].lstrip('_')}",
 )
 @click.pass_context
 def main(context: click.Context) -> None:
@@ -83,9 +95,20 @@ def main(context: click.Context) -> None:
 
 
 for command in (
-    *(commands.contact_command, commands.curve_command, commands.sensitivity_command, commands.island_command),
+    *(
+        commands.contact_command,
+        commands.curve_command,
+        commands.sensitivity_command,
+        commands.island_command,
+    ),
     *(commands.fit_command, tables.tables_group),
-    *(tables.cache_command, scene.joint_command, scene.plan_command, scene.run_command, commands.cost_command),
+    *(
+        tables.cache_command,
+        scene.joint_command,
+        scene.plan_command,
+        scene.run_command,
+        commands.cost_command,
+    ),
     *(export.export_command, export.explore_command),
 ):
     command.format_options = functools.partial(format_options, command)  # type: ignore[method-assign]

@@ -21,19 +21,27 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.result import Contact
 
 LIGHTEST = 1e-4  # A/A0 at a curve's second point
-SEARCHED = 1 - np.append(np.geomspace(1e-3, 0.2, 60), np.linspace(0.2, 2.0, 141)[1:])  # d/h_max where areas are found
+SEARCHED = 1 - np.append(
+    np.geomspace(1e-3, 0.2, 60), np.linspace(0.2, 2.0, 141)[1:]
+)  # d/h_max where areas are found
 MIN_POINTS = 5
-DRAWN = ("calibrated", "persson")  # theories shown beside the chosen one in a picture, where available
+DRAWN = (
+    "calibrated",
+    "persson",
+)  # theories shown beside the chosen one in a picture, where available
 COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
 MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotropy")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
-@click.command("contact", short_help="Pressure and area at given gaps, pressures or areas.")
+@click.command(
+    "contact", short_help="Pressure and area at given gaps, pressures or areas."
+)
 @options.load_options(options.numbers_option)
 @options.leakage_option
 @options.numbers_option(
-    "--conductivity", help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'."
+    "--conductivity",
+    help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'.",
 )
 @options.specimen_options
 @options.theory_options
@@ -48,28 +56,37 @@ def contact_command(
 ) -> None:
     """Pressure, real contact area and stiffness -dF/du at given gaps, pressures or areas.
 
-    Plain numbers are in the units of the surface and of the modulus, "0.8um" is converted to them. Force is
-    F/(A0 E*), or F/A0 where a modulus is given; area is A/A0.
+    Plain numbers are in the units of the surface and of the modulus, "0.8um" is converted
+    to them. Force is F/(A0 E*), or F/A0 where a modulus is given; area is A/A0.
 
     Example: mbma contact --surface challenge --E-star 25MPa --length-unit mm -p 100kPa
     """
     if len(loads) != 1:
-        raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
+        raise InputError(
+            "one of --separation, --mean-separation, --pressure and --area is needed"
+        )
     ((name, numbers),) = loads.items()
     model = model.of(specimen.surface, name)
     from mbma_tables.contacts.contact import contact
 
-    known: dict[str, Any] = {name: finite_array(name, specimen.units.number(name, numbers))}
+    known: dict[str, Any] = {
+        name: finite_array(name, specimen.units.number(name, numbers))
+    }
     answer = contact(specimen.surface, **known, **model.keywords(specimen))
     yields = ("yielded", "unloading_stiffness") if model.yields else ()
-    values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
+    values = {
+        column: getattr(answer, column)
+        for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])
+    }
     values |= {"scatter": answer.scatter, "area_scatter": answer.area_scatter}
     values["valid"] = np.where(answer.valid, "yes", "no")
     values |= _leakage(answer) if leakage else {}
     units = {}
     if conductivity:
         if len(conductivity) > 2:
-            raise InputError(f"--conductivity is of both bodies, or of each: one or two, got {len(conductivity)}")
+            raise InputError(
+                f"--conductivity is of both bodies, or of each: one or two, got {len(conductivity)}"
+            )
         bodies, units["conductance"] = specimen.units.conductivities(*conductivity)
         values["conductance"] = answer.conductance(*bodies)
     report_answer("contact", specimen, model, answer, values, units).write(output)
@@ -78,11 +95,23 @@ def contact_command(
 def _leakage(answer: Contact) -> dict[str, Any]:
     """Columns of the flow coefficient of the gaps."""
     found = answer.leakage
-    return {"leakage": found.K, "leakage_scatter": found.scatter, "leakage_valid": found.valid}
+    return {
+        "leakage": found.K,
+        "leakage_scatter": found.scatter,
+        "leakage_valid": found.valid,
+    }
 
 
-@click.command("curve", short_help="Pressure and area from first contact to full compression.")
-@click.option("--points", type=click.IntRange(min=MIN_POINTS), default=41, show_default=True, help="How many gaps.")
+@click.command(
+    "curve", short_help="Pressure and area from first contact to full compression."
+)
+@click.option(
+    "--points",
+    type=click.IntRange(min=MIN_POINTS),
+    default=41,
+    show_default=True,
+    help="How many gaps.",
+)
 @options.leakage_option
 @options.plot_option
 @options.specimen_options
@@ -98,10 +127,11 @@ def curve_command(
 ) -> None:
     """Pressure and area against the mean separation, from first contact (u = h_max) to full compression (u = 0).
 
-    Contact areas are geometric, from 0.01% to the largest, between first contact and full compression. Gaps where a
-    theory has no finite force are omitted.
+    Contact areas are geometric, from 0.01% to the largest, between first contact and full
+    compression. Gaps where a theory has no finite force are omitted.
 
-    The picture has Persson's theory beside the chosen one, and the calibrated law with its scatter as a band.
+    The picture has Persson's theory beside the chosen one, and the calibrated law with its
+    scatter as a band.
 
     Example: mbma curve --surface concrete --plot concrete.png
     """
@@ -111,25 +141,41 @@ def curve_command(
     from mbma_tables.scenes.run import other_theory
 
     model, surface = model.of(specimen.surface), specimen.surface
-    asked, modulus = model.keywords(specimen), 1.0 if specimen.E_star is None else specimen.E_star
+    asked, modulus = (
+        model.keywords(specimen),
+        1.0 if specimen.E_star is None else specimen.E_star,
+    )
     gap = float(surface.h_max) * SEARCHED
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
     area = np.asarray(contact(surface, separation=gap, **asked).area)
     rising = slice(np.flatnonzero(area > 0)[0], int(area.argmax()) + 1)
-    wanted = np.geomspace(max(LIGHTEST, 1.5 * area[rising][0]), area[rising][-1], points - 1)
+    wanted = np.geomspace(
+        max(LIGHTEST, 1.5 * area[rising][0]), area[rising][-1], points - 1
+    )
     inner = np.interp(np.log(wanted[:-1]), np.log(area[rising]), gap[rising])
     gap = np.concatenate([[surface.h_max], inner, gap[-1:]])
     answer = contact(surface, separation=gap, **asked)
-    values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
+    values = {name: getattr(answer, name) for name in COLUMNS} | (
+        _leakage(answer) if leakage else {}
+    )
     picture = b""
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
-        cap, others = asked.get("hardness", math.inf), [name for name in DRAWN if name != model.theory]
-        curves = [answer.curve(leakage), *(other_theory(name, surface, gap, modulus, cap) for name in others)]
+        cap, others = (
+            asked.get("hardness", math.inf),
+            [name for name in DRAWN if name != model.theory],
+        )
+        curves = [
+            answer.curve(leakage),
+            *(other_theory(name, surface, gap, modulus, cap) for name in others),
+        ]
         labels = plots.pressure_label(unit_of("pressure", specimen.units))
         flow = plots.leakage_label(unit_of("leakage", specimen.units))
-        picture = plots.to_picture(plots.draw_compression(curves, title, labels, leakage_label=flow), plot.suffix[1:])
+        picture = plots.to_picture(
+            plots.draw_compression(curves, title, labels, leakage_label=flow),
+            plot.suffix[1:],
+        )
     report_answer("curve", specimen, model, answer, values).write(output, plot, picture)
 
 
@@ -138,34 +184,54 @@ def curve_command(
 @options.specimen_options
 @options.theory_options
 @options.json_option("a table")
-def sensitivity_command(loads: dict[str, Any], specimen: Specimen, model: options.Model, as_json: bool) -> None:
+def sensitivity_command(
+    loads: dict[str, Any], specimen: Specimen, model: options.Model, as_json: bool
+) -> None:
     """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
 
-    Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
-    and lengths; of a spectrum also h_max, cut-offs and the exponent of an extrapolation.
+    Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum
+    the scales of its heights and lengths; of a spectrum also h_max, cut-offs and the
+    exponent of an extrapolation.
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
     from mbma_tables.contacts.contact import one_known
     from mbma_tables.contacts.sensitivity import sensitivity
 
-    model = model.of(specimen.surface, one_known(**dict.fromkeys(options.LOADS) | loads)[0])
-    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, **model._asdict())
-    units = {name: shown_unit(name, found.units) for name in (*found.parameters, *found.answers)}
+    model = model.of(
+        specimen.surface, one_known(**dict.fromkeys(options.LOADS) | loads)[0]
+    )
+    found = sensitivity(
+        specimen.surface, **loads, E_star=specimen.modulus, **model._asdict()
+    )
+    units = {
+        name: shown_unit(name, found.units)
+        for name in (*found.parameters, *found.answers)
+    }
     if as_json:
         echo(to_json(vars(found) | {"theory": model.theory, "units": units}))
         return
-    here = ", ".join(f"{name} {value:.6g} {units[name]}".removesuffix(" -") for name, value in found.answers.items())
-    echo(f"mbma sensitivity: {specimen.title}, theory {model.theory}\nhere: {here}\n\n{found}")
+    here = ", ".join(
+        f"{name} {value:.6g} {units[name]}".removesuffix(" -")
+        for name, value in found.answers.items()
+    )
+    echo(
+        f"mbma sensitivity: {specimen.title}, theory {model.theory}\nhere: {here}\n\n{found}"
+    )
 
 
 @click.command("island", short_help="Contact islands at given approaches.")
-@options.numbers_option("--delta", help="Approach z_max - d of an island [length], positive; may be repeated.")
+@options.numbers_option(
+    "--delta", help="Approach z_max - d of an island [length], positive; may be repeated."
+)
 @options.specimen_options
 @options.model_options
 @options.output_options
 def island_command(
-    delta: list[float | str] | None, specimen: Specimen, model: options.Model, output: options.Output
+    delta: list[float | str] | None,
+    specimen: Specimen,
+    model: options.Model,
+    output: options.Output,
 ) -> None:
     """Band, radii, densities, force and area of contact islands at given approaches.
 
@@ -177,18 +243,43 @@ def island_command(
         raise InputError("approaches are needed: --delta")
     from mbma_tables.theories.mbma.island import island
 
-    asked = {name: value for name, value in model.keywords(specimen).items() if name != "theory"}
-    answer = island(specimen.surface, finite_array("delta", specimen.units.number("delta", delta)), **asked)
-    values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")}
-    units = {name: unit_of(f"island_{name}", specimen.units) for name in ("force", "area")}
+    asked = {
+        name: value
+        for name, value in model.keywords(specimen).items()
+        if name != "theory"
+    }
+    answer = island(
+        specimen.surface,
+        finite_array("delta", specimen.units.number("delta", delta)),
+        **asked,
+    )
+    values = {
+        name: getattr(answer, name)
+        for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")
+    }
+    units = {
+        name: unit_of(f"island_{name}", specimen.units) for name in ("force", "area")
+    }
     report_answer("island", specimen, model, answer, values, units).write(output)
 
 
 @click.command("fit", short_help="Evaluate a measured map or line scan, and its contact.")
-@click.argument("measurements", metavar="MAP...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
+@click.argument(
+    "measurements",
+    metavar="MAP...",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path),
+)
+@options.quantity_option(
+    "--E-star", "E_star", help="Effective modulus; without one pressures are over E*."
+)
 @options.plot_option
-@click.option("--simulate", is_flag=True, help="Simulate the map by boundary elements; --out OWN.nc stores results.")
+@click.option(
+    "--simulate",
+    is_flag=True,
+    help="Simulate the map by boundary elements; --out OWN.nc stores results.",
+)
 @options.map_options
 @options.output_options
 def fit_command(
@@ -201,26 +292,37 @@ def fit_command(
 ) -> None:
     """Read a map or line scan; report its properties and treatment, and its contact with a flat.
 
-    The table is by the default theory of mbma contact, with its distance from boundary elements (scatter: standard
-    deviation of ln A at a pressure and of ln F at a separation). The picture has the map, its spectrum, its heights,
-    and area and separation against pressure by the calibrated law and MBMA.
+    The table is by the default theory of mbma contact, with its distance from boundary
+    elements (scatter: standard deviation of ln A at a pressure and of ln F at a
+    separation). The picture has the map, its spectrum, its heights, and area and separation
+    against pressure by the calibrated law and MBMA.
 
-    Several maps are scans of one surface: spectra, heights and curves are averaged, and the picture shows the first.
+    Several maps are scans of one surface: spectra, heights and curves are averaged, and the
+    picture shows the first.
 
-    With --simulate the table is by boundary elements on the map itself, and --out OWN.nc writes them, a table of the
-    surface that --map OWN.nc of other commands reads in place of the map.
+    With --simulate the table is by boundary elements on the map itself, and --out OWN.nc
+    writes them, a table of the surface that --map OWN.nc of other commands reads in place
+    of the map.
 
     Example: mbma fit wafer.sur --short-cutoff 2um --plot wafer.png
     """
     options.check_plot(plot, output.out)
     from mbma_tables.common.plots import pressure_label, to_picture
     from mbma_tables.common.units import Units
-    from mbma_tables.contacts.measurement import areal, curves, described, draw, table_of_loads
+    from mbma_tables.contacts.measurement import (
+        areal,
+        curves,
+        described,
+        draw,
+        table_of_loads,
+    )
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
     from mbma_tables.theories import BoundaryElements, theory_name
 
-    modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
+    modulus, stress_unit = effective_modulus_of(
+        {} if E_star is None else {"E_star": E_star}
+    )
     scans = [measured(path, treatment) for path in measurements]
     surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
@@ -228,9 +330,14 @@ def fit_command(
     columns, told = table_of_loads(surface, scale, theory)
     if simulate and output.out is not None and output.out.suffix == ".nc":
         BoundaryElements.of(surface).to_netcdf(output.out)
-        told, output = [*told, f"{output.out} has the simulation"], output._replace(out=None)
+        told, output = (
+            [*told, f"{output.out} has the simulation"],
+            output._replace(out=None),
+        )
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
-    facts: dict[str, Any] = {name: getattr(surface, name) for name in MEASURED} | {"areal": areal(surface)}
+    facts: dict[str, Any] = {name: getattr(surface, name) for name in MEASURED} | {
+        "areal": areal(surface)
+    }
     facts |= {"theory": theory, "length_unit": surface.unit, "stress_unit": stress_unit}
     facts |= {"provenance": surface.provenance, "notes": told}
     title = ", ".join(path.name for path in measurements)
@@ -238,27 +345,39 @@ def fit_command(
     picture = b""
     if plot is not None:
         label = pressure_label(unit_of("pressure", units))
-        picture = to_picture(draw(scans[0][0], surface, curves(surface, scale), title, label), plot.suffix[1:])
+        picture = to_picture(
+            draw(scans[0][0], surface, curves(surface, scale), title, label),
+            plot.suffix[1:],
+        )
     notes = [*described(surface), f"table by theory {theory}", *told]
     Report("fit", title, notes, facts, columns, own).write(output, plot, picture)
 
 
 @click.command("cost", short_help="Computing time against accuracy.")
-@click.option("--distance", is_flag=True, help="Theories' deviation from simulation instead of numerical error.")
+@click.option(
+    "--distance",
+    is_flag=True,
+    help="Theories' deviation from simulation instead of numerical error.",
+)
 @options.json_option("a table")
 def cost_command(distance: bool, as_json: bool) -> None:
     """Error and time of every method, as measured on held-out surfaces.
 
-    Costs are times relative to that of a fixed piece of work; seconds are those of the machine of the measurement.
-    See docs/cost.md. With --distance: root mean squares of ln(theory/boundary elements), of area at equal force
-    and force at equal separation, light at 1-10% contact and deep at 10-97%.
+    Costs are times relative to that of a fixed piece of work; seconds are those of the
+    machine of the measurement. See docs/cost.md. With --distance: root mean squares of
+    ln(theory/boundary elements), of area at equal force and force at equal separation,
+    light at 1-10% contact and deep at 10-97%.
 
     Example: mbma cost --distance
     """
     from mbma_tables.scenes.plan import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
-    rows: Any = shipped_distances() if distance else [row for row in costs.rows if row.island_model != UNIT]
+    rows: Any = (
+        shipped_distances()
+        if distance
+        else [row for row in costs.rows if row.island_model != UNIT]
+    )
     unit = costs.seconds
     records = [row._asdict() | {"seconds": row.cost * unit} for row in rows]
     if as_json:
@@ -266,4 +385,7 @@ def cost_command(distance: bool, as_json: bool) -> None:
         return
     columns = {name: [record[name] for record in records] for name in records[0]}
     title = "distance" if distance else "cost"
-    echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)
+    echo(
+        Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(),
+        nl=False,
+    )

@@ -38,7 +38,18 @@ SCATTER = {
     "unloading_stiffness_scatter": "ln unloading stiffness",
     "separation_scatter": "u",
 }
-SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
+SURFACE_NUMBERS = (
+    "hurst",
+    "q0",
+    "q1",
+    "zeta_1",
+    "h_rms",
+    "h_max",
+    "m0",
+    "m2",
+    "m4",
+    "alpha",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,8 +66,14 @@ class Report:
     @functools.cached_property
     def columns(self) -> dict[str, list[Any]]:
         """Entries of the columns, None in place of NaN."""
-        entries = {name: np.atleast_1d(array).ravel().tolist() for name, array in self.values.items()}
-        return {name: [None if entry != entry else entry for entry in column] for name, column in entries.items()}
+        entries = {
+            name: np.atleast_1d(array).ravel().tolist()
+            for name, array in self.values.items()
+        }
+        return {
+            name: [None if entry != entry else entry for entry in column]
+            for name, column in entries.items()
+        }
 
     @property
     def all_units(self) -> dict[str, str]:
@@ -69,21 +86,39 @@ class Report:
         lines = []
         for name, values in self.columns.items():
             cells = [name, *([units[name]] if units else []), *map(_rounded, values)]
-            width, text = max(map(len, cells)), any(isinstance(value, str) for value in values)
-            lines.append([cell.ljust(width) if text else cell.rjust(width) for cell in cells])
+            width, text = (
+                max(map(len, cells)),
+                any(isinstance(value, str) for value in values),
+            )
+            lines.append(
+                [cell.ljust(width) if text else cell.rjust(width) for cell in cells]
+            )
         table = ["  ".join(row).rstrip() for row in zip(*lines, strict=True)]
         head = [visible(f"mbma {self.command}: {self.title}"), *map(visible, self.notes)]
         return "\n".join([*head, "", *table]) + "\n"
 
     def to_json(self) -> str:
         """One JSON object, its numbers with all their digits."""
-        head = {"program": f"mbma {__version__}", "command": self.command, "title": self.title}
-        return to_json({**head, **self.facts, "units": self.all_units, "columns": self.columns}) + "\n"
+        head = {
+            "program": f"mbma {__version__}",
+            "command": self.command,
+            "title": self.title,
+        }
+        return (
+            to_json(
+                {**head, **self.facts, "units": self.all_units, "columns": self.columns}
+            )
+            + "\n"
+        )
 
     def to_csv(self) -> str:
         """Comment lines, the columns' names, then their numbers with all their digits."""
         units = "; ".join(f"{name} [{unit}]" for name, unit in self.all_units.items())
-        head = (f"mbma {__version__} {self.command}: {self.title}", *self.notes, f"columns: {units}")
+        head = (
+            f"mbma {__version__} {self.command}: {self.title}",
+            *self.notes,
+            f"columns: {units}",
+        )
         content = io.StringIO()
         content.write(comment(head, "#"))
         rows = csv.writer(content, lineterminator="\n")
@@ -91,9 +126,17 @@ class Report:
         rows.writerows(zip(*self.columns.values(), strict=True))
         return content.getvalue()
 
-    def write(self, output: Output, plot: Path | None = None, picture: bytes = b"") -> None:
+    def write(
+        self, output: Output, plot: Path | None = None, picture: bytes = b""
+    ) -> None:
         """To its file, with the picture after it, or to stdout once the picture is written."""
-        text = self.to_json() if output.as_json else self.to_csv() if output.as_csv else self.to_table()
+        text = (
+            self.to_json()
+            if output.as_json
+            else self.to_csv()
+            if output.as_csv
+            else self.to_table()
+        )
         if output.out is not None and str(output.out) != "-":
             write_file(output.out, text.encode())
         if plot is not None:
@@ -104,7 +147,9 @@ class Report:
 
 def to_json(content: Any) -> str:
     """JSON, with null in place of missing numbers."""
-    return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=2)
+    return json.dumps(
+        json.loads(json.dumps(content), parse_constant=lambda _: None), indent=2
+    )
 
 
 def _rounded(value: Any) -> str:
@@ -131,7 +176,9 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     # a spectrum that is no power law has no Hurst exponent
     numbers = {name: float(value) for name, value in known.items() if value is not None}
     units = {name: shown_unit(name, specimen.units).strip("-") for name in numbers}
-    listed = (f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items())
+    listed = (
+        f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items()
+    )
     assumed = assumptions(surface)
     notes = [f"surface: {', '.join(listed)}", *assumption_notes(assumed)]
     notes += [record["told"] for record in surface.provenance if "told" in record]
@@ -140,25 +187,42 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     fit = getattr(surface, "fit", None)  # a field if given by five numbers, else a method
     if dataclasses.is_dataclass(fit):
         facts["fit"] = {name: np.asarray(v).tolist() for name, v in vars(fit).items()}
-        notes.append("fit: " + ", ".join(f"{name} {_rounded(v)}" for name, v in facts["fit"].items() if v is not None))
+        notes.append(
+            "fit: "
+            + ", ".join(
+                f"{name} {_rounded(v)}"
+                for name, v in facts["fit"].items()
+                if v is not None
+            )
+        )
     return facts, notes
 
 
 def _validity(answer: Contact, yields: bool) -> tuple[list[str], dict[str, Any]]:
     """Range in which a contact's theory was tested, and its scatter: lines of text, and machine-readable facts."""
     valid, notes = np.atleast_1d(answer.valid), []
-    reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in answer.reasons.items()}
+    reasons = {
+        reason: np.flatnonzero(mask).tolist() for reason, mask in answer.reasons.items()
+    }
     if reasons:
-        listed = "; ".join(f"{reason} ({len(places)})" for reason, places in reasons.items())
+        listed = "; ".join(
+            f"{reason} ({len(places)})" for reason, places in reasons.items()
+        )
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
     scatter = {name: getattr(answer, name) for name in SCATTER}
     # of an elastic contact both stiffnesses are one
-    listed_names = [name for name in SCATTER if yields or name != "unloading_stiffness_scatter"]
+    listed_names = [
+        name for name in SCATTER if yields or name != "unloading_stiffness_scatter"
+    ]
     meanings = ", ".join(SCATTER[name] for name in listed_names)
     ranges = ", ".join(shown(scatter[name], answer.units[name]) for name in listed_names)
     if np.isfinite([*scatter.values()]).any():
         notes.append(f"scatter of {meanings}: {ranges}")
-    return notes, {"valid": valid.tolist(), "reasons": reasons, **{n: np.ravel(v).tolist() for n, v in scatter.items()}}
+    return notes, {
+        "valid": valid.tolist(),
+        "reasons": reasons,
+        **{n: np.ravel(v).tolist() for n, v in scatter.items()},
+    }
 
 
 def report_answer(
@@ -176,9 +240,14 @@ def report_answer(
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {stress}".rstrip()
     made = (
-        f", variant {answer.variant}, island model {answer.island_model}, rtol {model.rtol:g}" if answer.variant else ""
+        f", variant {answer.variant}, island model {answer.island_model}, rtol {model.rtol:g}"
+        if answer.variant
+        else ""
     )
-    notes += [f"theory {model.theory}{made}; {scale}", "error: relative, numerical, beside the theory's scatter"]
+    notes += [
+        f"theory {model.theory}{made}; {scale}",
+        "error: relative, numerical, beside the theory's scatter",
+    ]
     facts = {
         "theory": model.theory,
         "variant": answer.variant or None,

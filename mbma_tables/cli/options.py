@@ -56,7 +56,11 @@ class Model(NamedTuple):
         """Keywords for `contact`."""
         asked = self._asdict() | {"E_star": specimen.modulus}
         cap = asked.pop("hardness")
-        return asked if cap is None else asked | {"hardness": hardness_in(specimen.units, cap)}
+        return (
+            asked
+            if cap is None
+            else asked | {"hardness": hardness_in(specimen.units, cap)}
+        )
 
 
 class Output(NamedTuple):
@@ -79,15 +83,23 @@ def _parse_number(ctx: click.Context, param: click.Parameter, given: Any) -> Any
         return None if given is None else float(given)
     except ValueError:
         if not given.strip().startswith(tuple("+-.0123456789")):
-            raise click.BadParameter(f"{given!r} is not a number, nor one with its unit.", ctx, param) from None
+            raise click.BadParameter(
+                f"{given!r} is not a number, nor one with its unit.", ctx, param
+            ) from None
         return given
 
 
-def _parse_numbers(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> list[float | str] | None:
+def _parse_numbers(
+    ctx: click.Context, param: click.Parameter, given: tuple[str, ...]
+) -> list[float | str] | None:
     """All numbers of a repeated option, with commas between them; None where it was not given."""
     numbers: list[Any] = []
     for text in given:
-        numbers += [_parse_number(ctx, param, part) for part in text.split(",")] if text.strip() else []
+        numbers += (
+            [_parse_number(ctx, param, part) for part in text.split(",")]
+            if text.strip()
+            else []
+        )
     return numbers if given else None
 
 
@@ -98,10 +110,18 @@ def quantity_option(*names: str, help: str) -> Decorator:
 
 def numbers_option(*names: str, help: str) -> Decorator:
     """An option that may be repeated, each time with one number or several, each perhaps with its unit."""
-    return click.option(*names, multiple=True, callback=_parse_numbers, metavar="X[UNIT][,X...]", help=help)
+    return click.option(
+        *names,
+        multiple=True,
+        callback=_parse_numbers,
+        metavar="X[UNIT][,X...]",
+        help=help,
+    )
 
 
-def option_group(argument: str, build: Callable[[dict[str, Any]], Any], *options: Any) -> Decorator:
+def option_group(
+    argument: str, build: Callable[[dict[str, Any]], Any], *options: Any
+) -> Decorator:
     """Options that reach a command as one argument, built from their values by name."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -130,11 +150,15 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
     length, stress = given["length_unit"], given["stress_unit"]
     known = (*specimens.NUMBERS, *specimens.MAP_OPTIONS, "map", "model")
-    surface = given_values({"name": given["surface"]} | {name: given[name] for name in known})
+    surface = given_values(
+        {"name": given["surface"]} | {name: given[name] for name in known}
+    )
     material = given_values({name: given[name] for name in specimens.MATERIAL})
     if (given["file"] is None) == (not surface):
         got = ", ".join(["file"] * (given["file"] is not None) + list(surface)) or "none"
-        raise InputError(f"one surface is needed: --surface NAME, --file TOML, --map MAP, or its numbers; got {got}")
+        raise InputError(
+            f"one surface is needed: --surface NAME, --file TOML, --map MAP, or its numbers; got {got}"
+        )
     if given["file"] is not None:
         specimen = specimens.read_specimen(given["file"])
     else:
@@ -142,13 +166,18 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
         specimen = specimens.from_tables(tables, Path(), "surface given by numbers")
     if material:
         modulus, unit = specimens.effective_modulus_of(material, stress)
-        specimen = dataclasses.replace(specimen, E_star=modulus, stress_unit=unit or specimen.stress_unit)
+        specimen = dataclasses.replace(
+            specimen, E_star=modulus, stress_unit=unit or specimen.stress_unit
+        )
     return specimen.in_units(length, stress)
 
 
 def _option(name: str, help: str, **kind: Any) -> Decorator:
     """The option for one argument of the library, by its name; a quantity unless another kind is given."""
-    flag, kind = f"--{name.replace('_', '-')}", kind or {"callback": _parse_number, "metavar": "X[UNIT]"}
+    flag, kind = (
+        f"--{name.replace('_', '-')}",
+        kind or {"callback": _parse_number, "metavar": "X[UNIT]"},
+    )
     return click.option(flag, name.partition("/")[0], help=help, **kind)
 
 
@@ -158,9 +187,20 @@ _MAP_OPTIONS = (
     _option("dx", "Sampling step [length], of a map whose file has none;"),
     _option("dy", "and along its second axis, if another."),
     _option("channel", "Number of the map's channel in its file.", type=int),
-    _option("periodic/--not-periodic", "Whether the map continues periodically.", default=None),
-    _option("detrend", "What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", metavar="MODE"),
-    _option("outliers", "Remove points beyond N standard deviations; try 10.", type=float, metavar="N"),
+    _option(
+        "periodic/--not-periodic", "Whether the map continues periodically.", default=None
+    ),
+    _option(
+        "detrend",
+        "What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.",
+        metavar="MODE",
+    ),
+    _option(
+        "outliers",
+        "Remove points beyond N standard deviations; try 10.",
+        type=float,
+        metavar="N",
+    ),
     _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
     _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
     _option("long_cutoff", "Longest wavelength to keep [length]."),
@@ -170,9 +210,14 @@ _MAP_OPTIONS = (
     _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
 )
 length_unit = functools.partial(
-    click.option, "--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."
+    click.option,
+    "--length-unit",
+    metavar="UNIT",
+    help="Unit of plain lengths and of the answer, such as mm.",
 )
-stress_unit_option = _option("stress_unit", "Unit of plain moduli and of the answer, such as MPa.", metavar="UNIT")
+stress_unit_option = _option(
+    "stress_unit", "Unit of plain moduli and of the answer, such as MPa.", metavar="UNIT"
+)
 
 _SPECIMEN_OPTIONS = (
     _option(
@@ -184,7 +229,11 @@ _SPECIMEN_OPTIONS = (
     _option("file", "Surface: a TOML file.", type=PATH, metavar="TOML"),
     _option("map", "Surface: a measured map or line scan.", type=PATH, metavar="MAP"),
     *_MAP_OPTIONS,
-    _option("model", "Of a map: its own spectrum, or five numbers.", type=click.Choice(("measured", "self-affine"))),
+    _option(
+        "model",
+        "Of a map: its own spectrum, or five numbers.",
+        type=click.Choice(("measured", "self-affine")),
+    ),
     _option("hurst", "Surface in numbers: Hurst exponent, in (0, 1].", type=float),
     _option("q0", "Smallest wavenumber [1/length]."),
     _option("q1", "Largest wavenumber [1/length]; or give --zeta-1."),
@@ -194,7 +243,9 @@ _SPECIMEN_OPTIONS = (
     _option("m0", "Surface by moments: hurst, h_max, variance of height [length^2],"),
     _option("m2", "variance of a profile's slope,", type=float),
     _option("m4", "variance of a profile's second derivative [1/length^2]."),
-    _option("Rq", "Surface by a drawing: rms height of a profile [length], with hurst, h_max,"),
+    _option(
+        "Rq", "Surface by a drawing: rms height of a profile [length], with hurst, h_max,"
+    ),
     _option("Ra", "or its mean absolute height,"),
     _option("Sq", "or rms height of a map,"),
     _option("Sa", "or mean absolute height of a map;"),
@@ -203,10 +254,19 @@ _SPECIMEN_OPTIONS = (
     _option("Rsm", "or mean spacing of a profile's elements [length];"),
     _option("longest", "longest wavelength [length],"),
     _option("shortest", "or shortest wavelength [length],"),
-    _option("rolloff", "wavelength from which on a power law follows a flat spectrum [length],"),
+    _option(
+        "rolloff",
+        "wavelength from which on a power law follows a flat spectrum [length],",
+    ),
     _option("Sp", "highest point of a map [length] in place of --h-max,"),
-    _option("nominal_area", "or the nominal area [length^2], which determines the highest point."),
-    _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
+    _option(
+        "nominal_area",
+        "or the nominal area [length^2], which determines the highest point.",
+    ),
+    _option(
+        "E_star",
+        "Effective modulus; export needs one, elsewhere forces are over E* without it.",
+    ),
     _option("E1", "Instead of --E-star: Young's modulus,"),
     _option("nu1", "and Poisson's ratio of one body,", type=float),
     _option("E2", "Young's modulus of the other,"),
@@ -218,7 +278,9 @@ map_options = option_group("treatment", given_values, *_MAP_OPTIONS, length_unit
 specimen_options = option_group("specimen", _specimen, *_SPECIMEN_OPTIONS)
 # None where none of them is given
 optional_specimen_options = option_group(
-    "specimen", lambda given: _specimen(given) if given_values(given) else None, *_SPECIMEN_OPTIONS
+    "specimen",
+    lambda given: _specimen(given) if given_values(given) else None,
+    *_SPECIMEN_OPTIONS,
 )
 
 
@@ -228,25 +290,54 @@ def load_options(option: Callable[..., Decorator]) -> Decorator:
         "loads",
         given_values,
         option("--separation", "-d", help="Gap d from the mid-plane [length]."),
-        option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length]."),
-        option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given."),
+        option(
+            "--mean-separation",
+            "-u",
+            help="Instead: mean separation u = (h_max + d)/2 [length].",
+        ),
+        option(
+            "--pressure",
+            "-p",
+            help="Instead: force over nominal area, over E* where none is given.",
+        ),
         option("--area", "-a", help="Instead: real over nominal contact area."),
     )
 
 
 def json_option(instead: str) -> Decorator:
     """The option that prints JSON in place of a table, or of text."""
-    return click.option("--json", "as_json", is_flag=True, help=f"Print one JSON object instead of {instead}.")
+    return click.option(
+        "--json",
+        "as_json",
+        is_flag=True,
+        help=f"Print one JSON object instead of {instead}.",
+    )
 
 
 SHOWN: dict[str, Any] = {"show_default": True}
 variant_option = _option(
-    "variant", "Variant of the paper's equations, of mbma.", default="reported", type=click.Choice([*NAMED]), **SHOWN
+    "variant",
+    "Variant of the paper's equations, of mbma.",
+    default="reported",
+    type=click.Choice([*NAMED]),
+    **SHOWN,
 )
 _MODEL_OPTIONS = (
     variant_option,
-    _option("island_model", "Island model.", default="universal", type=click.Choice(ISLAND_MODELS), **SHOWN),
-    _option("rtol", "Requested numerical relative error.", type=float, default=DEFAULT_RTOL, **SHOWN),
+    _option(
+        "island_model",
+        "Island model.",
+        default="universal",
+        type=click.Choice(ISLAND_MODELS),
+        **SHOWN,
+    ),
+    _option(
+        "rtol",
+        "Requested numerical relative error.",
+        type=float,
+        default=DEFAULT_RTOL,
+        **SHOWN,
+    ),
 )
 theory_option = _option(
     "theory",
@@ -264,18 +355,31 @@ hardness_option = _option(
     metavar="X[UNIT]",
 )  # fmt: skip
 theory_options = option_group(
-    "model", lambda given: Model(**given_values(given)), theory_option, *_MODEL_OPTIONS, hardness_option
+    "model",
+    lambda given: Model(**given_values(given)),
+    theory_option,
+    *_MODEL_OPTIONS,
+    hardness_option,
 )
 
 output_options = option_group(
     "output",
     _output,
     json_option("a table"),
-    click.option("--csv", "as_csv", is_flag=True, help="Print CSV with '#' comments instead of a table."),
+    click.option(
+        "--csv",
+        "as_csv",
+        is_flag=True,
+        help="Print CSV with '#' comments instead of a table.",
+    ),
     _option("out", "Write to a file instead.", type=PATH, metavar="FILE"),
 )
-leakage_option = _option("leakage", "Add the flow coefficient of the gaps [length^3].", is_flag=True)
-plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE")
+leakage_option = _option(
+    "leakage", "Add the flow coefficient of the gaps [length^3].", is_flag=True
+)
+plot_option = _option(
+    "plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE"
+)
 
 
 # headings of help, and the options below them; others are below "Options"
@@ -283,24 +387,51 @@ _SECTIONS = {
     "What is known": LOADS,
     "Surface": ("surface", "file", "map"),
     "Measured map": (*specimens.MAP_OPTIONS, "model"),
-    "Surface in numbers": ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "nominal_area", "m0", "m2", "m4"),
+    "Surface in numbers": (
+        "hurst",
+        "q0",
+        "q1",
+        "zeta_1",
+        "h_rms",
+        "h_max",
+        "nominal_area",
+        "m0",
+        "m2",
+        "m4",
+    ),
     "Surface by roughness parameters": ROUGHNESS,
-    "Bodies": (*specimens.MATERIAL, "hardness", "conductivity", "length_unit", "stress_unit"),
+    "Bodies": (
+        *specimens.MATERIAL,
+        "hardness",
+        "conductivity",
+        "length_unit",
+        "stress_unit",
+    ),
     "Theory": ("theory", "variant", "island_model", "rtol"),
     "Options": (),
 }
 
 
-def format_options(command: click.Command, context: click.Context, formatter: click.HelpFormatter) -> None:
+def format_options(
+    command: click.Command, context: click.Context, formatter: click.HelpFormatter
+) -> None:
     """The options of a command for its help, in sections where there are many."""
-    parameters = [each for each in command.get_params(context) if isinstance(each, click.Option)]
-    titles = {name: title for title, names in reversed(_SECTIONS.items()) for name in names}
+    parameters = [
+        each for each in command.get_params(context) if isinstance(each, click.Option)
+    ]
+    titles = {
+        name: title for title, names in reversed(_SECTIONS.items()) for name in names
+    }
     titles = titles if len(parameters) > MANY else {}
     for title in _SECTIONS:
-        own = [each for each in parameters if titles.get(str(each.name), "Options") == title]
+        own = [
+            each for each in parameters if titles.get(str(each.name), "Options") == title
+        ]
         if own:
             with formatter.section(title):
-                formatter.write_dl([each.get_help_record(context) or ("", "") for each in own])
+                formatter.write_dl(
+                    [each.get_help_record(context) or ("", "") for each in own]
+                )
 
 
 def check_plot(plot: Path | None, out: Path | None) -> None:

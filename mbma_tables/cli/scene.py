@@ -49,7 +49,10 @@ def plan_command(file: Path, as_json: bool) -> None:
         echo(scene.explain(), nl=False)
         return
     plan = scene.plan()
-    content = {name: getattr(plan, name) for name in ("rtol", "error", "seconds", "left_out", "switched_off")}
+    content = {
+        name: getattr(plan, name)
+        for name in ("rtol", "error", "seconds", "left_out", "switched_off")
+    }
     content |= {"first_use_seconds": plan.first_use}
     steps = [vars(step) | {"island_model": step.island_model_name} for step in plan.steps]
     echo(to_json(content | {"steps": steps}))
@@ -79,11 +82,22 @@ def run_command(file: Path, out: Path | None, as_json: bool) -> None:
     # the quantities at gaps, or at islands if there are none at gaps
     dims = [field.dims for field in found.variables.values()]
     lines = next((lines for lines in (("gap",), ("island", "node")) if lines in dims), ())
-    fields = {str(name): field for name, field in found.variables.items() if field.dims == lines}
+    fields = {
+        str(name): field for name, field in found.variables.items() if field.dims == lines
+    }
     facts = found.attrs
-    made = f"variant {facts['variant']}" if facts["variant"] else f"theory {facts['theory']}"
-    error = f"error at most {facts['error']:.2g}" if math.isfinite(facts["error"]) else "error not known"
-    notes, units = [f"{made}, rtol {facts['rtol']:.3g}, {error}"], {n: f.attrs["units"] for n, f in fields.items()}
+    made = (
+        f"variant {facts['variant']}" if facts["variant"] else f"theory {facts['theory']}"
+    )
+    error = (
+        f"error at most {facts['error']:.2g}"
+        if math.isfinite(facts["error"])
+        else "error not known"
+    )
+    notes, units = (
+        [f"{made}, rtol {facts['rtol']:.3g}, {error}"],
+        {n: f.attrs["units"] for n, f in fields.items()},
+    )
     values = {name: field.values for name, field in fields.items()}
     report = Report("run", str(facts["title"]), notes, dict(facts), values, units)
     if out is not None:
@@ -110,7 +124,9 @@ def _export_joint(file: Path, out: Path, target: str, **options: Any) -> None:
     if "pressures" in options:
         ends = options["pressures"].split(":")
         if len(ends) != 2:
-            raise InputError(f"--pressures must be like 1MPa:50MPa, got {options['pressures']!r}")
+            raise InputError(
+                f"--pressures must be like 1MPa:50MPa, got {options['pressures']!r}"
+            )
         options["pressures"] = tuple(ends)
     if "quantity" in options:
         options["quantity"] = options["quantity"].split(",")
@@ -129,26 +145,73 @@ def _export_joint(file: Path, out: Path, target: str, **options: Any) -> None:
 _export_options = option_group(
     "export",
     given_values,
-    click.option("--export", "target", metavar="TARGET", help="Write for another program: a target of `mbma export`."),
-    click.option("--pressures", metavar="X:X", help="Of --export: smallest and largest pressure, such as 1MPa:50MPa."),
+    click.option(
+        "--export",
+        "target",
+        metavar="TARGET",
+        help="Write for another program: a target of `mbma export`.",
+    ),
+    click.option(
+        "--pressures",
+        metavar="X:X",
+        help="Of --export: smallest and largest pressure, such as 1MPa:50MPa.",
+    ),
     click.option("--name", help="Of the interaction, table, functions or module."),
-    click.option("--quantity", metavar="NAME[,NAME]", help="Of the rows; several for lsdyna, getdp, moose-function."),
+    click.option(
+        "--quantity",
+        metavar="NAME[,NAME]",
+        help="Of the rows; several for lsdyna, getdp, moose-function.",
+    ),
     click.option("--rows", type=int, help="Number of rows; else as few as --rtol needs."),
-    click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default."),
-    click.option("--without-heat", "heat", flag_value=False, default=None, help="Leave conductance out."),
-    click.option("--friction-pressure", metavar="X[UNIT]", help="At which a friction card's stiffness holds."),
-    click.option("--leakage", is_flag=True, default=None, help="Functions with the flow coefficient of the gaps."),
-    click.option("--peklenik", type=float, help="Of a film: length of the roughness along x over that along y."),
-    click.option("--binaries", type=click.Choice(["here", "all", "none"]), help="Of an FMU."),
+    click.option(
+        "--rtol",
+        type=float,
+        help="Largest relative error of linear interpolation; 1e-3 by default.",
+    ),
+    click.option(
+        "--without-heat",
+        "heat",
+        flag_value=False,
+        default=None,
+        help="Leave conductance out.",
+    ),
+    click.option(
+        "--friction-pressure",
+        metavar="X[UNIT]",
+        help="At which a friction card's stiffness holds.",
+    ),
+    click.option(
+        "--leakage",
+        is_flag=True,
+        default=None,
+        help="Functions with the flow coefficient of the gaps.",
+    ),
+    click.option(
+        "--peklenik",
+        type=float,
+        help="Of a film: length of the roughness along x over that along y.",
+    ),
+    click.option(
+        "--binaries", type=click.Choice(["here", "all", "none"]), help="Of an FMU."
+    ),
     click.option("--length-unit", metavar="UNIT", help="Of the file; mm by default."),
     click.option("--stress-unit", metavar="UNIT", help="Of the file; MPa by default."),
 )
 
 
-@click.command("joint", short_help="Stiffness, area, gap and conductance of two metal parts.")
+@click.command(
+    "joint", short_help="Stiffness, area, gap and conductance of two metal parts."
+)
 @toml_file
-@numbers_option("--pressure", "-p", help="Force over nominal area; plain numbers are in GPa.")
-@click.option("--force", multiple=True, metavar="X[UNIT]", help="In place of pressures: 40kN, on nominal_area.")
+@numbers_option(
+    "--pressure", "-p", help="Force over nominal area; plain numbers are in GPa."
+)
+@click.option(
+    "--force",
+    multiple=True,
+    metavar="X[UNIT]",
+    help="In place of pressures: 40kN, on nominal_area.",
+)
 @plot_option
 @_export_options
 @output_options
@@ -162,24 +225,31 @@ def joint_command(
 ) -> None:
     """Interface laws of the joint in FILE (TOML: materials, nominal_area, part_a, part_b) at pressures.
 
-    With --export the joint is written for another program instead, with conductance of solid spots and gas: any
-    target of `mbma export` that takes a law.
+    With --export the joint is written for another program instead, with conductance of
+    solid spots and gas: any target of `mbma export` that takes a law.
 
     Example: mbma joint examples/joint.toml --pressure 1MPa,10MPa,50MPa
 
-    Example: mbma joint examples/joint.toml --export abaqus --pressures 1MPa:50MPa --name JOINT --out joint.inp
+    Example: mbma joint examples/joint.toml --export abaqus --pressures 1MPa:50MPa --name
+    JOINT --out joint.inp
     """
     if "target" in export:
         if pressure or force or plot is not None or output.as_json or output.as_csv:
-            raise InputError("--export writes the joint: leave --pressure, --force, --plot, --json and --csv out")
+            raise InputError(
+                "--export writes the joint: leave --pressure, --force, --plot, --json and --csv out"
+            )
         if output.out is None:
             raise InputError("--export needs --out, the file to write")
         _export_joint(file, output.out, **export)
         return
     if export:
-        raise InputError(f"{', '.join(_flag(name) for name in export)} belong to --export TARGET")
+        raise InputError(
+            f"{', '.join(_flag(name) for name in export)} belong to --export TARGET"
+        )
     if bool(pressure) == bool(force):
-        raise InputError("pressures or forces are needed: --pressure or --force; or --export TARGET")
+        raise InputError(
+            "pressures or forces are needed: --pressure or --force; or --export TARGET"
+        )
     check_plot(plot, output.out)
     from mbma_tables.common.plots import to_picture
     from mbma_tables.joint import Joint
@@ -187,7 +257,9 @@ def joint_command(
     joint = Joint.from_toml(file)
     found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
     held, facts = joint.quantities(found), joint.facts()
-    values = {name: kept.values for name, kept in held.items()} | {"valid": np.where(found.valid, "yes", "no")}
+    values = {name: kept.values for name, kept in held.items()} | {
+        "valid": np.where(found.valid, "yes", "no")
+    }
     # a line for each assumption, as of other commands
     assumed = assumptions(joint.surface)
     notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
@@ -196,4 +268,6 @@ def joint_command(
         notes.append(f"not valid at {int(np.sum(mask))} of {np.size(mask)}: {reason}")
     units = {name: kept.unit for name, kept in held.items() if kept.unit != "1"}
     picture = b"" if plot is None else to_picture(joint.plot(), plot.suffix[1:])
-    Report("joint", file.name, notes, {**facts, "assumed": assumed}, values, units).write(output, plot, picture)
+    Report("joint", file.name, notes, {**facts, "assumed": assumed}, values, units).write(
+        output, plot, picture
+    )

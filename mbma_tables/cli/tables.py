@@ -22,7 +22,9 @@ def _place(name: str) -> tuple[Path, str | None]:
     from mbma_tables.theories.mbma.tables import shipped
 
     if name not in KINDS and not Path(name).exists():
-        raise InputError(f"no table and no file is called {name!r}: the tables are {' and '.join(KINDS)}")
+        raise InputError(
+            f"no table and no file is called {name!r}: the tables are {' and '.join(KINDS)}"
+        )
     return (shipped(name), name) if name in KINDS else (Path(name), None)
 
 
@@ -46,13 +48,28 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
 
         theory = BoundaryElements.from_netcdf(table)
         answer = theory.answer(theory.surface, theory.rows[2])
-        error, loads = float(np.abs(np.array(answer[:2]) / theory.rows[:2] - 1).max()), theory.rows.shape[1]
+        error, loads = (
+            float(np.abs(np.array(answer[:2]) / theory.rows[:2] - 1).max()),
+            theory.rows.shape[1],
+        )
         if not error <= FAITHFUL:
-            raise TableFileError(f"{table}: its curves miss its simulated loads by {error:.1e}; {OWN_REMEDY}")
-        found: dict[str, Any] = {"path": table, "kind": OWN, "points": loads, "table_error": error}
-        return found, f"{table}: hashes match; {loads} simulated loads: curves within {error:.1e}"
+            raise TableFileError(
+                f"{table}: its curves miss its simulated loads by {error:.1e}; {OWN_REMEDY}"
+            )
+        found: dict[str, Any] = {
+            "path": table,
+            "kind": OWN,
+            "points": loads,
+            "table_error": error,
+        }
+        return (
+            found,
+            f"{table}: hashes match; {loads} simulated loads: curves within {error:.1e}",
+        )
     v = verify(*_place(table))
-    solver = f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"
+    solver = (
+        f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"
+    )
     text = f"{v.path}: hashes match; {v.points} conformance points: table within {v.table_error:.1e}, exact solver "
     return v._asdict(), text + solver
 
@@ -65,12 +82,20 @@ def info_command(table: str, as_json: bool) -> None:
     entries: dict[str, Any]
     if holds_own(table):
         values, attributes = read_own(table)
-        kind, entries = "variables", {name: [float(v.min()), float(v.max())] for name, v in values.items()}
-        lines = [f"variable {name}: {values[name].size} numbers, {a:g} to {b:g}" for name, (a, b) in entries.items()]
+        kind, entries = (
+            "variables",
+            {name: [float(v.min()), float(v.max())] for name, v in values.items()},
+        )
+        lines = [
+            f"variable {name}: {values[name].size} numbers, {a:g} to {b:g}"
+            for name, (a, b) in entries.items()
+        ]
     else:
         content = read_table(*_place(table))
         kind, attributes = "axes", content.attributes
-        entries = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
+        entries = {
+            axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes
+        }
         # the universal table has cells, not nodes
         text = "axis {name}: {long_name}, {first:g} to {last:g}"
         text += "" if content.kind == UNIVERSAL else ", {nodes} nodes, {position_formula}"
@@ -85,8 +110,8 @@ def info_command(table: str, as_json: bool) -> None:
 def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     """Check hashes and conformance points of TABLES (kinds or files; all shipped ones if none is named).
 
-    The conformance points are answered by the table and by the exact solver, and compared with the stored answers; of
-    a table of your own surface the simulated loads are.
+    The conformance points are answered by the table and by the exact solver, and compared
+    with the stored answers; of a table of your own surface the simulated loads are.
     """
     verdicts, lines = zip(*map(_verified, tables or KINDS), strict=True)
     _show({"tables": verdicts}, lines, as_json)
@@ -98,14 +123,25 @@ def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
 def cache_command(clear: bool, as_json: bool) -> None:
     """Folder in which loads and flows of simulated maps are stored, number of files, and their size.
 
-    The environment variable MBMA_TABLES_CACHE names another folder; "off" disables the cache. When it
-    exceeds 1 GiB, the files used longest ago are removed.
+    The environment variable MBMA_TABLES_CACHE names another folder; "off" disables the
+    cache. When it exceeds 1 GiB, the files used longest ago are removed.
 
     Example: mbma cache --clear
     """
     place, removed = cache.folder(), cache.trim(0) if clear else 0
     kept = cache.files()
     size = sum(stat.st_size for _, stat in kept)
-    facts = {"folder": None if place is None else str(place), "files": len(kept), "bytes": size, "removed": removed}
-    line = f"{place}: {len(kept)} files, {size} bytes" + (f"; {removed} removed" if clear else "")
-    _show(facts, [f"nothing is kept: {cache.VARIABLE} is off" if place is None else line], as_json)
+    facts = {
+        "folder": None if place is None else str(place),
+        "files": len(kept),
+        "bytes": size,
+        "removed": removed,
+    }
+    line = f"{place}: {len(kept)} files, {size} bytes" + (
+        f"; {removed} removed" if clear else ""
+    )
+    _show(
+        facts,
+        [f"nothing is kept: {cache.VARIABLE} is off" if place is None else line],
+        as_json,
+    )

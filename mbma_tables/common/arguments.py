@@ -27,9 +27,17 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 R = TypeVar("R")
-SYMBOLS = {"H": "hurst", "d": "separation", "u": "mean_separation", "p": "pressure", "E": "E_star", "A": "area"}
+SYMBOLS = {
+    "H": "hurst",
+    "d": "separation",
+    "u": "mean_separation",
+    "p": "pressure",
+    "E": "E_star",
+    "A": "area",
+}
 FloatArray = NDArray[np.float64]
-Numbers: TypeAlias = "np.float64 | FloatArray | xr.DataArray"  # types of results: a number, an array, or these by name
+# types of results: a number, an array, or these by name
+Numbers: TypeAlias = "np.float64 | FloatArray | xr.DataArray"
 
 
 def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
@@ -37,7 +45,10 @@ def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
     if values.ndim == 0:
         return _shortest(values[()])
     places = np.argwhere(mask)
-    quoted = [f"{_shortest(values[tuple(p)])} at {tuple(int(i) for i in p)}" for p in places[:SHOWN]]
+    quoted = [
+        f"{_shortest(values[tuple(p)])} at {tuple(int(i) for i in p)}"
+        for p in places[:SHOWN]
+    ]
     more = len(places) - SHOWN
     return ", ".join(quoted) + (f" and {more} more" if more > 0 else "")
 
@@ -108,7 +119,10 @@ def is_labelled(value: Any) -> bool:
 def any_labelled(surface: Any, *values: Any) -> bool:
     """Whether a surface or any value is of DataArrays."""
     xarray: Any = sys.modules.get("xarray")
-    return xarray is not None and (surface.labelled or any(map(isinstance, values, itertools.repeat(xarray.DataArray))))
+    return xarray is not None and (
+        surface.labelled
+        or any(map(isinstance, values, itertools.repeat(xarray.DataArray)))
+    )
 
 
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
@@ -147,7 +161,9 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
         raise InputError(f"{name} is empty: at least one number is needed")
     bad = ~np.isfinite(array)
     if bad.any():
-        raise OutOfRangeError(f"{name} must be finite, got {describe_entries(array, bad)}", bad)
+        raise OutOfRangeError(
+            f"{name} must be finite, got {describe_entries(array, bad)}", bad
+        )
     return array
 
 
@@ -165,28 +181,39 @@ def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     return table.reshape(len(given), -1), shape
 
 
-def filled(fill: Callable[..., Any], columns: Any, outputs: int, *more: Any) -> FloatArray:
+def filled(
+    fill: Callable[..., Any], columns: Any, outputs: int, *more: Any
+) -> FloatArray:
     """Rows that a loop of the core, ``fill(*columns, *more, *rows)``, makes of flat columns of one length."""
     size = columns[0].size
     out = np.empty((outputs, size))
     if size <= BLOCK:
         fill(*columns, *more, *out)
     else:
-        in_blocks(lambda some: fill(*(each[some] for each in columns), *more, *out[:, some]), size, BLOCK)
+        in_blocks(
+            lambda some: fill(*(each[some] for each in columns), *more, *out[:, some]),
+            size,
+            BLOCK,
+        )
     return out
 
 
-def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> list[FloatArray]:
+def answered(
+    fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any
+) -> list[FloatArray]:
     """Rows computed by a loop of the core from the arguments, in their broadcast shape."""
     columns, shape = rows(*given)
     return list(filled(fill, columns, outputs, *more).reshape(outputs, *shape))
 
 
-def entry_by_entry(function: Callable[..., Any], width: int, *given: ArrayLike) -> FloatArray:
+def entry_by_entry(
+    function: Callable[..., Any], width: int, *given: ArrayLike
+) -> FloatArray:
     """Results of a function of flat arrays, computed block by block for the broadcast arguments.
 
-    Memory stays flat, and Ctrl-C takes effect between two blocks. The function needs about `width` numbers
-    for each entry; entries are the last axis of its results, which must not depend on one another.
+    Memory stays flat, and Ctrl-C takes effect between two blocks. The function needs about
+    `width` numbers for each entry; entries are the last axis of its results, which must not
+    depend on one another.
     """
     columns = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
     flat = [column.ravel() for column in columns]
@@ -207,13 +234,17 @@ def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:
     return list(zip(known.tolist(), np.split(order, first[1:]), strict=False))
 
 
-def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "") -> None:
+def require(
+    name: str, value: FloatArray, good: Any, allowed: str, unit: str = ""
+) -> None:
     """Raise an error for entries of `value` where `good` is false; `allowed` describes valid ones, `unit` is theirs."""
     if isinstance(good, np.bool_) and good:
         return
     bad = ~np.asarray(good, dtype=bool)
     if bad.any():
-        raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}{unit}", bad)
+        raise OutOfRangeError(
+            f"{name} must be {allowed}, got {describe_entries(value, bad)}{unit}", bad
+        )
 
 
 def positive_array(name: str, value: ArrayLike) -> FloatArray:
@@ -232,7 +263,9 @@ def checked_hardness(hardness: ArrayLike) -> FloatArray:
     except ValueError as fault:  # rows of different lengths
         raise InputError(f"hardness must be real numbers: {fault}") from None
     infinite = np.isposinf(values) if values.dtype.kind in "fiu" else False
-    given = finite_array("hardness", np.where(infinite, 1.0, values) if np.any(infinite) else hardness)
+    given = finite_array(
+        "hardness", np.where(infinite, 1.0, values) if np.any(infinite) else hardness
+    )
     require("hardness", given, given > 0, "positive, or infinite where nothing yields")
     return np.where(infinite, np.inf, given)
 
@@ -255,8 +288,14 @@ def number_in(name: str, value: Any, low: float, high: float) -> float:
 
 def whole_number_in(name: str, value: Any, low: int, high: int) -> int:
     """`value` as an int within [low, high]."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
-        raise InputError(f"{name} must be a whole number in [{low}, {high}], got {value!r}")
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | np.integer)
+        or not low <= value <= high
+    ):
+        raise InputError(
+            f"{name} must be a whole number in [{low}, {high}], got {value!r}"
+        )
     return int(value)
 
 
@@ -265,5 +304,7 @@ def broadcast_shape(**arguments: Any) -> tuple[int, ...]:
     try:
         return np.broadcast(*arguments.values()).shape
     except ValueError:
-        listed = ", ".join(f"{name} {np.shape(value)}" for name, value in arguments.items())
+        listed = ", ".join(
+            f"{name} {np.shape(value)}" for name, value in arguments.items()
+        )
         raise InputError(f"arguments do not broadcast: {listed}") from None

@@ -1,10 +1,12 @@
 """A folder of results that take long to compute, kept between processes: whole files, the oldest removed first.
 
-The folder is that of the platform's caches; the environment variable `MBMA_TABLES_CACHE` names another, and "off"
-turns it off. Results that cannot be read or written are computed again, without a warning.
+The folder is that of the platform's caches; the environment variable `MBMA_TABLES_CACHE`
+names another, and "off" turns it off. Results that cannot be read or written are computed
+again, without a warning.
 
-Each file ends in `SUFFIX`; files of other names in the folder are never read, counted or removed. It begins with the
-SHA-256 of what follows, arrays in numpy's compressed format, so that a damaged file is recognised before it is opened.
+Each file ends in `SUFFIX`; files of other names in the folder are never read, counted or
+removed. It begins with the SHA-256 of what follows, arrays in numpy's compressed format, so
+that a damaged file is recognised before it is opened.
 """
 
 import contextlib
@@ -35,8 +37,17 @@ def folder() -> pathlib.Path | None:
     if named:
         return pathlib.Path(named)
     home = pathlib.Path.home()
-    own = {"darwin": home / "Library" / "Caches", "win32": pathlib.Path(os.environ.get("LOCALAPPDATA") or home)}
-    return own.get(sys.platform, pathlib.Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")) / "mbma_tables"
+    own = {
+        "darwin": home / "Library" / "Caches",
+        "win32": pathlib.Path(os.environ.get("LOCALAPPDATA") or home),
+    }
+    return (
+        own.get(
+            sys.platform,
+            pathlib.Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache"),
+        )
+        / "mbma_tables"
+    )
 
 
 def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
@@ -56,7 +67,10 @@ def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
         if not shapes.keys() <= set(archive.files):
             return None
         arrays: dict[str, Any] = {key: archive[key] for key in shapes}
-    if any(arrays[key].shape != shape or not np.isfinite(arrays[key]).all() for key, shape in shapes.items()):
+    if any(
+        arrays[key].shape != shape or not np.isfinite(arrays[key]).all()
+        for key, shape in shapes.items()
+    ):
         return None
     with contextlib.suppress(OSError):
         os.utime(path)

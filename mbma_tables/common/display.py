@@ -1,7 +1,7 @@
 """Display of results: a line in a terminal, a small table with its picture in a notebook, an xarray Dataset.
 
-A class that derives from `Displayed` defines its description (`_facts`), its quantities (`_variables`) and its
-picture (`_figure`).
+A class that derives from `Displayed` defines its description (`_facts`), its quantities
+(`_variables`) and its picture (`_figure`).
 """
 
 from __future__ import annotations
@@ -45,7 +45,11 @@ def shown(value: Any, unit: str = "1") -> str:
         return f"<DataArray {dict(value.sizes)}>"
     numbers = np.asarray(value)
     if numbers.dtype == bool:
-        return str(bool(numbers)) if numbers.ndim == 0 else f"{int(numbers.sum())} of {numbers.size}"
+        return (
+            str(bool(numbers))
+            if numbers.ndim == 0
+            else f"{int(numbers.sum())} of {numbers.size}"
+        )
     known = numbers[~np.isnan(numbers)]
     if not known.size:
         return "not known"
@@ -65,10 +69,20 @@ class Displayed:
     _dims: ClassVar[tuple[str, ...] | None] = None
 
     def __init_subclass__(cls) -> None:
-        held = {name: each.metadata for name, each in vars(cls).items() if isinstance(each, dataclasses.Field)}
-        lines = [f"{name}\n    {about['meaning']}" for name, about in held.items() if "meaning" in about]
+        held = {
+            name: each.metadata
+            for name, each in vars(cls).items()
+            if isinstance(each, dataclasses.Field)
+        }
+        lines = [
+            f"{name}\n    {about['meaning']}"
+            for name, about in held.items()
+            if "meaning" in about
+        ]
         if lines and cls.__doc__:
-            cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__), "\nAttributes\n----------", *lines])
+            cls.__doc__ = "\n".join(
+                [inspect.cleandoc(cls.__doc__), "\nAttributes\n----------", *lines]
+            )
 
     def _facts(self) -> Mapping[str, str]:
         """Its description, by name."""
@@ -77,9 +91,18 @@ class Displayed:
     def _variables(self) -> Mapping[str, Variable]:
         """Its quantities, by name."""
         own: Any = self
-        known = {each.name: each.metadata["meaning"] for each in dataclasses.fields(own) if each.metadata}
+        known = {
+            each.name: each.metadata["meaning"]
+            for each in dataclasses.fields(own)
+            if each.metadata
+        }
         return {
-            name: Variable(getattr(self, name), self.units.get(name, "1"), re.split(r";| \[", text)[0], self._dims)
+            name: Variable(
+                getattr(self, name),
+                self.units.get(name, "1"),
+                re.split(r";| \[", text)[0],
+                self._dims,
+            )
             for name, text in known.items()
         }
 
@@ -130,7 +153,9 @@ def saved(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
     if path is not None:
         kind = os.fspath(path).rpartition(".")[2]
         if kind not in KINDS:
-            raise InputError(f"a picture's name must end with one of .{', .'.join(KINDS)}, got {os.fspath(path)!r}")
+            raise InputError(
+                f"a picture's name must end with one of .{', .'.join(KINDS)}, got {os.fspath(path)!r}"
+            )
         write_file(path, to_picture(figure, kind))
     return figure
 
@@ -144,7 +169,13 @@ def dataset_of(variables: Mapping[str, Variable], facts: Mapping[str, str]) -> x
             made[name] = values.assign_attrs(described)
             continue
         rank = np.ndim(values)
-        own = dims if dims is not None else ("point",) if rank == 1 else tuple(f"dim_{k}" for k in range(rank))
+        own = (
+            dims
+            if dims is not None
+            else ("point",)
+            if rank == 1
+            else tuple(f"dim_{k}" for k in range(rank))
+        )
         made[name] = xarray.Variable(own, values, described)
     dataset: xr.Dataset = xarray.Dataset(made, attrs=dict(facts))
     return dataset

@@ -8,7 +8,8 @@ from mbma_tables.common.plain_text import visible
 class MbmaError(Exception):
     """Base of every error that this library raises on purpose.
 
-    Its message may quote a user's text, such as the name of a file: control characters are escapes in it.
+    Its message may quote a user's text, such as the name of a file: control characters are
+    escapes in it.
     """
 
     def __init__(self, message: object = "") -> None:

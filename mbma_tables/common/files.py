@@ -38,7 +38,11 @@ def numbers_of(lines: list[str], delimiter: str | None) -> FloatArray:
             warnings.simplefilter("error")  # for a file without numbers
             return np.loadtxt(lines, ndmin=2, delimiter=delimiter)
     except (ValueError, UserWarning) as fault:
-        raise InputError(re.sub(r"could not convert string .* to float64 at", "no number at", str(fault))) from None
+        raise InputError(
+            re.sub(
+                r"could not convert string .* to float64 at", "no number at", str(fault)
+            )
+        ) from None
 
 
 def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
@@ -47,19 +51,28 @@ def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
         # a pipe would wait for a writer, a device may have no end
         if os.fspath(path) != "-" and not stat.S_ISREG(os.stat(path).st_mode):
             raise InputError(f"{path} cannot be read: it is not a regular file")
-        with contextlib.nullcontext(sys.stdin.buffer) if os.fspath(path) == "-" else open(path, "rb") as stream:
+        with (
+            contextlib.nullcontext(sys.stdin.buffer)
+            if os.fspath(path) == "-"
+            else open(path, "rb") as stream
+        ):
             content = stream.read(max_bytes + 1)
     except OSError as fault:
         raise InputError(f"{path} cannot be read: {fault.strerror or fault}") from None
     if len(content) > max_bytes:
-        raise InputError(f"{path} has more than {max_bytes} bytes, which is too large for such a file")
+        raise InputError(
+            f"{path} has more than {max_bytes} bytes, which is too large for such a file"
+        )
     return content
 
 
-def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool = False) -> None:
+def write_file(
+    path: os.PathLike[str] | str, content: bytes, make_folders: bool = False
+) -> None:
     """Write a file whole or not at all: under a temporary name beside it, which then replaces it.
 
-    Links are followed, "-" is standard output. Where it cannot be written, what was there before is unchanged.
+    Links are followed, "-" is standard output. Where it cannot be written, what was there
+    before is unchanged.
     """
     if os.fspath(path) == "-":
         sys.stdout.buffer.write(content)
@@ -76,7 +89,8 @@ def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool 
         if make_folders:
             target.parent.mkdir(parents=True, exist_ok=True)
         with contextlib.suppress(FileNotFoundError):
-            # replacing would turn a device such as /dev/null into a regular file; a link to itself ends here
+            # replacing would turn a device such as /dev/null into a regular file; a link to
+            # itself ends here
             if not stat.S_ISREG(os.stat(target).st_mode):
                 raise InputError(f"{path} cannot be written: it is not a regular file")
         try:

@@ -10,7 +10,9 @@ WAIT = 0.1  # s between two checks for Ctrl-C
 
 def in_blocks(fill: Callable[[slice], Answer], count: int, size: int) -> list[Answer]:
     """``fill(slice)`` of each `size` of `count` entries, in order; Ctrl-C takes effect between two of them."""
-    return [fill(slice(first, min(first + size, count))) for first in range(0, count, size)]
+    return [
+        fill(slice(first, min(first + size, count))) for first in range(0, count, size)
+    ]
 
 
 def interruptible(compute: Callable[[], Answer]) -> Answer:

@@ -1,7 +1,8 @@
 """Open and check table files (netCDF-4), which `generate.tables.writing` writes; write those of a user's own surface.
 
-A file ends in a line with the SHA-256 of all bytes before it, which is checked before the HDF5 library opens the file,
-since that may crash on damaged bytes. HDF5 ignores what follows its own end of file.
+A file ends in a line with the SHA-256 of all bytes before it, which is checked before the
+HDF5 library opens the file, since that may crash on damaged bytes. HDF5 ignores what
+follows its own end of file.
 """
 
 from __future__ import annotations
@@ -34,7 +35,11 @@ MAX_BYTES = 256 * 2**20  # largest size of a file, and of its values
 # the HDF5 library is not thread-safe, and a process must not be forked during its calls
 HDF5_LOCK = threading.RLock()
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(before=HDF5_LOCK.acquire, after_in_parent=HDF5_LOCK.release, after_in_child=HDF5_LOCK.release)
+    os.register_at_fork(
+        before=HDF5_LOCK.acquire,
+        after_in_parent=HDF5_LOCK.release,
+        after_in_child=HDF5_LOCK.release,
+    )
 
 
 def digest_json(content: Any) -> str:
@@ -57,15 +62,22 @@ def digest_arrays(arrays: dict[str, Any]) -> str:
 def _attributes_of(owner: Any) -> dict[str, Any]:
     """The attributes of a file or a variable as plain Python values, lists where they are arrays."""
     values = {name: owner.getncattr(name) for name in owner.ncattrs()}
-    return {name: v.tolist() if isinstance(v, np.ndarray | np.generic) else v for name, v in values.items()}
+    return {
+        name: v.tolist() if isinstance(v, np.ndarray | np.generic) else v
+        for name, v in values.items()
+    }
 
 
 def attributes_digest(dataset: netCDF4.Dataset) -> str:
     """SHA-256 of all attributes of a file except this hash, and of the dimensions and attributes of its variables."""
     own = _attributes_of(dataset)
-    content = {"": {name: value for name, value in own.items() if name != "attributes_sha256"}}
+    content = {
+        "": {name: value for name, value in own.items() if name != "attributes_sha256"}
+    }
     for name, variable in dataset.variables.items():
-        content[name] = _attributes_of(variable) | {"dimensions": list(variable.dimensions)}
+        content[name] = _attributes_of(variable) | {
+            "dimensions": list(variable.dimensions)
+        }
     return digest_json(content)
 
 
@@ -74,12 +86,18 @@ def read_sealed(path: pathlib.Path, remedy: str = REMEDY.format("all")) -> bytes
     try:
         content = read_file(path, MAX_BYTES)
     except InputError as fault:
-        raise TableFileError(f"{path}: {str(fault).removeprefix(f'{path} ')}; {remedy}") from None
+        raise TableFileError(
+            f"{path}: {str(fault).removeprefix(f'{path} ')}; {remedy}"
+        ) from None
     body, seal = content[:-SEAL_LENGTH], content[-SEAL_LENGTH:]
     if not seal.startswith(SEAL) or not seal.endswith(b"\n"):
-        raise TableFileError(f"{path}: is not a table file, or is cut short (no checksum at its end); {remedy}")
+        raise TableFileError(
+            f"{path}: is not a table file, or is cut short (no checksum at its end); {remedy}"
+        )
     if seal[len(SEAL) : -1] != hashlib.sha256(body).hexdigest().encode():
-        raise TableFileError(f"{path}: is damaged (its checksum does not match); {remedy}")
+        raise TableFileError(
+            f"{path}: is damaged (its checksum does not match); {remedy}"
+        )
     return body
 
 
@@ -97,7 +115,9 @@ def opened(path: os.PathLike[str] | str, remedy: str) -> Iterator[netCDF4.Datase
         raise TableFileError(f"{source}: {fault}; {remedy}") from None
     # raised by netCDF4 for bytes that are not a netCDF file, or without a variable
     except (OSError, RuntimeError, LookupError) as fault:
-        raise TableFileError(f"{source}: is not a table file ({fault}); {remedy}") from None
+        raise TableFileError(
+            f"{source}: is not a table file ({fault}); {remedy}"
+        ) from None
 
 
 def verified(
@@ -107,19 +127,33 @@ def verified(
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
     own = _attributes_of(dataset)
-    described = {name: _attributes_of(variable) for name, variable in dataset.variables.items()}
+    described = {
+        name: _attributes_of(variable) for name, variable in dataset.variables.items()
+    }
     for owner, attributes in {"": own, **described}.items():
         for name, value in attributes.items():
             schema.check_attribute(owner, name, value)
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
-            raise ValueError(f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}")
+            raise ValueError(
+                f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}"
+            )
     missing = [name for name in required if name not in own]
     if missing or own.get("attributes_sha256") != attributes_digest(dataset):
-        raise ValueError(f"lacks attribute {missing[0]}" if missing else "has attributes that were edited")
-    if dataset.groups or sum(variable.size for variable in dataset.variables.values()) * 8 > MAX_BYTES:
+        raise ValueError(
+            f"lacks attribute {missing[0]}"
+            if missing
+            else "has attributes that were edited"
+        )
+    if (
+        dataset.groups
+        or sum(variable.size for variable in dataset.variables.values()) * 8 > MAX_BYTES
+    ):
         raise ValueError(f"has groups, or more than {MAX_BYTES} bytes of values")
-    values = {name: np.ascontiguousarray(variable[...]) for name, variable in dataset.variables.items()}
+    values = {
+        name: np.ascontiguousarray(variable[...])
+        for name, variable in dataset.variables.items()
+    }
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
     if digest_arrays(values) != own["values_sha256"]:
         raise ValueError("has values that do not match their hash")
@@ -129,31 +163,59 @@ def verified(
 def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     """The table in an open file of known kind and format."""
     own, described, values = verified(dataset, schema.REQUIRED)
-    names, fields = [name for name, _ in schema.AXES[kind]], ("long_name", "transform", "offset", "first", "last")
-    axes = tuple(schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size)) for name in names)
+    names, fields = (
+        [name for name, _ in schema.AXES[kind]],
+        ("long_name", "transform", "offset", "first", "last"),
+    )
+    axes = tuple(
+        schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size))
+        for name in names
+    )
     kinds = schema.COEFFICIENTS[kind], "error"
     for what, over in zip(kinds, schema.dimensions(kind), strict=True):
-        if any(dataset[f"{what}_{function}"].dimensions != over for function in schema.FUNCTIONS):
+        if any(
+            dataset[f"{what}_{function}"].dimensions != over
+            for function in schema.FUNCTIONS
+        ):
             raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
     coefficients, local_error = (
-        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1) for what in kinds
+        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1)
+        for what in kinds
     )
-    main = {f"{what}_{function}" for what in kinds for function in schema.FUNCTIONS} | set(names)
+    main = {
+        f"{what}_{function}" for what in kinds for function in schema.FUNCTIONS
+    } | set(names)
     point = "conformance_"
     beside = [name for name in values if name not in main and not name.startswith(point)]
-    auxiliary = {name: (dataset[name].dimensions, values[name], described[name]) for name in beside}
-    conformance = {name.removeprefix(point): values[name] for name in values if name.startswith(point)}
-    return schema.TableContent(kind, axes, coefficients, local_error, auxiliary, conformance, own)
+    auxiliary = {
+        name: (dataset[name].dimensions, values[name], described[name]) for name in beside
+    }
+    conformance = {
+        name.removeprefix(point): values[name]
+        for name in values
+        if name.startswith(point)
+    }
+    return schema.TableContent(
+        kind, axes, coefficients, local_error, auxiliary, conformance, own
+    )
 
 
-def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.TableContent:
+def read_table(
+    path: os.PathLike[str] | str, kind: str | None = None
+) -> schema.TableContent:
     """Open and check a table file, which must be of a `kind` where one is given."""
     with opened(path, REMEDY.format(kind or "all")) as dataset:
-        found, version = (getattr(dataset, name, None) for name in ("mbma_kind", "format_version"))
+        found, version = (
+            getattr(dataset, name, None) for name in ("mbma_kind", "format_version")
+        )
         if found not in schema.KINDS or (kind is not None and found != kind):
-            raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(schema.KINDS)}")
+            raise ValueError(
+                f"holds a table of kind {found!r}, not {kind or ' or '.join(schema.KINDS)}"
+            )
         if version != schema.FORMAT_VERSIONS[found]:
-            raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
+            raise ValueError(
+                f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}"
+            )
         content = _content(dataset, found)
         schema.check_content(content)
     return content
@@ -183,7 +245,12 @@ def write_own(
     import netCDF4
 
     arrays = {name: np.asarray(entry[1], float) for name, entry in variables.items()}
-    own = {"mbma_kind": OWN, "format_version": OWN_FORMAT, "values_sha256": digest_arrays(arrays), **attributes}
+    own = {
+        "mbma_kind": OWN,
+        "format_version": OWN_FORMAT,
+        "values_sha256": digest_arrays(arrays),
+        **attributes,
+    }
 
     def write(draft: str) -> None:
         with HDF5_LOCK, netCDF4.Dataset(draft, "w", format="NETCDF4") as dataset:
@@ -191,7 +258,9 @@ def write_own(
                 for dimension, size in zip(over, arrays[name].shape, strict=True):
                     if dimension not in dataset.dimensions:
                         dataset.createDimension(dimension, size)
-                variable = dataset.createVariable(name, "f8", over, zlib=bool(over), endian="little", fill_value=False)
+                variable = dataset.createVariable(
+                    name, "f8", over, zlib=bool(over), endian="little", fill_value=False
+                )
                 variable.setncatts({"long_name": meaning, "units": units})
                 variable[...] = arrays[name]
             dataset.setncatts(own)
@@ -207,7 +276,9 @@ def write_own(
 def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Values and attributes of such a file, checked; TableFileError for damaged, edited and other ones."""
     with opened(path, OWN_REMEDY) as dataset:
-        own, _, values = verified(dataset, ("mbma_kind", "format_version", "values_sha256"))
+        own, _, values = verified(
+            dataset, ("mbma_kind", "format_version", "values_sha256")
+        )
         if (own["mbma_kind"], own["format_version"]) != (OWN, OWN_FORMAT):
             raise ValueError(
                 f"holds a {own['mbma_kind']} of format {own['format_version']}, not a {OWN} of {OWN_FORMAT}"

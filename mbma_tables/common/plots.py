@@ -51,7 +51,9 @@ class Curve:
     gap: FloatArray  # mean separation u/h_rms (50)
     pressure: FloatArray  # F/A0, or F/(A0 E*)
     area: FloatArray  # A/A0
-    scatter: FloatArray | None = None  # standard deviation of ln F at the gap, drawn as a band,
+    scatter: FloatArray | None = (
+        None  # standard deviation of ln F at the gap, drawn as a band,
+    )
     area_scatter: FloatArray | None = None  # and of ln A at the force
     leakage: FloatArray | None = None  # flow coefficient of the gaps, zero where blocked,
     leakage_scatter: FloatArray | None = None  # and standard deviation of its logarithm
@@ -59,7 +61,9 @@ class Curve:
 
 def new_figure(width: float, height: float) -> Figure:
     """A figure [inches] that is independent of pyplot and that notebooks show."""
-    figure: Any = needed("matplotlib.figure").Figure(figsize=(width, height), layout="constrained")
+    figure: Any = needed("matplotlib.figure").Figure(
+        figsize=(width, height), layout="constrained"
+    )
     figure._repr_png_ = lambda: to_picture(figure, dpi=72)
     made: Figure = figure
     return made
@@ -76,11 +80,15 @@ def draw_line(x: Any, y: Any, x_label: str, y_label: str) -> Figure:
 
 
 def draw_panels(
-    x: FloatArray, panels: Mapping[str, Sequence[tuple[str, FloatArray, FloatArray | None]]], x_label: str
+    x: FloatArray,
+    panels: Mapping[str, Sequence[tuple[str, FloatArray, FloatArray | None]]],
+    x_label: str,
 ) -> Figure:
     """Panels by the label of their ordinate, of lines: name, values, and standard deviation of ln or None."""
     figure = new_figure(5 * (len(panels) + 1) // 2, 8)
-    for axes, (label, lines) in zip(figure.subplots(2, -(-len(panels) // 2)).flat, panels.items(), strict=False):
+    for axes, (label, lines) in zip(
+        figure.subplots(2, -(-len(panels) // 2)).flat, panels.items(), strict=False
+    ):
         for name, y, scatter in lines:
             axes.loglog(x, y, label=name)
             _band(axes, x, y, scatter)
@@ -101,9 +109,9 @@ def draw_compression(
 ) -> Figure:
     """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
 
-    A third one, flow coefficient against pressure, where a curve has leakage, and one for each label of `more`, with
-    lines by name over the first curve's pressure. Points without contact, and blocked flow, have no place on a
-    logarithmic axis and are left out.
+    A third one, flow coefficient against pressure, where a curve has leakage, and one for
+    each label of `more`, with lines by name over the first curve's pressure. Points without
+    contact, and blocked flow, have no place on a logarithmic axis and are left out.
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
@@ -114,17 +122,28 @@ def draw_compression(
     ][: 2 + any(curve.leakage is not None for curve in curves)]
     figure = new_figure(5 * (len(panels) + len(more)), 4.5)
     own, others = np.split(figure.subplots(1, len(panels) + len(more)), [len(panels)])
-    for axes, (x_name, y_name, scatter, x_label, y_label) in zip(own, panels, strict=True):
+    for axes, (x_name, y_name, scatter, x_label, y_label) in zip(
+        own, panels, strict=True
+    ):
         for curve in curves:
             touches = (curve.pressure > 0) & (curve.area > 0)
             if not touches.any():
-                raise InputError(f"{curve.label!r} has no contact to draw on logarithmic axes")
+                raise InputError(
+                    f"{curve.label!r} has no contact to draw on logarithmic axes"
+                )
             x, y = getattr(curve, x_name), getattr(curve, y_name)
             if y is not None:
                 y = np.where(touches & (np.asarray(y) > 0), y, np.nan)
-                axes.plot(x, y, marker="." if curve is curves[0] else "", label=curve.label)
+                axes.plot(
+                    x, y, marker="." if curve is curves[0] else "", label=curve.label
+                )
                 _band(axes, x, y, getattr(curve, scatter))
-        axes.set(xlabel=x_label, ylabel=y_label, xscale="linear" if x_name == "gap" else "log", yscale="log")
+        axes.set(
+            xlabel=x_label,
+            ylabel=y_label,
+            xscale="linear" if x_name == "gap" else "log",
+            yscale="log",
+        )
     for axes, (label, lines) in zip(others, more.items(), strict=True):
         for name, values in lines.items():
             axes.loglog(curves[0].pressure, values, marker=".", label=name)
@@ -144,22 +163,37 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
     known = np.isfinite(scatter) & (y > 0)
     factor = np.exp(np.where(known, scatter, 0.0))
     colour = axes.lines[-1].get_color()
-    axes.fill_between(x, y / factor, y * factor, where=known.tolist(), alpha=0.25, color=colour, lw=0)
+    axes.fill_between(
+        x, y / factor, y * factor, where=known.tolist(), alpha=0.25, color=colour, lw=0
+    )
 
 
-def to_picture(figure: Figure, kind: str = "png", dpi: float = 120, outlines: bool = False) -> bytes:
+def to_picture(
+    figure: Figure, kind: str = "png", dpi: float = 120, outlines: bool = False
+) -> bytes:
     """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure.
 
-    Text stays text in SVG; with `outlines` its letters are drawn as paths, which need no font, and coordinates have
-    two decimals, so that rounding differences between machines do not change the file.
+    Text stays text in SVG; with `outlines` its letters are drawn as paths, which need no
+    font, and coordinates have two decimals, so that rounding differences between machines
+    do not change the file.
     """
     import matplotlib as mpl
 
     content = io.BytesIO()
     # files contain no time stamps and no random numbers
-    stable: Any = {"svg.fonttype": "path" if outlines else "none", "svg.hashsalt": "mbma_tables"}
-    undated: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}}
+    stable: Any = {
+        "svg.fonttype": "path" if outlines else "none",
+        "svg.hashsalt": "mbma_tables",
+    }
+    undated: dict[str, Any] = {
+        "svg": {"Date": None, "Creator": None},
+        "pdf": {"CreationDate": None},
+    }
     with mpl.rc_context(stable):
         figure.savefig(content, format=kind, dpi=dpi, metadata=undated.get(kind))
     drawn = content.getvalue()
-    return re.sub(rb'(\.\d\d)\d+(?=[ \n"])', rb"\1", drawn) if kind == "svg" and outlines else drawn
+    return (
+        re.sub(rb'(\.\d\d)\d+(?=[ \n"])', rb"\1", drawn)
+        if kind == "svg" and outlines
+        else drawn
+    )

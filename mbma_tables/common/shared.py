@@ -40,7 +40,9 @@ def frozen(value: T) -> T:
     return value
 
 
-def shared(maxsize: int | None = None) -> Callable[[Callable[..., T]], "functools._lru_cache_wrapper[T]"]:
+def shared(
+    maxsize: int | None = None,
+) -> Callable[[Callable[..., T]], "functools._lru_cache_wrapper[T]"]:
     """Decorator: results are kept as by `functools.lru_cache`, with read-only arrays."""
 
     def decorate(make: Callable[..., T]) -> "functools._lru_cache_wrapper[T]":

@@ -1,8 +1,9 @@
 """Units of length and stress: known units, parsing and conversion of texts such as "0.8 um", units of results.
 
-The same rule applies everywhere. Plain numbers are in the known unit, the surface's or the modulus's; texts with a unit
-are converted to it. A requested unit converts values that have another one, and is that of plain numbers if none is
-known yet. An error is raised for values that cannot be converted.
+The same rule applies everywhere. Plain numbers are in the known unit, the surface's or the
+modulus's; texts with a unit are converted to it. A requested unit converts values that have
+another one, and is that of plain numbers if none is known yet. An error is raised for
+values that cannot be converted.
 """
 
 import dataclasses
@@ -19,20 +20,38 @@ from mbma_tables.common.arguments import one_number, positive_array
 from mbma_tables.common.errors import InputError
 
 _POUND_PER_INCH = Fraction("4.4482216152605") / Fraction("0.0254") ** 2
-_LENGTHS = (
-    "m=1 km=1e3 cm=1e-2 mm=1e-3 um=1e-6 nm=1e-9 angstrom=1e-10 pm=1e-12 ft=0.3048 in=0.0254 mil=254e-7 uin=254e-10"
-)
+_LENGTHS = "m=1 km=1e3 cm=1e-2 mm=1e-3 um=1e-6 nm=1e-9 angstrom=1e-10 pm=1e-12 ft=0.3048 in=0.0254 mil=254e-7 uin=254e-10"
 _STRESSES = "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 TPa=1e12 bar=1e5 atm=101325"
 SIZES: dict[str, dict[str, Fraction]] = {
-    kind: {unit: Fraction(size) for unit, size in (pair.split("=") for pair in text.split())}
+    kind: {
+        unit: Fraction(size) for unit, size in (pair.split("=") for pair in text.split())
+    }
     for kind, text in {"length": _LENGTHS, "stress": _STRESSES}.items()
 }
-SIZES["stress"] |= {"psi": _POUND_PER_INCH, "ksi": 1000 * _POUND_PER_INCH, "Msi": 10**6 * _POUND_PER_INCH}
+SIZES["stress"] |= {
+    "psi": _POUND_PER_INCH,
+    "ksi": 1000 * _POUND_PER_INCH,
+    "Msi": 10**6 * _POUND_PER_INCH,
+}
 SIZES["force"] = {
     unit: Fraction(size)
-    for unit, size in (("N", 1), ("mN", "1e-3"), ("kN", 1000), ("MN", 10**6), ("lbf", "4.4482216152605"))
+    for unit, size in (
+        ("N", 1),
+        ("mN", "1e-3"),
+        ("kN", 1000),
+        ("MN", 10**6),
+        ("lbf", "4.4482216152605"),
+    )
 }
-ALIASES = {"micron": "um", "Å": "angstrom", "inch": "in", "N/mm^2": "MPa", "N/mm2": "MPa", "N/m^2": "Pa", "N/m2": "Pa"}
+ALIASES = {
+    "micron": "um",
+    "Å": "angstrom",
+    "inch": "in",
+    "N/mm^2": "MPa",
+    "N/mm2": "MPa",
+    "N/m^2": "Pa",
+    "N/m2": "Pa",
+}
 # powers of length and of stress of named quantities
 DIMENSIONS = {
     name: powers
@@ -58,29 +77,42 @@ DIMENSIONS = {
     }.items()
     for name in names.split()
 }
-CONDUCTIVITIES = {"W/mK": "W/(m^2 K)", "S/m": "S/m^2"}  # and the unit of conductance, over a length in metres
-_ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "²": "2"})
+CONDUCTIVITIES = {
+    "W/mK": "W/(m^2 K)",
+    "S/m": "S/m^2",
+}  # and the unit of conductance, over a length in metres
+_ASCII = str.maketrans(
+    {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "²": "2"}
+)
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.DOTALL)
 
 
 def known(unit: Any, kind: str = "length") -> str:
     """A unit's name as this package writes it; the error for an unknown one suggests the nearest."""
     if not isinstance(unit, str):
-        raise InputError(f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}")
+        raise InputError(
+            f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}"
+        )
     plain = ALIASES.get(unit.strip(), unit.strip().translate(_ASCII))
     plain = ALIASES.get(plain, plain)
     if kind == "length" and plain in SIZES["stress"]:
-        raise InputError(f"{unit!r} is no known unit of length but one of stress, as pressure= takes")
+        raise InputError(
+            f"{unit!r} is no known unit of length but one of stress, as pressure= takes"
+        )
     if plain not in SIZES[kind]:
         near = difflib.get_close_matches(plain, SIZES[kind], 3, 0.6) or SIZES[kind]
-        raise InputError(f"{unit!r} is no known unit of {kind}: write {' or '.join(near)}")
+        raise InputError(
+            f"{unit!r} is no known unit of {kind}: write {' or '.join(near)}"
+        )
     return plain
 
 
 @functools.lru_cache(1024)
 def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
     """Factor from one unit to another, rounded once."""
-    return float((SIZES[kind][known(have, kind)] / SIZES[kind][known(want, kind)]) ** power)
+    return float(
+        (SIZES[kind][known(have, kind)] / SIZES[kind][known(want, kind)]) ** power
+    )
 
 
 @functools.lru_cache(1024)
@@ -88,10 +120,14 @@ def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none."""
     found = _NUMBER.fullmatch(text)
     if found is None:
-        raise InputError(f"{name} must be a number, or one with its unit, got {text[:60]!r}")
+        raise InputError(
+            f"{name} must be a number, or one with its unit, got {text[:60]!r}"
+        )
     number, rest = float(found[1]), found[2].strip()
     if math.isinf(number):
-        raise InputError(f"{name} = {text[:60]!r} is above the largest number of 64 bits, 1.8e308")
+        raise InputError(
+            f"{name} = {text[:60]!r} is above the largest number of 64 bits, 1.8e308"
+        )
     if not rest:
         return number, None
     length, stress = DIMENSIONS.get(name, (0, 0))
@@ -105,7 +141,9 @@ def read(name: str, text: str) -> tuple[float, str | None]:
     whole = re.fullmatch(r"(1? ?/ ?)?(.*?)\^?(-?\d+)?", base)
     if whole is not None and int(whole[3] or 1) * (-1 if whole[1] else 1) == power:
         return number, known(whole[2], kind)
-    sample = unit_of(name, Units(next(iter(SIZES["length"])), next(iter(SIZES["stress"]))))
+    sample = unit_of(
+        name, Units(next(iter(SIZES["length"])), next(iter(SIZES["stress"])))
+    )
     raise InputError(f"{name} = {text!r}: the unit must be like {sample}")
 
 
@@ -119,7 +157,11 @@ class Units:
     def __post_init__(self) -> None:
         for kind in ("length", "stress"):
             unit = getattr(self, kind)
-            if unit is None or (kind == "stress" and unit == "1") or (isinstance(unit, str) and unit in SIZES[kind]):
+            if (
+                unit is None
+                or (kind == "stress" and unit == "1")
+                or (isinstance(unit, str) and unit in SIZES[kind])
+            ):
                 continue
             object.__setattr__(self, kind, known(unit, kind))
 
@@ -127,16 +169,27 @@ class Units:
         """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry."""
         if isinstance(value, list | tuple):
             flat = list(_entries(value))
-            bare = [entry for entry in flat if not isinstance(entry, str) or read(name, entry)[1] is None]
+            bare = [
+                entry
+                for entry in flat
+                if not isinstance(entry, str) or read(name, entry)[1] is None
+            ]
             if 0 < len(bare) < len(flat):
-                raise InputError(f"{name}: {bare[0]!r} has no unit beside others that have: write it to each")
+                raise InputError(
+                    f"{name}: {bare[0]!r} has no unit beside others that have: write it to each"
+                )
             return [self.number(name, entry) for entry in value]
         length, power = DIMENSIONS.get(name, (0, 0))
         kind, own = ("length", self.length) if length else ("stress", self.stress)
         if not isinstance(value, str):
             # of a DataArray
             stated = getattr(value, "attrs", {}).get("units")
-            if own in SIZES[kind] and stated in SIZES[kind] and (length or power) == 1 and stated != own:
+            if (
+                own in SIZES[kind]
+                and stated in SIZES[kind]
+                and (length or power) == 1
+                and stated != own
+            ):
                 raise InputError(
                     f"{name} is in {stated!r} by its attribute units, and asked for in {own!r}: convert it"
                 )
@@ -145,13 +198,23 @@ class Units:
         if unit is None:
             return number
         if own == "1":
-            raise InputError(f"{name} = {value!r} needs a modulus, which is missing: stresses are over E* without one")
+            raise InputError(
+                f"{name} = {value!r} needs a modulus, which is missing: stresses are over E* without one"
+            )
         if own is None:
-            mend = "give the surface its unit" if length else "give E* with its unit, such as '100 GPa'"
-            raise InputError(f"{name} = {value!r} beside numbers whose unit of {kind} is not known: {mend}")
+            mend = (
+                "give the surface its unit"
+                if length
+                else "give E* with its unit, such as '100 GPa'"
+            )
+            raise InputError(
+                f"{name} = {value!r} beside numbers whose unit of {kind} is not known: {mend}"
+            )
         converted = number * factor(unit, own, kind, length or power)
         if math.isinf(converted):
-            raise InputError(f"{name} = {value!r} is above the largest number of 64 bits in {own}")
+            raise InputError(
+                f"{name} = {value!r} is above the largest number of 64 bits in {own}"
+            )
         return converted
 
     def conductivities(self, *given: Any) -> tuple[list[Any], str]:
@@ -159,15 +222,22 @@ class Units:
         if not any(isinstance(value, str) for value in given):
             return list(given), f"conductivity/{unit_of('separation', self)}"
         found: list[Any] = [_NUMBER.fullmatch(str(value)) for value in given]
-        names = {re.sub(r"[\s()*]", "", each[2]).replace("/m/K", "/mK") if each else "" for each in found}
+        names = {
+            re.sub(r"[\s()*]", "", each[2]).replace("/m/K", "/mK") if each else ""
+            for each in found
+        }
         if len(names) > 1 or not names <= CONDUCTIVITIES.keys():
             allowed = "numbers, or texts in one unit such as '45 W/(m K)' or '6e7 S/m'"
-            raise InputError(f"conductivities are {allowed}, got {' and '.join(map(repr, given))}")
+            raise InputError(
+                f"conductivities are {allowed}, got {' and '.join(map(repr, given))}"
+            )
         if self.length is None:
             raise InputError(
                 f"conductivity {given[0]!r} beside lengths whose unit is not known: give the surface its unit"
             )
-        return [float(each[1]) * factor("m", self.length) for each in found], CONDUCTIVITIES[names.pop()]
+        return [
+            float(each[1]) * factor("m", self.length) for each in found
+        ], CONDUCTIVITIES[names.pop()]
 
 
 UNKNOWN = Units()
@@ -178,11 +248,21 @@ def resolve(
 ) -> tuple[dict[str, Any], str | None]:
     """Numbers in one unit of length or stress, and that unit: the one asked for, else the first that is named."""
     named = {name: _named(name, value, kind) for name, value in given.items()}
-    unit = known(asked, kind) if asked else next((u for u in named.values() if u is not None), None)
-    if unit is not None and not asked and any(isinstance(value, str) for value in given.values()):
+    unit = (
+        known(asked, kind)
+        if asked
+        else next((u for u in named.values() if u is not None), None)
+    )
+    if (
+        unit is not None
+        and not asked
+        and any(isinstance(value, str) for value in given.values())
+    ):
         plain = [n for n in given if any(DIMENSIONS.get(n, ())) and named.get(n) is None]
         if plain:
-            raise InputError(f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each")
+            raise InputError(
+                f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each"
+            )
     own = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: own.number(name, value) for name, value in given.items()}, unit
 
@@ -196,7 +276,10 @@ def _entries(value: Any) -> Iterator[Any]:
 def _named(name: str, value: Any, kind: str) -> str | None:
     """The unit that a text, the first such in a list, or the attribute units of a DataArray names."""
     if isinstance(value, list | tuple):
-        return next((unit for unit in (_named(name, entry, kind) for entry in value) if unit), None)
+        return next(
+            (unit for unit in (_named(name, entry, kind) for entry in value) if unit),
+            None,
+        )
     if isinstance(value, str):
         return read(name, value)[1]
     stated = getattr(value, "attrs", {}).get("units")
@@ -210,7 +293,9 @@ def require_surface(surface: Any) -> None:
         raise InputError(f"surface must be a Surface, got {reprlib.repr(surface)}{hint}")
 
 
-def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tuple[Any, Units]:
+def modulus_and_units(
+    E_star: Any, surface: Any, asked: str | None = None
+) -> tuple[Any, Units]:
     """A modulus as a number, and the units of results: the surface's, and the one asked for or named by "100 GPa"."""
     require_surface(surface)
     stress = known(asked, "stress") if asked else _named("E_star", E_star, "stress")
@@ -235,13 +320,19 @@ def force_over_area(force: Any, area: Any, length: str | None) -> str:
     if isinstance(force, str):
         match = _NUMBER.fullmatch(force)
         if match is None:
-            raise InputError(f"force must be a number, or one with its unit, got {force[:60]!r}")
+            raise InputError(
+                f"force must be a number, or one with its unit, got {force[:60]!r}"
+            )
         number = float(match[1])
         unit = known(match[2], "force") if match[2].strip() else "N"
-    newtons = float(positive_array("force", one_number("force", number))) * float(SIZES["force"][unit])
+    newtons = float(positive_array("force", one_number("force", number))) * float(
+        SIZES["force"][unit]
+    )
     size = Units(length=length).number("nominal_area", area)
     if length is None:
-        raise InputError("force needs a nominal area whose unit is known: give the surface its unit")
+        raise InputError(
+            "force needs a nominal area whose unit is known: give the surface its unit"
+        )
     return f"{newtons / (float(size) * factor(length, 'm', power=2)):.15g} Pa"
 
 
@@ -249,4 +340,8 @@ def in_unit(surface: Any, unit: str | None) -> Any:
     """A surface in the unit asked for: converted from its own unit, or given that unit where it has none."""
     if unit is None:
         return surface
-    return dataclasses.replace(surface, unit=unit) if surface.unit is None else surface.to(unit)
+    return (
+        dataclasses.replace(surface, unit=unit)
+        if surface.unit is None
+        else surface.to(unit)
+    )

@@ -9,31 +9,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled, number_in, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    Numbers,
+    is_labelled,
+    number_in,
+    require,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
 from mbma_tables.materials import Pair, tangential_ratio
 from mbma_tables.quantities.lay import stress_shares
 from mbma_tables.surfaces.any_surface import AnySurface
 
-OF_YIELDING = (
-    "slip of a contact that yields is not known: its normal law is for loading only; `stiffness` of full stick is known"
-)
+OF_YIELDING = "slip of a contact that yields is not known: its normal law is for loading only; `stiffness` of full stick is known"
 OF_LAY = "slip of a surface with a lay was not compared with simulations; `stiffness` of full stick is known"
 DIRECTIONS = ("along", "across")
 ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
 
 
-def _pressure_at(theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray) -> tuple[Any]:
+def _pressure_at(
+    theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray
+) -> tuple[Any]:
     return (E_star * theory.answer(surface, u).pressure,)
 
 
-def _energy_at(theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray) -> tuple[Any]:
+def _energy_at(
+    theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray
+) -> tuple[Any]:
     return (E_star * theory.energy(surface, u),)
 
 
 def _separation_at(
-    theory: Any, surface: AnySurface, _: FloatArray, E_star: FloatArray, pressure: FloatArray
+    theory: Any,
+    surface: AnySurface,
+    _: FloatArray,
+    E_star: FloatArray,
+    pressure: FloatArray,
 ) -> tuple[Any]:
     return (theory.mean_separation_at(surface, "pressure", pressure / E_star),)
 
@@ -92,25 +104,30 @@ def checked_direction(direction: Any, surface: AnySurface) -> None:
     if direction is None:
         return
     if direction not in DIRECTIONS:
-        raise InputError(f"direction must be one of {DIRECTIONS}, relative to the lay, got {direction!r}")
+        raise InputError(
+            f"direction must be one of {DIRECTIONS}, relative to the lay, got {direction!r}"
+        )
     if getattr(surface, "anisotropy", None) is None:
-        raise InputError("direction needs a surface whose anisotropy is known, such as that of a map")
+        raise InputError(
+            "direction needs a surface whose anisotropy is known, such as that of a map"
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tangential:
     """A contact under shear at constant normal pressure, made by `tangential` of contacts and laws, in their units.
 
-    With kappa the normal over the tangential stiffness (`materials.tangential_ratio`), Coulomb friction f at each
-    point::
+    With kappa the normal over the tangential stiffness (`materials.tangential_ratio`),
+    Coulomb friction f at each point::
 
         full stick        k_t = k_n/kappa, k_n of small unloading: `unloading_stiffness`
         partial slip      tau(delta) = f [p(u) - p(u + delta/(f kappa))]
         gross slip        tau = f p, from delta = f kappa (h_max - u) on
         energy of a cycle 8 times the integral of tau to its amplitude, less 4 tau delta (Masing 1926)
 
-    Partial slip is the difference of two normal contacts (M. Ciavarella, J. Mech. Phys. Solids 46 (1998) 2391), for
-    isotropic bodies whose normal pressures do not move them tangentially: nu = 0, or alike bodies nearly so.
+    Partial slip is the difference of two normal contacts (M. Ciavarella, J. Mech. Phys.
+    Solids 46 (1998) 2391), for isotropic bodies whose normal pressures do not move them
+    tangentially: nu = 0, or alike bodies nearly so.
     """
 
     ratio: Any  # kappa
@@ -153,9 +170,20 @@ class Tangential:
         tau = self._checked("shear", shear)
         left = self.pressure - tau / friction
         if not is_labelled(left):
-            left = np.where(np.abs(left) <= 4 * np.finfo(float).eps * np.asarray(self.pressure), 0.0, left)
-            require("shear", np.broadcast_to(tau, np.shape(left)), left >= 0, "at most the friction times the pressure")
-        displacement: Numbers = friction * self.ratio * (normal.separation(left) - self.mean_separation)
+            left = np.where(
+                np.abs(left) <= 4 * np.finfo(float).eps * np.asarray(self.pressure),
+                0.0,
+                left,
+            )
+            require(
+                "shear",
+                np.broadcast_to(tau, np.shape(left)),
+                left >= 0,
+                "at most the friction times the pressure",
+            )
+        displacement: Numbers = (
+            friction * self.ratio * (normal.separation(left) - self.mean_separation)
+        )
         return displacement
 
     def energy_loss(self, shear: ArrayLike | str) -> Numbers:
@@ -164,8 +192,12 @@ class Tangential:
         tau = self._checked("shear", shear)
         delta = self.displacement(shear)
         scale = friction * self.ratio
-        released = normal.energy(self.mean_separation) - normal.energy(self._moved(delta / scale))
-        loss: Numbers = 8 * friction * (self.pressure * delta - scale * released) - 4 * tau * delta
+        released = normal.energy(self.mean_separation) - normal.energy(
+            self._moved(delta / scale)
+        )
+        loss: Numbers = (
+            8 * friction * (self.pressure * delta - scale * released) - 4 * tau * delta
+        )
         return loss
 
     def _moved(self, approach: Any) -> Any:
@@ -185,25 +217,35 @@ class Tangential:
         if isinstance(self._normal, str):
             raise InputError(self._normal)
         if self.friction is None:
-            raise InputError("slip needs friction, the coefficient of friction: tangential(friction=...)")
+            raise InputError(
+                "slip needs friction, the coefficient of friction: tangential(friction=...)"
+            )
         return self._normal, self.friction
 
 
-def ratio_of(nu: Any, E: Any, pair: Pair | None, direction: str | None, surface: Any, area: Any) -> Any:
+def ratio_of(
+    nu: Any, E: Any, pair: Pair | None, direction: str | None, surface: Any, area: Any
+) -> Any:
     """kappa for given Poisson's ratios and moduli, or for the named materials."""
     if nu is None and pair is None:
-        raise InputError("tangential stiffness needs nu, Poisson's ratio of the bodies, where no materials are named")
+        raise InputError(
+            "tangential stiffness needs nu, Poisson's ratio of the bodies, where no materials are named"
+        )
     if nu is None:
         nu, E = zip(*((metal.nu, metal.E) for metal in pair.metals), strict=True)  # type: ignore[union-attr]
     lay: Any = getattr(surface, "anisotropy", None)
     if direction is None:
         if lay is not None and lay > ISOTROPIC:
-            raise InputError(f"the surface has a lay (anisotropy {lay:.3g}): give direction, 'along' or 'across' it")
+            raise InputError(
+                f"the surface has a lay (anisotropy {lay:.3g}): give direction, 'along' or 'across' it"
+            )
         return tangential_ratio(nu, E)
     checked_direction(direction, surface)
 
     def share(poisson: FloatArray) -> Any:
-        return stress_shares(lay, np.asarray(area)[(..., *[None] * poisson.ndim)], poisson)[DIRECTIONS.index(direction)]
+        return stress_shares(
+            lay, np.asarray(area)[(..., *[None] * poisson.ndim)], poisson
+        )[DIRECTIONS.index(direction)]
 
     return tangential_ratio(nu, E, share)
 
@@ -211,24 +253,26 @@ def ratio_of(nu: Any, E: Any, pair: Pair | None, direction: str | None, surface:
 class Interface:
     """Conductances and shear of a `Contact`."""
 
-    def conductance(self: Any, k1: ArrayLike | str | None = None, k2: ArrayLike | str | None = None) -> Numbers:
+    def conductance(
+        self: Any, k1: ArrayLike | str | None = None, k2: ArrayLike | str | None = None
+    ) -> Numbers:
         """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
 
-        It is proportional to the stiffness at constant contact area, as both solve the same potential problem (J. R.
-        Barber, Proc. R. Soc. A 459 (2003)). The slope of the loading curve of yielded contacts is up to ten times
-        smaller.
+        It is proportional to the stiffness at constant contact area, as both solve the same
+        potential problem (J. R. Barber, Proc. R. Soc. A 459 (2003)). The slope of the
+        loading curve of yielded contacts is up to ten times smaller.
 
         Parameters
         ----------
         k1, k2 : array_like or str
-            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1, and without both they are
-            the thermal conductivities of the named `materials`.
+            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1,
+            and without both they are the thermal conductivities of the named `materials`.
 
         Returns
         -------
         ndarray or DataArray
-            [unit of k/length of the surface]; in W/(m^2 K) for "45 W/(m K)", in S/m^2 for "6e6 S/m". Its scatter is
-            `unloading_stiffness_scatter`.
+            [unit of k/length of the surface]; in W/(m^2 K) for "45 W/(m K)", in S/m^2 for
+            "6e6 S/m". Its scatter is `unloading_stiffness_scatter`.
 
         Examples
         --------
@@ -243,11 +287,15 @@ class Interface:
         source = self._source
         if k1 is None:
             if source.materials is None:
-                raise InputError("conductance needs k1, the bodies' conductivity, where no materials are named")
+                raise InputError(
+                    "conductance needs k1, the bodies' conductivity, where no materials are named"
+                )
             k1, k2 = source.materials.conductivities
         (k1, k2), _ = source.units.conductivities(k1, k1 if k2 is None else k2)
         # linear in the stiffness, which may be NaN or a DataArray
-        found: Numbers = mean_conductivity(k1, k2) / source.E_star * self.unloading_stiffness
+        found: Numbers = (
+            mean_conductivity(k1, k2) / source.E_star * self.unloading_stiffness
+        )
         return found
 
     def gap_conductance(
@@ -259,7 +307,8 @@ class Interface:
     ) -> Numbers:
         """Conductance per nominal area of the gas in the gaps, parallel to `conductance` of the solid [W/(m^2 K)].
 
-        The law, data of gases and their accuracy are in `mbma_tables.quantities.gas`; without radiation.
+        The law, data of gases and their accuracy are in `mbma_tables.quantities.gas`;
+        without radiation.
 
         Parameters
         ----------
@@ -283,14 +332,22 @@ class Interface:
 
         source = self._source
         if source.units.length is None:
-            raise InputError("gap_conductance beside lengths whose unit is not known: give the surface its unit")
+            raise InputError(
+                "gap_conductance beside lengths whose unit is not known: give the surface its unit"
+            )
         if gas == VACUUM:
             return 0.0 * self.mean_separation  # type: ignore[no-any-return]
         metre = factor("m", source.units.length)
         pressure = Units(stress="Pa").number("gas_pressure", gas_pressure)
         k, jump = jump_of(gas, temperature, pressure, accommodation)
 
-        def mean(theory: Any, surface: AnySurface, u: FloatArray, E: FloatArray, area: FloatArray) -> tuple[Any, ...]:
+        def mean(
+            theory: Any,
+            surface: AnySurface,
+            u: FloatArray,
+            E: FloatArray,
+            area: FloatArray,
+        ) -> tuple[Any, ...]:
             eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
             return (k * metre * mean_inverse(u, area, jump * metre, surface.h_rms, eta),)
 
@@ -298,7 +355,11 @@ class Interface:
         return found
 
     def tangential(
-        self: Any, friction: float | None = None, nu: Any = None, E: Any = None, direction: str | None = None
+        self: Any,
+        friction: float | None = None,
+        nu: Any = None,
+        E: Any = None,
+        direction: str | None = None,
     ) -> Tangential:
         """Tangential stiffness of full stick, partial and gross slip.
 
@@ -309,7 +370,8 @@ class Interface:
         nu, E : optional
             As for `materials.tangential_ratio`; by default those of the `materials` named.
         direction : {"along", "across"}, optional
-            Of the shear relative to the lay, for surfaces whose anisotropy is known and above 1.4: full stick alone.
+            Of the shear relative to the lay, for surfaces whose anisotropy is known and
+            above 1.4: full stick alone.
 
         Examples
         --------

@@ -12,7 +12,13 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import Curve, draw_compression, new_figure, pressure_label, theory_label
+from mbma_tables.common.plots import (
+    Curve,
+    draw_compression,
+    new_figure,
+    pressure_label,
+    theory_label,
+)
 from mbma_tables.common.progress import shown as progress
 from mbma_tables.common.units import unit_of
 from mbma_tables.contacts.interface import Interface
@@ -23,8 +29,14 @@ from mbma_tables.theories.base import TheoryAnswer
 if TYPE_CHECKING:
     from mbma_tables.contacts.leakage import Leakage
 
-OF_HARDNESS = ("yielded", "unloading_stiffness", "unloading_stiffness_scatter", "plane_separation")
-# what yields depends on the heaviest load before: none is assumed, also where pressures of one request fall
+OF_HARDNESS = (
+    "yielded",
+    "unloading_stiffness",
+    "unloading_stiffness_scatter",
+    "plane_separation",
+)
+# what yields depends on the heaviest load before: none is assumed, also where pressures of
+# one request fall
 FIRST_LOADING = "first; each pressure is reached from no contact"
 MOST_SHOWN = 10_000  # entries up to which the text includes errors, scatter and validity
 
@@ -48,13 +60,18 @@ class Contact(Interface, Displayed):
     mean_separation: Numbers  #: u = (h_max + d)/2 (50) [length]
     pressure: Numbers  #: F/A0 in the unit of E_star; F/(A0 E*) where that is 1
     area: Numbers  #: A/A0; MBMA does not end at 1 under full compression, and this is not clamped
-    #: bound on the relative numerical error of both against the theory (for "mbma" against its island model), NaN where
-    #: not known; the deviation of the theory from simulation is `scatter`
+    # : bound on the relative numerical error of both against the theory (for "mbma" against
+    # its island model), NaN where : not known; the deviation of the theory from simulation
+    # is `scatter`
     error: Numbers
-    theory: str  #: name of what computed them; variant and island model are empty unless the theory is MBMA
+    # : name of what computed them; variant and island model are empty unless the theory is
+    # MBMA
+    theory: str
     variant: str
     island_model: str
-    islands: int | None  #: number of islands evaluated; None if computed by dask or if the theory has none
+    islands: (
+        int | None
+    )  #: number of islands evaluated; None if computed by dask or if the theory has none
     _source: Source = dataclasses.field(repr=False, kw_only=True)
 
     @property
@@ -71,15 +88,26 @@ class Contact(Interface, Displayed):
             facts["resolution"] = source.surface.resolution
         for name in ("mean_separation", "pressure", "area"):
             facts[name] = shown(getattr(self, name), units[name])
-        if any_labelled(source.surface, self.mean_separation) or np.size(self.error) > MOST_SHOWN:
+        if (
+            any_labelled(source.surface, self.mean_separation)
+            or np.size(self.error) > MOST_SHOWN
+        ):
             return facts
         if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
-        facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
-        facts |= {name: shown(values, unit) for name, (values, unit) in self._stiffness().items()}
+        facts["separation_scatter"] = shown(
+            self.separation_scatter, units["separation_scatter"]
+        )
+        facts |= {
+            name: shown(values, unit)
+            for name, (values, unit) in self._stiffness().items()
+        }
         if source.materials is not None and source.units.length is None:
             facts["conductance"] = "needs the surface's unit"
-        more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
+        more = {
+            name: getattr(self, name)
+            for name in ("error", "scatter", "stiffness_scatter", "valid")
+        }
         if source.yields:
             more["unloading_stiffness_scatter"] = self.unloading_stiffness_scatter
             more |= {"psi": self.psi, "yielded": self.yielded}
@@ -90,7 +118,9 @@ class Contact(Interface, Displayed):
             light = self.elastic_hardness * ELASTIC_PSI / 2
             if np.any(self.pressure > light):
                 limit = shown(light, units["pressure"])
-                facts["pressure"] += f" (above E* g/2 = {limit}, the mean pressure in light contact)"
+                facts["pressure"] += (
+                    f" (above E* g/2 = {limit}, the mean pressure in light contact)"
+                )
         if source.theory.advice:
             facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}
@@ -99,19 +129,33 @@ class Contact(Interface, Displayed):
         """Stiffnesses, and the conductance of named materials, with their units."""
         found = {"stiffness": (self.stiffness, self.units["stiffness"])}
         if self._source.yields:
-            found["unloading_stiffness"] = self.unloading_stiffness, self.units["unloading_stiffness"]
+            found["unloading_stiffness"] = (
+                self.unloading_stiffness,
+                self.units["unloading_stiffness"],
+            )
         if self._source.materials is not None and self._source.units.length is not None:
             found["conductance"] = self.conductance(), "W/(m^2 K)"
         return found
 
     def _variables(self) -> dict[str, Variable]:
         source = self._source
-        known = {n: getattr(self, n) for n in MEANINGS if n not in (("energy",) if source.yields else OF_HARDNESS)}
-        return {n: Variable(v, unit_of(n, source.units), MEANINGS[n]) for n, v in known.items() if v is not None}
+        known = {
+            n: getattr(self, n)
+            for n in MEANINGS
+            if n not in (("energy",) if source.yields else OF_HARDNESS)
+        }
+        return {
+            n: Variable(v, unit_of(n, source.units), MEANINGS[n])
+            for n, v in known.items()
+            if v is not None
+        }
 
     def _origin(self) -> dict[str, str]:
         source = self._source
-        return {"E_star": shown(source.E_star, unit_of("pressure", source.units)), "surface": repr(source.surface)}
+        return {
+            "E_star": shown(source.E_star, unit_of("pressure", source.units)),
+            "surface": repr(source.surface),
+        }
 
     def _figure(self) -> Any:
         source, unit = self._source, self.units["pressure"]
@@ -127,9 +171,17 @@ class Contact(Interface, Displayed):
         """The line that plots draw, for one surface at several separations; optionally with its leakage."""
         surface = self._source.surface
         if np.size(self.pressure) < 2 or surface.shape != ():
-            raise InputError("one surface's force and area at several separations make a curve, and this has none")
+            raise InputError(
+                "one surface's force and area at several separations make a curve, and this has none"
+            )
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
-        fields = [self.mean_separation / surface.h_rms, self.pressure, self.area, self.scatter, self.area_scatter]
+        fields = [
+            self.mean_separation / surface.h_rms,
+            self.pressure,
+            self.area,
+            self.scatter,
+            self.area_scatter,
+        ]
         if leakage:
             fields += [self.leakage.K, self.leakage.scatter]
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
@@ -161,7 +213,9 @@ class Contact(Interface, Displayed):
 
         source, pressure = self._source, np.asarray(self.pressure, float)
         if pressure.ndim or np.ndim(source.E_star) or np.ndim(source.hardness):
-            raise InputError("a map is of one contact: give one pressure, one modulus and one hardness")
+            raise InputError(
+                "a map is of one contact: give one pressure, one modulus and one hardness"
+            )
         surface: Any = source.surface
         whole = map_of(surface)
         modulus, force = float(source.E_star), float(pressure) / float(source.E_star)
@@ -172,11 +226,21 @@ class Contact(Interface, Displayed):
         scale, gradient = float(np.abs(values).max()), float(surface.bearing.gradient)
         stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
         cap = float(source.hardness) / modulus / gradient
-        engine = boundary_elements.Contact(values / scale, stretched, pressing.TOLERANCE, cap, not whole.periodic)
+        engine = boundary_elements.Contact(
+            values / scale, stretched, pressing.TOLERANCE, cap, not whole.periodic
+        )
         with progress("boundary elements"):
             engine.press(force / gradient)
-        units = {"pressure": self.units["pressure"]} | dict.fromkeys(("gap", "heights"), source.units.length or "1")
-        return ContactMap(whole.steps, units, modulus * gradient * engine.traction, scale * engine.gap, values)
+        units = {"pressure": self.units["pressure"]} | dict.fromkeys(
+            ("gap", "heights"), source.units.length or "1"
+        )
+        return ContactMap(
+            whole.steps,
+            units,
+            modulus * gradient * engine.traction,
+            scale * engine.gap,
+            values,
+        )
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
@@ -201,7 +265,9 @@ class Contact(Interface, Displayed):
                 "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness the "
                 "initial stiffness of unloading"
             )
-        return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
+        return self._source.map(
+            lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1
+        )[0]
 
     def _of_loading(self, name: str, elastic: Any) -> Any:
         """A field of `Loaded`, divided by E*; `elastic` where nothing yields."""
@@ -210,7 +276,9 @@ class Contact(Interface, Displayed):
             return elastic
         if source.loaded is not None:
             return getattr(source.loaded, name)[()]
-        return source.map(lambda theory, s, u, E: (getattr(theory.loaded(s, u), name),), self, 1)[0]
+        return source.map(
+            lambda theory, s, u, E: (getattr(theory.loaded(s, u), name),), self, 1
+        )[0]
 
     @described
     def yielded(self) -> Any:
@@ -232,7 +300,11 @@ class Contact(Interface, Displayed):
     @property
     def psi(self) -> Any:
         """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
-        return (self._source.E_star * self._source.surface.rms_gradient / self._source.hardness)[()]
+        return (
+            self._source.E_star
+            * self._source.surface.rms_gradient
+            / self._source.hardness
+        )[()]
 
     @property
     def elastic_hardness(self) -> Any:
@@ -259,8 +331,9 @@ class Contact(Interface, Displayed):
     def stiffness_scatter(self) -> Any:
         """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
 
-        NaN where a hardness is given: the slope of the loading curve of contacts that yield was not compared with
-        simulations; `unloading_stiffness_scatter` is that of their unloading stiffness and conductance.
+        NaN where a hardness is given: the slope of the loading curve of contacts that yield
+        was not compared with simulations; `unloading_stiffness_scatter` is that of their
+        unloading stiffness and conductance.
         """
         return self._scatter("stiffness")
 
@@ -268,10 +341,13 @@ class Contact(Interface, Displayed):
     def unloading_stiffness_scatter(self) -> Any:
         """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
 
-        Also of the conductance and of the tangential stiffness, which are proportional to it. Without a hardness both
-        stiffnesses are the same, and so are their uncertainties.
+        Also of the conductance and of the tangential stiffness, which are proportional to
+        it. Without a hardness both stiffnesses are the same, and so are their
+        uncertainties.
         """
-        return self._scatter("unloading_stiffness" if self._source.yields else "stiffness")
+        return self._scatter(
+            "unloading_stiffness" if self._source.yields else "stiffness"
+        )
 
     @described
     def separation_scatter(self) -> Any:
@@ -280,7 +356,9 @@ class Contact(Interface, Displayed):
             return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 
     def _scatter(self, of: str) -> Numbers:
-        return self._source.map(lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self.area})[0]
+        return self._source.map(
+            lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self.area}
+        )[0]
 
     @functools.cached_property
     def leakage(self) -> Leakage:
@@ -292,7 +370,11 @@ class Contact(Interface, Displayed):
     @property
     def _against(self) -> tuple[Any, ...]:
         """Arguments for `Source.valid` and `Source.reasons`."""
-        return self, functools.partial(reasons_against, self._source), self._answer._asdict()
+        return (
+            self,
+            functools.partial(reasons_against, self._source),
+            self._answer._asdict(),
+        )
 
     @described
     def valid(self) -> Any:
@@ -311,12 +393,16 @@ class ContactMap(Displayed):
 
     steps: tuple[float, ...]  #: sampling steps along x and y [length]
     units: dict[str, str]
-    pressure: FloatArray = quantity("contact pressure; zero where the gap is open [stress]")
+    pressure: FloatArray = quantity(
+        "contact pressure; zero where the gap is open [stress]"
+    )
     gap: FloatArray = quantity("gap to the rigid plane; zero in contact [length]")
     heights: FloatArray = quantity("height above the mean [length]")
     _dims = ("x", "y")
 
-    contact = property(lambda self: self.pressure > 0, doc="True where the map is in contact.")
+    contact = property(
+        lambda self: self.pressure > 0, doc="True where the map is in contact."
+    )
 
     def _facts(self) -> dict[str, str]:
         return {
@@ -329,20 +415,38 @@ class ContactMap(Displayed):
 
     def _variables(self) -> dict[str, Variable]:
         axes = zip("xy", self.pressure.shape, self.steps, strict=True)
-        places = {n: Variable(np.arange(count) * step, self.units["gap"], "", (n,)) for n, count, step in axes}
-        touching = {"contact": Variable(self.contact, "1", "whether the map touches", self._dims)}
+        places = {
+            n: Variable(np.arange(count) * step, self.units["gap"], "", (n,))
+            for n, count, step in axes
+        }
+        touching = {
+            "contact": Variable(self.contact, "1", "whether the map touches", self._dims)
+        }
         return {**places, **super()._variables(), **touching}
 
     def _figure(self) -> Any:
         figure = new_figure(10, 4.2)
-        length, stress = {"1": "length"}.get(self.units["gap"], self.units["gap"]), self.units["pressure"]
-        sides = [count * step for count, step in zip(self.pressure.shape, self.steps, strict=True)]
+        length, stress = (
+            {"1": "length"}.get(self.units["gap"], self.units["gap"]),
+            self.units["pressure"],
+        )
+        sides = [
+            count * step
+            for count, step in zip(self.pressure.shape, self.steps, strict=True)
+        ]
         fields = {
-            pressure_label(stress): (np.where(self.contact, self.pressure, np.nan), "magma_r"),
+            pressure_label(stress): (
+                np.where(self.contact, self.pressure, np.nan),
+                "magma_r",
+            ),
             f"gap [{length}]": (np.where(self.contact, np.nan, self.gap), "viridis"),
         }
-        for axes, (label, (values, colours)) in zip(figure.subplots(1, 2), fields.items(), strict=True):
-            picture = axes.imshow(values.T, origin="lower", extent=(0, sides[0], 0, sides[1]), cmap=colours)
+        for axes, (label, (values, colours)) in zip(
+            figure.subplots(1, 2), fields.items(), strict=True
+        ):
+            picture = axes.imshow(
+                values.T, origin="lower", extent=(0, sides[0], 0, sides[1]), cmap=colours
+            )
             axes.set_xlabel(f"x [{length}]")
             axes.set_ylabel(f"y [{length}]")
             figure.colorbar(picture, ax=axes, label=label, shrink=0.8)

@@ -36,23 +36,33 @@ ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
 class Sensitivity:
     """Result of `sensitivity`; its text is a table.
 
-    Stiffness is that of loading, conductance that over the mean conductivity of the bodies [1/length].
+    Stiffness is that of loading, conductance that over the mean conductivity of the bodies
+    [1/length].
     """
 
     by: str  #: quantity held fixed: "separation", "mean_separation", "pressure" or "area"
-    parameters: dict[str, float]  #: the surface's parameters, the modulus if given, and the quantity held fixed
+    parameters: dict[
+        str, float
+    ]  #: the surface's parameters, the modulus if given, and the quantity held fixed
     answers: dict[str, float]  #: the results for these parameters
-    #: d ln(result)/d ln(parameter) by parameter and result, the other parameters held; NaN where the result jumps
+    # : d ln(result)/d ln(parameter) by parameter and result, the other parameters held; NaN
+    # where the result jumps
     slopes: dict[str, dict[str, float]]
     errors: dict[str, dict[str, float]]  #: estimates of their errors
     units: Units  #: of parameters and results
 
     def __str__(self) -> str:
         width = max(map(len, self.parameters)) + 2
-        lines = [f"d ln(answer)/d ln(parameter) at given {self.by}", f"{'':{width}}{'value':>22}"]
+        lines = [
+            f"d ln(answer)/d ln(parameter) at given {self.by}",
+            f"{'':{width}}{'value':>22}",
+        ]
         lines[1] += "".join(f"{name:>17}" for name in self.answers)
         for name, value in self.parameters.items():
-            slopes = "".join(f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}" for answer in self.answers)
+            slopes = "".join(
+                f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}"
+                for answer in self.answers
+            )
             unit = unit_of(name.rpartition(".")[2], self.units)
             number = f"{value:.5g} {unit}".removesuffix(" 1")
             lines.append(f"{name:{width}}{number:>22}{slopes}")
@@ -80,19 +90,22 @@ def sensitivity(
     Parameters
     ----------
     surface : Surface
-        One surface. Its parameters are its five numbers, or those of the drawing that it was made from
-        (`Surface.from_roughness`). Those of one given by a spectrum are "heights" and "lengths", factors of all
-        heights and of all lengths along the plane, like an instrument's calibration factors; h_max alone; the
-        "shortest" and "longest" wavelengths, cut-offs that only remove wavelengths, and with an extrapolated spectrum
-        its exponent "extrapolate_hurst". Where the calibrated law uses a map's own heights and curves, and where the
-        map is simulated, h_max and cut-offs are left out: they follow from the map.
+        One surface. Its parameters are its five numbers, or those of the drawing that it
+        was made from (`Surface.from_roughness`). Those of one given by a spectrum are
+        "heights" and "lengths", factors of all heights and of all lengths along the plane,
+        like an instrument's calibration factors; h_max alone; the "shortest" and "longest"
+        wavelengths, cut-offs that only remove wavelengths, and with an extrapolated
+        spectrum its exponent "extrapolate_hurst". Where the calibrated law uses a map's own
+        heights and curves, and where the map is simulated, h_max and cut-offs are left out:
+        they follow from the map.
     separation, mean_separation, pressure, area : float or str, one of them
         The quantity held fixed, as for `contact`.
     E_star : float or str
         Effective modulus, as for `contact`.
     theory, island_model, variant, rtol, hardness, materials : optional
-        As for `contact`, with the same default theory; a hardness is one of the parameters. The simulation of a map
-        answers for its heights and lengths by similarity, without a hardness.
+        As for `contact`, with the same default theory; a hardness is one of the parameters.
+        The simulation of a map answers for its heights and lengths by similarity, without a
+        hardness.
 
     Returns
     -------
@@ -101,7 +114,8 @@ def sensitivity(
     Raises
     ------
     InputError, OutOfRangeError
-        For a batch, unknown names, where there is no contact, and for the simulation of a map with a hardness.
+        For a batch, unknown names, where there is no contact, and for the simulation of a
+        map with a hardness.
 
     Examples
     --------
@@ -114,8 +128,15 @@ def sensitivity(
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.68'
     """
-    by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
-    chosen = chosen_theory(surface, theory, by, island_model=island_model, variant=variant, rtol=rtol)
+    by, value = one_known(
+        separation=separation,
+        mean_separation=mean_separation,
+        pressure=pressure,
+        area=area,
+    )
+    chosen = chosen_theory(
+        surface, theory, by, island_model=island_model, variant=variant, rtol=rtol
+    )
     E_star, hardness, _ = bodies(materials, E_star, hardness)
     modulus, units = modulus_and_units(E_star, surface)
     return relative_derivatives(
@@ -147,23 +168,43 @@ class Unknowns:
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def answers(
-        self, numbers: Mapping[str, Any], by: str, value: Any, modulus: Any, cap: Any, theory: Theory
+        self,
+        numbers: Mapping[str, Any],
+        by: str,
+        value: Any,
+        modulus: Any,
+        cap: Any,
+        theory: Theory,
     ) -> dict[str, Any]:
         """`ANSWERS` of the surface of these numbers."""
-        pressed: Any = contact(self.make(**numbers), **{by: value}, E_star=modulus, hardness=cap, theory=theory)
-        answers = {name: getattr(pressed, name) for name in ANSWERS if name != "conductance"}
+        pressed: Any = contact(
+            self.make(**numbers),
+            **{by: value},
+            E_star=modulus,
+            hardness=cap,
+            theory=theory,
+        )
+        answers = {
+            name: getattr(pressed, name) for name in ANSWERS if name != "conductance"
+        }
         return answers | {"conductance": pressed.unloading_stiffness / modulus}
 
 
 class OfOneMap(Unknowns):
     """A map whose theory is a simulation of it: heights and lengths scale what was simulated.
 
-    A map with heights `a` and lengths `l` times as large is pressed as the map itself is by bodies of modulus E* a/l,
-    at gaps 1/a times as large.
+    A map with heights `a` and lengths `l` times as large is pressed as the map itself is by
+    bodies of modulus E* a/l, at gaps 1/a times as large.
     """
 
     def answers(
-        self, numbers: Mapping[str, Any], by: str, value: Any, modulus: Any, cap: Any, theory: Theory
+        self,
+        numbers: Mapping[str, Any],
+        by: str,
+        value: Any,
+        modulus: Any,
+        cap: Any,
+        theory: Theory,
     ) -> dict[str, Any]:
         """`ANSWERS` of the map with these factors."""
         heights, lengths = numbers["heights"], numbers["lengths"]
@@ -175,7 +216,9 @@ class OfOneMap(Unknowns):
             "pressure": equal_modulus * pressed.pressure,
             "area": pressed.area,
             "stiffness": equal_modulus / heights * pressed.stiffness,
-            "conductance": equal_modulus / (heights * modulus) * pressed.unloading_stiffness,
+            "conductance": equal_modulus
+            / (heights * modulus)
+            * pressed.unloading_stiffness,
         }
 
 
@@ -222,7 +265,9 @@ def relative_derivatives(
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
     # without a modulus all stresses are over it; the logarithm of zero does not vary
     fixed = set(moduli) if units.stress == "1" else set()
-    varied = [name for name, number in numbers.items() if number != 0 and name not in fixed]
+    varied = [
+        name for name, number in numbers.items() if number != 0 and name not in fixed
+    ]
     same = "mean_separation" if by == "separation" else by
     wanted = [name for name in ANSWERS if name != same]
 
@@ -230,7 +275,9 @@ def relative_derivatives(
         """Of the answers wanted, for numbers or arrays of them."""
         modulus = modulus_of(*(given[name] for name in moduli))
         own = {name: given[name] for name in unknowns.numbers}
-        answers = unknowns.answers(own, by, given[by], modulus, given.get("hardness", np.inf), theory)
+        answers = unknowns.answers(
+            own, by, given[by], modulus, given.get("hardness", np.inf), theory
+        )
         return np.log([answers[name] for name in wanted])
 
     @np.errstate(all="ignore")
@@ -244,13 +291,18 @@ def relative_derivatives(
         if unknowns.batches:
             table = logarithms_of(columns)
         else:
-            entries = [{name: column[k] for name, column in columns.items()} for k in range(count)]
+            entries = [
+                {name: column[k] for name, column in columns.items()}
+                for k in range(count)
+            ]
             table = np.transpose([logarithms_of(entry) for entry in entries])
         return table[:, back.ravel()].reshape(-1, *x.shape[1:])
 
     here = np.exp(logarithms(np.zeros((len(varied), 1))))[:, 0]
     if not (here > 0).all():
-        raise InputError(f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist")
+        raise InputError(
+            f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist"
+        )
     with np.errstate(all="ignore"):
         derivative = jacobian(
             logarithms,
@@ -274,13 +326,20 @@ def relative_derivatives(
     )
 
 
-def _by_name(labels: Sequence[str], wanted: Sequence[str], table: FloatArray) -> dict[str, dict[str, float]]:
+def _by_name(
+    labels: Sequence[str], wanted: Sequence[str], table: FloatArray
+) -> dict[str, dict[str, float]]:
     """A table with a row for each answer and a column for each number, by the names of both."""
     columns = table.T.tolist()
-    return {name: dict(zip(wanted, column, strict=True)) for name, column in zip(labels, columns, strict=True)}
+    return {
+        name: dict(zip(wanted, column, strict=True))
+        for name, column in zip(labels, columns, strict=True)
+    }
 
 
-def _sides(varied: Sequence[str], numbers: Mapping[str, float], one_sided: Mapping[str, float]) -> FloatArray:
+def _sides(
+    varied: Sequence[str], numbers: Mapping[str, float], one_sided: Mapping[str, float]
+) -> FloatArray:
     """Signs of one-sided steps, 0 for central ones, which need room to a number's upper limit."""
     limits = {"area": 1.0, "pressure": numbers.get("hardness", np.inf)}
     signs = dict(one_sided)
@@ -293,7 +352,9 @@ def _sides(varied: Sequence[str], numbers: Mapping[str, float], one_sided: Mappi
     return np.array([signs.get(name, 0.0) for name in varied])
 
 
-def unknowns_of(surface: AnySurface, theory: Theory | None, unit: str | None = None) -> Unknowns:
+def unknowns_of(
+    surface: AnySurface, theory: Theory | None, unit: str | None = None
+) -> Unknowns:
     """The numbers that a surface was made from.
 
     Parameters
@@ -301,8 +362,8 @@ def unknowns_of(surface: AnySurface, theory: Theory | None, unit: str | None = N
     surface : AnySurface
         One surface.
     theory : Theory or None
-        The theory that is asked about it; None where the surface is combined with another, which leaves the curves and
-        the points of a map out.
+        The theory that is asked about it; None where the surface is combined with another,
+        which leaves the curves and the points of a map out.
     unit : str, optional
         Unit of length of the numbers; default: the surface's.
     """
@@ -336,7 +397,9 @@ def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
     names = PARAMETERS if isinstance(surface, Surface) else ("q", "C", "h_max")
     for name in names:
         before, now = getattr(drawn, name), getattr(surface, name)
-        if np.shape(before) != np.shape(now) or not np.allclose(before, now, rtol=1e-9, atol=0):
+        if np.shape(before) != np.shape(now) or not np.allclose(
+            before, now, rtol=1e-9, atol=0
+        ):
             return None
     numbers = dict(record["given"])
     if unit not in (None, surface.unit):
@@ -353,13 +416,16 @@ def _of_spectrum(surface: MeasuredSurface, theory: Theory | None) -> Unknowns:
     own: dict[str, float] = {"heights": 1.0, "lengths": 1.0}
     cut_offs: dict[str, float] = {}
     uncut = surface
-    # the calibrated law uses measured heights, which have their own highest point and shortest wavelengths
+    # the calibrated law uses measured heights, which have their own highest point and
+    # shortest wavelengths
     takes_map = theory is not None and theory.name == Calibrated.name
     of_its_heights = takes_map or theory is None
     if surface.heights.is_gaussian or not of_its_heights:
         own["h_max"] = float(surface.h_max)
     if "extrapolated" in steps:
-        uncut = surface.between(float(surface.q0), 2 * math.pi / steps["resolution"]["shortest"])
+        uncut = surface.between(
+            float(surface.q0), 2 * math.pi / steps["resolution"]["shortest"]
+        )
         own["extrapolate_hurst"] = steps["extrapolated"]["hurst"]
     elif surface.bearing is None or not takes_map:
         cut_offs = {
@@ -370,7 +436,9 @@ def _of_spectrum(surface: MeasuredSurface, theory: Theory | None) -> Unknowns:
     def make(heights: float, lengths: float, **others: float) -> MeasuredSurface:
         moved = uncut
         if any(others[name] != wavelength for name, wavelength in cut_offs.items()):
-            moved = uncut.between(2 * math.pi / others["longest"], 2 * math.pi / others["shortest"])
+            moved = uncut.between(
+                2 * math.pi / others["longest"], 2 * math.pi / others["shortest"]
+            )
         if "extrapolate_hurst" in others:
             shortest = steps["extrapolated"]["shortest"]
             moved = extrapolated(uncut, shortest, others["extrapolate_hurst"])

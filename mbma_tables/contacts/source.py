@@ -46,14 +46,17 @@ MEANINGS = {
     "separation_scatter": "model uncertainty: standard deviation of the mean separation at this pressure",
     "valid": "whether the theory was tested for such contacts",
 }
-MAX_GRADIENT = 1.0  # larger rms gradients suggest that heights and wavenumbers are in different units
+# larger rms gradients suggest that heights and wavenumbers are in different units
+MAX_GRADIENT = 1.0
 
 
 def named(value: Any, name: str, units: Units) -> Any:
     """A quantity of a contact; a DataArray gets its name, meaning and unit."""
     if not is_labelled(value):
         return value
-    return value.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
+    return value.rename(name).assign_attrs(
+        long_name=MEANINGS[name], units=unit_of(name, units)
+    )
 
 
 Against = Callable[..., dict[str, Any]]
@@ -82,36 +85,61 @@ class Source:
         return self.theory.with_hardness(checked_hardness(hardness), E_star)
 
     def map(
-        self, function: Callable[..., tuple[Any, ...]], contact: Any, outputs: int, more: Any = None
+        self,
+        function: Callable[..., tuple[Any, ...]],
+        contact: Any,
+        outputs: int,
+        more: Any = None,
     ) -> tuple[Numbers, ...]:
         """``function(theory, surface, u, E_star, *more)``, a tuple, of the contact's entries."""
-        arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, "hardness": self.hardness}
+        arrays = {
+            "mean_separation": contact.mean_separation,
+            "E_star": self.E_star,
+            "hardness": self.hardness,
+        }
         arrays |= more or {}
 
-        def block(surface: AnySurface, u: Any, E_star: Any, hardness: Any, *others: Any) -> tuple[Any, ...]:
+        def block(
+            surface: AnySurface, u: Any, E_star: Any, hardness: Any, *others: Any
+        ) -> tuple[Any, ...]:
             return function(self.theory_at(E_star, hardness), surface, u, E_star, *others)
 
         if any_labelled(self.surface, *arrays.values()):
-            found: tuple[Numbers, ...] = apply_to_surface(block, self.surface, arrays, outputs)
+            found: tuple[Numbers, ...] = apply_to_surface(
+                block, self.surface, arrays, outputs
+            )
             return found
-        return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
+        return tuple(
+            part[()] for part in block(self.surface, *map(np.asarray, arrays.values()))
+        )
 
     def valid(self, contact: Any, against: Against, more: Mapping[str, Any]) -> Numbers:
         """True where none of the reasons (masks by text) of ``against(theory, surface, u, E_star, *more)`` applies."""
 
         def none(*given: Any) -> tuple[FloatArray]:
-            return (np.asarray(~np.logical_or.reduce(list(against(*given).values())), dtype=float),)
+            return (
+                np.asarray(
+                    ~np.logical_or.reduce(list(against(*given).values())), dtype=float
+                ),
+            )
 
         return self.map(none, contact, 1, more)[0].astype(bool)
 
-    def reasons(self, contact: Any, against: Against, more: Mapping[str, Any]) -> dict[str, Any]:
+    def reasons(
+        self, contact: Any, against: Against, more: Mapping[str, Any]
+    ) -> dict[str, Any]:
         """The same reasons with their masks, plain arrays, where any entry has them."""
-        surface, fields = self.surface, [contact.mean_separation, self.E_star, self.hardness, *more.values()]
+        surface, fields = (
+            self.surface,
+            [contact.mean_separation, self.E_star, self.hardness, *more.values()],
+        )
         if any_labelled(surface, *fields):
             import xarray as xr
 
             own = [getattr(surface, name) for name in surface.parameters]
-            fields = list(map(np.asarray, xr.broadcast(*map(xr.DataArray, [*fields, *own]))))
+            fields = list(
+                map(np.asarray, xr.broadcast(*map(xr.DataArray, [*fields, *own])))
+            )
             surface = surface.with_numbers(*fields[3 + len(more) :]) if own else surface
         u, E_star, hardness, *known = map(np.asarray, fields[: 3 + len(more)])
         found = against(self.theory_at(E_star, hardness), surface, u, E_star, *known)
@@ -119,15 +147,25 @@ class Source:
 
 
 def reasons_against(
-    source: Source, theory: Theory, surface: AnySurface, u: FloatArray, E_star: FloatArray, *known: FloatArray
+    source: Source,
+    theory: Theory,
+    surface: AnySurface,
+    u: FloatArray,
+    E_star: FloatArray,
+    *known: FloatArray,
 ) -> dict[str, Any]:
     """Every reason why results of a source's theory, perhaps with a hardness, are not valid, with its mask."""
     answer = TheoryAnswer(*known)
-    steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure))
+    steep = np.broadcast_to(
+        np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure)
+    )
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
-    measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.pressure), dtype=bool))
+    measured = dict.fromkeys(
+        theory.elastic.departures(surface), np.ones(np.shape(answer.pressure), dtype=bool)
+    )
     found = {text: steep, **measured, **theory.reasons(surface, answer, u)}
-    # elastic contacts with pressures that the named metals (without names: any metal) do not support
+    # elastic contacts with pressures that the named metals (without names: any metal) do
+    # not support
     stress, pair = source.units.stress, source.materials
     if stress in (None, "1") or (pair is None and source.stated):
         return found
@@ -142,13 +180,21 @@ def reasons_against(
         )
         return found | {text: elastic & (mean > HARDEST * unit)}
     soft, hard = pair.softer.hardness
-    needed = f"'{soft:g} GPa'" if soft == hard else f" of its temper, '{soft:g} GPa' to '{hard:g} GPa'"
+    needed = (
+        f"'{soft:g} GPa'"
+        if soft == hard
+        else f" of its temper, '{soft:g} GPa' to '{hard:g} GPa'"
+    )
     yields = E_star * np.asarray(surface.rms_gradient) > ELASTIC_PSI * soft * unit
     text = f"{pair.softer.name} yields here: give hardness={needed}"
     return found | {text: elastic & (yields | (mean > soft * unit))}
 
 
-class LawPoint(collections.namedtuple("LawPoint", ("separation", "mean_separation", "area", "stiffness", "pressure"))):
+class LawPoint(
+    collections.namedtuple(
+        "LawPoint", ("separation", "mean_separation", "area", "stiffness", "pressure")
+    )
+):
     """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape."""
 
     units = Units()  #: the law's
@@ -159,4 +205,6 @@ class LawPoint(collections.namedtuple("LawPoint", ("separation", "mean_separatio
 
 
 #: results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape
-LawValues = collections.namedtuple("LawValues", ("pressure", "area", "stiffness", "energy"))
+LawValues = collections.namedtuple(
+    "LawValues", ("pressure", "area", "stiffness", "energy")
+)

@@ -1,8 +1,9 @@
 """The compiled core: all loops of the library, in C, as exports contain it.
 
-`core` is the module of the newest generation of processor that this machine supports; the environment variable
-MBMA_TABLES_CORE names another one, such as "x86_64_v3". `mbma.h` describes the functions; arguments of the wrappers are
-in the same order, without the counts of arrays.
+`core` is the module of the newest generation of processor that this machine supports; the
+environment variable MBMA_TABLES_CORE names another one, such as "x86_64_v3". `mbma.h`
+describes the functions; arguments of the wrappers are in the same order, without the counts
+of arrays.
 """
 
 import importlib
@@ -26,7 +27,9 @@ def _load() -> Any:
             "install it there with `pip install -e .`"
         ) from missing
     best = next(name for name, least in GENERATIONS.items() if plain.generation >= least)
-    return plain if best == "plain" else importlib.import_module(f"mbma_tables.core._{best}")
+    return (
+        plain if best == "plain" else importlib.import_module(f"mbma_tables.core._{best}")
+    )
 
 
 core: Any = _load()

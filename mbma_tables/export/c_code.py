@@ -1,7 +1,8 @@
 """The model as C: the core's own files, its tables as data beside them, and calls of one surface; built and replayed.
 
-Tables are text, in the shortest decimals that reproduce every bit, so that any compiler on any machine reads the same
-numbers; 150,000 numbers are 3 MB of text and a fraction of a second of compiling.
+Tables are text, in the shortest decimals that reproduce every bit, so that any compiler on
+any machine reads the same numbers; 150,000 numbers are 3 MB of text and a fraction of a
+second of compiling.
 """
 
 import dataclasses
@@ -23,7 +24,16 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.export.conformance import FORM, POINTS_FILE, points_text
 from mbma_tables.export.targets import Target
-from mbma_tables.export.text import about, braces, core_file, filled, number, numerals, opening, written_by
+from mbma_tables.export.text import (
+    about,
+    braces,
+    core_file,
+    filled,
+    number,
+    numerals,
+    opening,
+    written_by,
+)
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
 from mbma_tables.theories import persson
 from mbma_tables.theories.calibrated import table as calibrated_table
@@ -35,7 +45,11 @@ from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.universal import RECORD, UniversalModel
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
-CORE = ("totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
+CORE = (
+    "totals.c",
+    "calibrated.c",
+    "spectrum_laws.c",
+)  # and the headers that they include
 MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")
 SELFTEST = "mbma_selftest.c"
 SOURCES = (*CORE, *MODEL[1:], SELFTEST)
@@ -77,9 +91,17 @@ def core_texts() -> dict[str, str]:
 def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
     """Names and texts of the source files."""
     if variant.addition != "sum":
-        raise InputError(f"exported code adds the areas of islands: variant {variant.name!r} takes their cover")
-    heads = {name: opening(header(name, model, variant), "/*") for name in (*MODEL, SELFTEST)}
-    texts = core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
+        raise InputError(
+            f"exported code adds the areas of islands: variant {variant.name!r} takes their cover"
+        )
+    heads = {
+        name: opening(header(name, model, variant), "/*") for name in (*MODEL, SELFTEST)
+    }
+    texts = (
+        core_texts()
+        | model_texts(heads)
+        | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
+    )
     return texts | {SELFTEST: filled(SELFTEST, HEADER=heads[SELFTEST])}
 
 
@@ -93,7 +115,9 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
         "FORM_X_LOW": number(form["X"][0]),
         "FORM_X_HIGH": number(form["X"][1]),
         "FORM_MU_HIGH": number(form["mu"][1]),
-        "FORM_ERROR": number(max(certificate.largest for certificate in certificates.values())),
+        "FORM_ERROR": number(
+            max(certificate.largest for certificate in certificates.values())
+        ),
         "MIN_RTOL": "1e-11",  # as `contact` allows
         "MAX_RTOL": "0.1",
         "QUADRATURE_SHARE": number(QUADRATURE_SHARE),
@@ -101,7 +125,10 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
         "LAW_ERROR": number(LAW_ERROR),
         "PERSSON_ERROR": number(persson.INVERSE_RTOL),
     }
-    return {name: filled(name, **parts, HEADER=heads[name]) for name in ("mbma_model.h", "mbma_model.c")}
+    return {
+        name: filled(name, **parts, HEADER=heads[name])
+        for name in ("mbma_model.h", "mbma_model.c")
+    }
 
 
 def closed_forms() -> tuple[str, str]:
@@ -113,7 +140,12 @@ def closed_forms() -> tuple[str, str]:
         lines += [f"/* {one.title} */", f"{head} {{"]
         for name, text in one.steps.items():
             left = "return" if name == one.result else f"const double {name} ="
-            lines += textwrap.wrap(f"{left} {text};", 120, initial_indent="    ", subsequent_indent="        ")
+            lines += textwrap.wrap(
+                f"{left} {text};",
+                120,
+                initial_indent="    ",
+                subsequent_indent="        ",
+            )
         lines += ["}", ""]
     return prototypes, re.sub(r"(\d)e0\b", r"\1.0", "\n".join(lines))
 
@@ -122,28 +154,61 @@ def tables(model: UniversalModel) -> dict[str, Any]:
     """The arrays of the tables by their names in C."""
     cells, places, _ = model.cells
     spline = calibrated_table.shipped().core_table[0]
-    return {"MBMA_CELLS": cells.reshape(-1, RECORD), "MBMA_PLACES": places, "MBMA_SPLINE": spline}
+    return {
+        "MBMA_CELLS": cells.reshape(-1, RECORD),
+        "MBMA_PLACES": places,
+        "MBMA_SPLINE": spline,
+    }
 
 
 def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> str:
     """The tables, and the variant of the equations; with `later` as variables, for a program to fill in."""
     lines, law = ['#include "mbma_model.h"'], calibrated_table.shipped()
-    for (name, values), kind in zip(tables(model).items(), ("mbma_cell", "int32_t", "float"), strict=True):
+    for (name, values), kind in zip(
+        tables(model).items(), ("mbma_cell", "int32_t", "float"), strict=True
+    ):
         head, body = (
             f"{kind} {name}[{len(values)}]",
-            _cells if kind == "mbma_cell" else lambda numbers: _wrapped(numerals(numbers)),
+            _cells
+            if kind == "mbma_cell"
+            else lambda numbers: _wrapped(numerals(numbers)),
         )
-        lines += ["", f"{head};"] if later else ["", f"static const {head} = {{", *body(values), "};"]
-    X, buckets, flags = model.cells[2][:4], model.cells[2][4:].astype(int), variant.numbers[5:].astype(int)
-    spline = "MBMA_SPLINE", law.cells, law.first, 1 / law.step, law.covered[:2, 0], law.covered[:2, 1]
-    theories = [np.array(dataclasses.astuple(constants)) for constants in (YANG_PERSSON, law.constants)]
+        lines += (
+            ["", f"{head};"]
+            if later
+            else ["", f"static const {head} = {{", *body(values), "};"]
+        )
+    X, buckets, flags = (
+        model.cells[2][:4],
+        model.cells[2][4:].astype(int),
+        variant.numbers[5:].astype(int),
+    )
+    spline = (
+        "MBMA_SPLINE",
+        law.cells,
+        law.first,
+        1 / law.step,
+        law.covered[:2, 0],
+        law.covered[:2, 1],
+    )
+    theories = [
+        np.array(dataclasses.astuple(constants))
+        for constants in (YANG_PERSSON, law.constants)
+    ]
     values = {
-        "mbma_cells CELLS": braces("MBMA_CELLS", "MBMA_PLACES", *numerals(X), *numerals(buckets)),
+        "mbma_cells CELLS": braces(
+            "MBMA_CELLS", "MBMA_PLACES", *numerals(X), *numerals(buckets)
+        ),
         "mbma_calibrated_table LAW": braces(braces(*spline), *numerals(theories[1][:3])),
         "mbma_law_constants THEORIES[]": braces(*theories),
-        "mbma_variant MBMA_VARIANT": braces(*numerals(variant.numbers[:5]), *numerals(flags)),
+        "mbma_variant MBMA_VARIANT": braces(
+            *numerals(variant.numbers[:5]), *numerals(flags)
+        ),
     }
-    held = (f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};" for name, text in values.items())
+    held = (
+        f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};"
+        for name, text in values.items()
+    )
     lines += [
         "",
         *held,
@@ -158,7 +223,9 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
 
 def _wrapped(items: Sequence[str], first: str = "", last: str = "") -> list[str]:
     text = f"{first}{', '.join(items)}{last}"
-    return textwrap.wrap(text, 120, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
+    return textwrap.wrap(
+        text, 120, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False
+    )
 
 
 def _cells(cells: FloatArray) -> Iterator[str]:
@@ -166,7 +233,11 @@ def _cells(cells: FloatArray) -> Iterator[str]:
     for cell in cells:
         yield from _wrapped(numerals(cell[:8]), "{", ",")
         for name, powers in zip("FA", cell[8:].reshape(2, 8, 8), strict=True):
-            yield from _wrapped([braces(*numerals(row)) for row in powers], "{", "}," if name == "F" else "}},")
+            yield from _wrapped(
+                [braces(*numerals(row)) for row in powers],
+                "{",
+                "}," if name == "F" else "}},",
+            )
 
 
 def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
@@ -174,12 +245,15 @@ def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     content, law = model.content, calibrated_table.shipped()
     found, (X, mu) = content.attributes, content.axes
     worst, visited = (
-        max(float(found[f"{which}largest_error_{of}"]) for of in ("F", "A")) for which in ("", "visited_")
+        max(float(found[f"{which}largest_error_{of}"]) for of in ("F", "A"))
+        for which in ("", "visited_")
     )
     form, certificates = RANGES[FORM], CERTIFICATES[FORM]
     ranges = [
         f"{axis} in [{about(math.exp(low) if k else low)}, {about(math.exp(high) if k else high)}]"
-        for k, (axis, (low, high)) in enumerate(zip(("H", "zeta_1", "u/h_rms"), law.covered, strict=True))
+        for k, (axis, (low, high)) in enumerate(
+            zip(("H", "zeta_1", "u/h_rms"), law.covered, strict=True)
+        )
     ]
     return [
         f"{name}: part of the MBMA model and the calibrated law of rough contact as source code.",
@@ -211,7 +285,9 @@ def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     ]
 
 
-def write_code(folder: os.PathLike[str] | str, variant: str | Variant = "reported") -> list[pathlib.Path]:
+def write_code(
+    folder: os.PathLike[str] | str, variant: str | Variant = "reported"
+) -> list[pathlib.Path]:
     """Write the model as C11, which C++ compiles too, with conformance points and a self-test that replays them.
 
     A missing folder is made, files of the same names are replaced. Returns the files written.
@@ -233,25 +309,46 @@ class BuildError(InputError):
     """A compiler or program that is not installed, or failed."""
 
 
-def built_by(command: Sequence[str], texts: Mapping[str, str], made: str, *last: str) -> bytes:
+def built_by(
+    command: Sequence[str], texts: Mapping[str, str], made: str, *last: str
+) -> bytes:
     """The output of a compiler for the C sources among texts."""
     with tempfile.TemporaryDirectory() as work:
         for name, text in texts.items():
             write_file(pathlib.Path(work, name), text.encode())
-        _run([*command, *(name for name in texts if name.endswith(".c")), "-o", made, *last], work, "did not compile")
+        _run(
+            [
+                *command,
+                *(name for name in texts if name.endswith(".c")),
+                "-o",
+                made,
+                *last,
+            ],
+            work,
+            "did not compile",
+        )
         return pathlib.Path(work, made).read_bytes()
 
 
 def _run(command: Sequence[str], folder: str, failure: str = "") -> str:
     """What a program prints; with `failure` it must end without an error."""
     try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+            check=False,
+        )
     except FileNotFoundError:
         raise BuildError(f"{command[0]} is not installed") from None
     except subprocess.TimeoutExpired:
         raise BuildError(f"{command[0]}: no end within {TIMEOUT:g} s") from None
     if failure and done.returncode:
-        raise BuildError(f"{' '.join(command[:3])} {failure}: {done.stderr.strip()[:500]}")
+        raise BuildError(
+            f"{' '.join(command[:3])} {failure}: {done.stderr.strip()[:500]}"
+        )
     return done.stdout
 
 
@@ -263,7 +360,9 @@ class Replay(NamedTuple):
     failed: int  # beyond their tolerance, or rejected
 
 
-def check(folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
+def check(
+    folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None
+) -> Replay:
     """Compile what `write_code` wrote, and replay the points beside it, or others.
 
     Raises
@@ -276,7 +375,18 @@ def check(folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None 
     if not csv.is_file():
         raise InputError(f"{csv} does not exist; write_code({str(place)!r}) makes it")
     with tempfile.TemporaryDirectory() as work:
-        _run(["cc", *FLAGS, *(str(place / name) for name in SOURCES), "-lm", "-o", "selftest"], work, "did not compile")
+        _run(
+            [
+                "cc",
+                *FLAGS,
+                *(str(place / name) for name in SOURCES),
+                "-lm",
+                "-o",
+                "selftest",
+            ],
+            work,
+            "did not compile",
+        )
         return read_report(_run([f"{work}/selftest", str(csv)], work))
 
 
@@ -285,7 +395,11 @@ def read_report(text: str) -> Replay:
     *kinds, last = [line.split() for line in text.splitlines()] or [[]]
     if last[:1] != ["failed"]:
         raise BuildError(f"the self-test did not end: {text[-500:]}")
-    return Replay({kind: int(n) for kind, n, _ in kinds}, {kind: float(most) for kind, _, most in kinds}, int(last[1]))
+    return Replay(
+        {kind: int(n) for kind, n, _ in kinds},
+        {kind: float(most) for kind, _, most in kinds},
+        int(last[1]),
+    )
 
 
 TARGETS = (Target("c", write_code, frozenset({"variant", "check"})),)

@@ -1,7 +1,7 @@
 """Conformance points beside exported code, which its self-test replays.
 
-A row of the points' file contains: kind, tolerance, number of arguments, the arguments, and each result with the scale
-of its difference. Lines that begin with # describe the kinds.
+A row of the points' file contains: kind, tolerance, number of arguments, the arguments, and
+each result with the scale of its difference. Lines that begin with # describe the kinds.
 """
 
 import math
@@ -47,15 +47,31 @@ SHARES = (0.02, 0.3, 0.7, 0.99)  # u/h_max
 RTOL = 1e-8
 
 
-def rows(kind: str, arguments: Iterable[Any], answers: Any, scales: Any = None, tolerance: Any = TOLERANCE) -> Rows:
+def rows(
+    kind: str,
+    arguments: Iterable[Any],
+    answers: Any,
+    scales: Any = None,
+    tolerance: Any = TOLERANCE,
+) -> Rows:
     """Lines of the points' file; columns of arguments, answers and scales of their differences broadcast."""
     given = np.broadcast_arrays(*arguments, tolerance)
     expected = np.array([np.broadcast_to(answer, given[0].shape) for answer in answers])
-    units = np.abs(expected) if scales is None else np.array([np.broadcast_to(unit, given[0].shape) for unit in scales])
+    units = (
+        np.abs(expected)
+        if scales is None
+        else np.array([np.broadcast_to(unit, given[0].shape) for unit in scales])
+    )
     # results that are exactly 0 must be exactly 0
-    pairs = np.stack([expected, np.where(units == 0, 1.0, units)], axis=1).reshape(-1, given[0].size)
-    for *own, most, numbers in zip(*(column.ravel().tolist() for column in given), pairs.T.tolist(), strict=True):
-        cells = [number(value, infinity="inf", missing="nan") for value in (*own, *numbers)]
+    pairs = np.stack([expected, np.where(units == 0, 1.0, units)], axis=1).reshape(
+        -1, given[0].size
+    )
+    for *own, most, numbers in zip(
+        *(column.ravel().tolist() for column in given), pairs.T.tolist(), strict=True
+    ):
+        cells = [
+            number(value, infinity="inf", missing="nan") for value in (*own, *numbers)
+        ]
         yield ",".join((kind, number(most), str(len(own)), *cells))
 
 
@@ -67,27 +83,47 @@ def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
 
 
 def surface_rows(
-    surface: tuple[float, ...], variant: Variant, approach: Any, depths: Any, shares: Any, E_star: float = 1.0
+    surface: tuple[float, ...],
+    variant: Variant,
+    approach: Any,
+    depths: Any,
+    shares: Any,
+    E_star: float = 1.0,
 ) -> Rows:
     """Islands and totals of one surface, gap by gap, and the calibrated law at shares of h_max, by the library."""
     own, model = Surface(*surface), universal_model()
     fields = geometry(approach, own.hurst, own.zeta_1, variant)
-    yield from rows("geometry", (approach, own.hurst, own.zeta_1), [fields[name] for name in FIELDS])
+    yield from rows(
+        "geometry", (approach, own.hurst, own.zeta_1), [fields[name] for name in FIELDS]
+    )
     gaps = own.h_max * (1 - np.asarray(depths))
     sums, compression = np.zeros((5, gaps.size)), (own.h_max - gaps) / own.h_rms
-    by_table(own, compression, np.arange(gaps.size), model, Sums(model, variant, RTOL), sums)
+    by_table(
+        own, compression, np.arange(gaps.size), model, Sums(model, variant, RTOL), sums
+    )
     stress = own.q0 * own.s
-    pressure, area, stiffness = stress * sums[0], sums[1], 2 * stress / own.h_rms * sums[2]
+    pressure, area, stiffness = (
+        stress * sums[0],
+        sums[1],
+        2 * stress / own.h_rms * sums[2],
+    )
     # at a maximum of force, stiffness is 0
-    least = np.maximum(np.abs(stiffness), np.where(pressure == 0, 1.0, pressure) / own.h_max)
+    least = np.maximum(
+        np.abs(stiffness), np.where(pressure == 0, 1.0, pressure) / own.h_max
+    )
     yield from rows(
-        "total", (*surface, gaps, 1.0, RTOL), (pressure, area, stiffness, 0.0), (pressure, area, least, ANY)
+        "total",
+        (*surface, gaps, 1.0, RTOL),
+        (pressure, area, stiffness, 0.0),
+        (pressure, area, least, ANY),
     )
     if len(shares):
         u = own.h_max * np.asarray(shares)
         found = contact(own, mean_separation=u, theory="calibrated", E_star=E_star)
         values = found.pressure, found.area, found.stiffness
-        yield from rows("calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY))
+        yield from rows(
+            "calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY)
+        )
         yield from rows("separation", (*surface, found.pressure, E_star), (u,))
 
 
@@ -105,11 +141,24 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
     known = points["table_F"], points["table_A"], model.answer(*places).error
     lines = [*rows("phi", places, known, None, points["tolerance"])]
     middle = 0.5 * (X.low + X.high)
-    statuses = {(X.low, 1.0): OK, (X.high, 1.0): OK, (middle, mu.high): OK, (middle, 0.0): OK}
-    statuses |= {(np.nextafter(X.low, -np.inf), 1.0): X_BELOW, (np.nextafter(X.high, np.inf), 1.0): X_ABOVE}
+    statuses = {
+        (X.low, 1.0): OK,
+        (X.high, 1.0): OK,
+        (middle, mu.high): OK,
+        (middle, 0.0): OK,
+    }
+    statuses |= {
+        (np.nextafter(X.low, -np.inf), 1.0): X_BELOW,
+        (np.nextafter(X.high, np.inf), 1.0): X_ABOVE,
+    }
     statuses |= {(middle, np.nextafter(mu.high, np.inf)): MU_ABOVE}
-    statuses |= dict.fromkeys([(math.nan, 1.0), (middle, math.nan), (middle, -1e-300)], INVALID)
-    lines += [*rows("status", np.array([*statuses]).T, [[*statuses.values()]]), *formula_rows(*places)]
+    statuses |= dict.fromkeys(
+        [(math.nan, 1.0), (middle, math.nan), (middle, -1e-300)], INVALID
+    )
+    lines += [
+        *rows("status", np.array([*statuses]).T, [[*statuses.values()]]),
+        *formula_rows(*places),
+    ]
     for surface in SURFACES:
         if surface[2] / surface[1] > max(3.0, variant.floor_u):
             approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)

@@ -52,7 +52,9 @@ def to_csv(law: LawTable) -> bytes:
     stream = io.StringIO()
     stream.write(comment(law.comments, "#"))
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([csv_cell(f"{name} [{unit}]") for name, (_, unit) in law.columns.items()])
+    writer.writerow(
+        [csv_cell(f"{name} [{unit}]") for name, (_, unit) in law.columns.items()]
+    )
     columns = (_cells(values) for values, _ in law.columns.values())
     writer.writerows(zip(*columns, strict=True))
     return stream.getvalue().encode()
@@ -62,9 +64,15 @@ def to_json(law: LawTable) -> bytes:
     """One object: the header, and the columns by name; of a conductance those of its pressure as "behaviour"."""
 
     def content(table: LawTable) -> dict[str, Any]:
-        return _header(table) | {"columns": {name: values.tolist() for name, (values, _) in table.columns.items()}}
+        return _header(table) | {
+            "columns": {
+                name: values.tolist() for name, (values, _) in table.columns.items()
+            }
+        }
 
-    whole = content(law) | ({} if law.behaviour is None else {"behaviour": content(law.behaviour)})
+    whole = content(law) | (
+        {} if law.behaviour is None else {"behaviour": content(law.behaviour)}
+    )
     return (json.dumps(whole, indent=1) + "\n").encode()
 
 
@@ -73,9 +81,18 @@ def to_matlab(law: LawTable) -> bytes:
     from scipy.io import savemat
 
     stream = io.BytesIO()
-    text = {name: value for name, value in _header(law).items() if name not in ("x", "y", "comments", "facts")}
+    text = {
+        name: value
+        for name, value in _header(law).items()
+        if name not in ("x", "y", "comments", "facts")
+    }
     comments = np.array(law.comments, dtype=object)
-    named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
+    named = {
+        "x": law.x[:, None],
+        "y": law.y[:, None],
+        "x_name": law.x_name,
+        "y_name": law.y_name,
+    }
     named |= {name: values[:, None] for name, (values, _) in law.more.items()}
     savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
     # the first 116 bytes are free text, where scipy writes the time: replaced, for identical bytes
@@ -102,11 +119,14 @@ def to_netcdf(law: LawTable) -> bytes:
         "history": law.comments[-1],
     }
     if law.x_name == "pressure":
-        # CF takes a dimension of pressures for heights in the atmosphere: rows are counted, and have their pressures
+        # CF takes a dimension of pressures for heights in the atmosphere: rows are counted,
+        # and have their pressures
         dataset = dataset.rename_dims(pressure="row").drop_indexes("pressure")
     # CF 2.5.1: a coordinate has no missing values, nor has anything here
     whole = {name: {"_FillValue": None} for name in law.columns}
-    return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole))
+    return written_bytes(
+        "law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole)
+    )
 
 
 to_hdf5 = to_netcdf
@@ -116,7 +136,9 @@ def to_parquet(law: LawTable) -> bytes:
     """A Parquet file: two columns, the header as metadata of the schema."""
     pyarrow, parquet = (needed(module) for module in ("pyarrow", "pyarrow.parquet"))
     table = pyarrow.table({name: values for name, (values, _) in law.columns.items()})
-    table = table.replace_schema_metadata({name: json.dumps(value) for name, value in _header(law).items()})
+    table = table.replace_schema_metadata(
+        {name: json.dumps(value) for name, value in _header(law).items()}
+    )
     stream = io.BytesIO()
     parquet.write_table(table, stream)
     return stream.getvalue()
@@ -126,7 +148,13 @@ def _matlab_files(law: LawTable, name: str) -> dict[str, bytes]:
     return {"": to_matlab(law), ".m": matlab_reader(law, name)}
 
 
-_WRITE = {"csv": to_csv, "json": to_json, "netcdf": to_netcdf, "hdf5": to_netcdf, "parquet": to_parquet}
+_WRITE = {
+    "csv": to_csv,
+    "json": to_json,
+    "netcdf": to_netcdf,
+    "hdf5": to_netcdf,
+    "parquet": to_parquet,
+}
 TARGETS = (
     *(Target(name, write, quantities=tuple(AGAINST)) for name, write in _WRITE.items()),
     Target("matlab", _matlab_files, end=".mat", quantities=tuple(AGAINST)),

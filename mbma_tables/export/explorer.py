@@ -1,7 +1,7 @@
 """One page to explore a surface in a browser: the exported C as WebAssembly, its tables and the drawing, in one file.
 
-The module is compiled once, by `python -m generate explorer`, from C whose constants are variables: a page sets them
-from the current tables, so that writing one needs no compiler.
+The module is compiled once, by `python -m generate explorer`, from C whose constants are
+variables: a page sets them from the current tables, so that writing one needs no compiler.
 """
 
 import base64
@@ -35,10 +35,16 @@ from mbma_tables.theories.yielding import formulas as hardness_law
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
 SHOWN_VARIANTS = (REPORTED, PRINTED, FITTED)
-SCRIPTS = ("model.js", "state.js", "hardness.js", "curves.js", "downloads.js", "charts.js", "main.js")
-MAP_NOTE = (
-    "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
+SCRIPTS = (
+    "model.js",
+    "state.js",
+    "hardness.js",
+    "curves.js",
+    "downloads.js",
+    "charts.js",
+    "main.js",
 )
+MAP_NOTE = "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 K_S, NU = 50.0, 0.3  # first conductivity [W/(m K)] and Poisson's ratio
 MAX_SAMPLES = 500  # samples of a spectrum, so that a step of a slider stays fast
 
@@ -50,7 +56,12 @@ def packed(values: Any) -> dict[str, Any]:
         flat = np.diff(flat.view(np.int32), prepend=np.int32(0))
     planes = np.ascontiguousarray(flat.view(np.uint8).reshape(flat.size, -1).T)
     text = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
-    return {"count": flat.size, "bytes": flat.itemsize, "differences": differences, "text": text}
+    return {
+        "count": flat.size,
+        "bytes": flat.itemsize,
+        "differences": differences,
+        "text": text,
+    }
 
 
 def _limits() -> dict[str, Any]:
@@ -59,7 +70,13 @@ def _limits() -> dict[str, Any]:
     return {
         "log_area": deviations.log_area.tolist(),
         "scatter": {
-            name: dict(zip(QUANTITIES, np.where(np.isfinite(rows), rows, np.array(None)).tolist(), strict=True))
+            name: dict(
+                zip(
+                    QUANTITIES,
+                    np.where(np.isfinite(rows), rows, np.array(None)).tolist(),
+                    strict=True,
+                )
+            )
             for name, rows in deviations.log_rms.items()
         },
         "gradient": source.MAX_GRADIENT,
@@ -90,7 +107,14 @@ def _start(surface: AnySurface) -> dict[str, Any]:
     spectrum = "\n".join(f"{q!r} {C!r}" for q, C in pairs)
     # the nearest five numbers, for use without the spectrum
     q0, q1, h_rms = (float(getattr(surface, name)) for name in ("q0", "q1", "h_rms"))
-    return {"hurst": 0.8, "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": float(surface.h_max), "spectrum": spectrum}
+    return {
+        "hurst": 0.8,
+        "q0": q0,
+        "q1": q1,
+        "h_rms": h_rms,
+        "h_max": float(surface.h_max),
+        "spectrum": spectrum,
+    }
 
 
 def explorer_page(
@@ -104,10 +128,11 @@ def explorer_page(
 ) -> str:
     """A page of HTML that shows how a surface touches, with sliders; it needs neither a server nor a network.
 
-    Of a measured surface it uses the spectrum, of at most 500 samples, and h_max; heights and maps, which the
-    calibrated law uses in Python, are not included. Without a modulus stresses are over E*. Theory, variant and
-    `hardness` are the initial ones; the default theory is that of `contact_law`, but the calibrated law for a map,
-    which the page does not simulate.
+    Of a measured surface it uses the spectrum, of at most 500 samples, and h_max; heights
+    and maps, which the calibrated law uses in Python, are not included. Without a modulus
+    stresses are over E*. Theory, variant and `hardness` are the initial ones; the default
+    theory is that of `contact_law`, but the calibrated law for a map, which the page does
+    not simulate.
 
     Examples
     --------
@@ -122,10 +147,16 @@ def explorer_page(
     # a page has no simulation of a map
     theory = "calibrated" if theory in OF_MAPS else theory
     if theory == "mbma" and measured:
-        raise InputError("MBMA in the page is of five numbers: take another theory, or surface.fit()")
+        raise InputError(
+            "MBMA in the page is of five numbers: take another theory, or surface.fit()"
+        )
     if theory not in THEORIES:
         raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
-    modulus = 1.0 if E_star is None else number_in("E_star", float(positive_array("E_star", E_star)), 1e-300, 1e300)
+    modulus = (
+        1.0
+        if E_star is None
+        else number_in("E_star", float(positive_array("E_star", E_star)), 1e-300, 1e300)
+    )
     units = Units(surface.unit, "1" if E_star is None else stress_unit)
     cap = np.inf if hardness is None else float(hardness_in(units, hardness))
     start = _start(surface) | {
@@ -140,15 +171,28 @@ def explorer_page(
         "version": __version__,
         "title": title,
         "start": start,
-        "units": {"length": units.length, "stress": units.stress, "metre": surface.unit and factor(surface.unit, "m")},
+        "units": {
+            "length": units.length,
+            "stress": units.stress,
+            "metre": surface.unit and factor(surface.unit, "m"),
+        },
         "departures": list(surface.departures()),
-        "note": MAP_NOTE if isinstance(surface, MeasuredSurface) and surface.bearing is not None else "",
+        "note": MAP_NOTE
+        if isinstance(surface, MeasuredSurface) and surface.bearing is not None
+        else "",
         "limits": _limits(),
         "model": {
             "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
-            "tables": {name: packed(value) for name, value in c_code.tables(universal_model()).items()},
+            "tables": {
+                name: packed(value)
+                for name, value in c_code.tables(universal_model()).items()
+            },
             "variants": {
-                one.name: {"numbers": one.numbers.tolist(), "cover": one.addition == "cover"} for one in SHOWN_VARIANTS
+                one.name: {
+                    "numbers": one.numbers.tolist(),
+                    "cover": one.addition == "cover",
+                }
+                for one in SHOWN_VARIANTS
             },
         },
     }
@@ -163,4 +207,6 @@ def explorer_page(
         "SCRIPT": f'(async () => {{\n"use strict";\n{scripts}\n}})()',
         "DATA": text,
     }
-    return re.sub("@([A-Z]+)@", lambda place: parts[place[1]], page_file("page.html").decode())
+    return re.sub(
+        "@([A-Z]+)@", lambda place: parts[place[1]], page_file("page.html").decode()
+    )

@@ -32,11 +32,23 @@ from mbma_tables.theories.mbma.variants import Variant
 
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
-SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
-ROUNDS, PARTS = 4, 32  # rounds and parts of the search for an end of validity between two of them
+SMALL, NEAREST = (
+    20,
+    1e-5,
+)  # smaller ones for validity alone, down to this share of the largest
+ROUNDS, PARTS = (
+    4,
+    32,
+)  # rounds and parts of the search for an end of validity between two of them
 KAPPA = 0.5, 2.0  # range of normal over tangential stiffness
 GAS_AT = 5  # pressures at which a header has the conductance of the gas alone
-OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # description of a surface given by a spectrum
+OWN_NUMBERS = (
+    "q0",
+    "q1",
+    "h_rms",
+    "h_max",
+    "rms_gradient",
+)  # description of a surface given by a spectrum
 
 
 class GasInGaps(NamedTuple):
@@ -68,7 +80,9 @@ class ExportedLaw:
     hardness: float  # infinite where the contact is elastic
     length: str  # unit of length,
     stress: str  # and of stress, or of force
-    made_by: tuple[str, ...] = ()  # header lines with the command that writes the file again
+    made_by: tuple[
+        str, ...
+    ] = ()  # header lines with the command that writes the file again
     direction: str | float | None = None  # of a simulated map's leakage
     force: ForceLaw | None = None
 
@@ -80,7 +94,11 @@ class ExportedLaw:
     @property
     def c_least(self) -> float:
         """Begin of the range of overclosures."""
-        return -np.inf if self.ends else (self.law.h_max - float(self.law.block[at.HIGHEST])) / 2
+        return (
+            -np.inf
+            if self.ends
+            else (self.law.h_max - float(self.law.block[at.HIGHEST])) / 2
+        )
 
     @property
     def c_most(self) -> float:
@@ -91,47 +109,80 @@ class ExportedLaw:
     def c_turn(self) -> float:
         """Overclosure at the maximum of pressure, or at full compression."""
         law = self.law
-        return (law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 2
+        return (
+            law.h_max - (law.lowest if law.turning_point is None else law.turning_point)
+        ) / 2
 
     @property
     def facts(self) -> dict[str, tuple[float, str]]:
         """Numbers of a joint required by some programs, with their units."""
         own = {"h_rms": (float(self.surface.h_rms), self.length)}
-        return own | {"rms_gradient": (float(self.surface.rms_gradient), "1"), "E_star": (self.modulus, self.stress)}
+        return own | {
+            "rms_gradient": (float(self.surface.rms_gradient), "1"),
+            "E_star": (self.modulus, self.stress),
+        }
 
     def slope(
-        self, quantity: str, conductivity: float | None = None, unit: str | None = None, kappa: Any = None
+        self,
+        quantity: str,
+        conductivity: float | None = None,
+        unit: str | None = None,
+        kappa: Any = None,
     ) -> tuple[float, str]:
         """Conductance, or tangential stiffness, over the law's slope, and its unit; of k_s, or of normal stiffness."""
         if quantity == "tangential_stiffness":
             return 1 / number_in("kappa", kappa, *KAPPA), f"{self.stress}/{self.length}"
         if conductivity is None:
-            raise InputError("conductance needs conductivity, which is missing: k_s = 2 k1 k2/(k1 + k2)")
+            raise InputError(
+                "conductance needs conductivity, which is missing: k_s = 2 k1 k2/(k1 + k2)"
+            )
         if not unit:
-            raise InputError("conductance needs conductivity_unit, which is missing: that of k_s, such as 'W/(m K)'")
+            raise InputError(
+                "conductance needs conductivity_unit, which is missing: that of k_s, such as 'W/(m K)'"
+            )
         if not isinstance(unit, str) or not unit.isprintable():
             raise InputError(f"conductivity_unit is not printable: {unit!r}")
-        return number_in("conductivity", conductivity, 1e-300, 1e300) / self.modulus, f"{unit}/{self.length}"
+        return number_in(
+            "conductivity", conductivity, 1e-300, 1e300
+        ) / self.modulus, f"{unit}/{self.length}"
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:
         """The law's leakage, in its direction."""
-        return self.law.leakage if self.direction is None else self.law.leakage.along(self.direction)
+        return (
+            self.law.leakage
+            if self.direction is None
+            else self.law.leakage.along(self.direction)
+        )
 
     def answer(self, u: FloatArray) -> Any:
         """The theory itself at mean separations; of a body the contacts at approaches that are left to the largest."""
         if self.force is not None:
             return pressed(self.force.body, self.law.h_max + self.force.first - u)
-        return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
+        return contact(
+            self.surface,
+            mean_separation=u,
+            E_star=self.modulus,
+            theory=self.theory,
+            hardness=self.hardness,
+        )
 
-    def of_gas(self, gas: GasInGaps | None, unit: str, end: float, included: bool) -> tuple[str, ...]:
+    def of_gas(
+        self, gas: GasInGaps | None, unit: str, end: float, included: bool
+    ) -> tuple[str, ...]:
         """Lines of a header on what conductance is of: solid spots, and gas in gaps up to an overclosure."""
         if gas is None or gas.name == "vacuum":
-            return ("conductance is that of the solid spots alone, without gas in the gaps",)
+            return (
+                "conductance is that of the solid spots alone, without gas in the gaps",
+            )
         u = self.law.h_max - end * np.linspace(0, 1, GAS_AT)
-        values, pressures = gas.conductance(self.answer(u)), np.asarray(self.law.pressure(u))
+        values, pressures = (
+            gas.conductance(self.answer(u)),
+            np.asarray(self.law.pressure(u)),
+        )
         alone = ", ".join(
-            f"{about(value)} at {about(pressure, 3)}" for value, pressure in zip(values, pressures, strict=True)
+            f"{about(value)} at {about(pressure, 3)}"
+            for value, pressure in zip(values, pressures, strict=True)
         )
         what = f"conductance is that of the solid spots and of the gas in the gaps together, {gas}"
         if not included:
@@ -141,10 +192,16 @@ class ExportedLaw:
             )
         return (f"{what}; the gas has {alone} {self.stress}, in {unit}",)
 
-    def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
+    def header(
+        self, what: str, range_: str, *more: str, end: float, leakage: bool = False
+    ) -> tuple[str, ...]:
         """Lines of a file's header: contents, range, error, validity up to `end`, and with `leakage` those of flow."""
         law, stress = self.law, self.stress
-        title = f"MBMA model, variant {law.variant!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
+        title = (
+            f"MBMA model, variant {law.variant!r}"
+            if law.theory == Mbma.name
+            else f"theory {law.theory!r}"
+        )
         title = f"Contact law of a rough surface, {title}"
         meaning = (
             "pressure is force over nominal area;",
@@ -168,7 +225,9 @@ class ExportedLaw:
                 "loading only, not for unloading, which is stiffer"
             )
         names = self.surface.parameters or OWN_NUMBERS
-        numbers = ", ".join(f"{name} = {number(getattr(self.surface, name))}" for name in names)
+        numbers = ", ".join(
+            f"{name} = {number(getattr(self.surface, name))}" for name in names
+        )
         return (
             f"{title}; mbma_tables {__version__}",
             what,
@@ -193,11 +252,21 @@ class ExportedLaw:
         u = law.h_max - end * np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
         found, pressure = self.answer(u), np.asarray(law.pressure(u))
         for reason, bad in (found.leakage if leakage else found).reasons.items():
-            for first, last in np.flatnonzero(np.diff(bad, prepend=False, append=False)).reshape(-1, 2):
-                low = first and self._last_valid(reason, u[first - 1], u[first], leakage, ROUND_FLOOR)
-                high = last < u.size and self._last_valid(reason, u[last], u[last - 1], leakage, ROUND_CEILING)
+            for first, last in np.flatnonzero(
+                np.diff(bad, prepend=False, append=False)
+            ).reshape(-1, 2):
+                low = first and self._last_valid(
+                    reason, u[first - 1], u[first], leakage, ROUND_FLOOR
+                )
+                high = last < u.size and self._last_valid(
+                    reason, u[last], u[last - 1], leakage, ROUND_CEILING
+                )
                 where = (
-                    f"from p = {low} to {high}" if low and high else f"above p = {low}" if low else f"below p = {high}"
+                    f"from p = {low} to {high}"
+                    if low and high
+                    else f"above p = {low}"
+                    if low
+                    else f"below p = {high}"
                 )
                 yield f"not valid {f'{where} {unit}' if low or high else 'at any pressure of the range'}: {reason}"
         if law.softening is not None:
@@ -207,18 +276,26 @@ class ExportedLaw:
             )
         if not self.ends:
             yield f"no last contact: pressure is {about(law.pressure(law.h_max))} {unit} at c = 0"
-        spread = self._spread("one standard deviation of ln p at a given c", found.scatter, pressure)
+        spread = self._spread(
+            "one standard deviation of ln p at a given c", found.scatter, pressure
+        )
         yield f"scatter of simulations about the theory, {spread}"
         if leakage:
-            spread = self._spread("one standard deviation of ln K", found.leakage.scatter, pressure)
+            spread = self._spread(
+                "one standard deviation of ln K", found.leakage.scatter, pressure
+            )
             yield from self._of_leakage(spread)
 
-    def _last_valid(self, reason: str, good: float, bad: float, leakage: bool, rounding: str) -> str:
+    def _last_valid(
+        self, reason: str, good: float, bad: float, leakage: bool, rounding: str
+    ) -> str:
         """Pressure, rounded outward, at the last separation where a reason does not apply, by bisection between two."""
         for _ in range(ROUNDS):
             u = np.linspace(good, bad, PARTS + 1)
             found = self.answer(u[1:-1])
-            mask = (found.leakage if leakage else found).reasons.get(reason, np.zeros(PARTS - 1, bool))
+            mask = (found.leakage if leakage else found).reasons.get(
+                reason, np.zeros(PARTS - 1, bool)
+            )
             k = 1 + int(np.argmax(np.append(mask, True)))
             good, bad = u[k - 1], u[k]
         four_digits = Context(prec=4, rounding=rounding)
@@ -240,14 +317,22 @@ class ExportedLaw:
         """A scatter at five pressures where it is known."""
         sizes, pressure = np.asarray(scatter)[SMALL:], pressure[SMALL:]
         known = np.flatnonzero(np.isfinite(sizes))
-        places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
-        listed = ", ".join(f"{about(sizes[k], 2)} at {about(pressure[k], 3)}" for k in places)
+        places = (
+            known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
+        )
+        listed = ", ".join(
+            f"{about(sizes[k], 2)} at {about(pressure[k], 3)}" for k in places
+        )
         return f"{what}: {listed} {self.stress}" if listed else "not known"
 
     def _of_leakage(self, scatter: str) -> Iterator[str]:
         """Lines on leakage."""
         blocked, stress = self.leakage.blocked_at, self.stress
-        way = "" if self.law.gaps is None else f", direction {self.direction or 'both, their geometric mean'}"
+        way = (
+            ""
+            if self.law.gaps is None
+            else f", direction {self.direction or 'both, their geometric mean'}"
+        )
         yield (
             f"leakage is the flow coefficient K [{self.length}^3] of the gaps{way}: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {stress} s: 1e-3 Pa s, as water's, is "
@@ -279,12 +364,21 @@ def exported_law(
 ) -> ExportedLaw:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
     if isinstance(surface, ForceLaw):
-        if E_star != 1.0 or hardness != np.inf or any((length_unit, stress_unit, theory)) or variant != "reported":
-            raise InputError("a force law has its modulus, hardness, units and theory: give no others")
+        if (
+            E_star != 1.0
+            or hardness != np.inf
+            or any((length_unit, stress_unit, theory))
+            or variant != "reported"
+        ):
+            raise InputError(
+                "a force law has its modulus, hardness, units and theory: give no others"
+            )
         body, layer = surface.body, surface.body.law
         length, _ = _known(body.surface.unit, layer.units.stress)
         numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
-        return ExportedLaw(body.surface, surface.law, body.theory, *numbers, force=surface)
+        return ExportedLaw(
+            body.surface, surface.law, body.theory, *numbers, force=surface
+        )
     one: AnySurface = in_unit(surface, length_unit)
     modulus, units = modulus_and_units(E_star, one, stress_unit)
     length, stress = _known(units.length, units.stress)
@@ -301,7 +395,11 @@ def exported_law(
 def _known(length: str | None, stress: str | None) -> tuple[str, str]:
     """The units, neither of which may be missing."""
     if length is None:
-        raise InputError("length_unit is missing: give it, or numbers with units, like '0.8 um'")
+        raise InputError(
+            "length_unit is missing: give it, or numbers with units, like '0.8 um'"
+        )
     if not stress or stress == "1":
-        raise InputError("stress_unit is missing: give it, or numbers with units, like E_star = '115 GPa'")
+        raise InputError(
+            "stress_unit is missing: give it, or numbers with units, like E_star = '115 GPa'"
+        )
     return length, stress

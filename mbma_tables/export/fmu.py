@@ -37,7 +37,14 @@ PLATFORMS = {
 INPUT = 1  # value reference of overclosure, after time
 
 
-def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries: str = "here", **asked: Any) -> bytes:
+def fmu(
+    surface: AnySurface,
+    E_star: float | str,
+    *,
+    name: str = "law",
+    binaries: str = "here",
+    **asked: Any,
+) -> bytes:
     """A contact law as an FMU of FMI 2.0: overclosure in; pressure, tangent, area and energy out.
 
     Parameters
@@ -45,9 +52,10 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     surface, E_star, name, **asked
         As for `law_text`; a conductivity adds the output conductance, leakage the output leakage.
     binaries : {"here", "all", "none"}
-        Beside the sources: a binary for this platform, by the system's C compiler or zig, where one of them is
-        installed; binaries for Linux, macOS and Windows on x86-64, by zig (the extra "fmu"); or none. FMI 2.0 names
-        no folder for ARM, where the importing tool compiles the sources.
+        Beside the sources: a binary for this platform, by the system's C compiler or zig,
+        where one of them is installed; binaries for Linux, macOS and Windows on x86-64, by
+        zig (the extra "fmu"); or none. FMI 2.0 names no folder for ARM, where the importing
+        tool compiles the sources.
 
     Returns
     -------
@@ -67,7 +75,9 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
     >>> zipfile.ZipFile(io.BytesIO(file)).namelist()
     ['modelDescription.xml', 'sources/road.c']
     """
-    checked_name(name, MAX_NAME, windows_words(), "Windows, where its files are named so,")
+    checked_name(
+        name, MAX_NAME, windows_words(), "Windows, where its files are named so,"
+    )
     found = asked_law(surface, E_star, name, **asked)
     law, exported = text_of("c-law", found), found.exported
     variables = _variables(found)
@@ -82,9 +92,14 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
         "LEAST": number(exported.c_least, infinity="INFINITY"),
         "MOST": number(exported.c_most),
     }
-    source = filled("fmu.c", {what: number(ratio) for what, ratio in found.slopes.items()}, **parts)
+    source = filled(
+        "fmu.c", {what: number(ratio) for what, ratio in found.slopes.items()}, **parts
+    )
     built = _binaries(name, source, binaries)
-    listed = ", ".join(path.split("/")[1] for path in built) or "none, sources only: the importing tool compiles them"
+    listed = (
+        ", ".join(path.split("/")[1] for path in built)
+        or "none, sources only: the importing tool compiles them"
+    )
     if binaries == "all":
         listed += f" (x86-64; linux64 for glibc {GLIBC} and later); on ARM the importing tool compiles the sources"
     said = "\n".join(map(inert, (*found.said, f"binaries: {listed}")))
@@ -103,21 +118,45 @@ def fmu(surface: AnySurface, E_star: float | str, *, name: str = "law", binaries
 def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
     """Shared libraries by their paths in the file, for the platforms asked for, as far as there is a compiler."""
     if asked not in ("here", "all", "none"):
-        raise InputError(f"binaries must be one of {('here', 'all', 'none')}, got {asked!r}")
-    zig, system = importlib.util.find_spec("ziglang"), f"{platform.machine()} {sys.platform}".lower()
+        raise InputError(
+            f"binaries must be one of {('here', 'all', 'none')}, got {asked!r}"
+        )
+    zig, system = (
+        importlib.util.find_spec("ziglang"),
+        f"{platform.machine()} {sys.platform}".lower(),
+    )
     if asked == "all" and zig is None:
-        raise InputError("binaries for all platforms are compiled by ziglang: pip install ziglang")
-    here = {"x86_64 linux": "linux64", "x86_64 darwin": "darwin64", "amd64 win32": "win64"}.get(system)
+        raise InputError(
+            "binaries for all platforms are compiled by ziglang: pip install ziglang"
+        )
+    here = {
+        "x86_64 linux": "linux64",
+        "x86_64 darwin": "darwin64",
+        "amd64 win32": "win64",
+    }.get(system)
     found = {}
     for target, (folder, end) in PLATFORMS.items():
-        # a file for all platforms is for others' machines, whose C library may be older than that of this one
+        # a file for all platforms is for others' machines, whose C library may be older
+        # than that of this one
         own_cc = asked == "here" and folder == here and shutil.which("cc")
         if not (own_cc or zig) or asked == "none" or (asked == "here" and folder != here):
             continue
-        command = ["cc"] if own_cc else [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s"]
-        command += ["-w", "-O2", "-shared", "-DMBMA_WITHOUT_HEADERS", *([] if end == ".dll" else ["-fPIC"])]
+        command = (
+            ["cc"]
+            if own_cc
+            else [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s"]
+        )
+        command += [
+            "-w",
+            "-O2",
+            "-shared",
+            "-DMBMA_WITHOUT_HEADERS",
+            *([] if end == ".dll" else ["-fPIC"]),
+        ]
         with contextlib.suppress(*([BuildError] if asked == "here" else [])):
-            found[f"binaries/{folder}/{name}{end}"] = built_by(command, {f"{name}.c": source}, f"{name}{end}", "-lm")
+            found[f"binaries/{folder}/{name}{end}"] = built_by(
+                command, {f"{name}.c": source}, f"{name}{end}", "-lm"
+            )
     return found
 
 
@@ -125,7 +164,10 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """XML attributes of each variable, by value reference."""
     exported = found.exported
     length, stress = exported.length, exported.stress
-    asked = {"start": number(0.0 if exported.ends else max(0.0, exported.c_least)), "max": number(exported.c_most)}
+    asked = {
+        "start": number(0.0 if exported.ends else max(0.0, exported.c_least)),
+        "max": number(exported.c_most),
+    }
     asked |= {} if exported.ends else {"min": number(exported.c_least)}
     outputs = {
         "pressure": (stress, "force over nominal area"),
@@ -137,21 +179,44 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     said = "h_max less the mean separation"
     return [
         {"name": "time", "causality": "independent", "unit": "s"},
-        {"name": "overclosure", "causality": "input", "unit": length, "description": said, **asked},
-        *({"name": n, "causality": "output", "unit": u, "description": said} for n, (u, said) in outputs.items()),
+        {
+            "name": "overclosure",
+            "causality": "input",
+            "unit": length,
+            "description": said,
+            **asked,
+        },
+        *(
+            {"name": n, "causality": "output", "unit": u, "description": said}
+            for n, (u, said) in outputs.items()
+        ),
     ]
 
 
-def _description(name: str, token: str, text: str, variables: list[dict[str, str]], exported: ExportedLaw) -> bytes:
+def _description(
+    name: str,
+    token: str,
+    text: str,
+    variables: list[dict[str, str]],
+    exported: ExportedLaw,
+) -> bytes:
     """modelDescription.xml."""
     length, stress = exported.length, exported.stress
     facts = {"fmiVersion": "2.0", "modelName": name, "guid": token, "description": text}
-    facts |= {"generationTool": f"mbma_tables {__version__}", "variableNamingConvention": "flat"}
+    facts |= {
+        "generationTool": f"mbma_tables {__version__}",
+        "variableNamingConvention": "flat",
+    }
     root = ET.Element("fmiModelDescription", facts)
     provides = {"modelIdentifier": name, "providesDirectionalDerivative": "true"}
-    for kind, more in (("ModelExchange", {}), ("CoSimulation", {"canHandleVariableCommunicationStepSize": "true"})):
+    for kind, more in (
+        ("ModelExchange", {}),
+        ("CoSimulation", {"canHandleVariableCommunicationStepSize": "true"}),
+    ):
         interface = ET.SubElement(root, kind, provides | more)
-        ET.SubElement(ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"})
+        ET.SubElement(
+            ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"}
+        )
     # by units of SI
     metre, pascal = factor(length, "m"), factor(stress, "Pa", "stress")
     bases: dict[str, tuple[dict[str, int], float]] = {
@@ -168,12 +233,17 @@ def _description(name: str, token: str, text: str, variables: list[dict[str, str
         named = ET.SubElement(units, "Unit", {"name": unit})
         if unit in bases:
             powers, size = bases[unit]
-            base = {key: str(power) for key, power in powers.items()} | {"factor": number(size)}
+            base = {key: str(power) for key, power in powers.items()} | {
+                "factor": number(size)
+            }
             ET.SubElement(named, "BaseUnit", base)
     categories = ET.SubElement(root, "LogCategories")
     for category in ("logStatusDiscard", "logStatusError"):
         ET.SubElement(categories, "Category", {"name": category})
-    listed, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")
+    listed, structure = (
+        ET.SubElement(root, "ModelVariables"),
+        ET.SubElement(root, "ModelStructure"),
+    )
     of_real = ("unit", "start", "min", "max")
     for reference, all_of in enumerate(variables):
         outer = {"valueReference": str(reference), "variability": "continuous"}
@@ -183,7 +253,9 @@ def _description(name: str, token: str, text: str, variables: list[dict[str, str
     for kind in ("Outputs", "InitialUnknowns"):
         parent = ET.SubElement(structure, kind)
         for place in range(INPUT + 2, len(variables) + 1):  # in the list, from 1
-            ET.SubElement(parent, "Unknown", {"index": str(place), "dependencies": str(INPUT + 1)})
+            ET.SubElement(
+                parent, "Unknown", {"index": str(place), "dependencies": str(INPUT + 1)}
+            )
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
 

@@ -11,7 +11,15 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import ExportedLaw, GasInGaps, exported_law
-from mbma_tables.export.law_languages import FUNCTIONS, LANGUAGES, MORE, Beside, Language, flow_numbers, law_numbers
+from mbma_tables.export.law_languages import (
+    FUNCTIONS,
+    LANGUAGES,
+    MORE,
+    Beside,
+    Language,
+    flow_numbers,
+    law_numbers,
+)
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import (
     about,
@@ -48,24 +56,31 @@ static const mbma_law {name} = {{&{name}_DATA.head, {name}_DATA.rows, {name}_DAT
 """  # of a law in C
 MODELICA_NAMES = r"\b(?<!type )(\w+)(?:\[[^]]*\])? = [-\d{]|function (\w+)"
 # functions that other files see, where they are made
-_MADE = re.compile(r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M)
+_MADE = re.compile(
+    r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M
+)
 
 
-def law_text(target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any) -> str:
+def law_text(
+    target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any
+) -> str:
     """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
 
     Parameters
     ----------
     target : str
-        One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`, kappa
-        `tangential_stiffness`, of an unloading stiffness that with a hardness is not the law's own slope.
+        One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`,
+        kappa `tangential_stiffness`, of an unloading stiffness that with a hardness is not
+        the law's own slope.
     surface, E_star, **asked
-        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit,
-        kappa. Or the force law of a rough sphere or cylinder (`RoughContact.law`) alone: its "pressure" is force.
+        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness,
+        conductivity, conductivity_unit, kappa. Or the force law of a rough sphere or
+        cylinder (`RoughContact.law`) alone: its "pressure" is force.
     name : str
         What functions, modules or packages are called, or begin with; "law" by default.
     leakage : bool
-        The function `leakage` as well, the flow coefficient K of the gaps [length^3], as `ContactLaw.leakage`.
+        The function `leakage` as well, the flow coefficient K of the gaps [length^3], as
+        `ContactLaw.leakage`.
 
     Returns
     -------
@@ -75,8 +90,8 @@ def law_text(target: str, surface: AnySurface | ForceLaw, E_star: float | str = 
     Raises
     ------
     InputError, OutOfRangeError
-        As `describe_law`; for conductance and tangential stiffness with a hardness in Python and MATLAB, and for
-        leakage of a target that is a user subroutine.
+        As `describe_law`; for conductance and tangential stiffness with a hardness in
+        Python and MATLAB, and for leakage of a target that is a user subroutine.
 
     Examples
     --------
@@ -88,13 +103,17 @@ def law_text(target: str, surface: AnySurface | ForceLaw, E_star: float | str = 
     return law_files(target, surface, E_star, **asked)[""]
 
 
-def law_files(target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any) -> dict[str, str]:
+def law_files(
+    target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any
+) -> dict[str, str]:
     """The result of `law_text`, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     language = LANGUAGES[target]
     if language.subroutine and (asked.get("leakage") or isinstance(surface, ForceLaw)):
-        raise InputError(f"{target} has no place for leakage, nor for the force of a body: leave it out")
+        raise InputError(
+            f"{target} has no place for leakage, nor for the force of a body: leave it out"
+        )
     if language.subroutine == "gapcon.c":  # which is of conductance alone
         asked.setdefault("conductivity_unit", "")
     checked_name(asked.get("name", NAME), MAX_NAME, language.reserved(), target)
@@ -132,22 +151,35 @@ def asked_law(
     checked_name(name, MAX_NAME, FUNCTIONS, "a function of the law")
     conducts = conductivity is not None or conductivity_unit is not None
     if isinstance(surface, ForceLaw) and (conducts or leakage):
-        raise InputError("a force law has neither conductance nor leakage: leave conductivity and leakage out")
+        raise InputError(
+            "a force law has neither conductance nor leakage: leave conductivity and leakage out"
+        )
     exported = exported_law(surface, E_star, **options)
     length, stress, law = exported.length, exported.stress, exported.law
     slopes, more = {}, {}
-    for quantity, wanted in (("conductance", conducts), ("tangential_stiffness", kappa is not None)):
+    for quantity, wanted in (
+        ("conductance", conducts),
+        ("tangential_stiffness", kappa is not None),
+    ):
         if wanted:
-            slopes[quantity], more[quantity] = exported.slope(quantity, conductivity, conductivity_unit, kappa)
+            slopes[quantity], more[quantity] = exported.slope(
+                quantity, conductivity, conductivity_unit, kappa
+            )
     if leakage:
         more["leakage"] = f"{length}^3"
     sloped, factor = law.unloading if slopes else (law, 1.0)
     what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure "
     what += f"[{stress} {length}]{''.join(f', {quantity} [{unit}]' for quantity, unit in more.items())}"
-    begin = "no contact below c = 0" if exported.ends else f"c from {number(exported.c_least)}"
+    begin = (
+        "no contact below c = 0"
+        if exported.ends
+        else f"c from {number(exported.c_least)}"
+    )
     turns = "" if law.turning_point is None else ", where pressure turns down"
     if conducts:
-        notes += exported.of_gas(gas, more["conductance"], exported.c_turn, included=False)
+        notes += exported.of_gas(
+            gas, more["conductance"], exported.c_turn, included=False
+        )
     said = exported.header(
         f"{what}, against overclosure c [{length}]",
         f"{begin}, to {number(exported.c_most)}; there is no answer outside",
@@ -177,7 +209,9 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
     numbers |= {"C_LEAST": exported.c_least, "C_MOST": exported.c_most}
     each = {what: language.number(ratio) for what, ratio in asked.slopes.items()}
     parts = {
-        "HEADER": opening((line.format(name=name, interface=interface) for line in lines), language.mark),
+        "HEADER": opening(
+            (line.format(name=name, interface=interface) for line in lines), language.mark
+        ),
         "NAME": name,
         "SUBROUTINE": "",
         "INTERFACE": interface,
@@ -205,71 +239,128 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
         if nested:
             parts["SLOPED"] = "elastic.elastic_tangent" if yields else "tangent"
         if yields:
-            own = parts | _numbers(language, "", law_numbers(asked.sloped)) | {"NAME": "elastic", "HEADER": ""}
-            text = filled(language.template, **own | {"LEAKAGE": "", "ELASTIC": ""}).strip()
+            own = (
+                parts
+                | _numbers(language, "", law_numbers(asked.sloped))
+                | {"NAME": "elastic", "HEADER": ""}
+            )
+            text = filled(
+                language.template, **own | {"LEAKAGE": "", "ELASTIC": ""}
+            ).strip()
             # some tools confuse names of a package with those of one in it
-            names = "|".join(constant or function for constant, function in re.findall(MODELICA_NAMES, text))
+            names = "|".join(
+                constant or function
+                for constant, function in re.findall(MODELICA_NAMES, text)
+            )
             parts["ELASTIC"] = re.sub(rf"\b({names})\b", r"elastic_\1", text)
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts)
         routine = language.subroutine.removesuffix(".c")
-        parts["DISPATCHER"] = filled("interfaces.c", **parts, ROUTINE=routine, LISTS=routine.upper())
+        parts["DISPATCHER"] = filled(
+            "interfaces.c", **parts, ROUTINE=routine, LISTS=routine.upper()
+        )
     return filled(template_name, each, **parts)
 
 
 def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[str, str]:
     """Numbers of a law by their placeholders."""
-    write: dict[type, Any] = {int: str, float: language.number, np.ndarray: language.array}
-    texts = {what: write[float if isinstance(value, float) else type(value)](value) for what, value in numbers.items()}
+    write: dict[type, Any] = {
+        int: str,
+        float: language.number,
+        np.ndarray: language.array,
+    }
+    texts = {
+        what: write[float if isinstance(value, float) else type(value)](value)
+        for what, value in numbers.items()
+    }
     return {
-        f"{prefix}{what}".upper(): text for what, text in (texts | {"records": str(len(numbers["centre"]))}).items()
+        f"{prefix}{what}".upper(): text
+        for what, text in (texts | {"records": str(len(numbers["centre"]))}).items()
     }
 
 
 def _core(target: str, asked: AskedLaw) -> dict[str, str]:
     """The core, as C or compiled, and the law's own blocks."""
-    law, leaks, name, parts = asked.exported.law, asked.more.get("leakage", ""), asked.name, dict[str, str]()
-    blocks = {"LAW": law.block} | ({"ELASTIC": asked.sloped.block} if asked.sloped is not law else {})
+    law, leaks, name, parts = (
+        asked.exported.law,
+        asked.more.get("leakage", ""),
+        asked.name,
+        dict[str, str](),
+    )
+    blocks = {"LAW": law.block} | (
+        {"ELASTIC": asked.sloped.block} if asked.sloped is not law else {}
+    )
     if leaks:
-        blocks["FLOW"], parts["FLOW_H_RMS"] = asked.exported.leakage.block, number(asked.exported.leakage.h_rms)
+        blocks["FLOW"], parts["FLOW_H_RMS"] = (
+            asked.exported.leakage.block,
+            number(asked.exported.leakage.h_rms),
+        )
     if target == "javascript-law":
         held = {"WASM": page_file(LAW_MODULE)}
-        held |= {f"{own}_BLOCK": block.astype("<f8", copy=False).tobytes() for own, block in blocks.items()}
-        return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
+        held |= {
+            f"{own}_BLOCK": block.astype("<f8", copy=False).tobytes()
+            for own, block in blocks.items()
+        }
+        return parts | {
+            place: base64.b64encode(content).decode("ascii")
+            for place, content in held.items()
+        }
     return parts | {
         "CORE": core_text(name),
         "CODE": _code_mark(),
-        "DECLARED": filled("law.h", dict.fromkeys(asked.slopes, ""), HEADER="", NAME=name, LEAKAGE=leaks).lstrip(),
-        "LAWS": "".join(_data(f"{name}_{own}", block) for own, block in blocks.items()).rstrip(),
+        "DECLARED": filled(
+            "law.h", dict.fromkeys(asked.slopes, ""), HEADER="", NAME=name, LEAKAGE=leaks
+        ).lstrip(),
+        "LAWS": "".join(
+            _data(f"{name}_{own}", block) for own, block in blocks.items()
+        ).rstrip(),
     }
 
 
 def _example(exported: ExportedLaw, language: Language) -> str:
     """One line with values of the library's law; Modelica solves for c itself."""
     c = float(f"{exported.c_turn / 4:.3g}")
-    p, k = (float(value) for value in exported.law.pressure_and_stiffness(exported.law.h_max - c))
+    p, k = (
+        float(value)
+        for value in exported.law.pressure_and_stiffness(exported.law.h_max - c)
+    )
     answers = {"pressure": (c, p), "tangent": (c, k)} | (
         {"overclosure": (p, c)} if language.template != "law.mo" else {}
     )
     calls = []
     for what, (x, y) in answers.items():
         rounded_x = language.number(float(f"{x:.7g}"))
-        calls.append(f"{language.call.format(name='{name}', what=what, x=rounded_x)} = {about(y, 7)}")
+        calls.append(
+            f"{language.call.format(name='{name}', what=what, x=rounded_x)} = {about(y, 7)}"
+        )
     return f"Example: {', '.join(calls)}"
 
 
 def core_text(prefix: str) -> str:
     """Laws of the core with their headers; a prefix to the functions lets a program hold several."""
     texts = [core_file(name) for name in ("mbma.h", "elementary.h", "law.c")]
-    renamed = [f"#define {name} {prefix}_{name}" for text in texts for name in _MADE.findall(text)]
+    renamed = [
+        f"#define {name} {prefix}_{name}"
+        for text in texts
+        for name in _MADE.findall(text)
+    ]
     parts = [re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts]
-    return "\n".join(["/* functions of the core, which this file holds, under names of its own */", *renamed, *parts])
+    return "\n".join(
+        [
+            "/* functions of the core, which this file holds, under names of its own */",
+            *renamed,
+            *parts,
+        ]
+    )
 
 
 @functools.cache
 def _code_mark() -> str:
     """A number in C of all code that laws in one file share: laws of different code are refused there."""
-    shared = [core_text(""), *map(template, ("law.c", "interfaces.c", "uinter.c", "gapcon.c"))]
+    shared = [
+        core_text(""),
+        *map(template, ("law.c", "interfaces.c", "uinter.c", "gapcon.c")),
+    ]
     return f"0x{zlib.crc32(''.join(shared).encode()):08x}"
 
 
@@ -278,10 +369,16 @@ def _data(name: str, block: FloatArray) -> str:
     whole = block.view(np.int64)
     last = int(whole[at.RECORDS])
     records = [
-        braces(*numerals(row[: at.FORCE_AT]), *np.split(row[at.FORCE_AT : -1], 2), *numerals(row[-1]))
+        braces(
+            *numerals(row[: at.FORCE_AT]),
+            *np.split(row[at.FORCE_AT : -1], 2),
+            *numerals(row[-1]),
+        )
         for row in block[last:].reshape(-1, at.RECORD)
     ]
-    head = braces(*numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD]))
+    head = braces(
+        *numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD])
+    )
     rows = whole[at.HEAD : last].reshape(-1, 2)
     data = ",\n".join(wrapped(part) for part in (head, braces(*rows), braces(*records)))
     return DATA.format(name=name, data=data, rows=len(rows), records=len(records))

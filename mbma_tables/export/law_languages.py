@@ -1,14 +1,16 @@
 """How a contact law is written in each language, and its numbers for those that do not read the core's C.
 
-They are polynomials in order of rising overclosure c. Record k, which holds where edges[k - 1] <= scale c < edges[k],
-is, with x = scale c for the first `side` records and x = scale (c - h_max) for the rest,
+They are polynomials in order of rising overclosure c. Record k, which holds where edges[k -
+1] <= scale c < edges[k], is, with x = scale c for the first `side` records and x = scale (c
+- h_max) for the rest,
 
     t = (x - centre) rate,   p = sum_j p[j] t^j,   A/A0 = sum_j a[j] t^j,   dp/dc = scale rate dp/dt,
     energy = energy_0 + t sum_j p[j] t^j/(j + 1)/(scale rate).
 
-Where contact ends at c = 0 the first record's polynomials are multiplied by t^power. Leakage has records of its own
-against x = scale (d - blocked) with the gap d = h_max - 2 c; with a power the first one is multiplied by it, and K is
-zero at and below x = 0. Where bodies are apart, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
+Where contact ends at c = 0 the first record's polynomials are multiplied by t^power.
+Leakage has records of its own against x = scale (d - blocked) with the gap d = h_max - 2 c;
+with a power the first one is multiplied by it, and K is zero at and below x = 0. Where
+bodies are apart, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
 """
 
 import functools
@@ -20,16 +22,43 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.export.reserved_words import fortran_words, law_in_matlab_words, modelica_words, python_words
+from mbma_tables.export.reserved_words import (
+    fortran_words,
+    law_in_matlab_words,
+    modelica_words,
+    python_words,
+)
 from mbma_tables.export.text import number, wrapped
 from mbma_tables.law import block as at
-from mbma_tables.law.block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
+from mbma_tables.law.block import (
+    AREA_AT,
+    CENTRE,
+    ENERGY_AT,
+    FORCE_AT,
+    POWER_F,
+    RATE,
+    SCALE,
+)
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.leakage import LeakageLaw
 
-MORE = ("conductance", "tangential_stiffness", "leakage")  # asked for; all but the last are slopes times a ratio
-FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
-# steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep
+MORE = (
+    "conductance",
+    "tangential_stiffness",
+    "leakage",
+)  # asked for; all but the last are slopes times a ratio
+FUNCTIONS = (
+    "pressure",
+    "tangent",
+    "with_tangent",
+    "curvature",
+    "area",
+    "energy",
+    "overclosure",
+    *MORE,
+)
+# steps of coefficients over the least value and the least slope of a polynomial; flatter
+# ones count as so steep
 VALUES, SLOPES, FLAT = 2e-14, 4e-13, 1e-4
 MOST_DECIMALS = 400  # more than any double has: coefficients stay as they are
 
@@ -55,7 +84,8 @@ def law_numbers(law: ContactLaw) -> dict[str, Any]:
     scale, side = 2 * float(head[SCALE]), len(sides[0][0]) if ends else 0
     edges, numbers = ([sides[0][0]], [sides[0][1]]) if ends else ([], [])
     for x, records in sides[ends:]:
-        # towards full compression an end belongs to the record of larger gaps, also where the sides meet
+        # towards full compression an end belongs to the record of larger gaps, also where
+        # the sides meet
         above = np.append(x[1:], 1.0)[::-1]
         edges.append(np.nextafter(law.h_max * scale - above, math.inf))
         numbers.append(records[::-1])
@@ -151,11 +181,15 @@ class Language(NamedTuple):
     usage: str
     call: str  # of a function, with {name}, {what} and {x}
     number: Callable[[float], str] = number
-    array: Callable[[FloatArray], str] | None = None  # None where the core's C reads the law
+    array: Callable[[FloatArray], str] | None = (
+        None  # None where the core's C reads the law
+    )
     subroutine: str = ""  # template of a solver's user subroutine that calls the law
     parts: tuple[tuple[str, str], ...] = ()  # what else is filled in
     beside: tuple["Beside", ...] = ()  # other files of the target
-    reserved: Callable[[], frozenset[str]] = frozenset  # names that it cannot have, in small letters
+    reserved: Callable[[], frozenset[str]] = (
+        frozenset  # names that it cannot have, in small letters
+    )
 
 
 NAN = "Outside the range: NaN."
@@ -182,12 +216,19 @@ INTERACTIONS = (
 )
 SEVERAL_UINTER = INTERACTIONS.format(routine="UINTER")
 SEVERAL_GAPCON = INTERACTIONS.format(routine="GAPCON")
-# how a user subroutine ends the job: Abaqus has a routine for it, CalculiX its own routines' exit status
+# how a user subroutine ends the job: Abaqus has a routine for it, CalculiX its own
+# routines' exit status
 STOP_IN_ABAQUS = (
-    ("STOP_DECLARED", "SUBROUTINE FOR_NAME(xit, XIT)(void); /* of Abaqus, closes its files */"),
+    (
+        "STOP_DECLARED",
+        "SUBROUTINE FOR_NAME(xit, XIT)(void); /* of Abaqus, closes its files */",
+    ),
     ("STOP", "FOR_NAME(xit, XIT)()"),
 )
-STOP_IN_CALCULIX = (("STOP_DECLARED", ""), ("STOP", "exit(201) /* as CalculiX's own routines do */"))
+STOP_IN_CALCULIX = (
+    ("STOP_DECLARED", ""),
+    ("STOP", "exit(201) /* as CalculiX's own routines do */"),
+)
 SUBROUTINE = C._replace(beside=())
 GAPCON = SUBROUTINE._replace(subroutine="gapcon.c")
 LANGUAGES = {

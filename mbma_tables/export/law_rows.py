@@ -1,7 +1,7 @@
 """A contact law as rows for other codes, with quantity and units; the rows are chosen by their error.
 
-Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
-approach, so that -dp/du = dp/dc.
+Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first
+contact, rising as bodies approach, so that -dp/du = dp/dc.
 """
 
 import functools
@@ -15,7 +15,13 @@ from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_nu
 from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.film import flow_factors
 from mbma_tables.export.exported_law import KAPPA, ExportedLaw, GasInGaps, exported_law
-from mbma_tables.export.law_table import MAX_ROWS, MIN_ROWS, LawTable, chosen_rows, rounded
+from mbma_tables.export.law_table import (
+    MAX_ROWS,
+    MIN_ROWS,
+    LawTable,
+    chosen_rows,
+    rounded,
+)
 from mbma_tables.export.targets import AGAINST
 from mbma_tables.export.text import about, number
 from mbma_tables.law.law import ROUNDING
@@ -28,7 +34,9 @@ from mbma_tables.theories.tested import TESTED_AREA
 
 FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
-FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
+# of the largest value, where no range is given: below it, errors are relative to this, not
+# to the value
+FLOOR = 1e-3
 FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
 LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # mean separations of the last points, over h_max
 FILM_ROWS = 200
@@ -68,32 +76,42 @@ def describe_law(
     Parameters
     ----------
     surface : Surface
-        One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`) alone, of pressure as force.
+        One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`)
+        alone, of pressure as force.
     E_star, variant, theory, hardness
-        As for `contact`; with a hardness the law of loading, and conductance by the stiffness of the frozen contact.
+        As for `contact`; with a hardness the law of loading, and conductance by the
+        stiffness of the frozen contact.
     length_unit, stress_unit : str, optional
-        Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
-    quantity : {"pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film"}
-        Pressure against overclosure, or against pressure conductance, tangential stiffness before slip, the flow
-        coefficient k h_rms^3 of the gaps (`ContactLaw.leakage`), or the hydraulic aperture k^(1/3) h_rms with the
-        aperture u, the derivative by u and the stiffness -dp/du. A film: flow factors (`flow_factors`), asperity
-        pressure and contact area against the mean gap u, from 0.2 h_rms or the largest of `pressures` to 10 h_rms, of
-        theory "calibrated" by default.
+        Units of the rows. A surface or modulus that has another one is converted; one that
+        has none is in these.
+    quantity : {"pressure", "conductance", "tangential_stiffness", "leakage",
+    "hydraulic_aperture", "film"}
+        Pressure against overclosure, or against pressure conductance, tangential stiffness
+        before slip, the flow coefficient k h_rms^3 of the gaps (`ContactLaw.leakage`), or
+        the hydraulic aperture k^(1/3) h_rms with the aperture u, the derivative by u and
+        the stiffness -dp/du. A film: flow factors (`flow_factors`), asperity pressure and
+        contact area against the mean gap u, from 0.2 h_rms or the largest of `pressures` to
+        10 h_rms, of theory "calibrated" by default.
     rows : int, optional
-        How many; else as few as `rtol` needs, 1e-3 where neither is given; 200 of a film, which has no `rtol`.
+        How many; else as few as `rtol` needs, 1e-3 where neither is given; 200 of a film,
+        which has no `rtol`.
     rtol : float, optional
-        Largest relative error of the interpolation where the result is above a thousandth of its largest, or
-        between `pressures`; of leakage from its largest down to that at 30% contact, or at the largest of `pressures`.
+        Largest relative error of the interpolation where the result is above a thousandth
+        of its largest, or between `pressures`; of leakage from its largest down to that at
+        30% contact, or at the largest of `pressures`.
     pressures : pair of float or str, optional
-        Smallest and largest pressure of the user's problem: rows end at the largest, and the error holds from the
-        smallest on. Else they end at full compression, or where the force turns down.
+        Smallest and largest pressure of the user's problem: rows end at the largest, and
+        the error holds from the smallest on. Else they end at full compression, or where
+        the force turns down.
     conductivity, conductivity_unit : float and str, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
     kappa : float or callable, optional
-        Normal over tangential stiffness (`materials.tangential_ratio`), a number or a function of the contact area.
+        Normal over tangential stiffness (`materials.tangential_ratio`), a number or a
+        function of the contact area.
     friction, friction_pressure : float, and float or str, optional
-        Coefficient of friction, for the friction cards of solvers, with `kappa`; the pressure at which their one
-        stiffness holds, by default the geometric mean of `pressures`. Comments have it at other pressures.
+        Coefficient of friction, for the friction cards of solvers, with `kappa`; the
+        pressure at which their one stiffness holds, by default the geometric mean of
+        `pressures`. Comments have it at other pressures.
     evenly : bool
         Equally spaced rows instead, for comparison.
     peklenik : float, optional
@@ -101,16 +119,19 @@ def describe_law(
     made_by : tuple of str
         Lines for the header of a file that say how to write it again.
     direction : str or float, optional
-        Of leakage of a simulated map: "x", "y" or degrees from x; else the geometric mean of both axes.
+        Of leakage of a simulated map: "x", "y" or degrees from x; else the geometric mean
+        of both axes.
     gas : GasInGaps, optional
         In the gaps, parallel to the solid spots: conductance is then that of both.
     most_rows : int, optional
-        Rows that the program keeps, taken where neither `rows` nor `rtol` is given and fewer miss the usual error.
+        Rows that the program keeps, taken where neither `rows` nor `rtol` is given and
+        fewer miss the usual error.
 
     Raises
     ------
     InputError, OutOfRangeError
-        For a batch of surfaces, missing units, a range beyond the law, and rows that cannot meet `rtol`.
+        For a batch of surfaces, missing units, a range beyond the law, and rows that cannot
+        meet `rtol`.
 
     Examples
     --------
@@ -121,7 +142,11 @@ def describe_law(
     """
     if quantity not in AGAINST:
         raise InputError(f"quantity must be one of {tuple(AGAINST)}, got {quantity!r}")
-    of_body, heat, film = isinstance(surface, ForceLaw), quantity == "conductance", quantity == "film"
+    of_body, heat, film = (
+        isinstance(surface, ForceLaw),
+        quantity == "conductance",
+        quantity == "film",
+    )
     for given, needs, names in (
         (of_body, quantity == "pressure", "a force law"),
         (peklenik is not None, film, "peklenik"),
@@ -130,12 +155,26 @@ def describe_law(
         (gas is not None, heat, "gas"),
     ):
         if given and not needs:
-            raise InputError(f"{names} does not belong to quantity={quantity!r}: leave it out")
+            raise InputError(
+                f"{names} does not belong to quantity={quantity!r}: leave it out"
+            )
     theory = "calibrated" if film and theory is None else theory
-    exported = exported_law(surface, E_star, length_unit, stress_unit, variant, theory, hardness, made_by, direction)
+    exported = exported_law(
+        surface,
+        E_star,
+        length_unit,
+        stress_unit,
+        variant,
+        theory,
+        hardness,
+        made_by,
+        direction,
+    )
     least, end = _range(exported, pressures)
     if film:
-        count = whole_number_in("rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS)
+        count = whole_number_in(
+            "rows", FILM_ROWS if rows is None else rows, MIN_ROWS, MAX_ROWS
+        )
         return _film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
     scale, unit, facts, behaviour = 1.0, exported.stress, exported.facts, None
@@ -150,14 +189,33 @@ def describe_law(
         number_of = 1.0 if callable(kappa) else kappa
         scale, unit = exported.slope(quantity, kappa=number_of)
     elif quantity != "pressure":
-        unit = exported.length if quantity == "hydraulic_aperture" else f"{exported.length}^3"
+        unit = (
+            exported.length
+            if quantity == "hydraulic_aperture"
+            else f"{exported.length}^3"
+        )
     if friction is not None:
-        of_friction, *more_said = _friction(exported, friction, kappa, friction_pressure, pressures)
+        of_friction, *more_said = _friction(
+            exported, friction, kappa, friction_pressure, pressures
+        )
         facts |= of_friction
         said.extend(more_said)
     choose = functools.partial(choose, most_rows=most_rows)
     ratio = kappa if quantity == "tangential_stiffness" and callable(kappa) else None
-    return _table(exported, quantity, unit, least, end, choose, scale, facts, behaviour, *said, gas=gas, kappa=ratio)
+    return _table(
+        exported,
+        quantity,
+        unit,
+        least,
+        end,
+        choose,
+        scale,
+        facts,
+        behaviour,
+        *said,
+        gas=gas,
+        kappa=ratio,
+    )
 
 
 def _curve(
@@ -175,7 +233,10 @@ def _curve(
     u = law.h_max * np.geomspace(max(1 - end / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
     d = law.h_max - 2 * c
-    pressure, stiffness = np.asarray(law.pressure(separation=d)), np.asarray(law.stiffness(separation=d))
+    pressure, stiffness = (
+        np.asarray(law.pressure(separation=d)),
+        np.asarray(law.stiffness(separation=d)),
+    )
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure
@@ -196,15 +257,31 @@ def _curve(
 
 
 def _friction(
-    exported: ExportedLaw, friction: float, kappa: Any, pressure: Any, pressures: tuple[Any, Any] | None
+    exported: ExportedLaw,
+    friction: float,
+    kappa: Any,
+    pressure: Any,
+    pressures: tuple[Any, Any] | None,
 ) -> tuple[dict[str, tuple[float, str]], str]:
     """Facts for friction cards, by the stiffness of a small unloading, and what these mean."""
     law, units = exported.law, exported.law.units
     if kappa is None or (pressure is None and pressures is None):
-        raise InputError("friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures")
-    ends = [float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))]
-    at = float(units.number("pressure", pressure)) if pressure is not None else math.sqrt(math.prod(ends))
-    ratio = number_in("kappa", kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa, *KAPPA)
+        raise InputError(
+            "friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures"
+        )
+    ends = [
+        float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))
+    ]
+    at = (
+        float(units.number("pressure", pressure))
+        if pressure is not None
+        else math.sqrt(math.prod(ends))
+    )
+    ratio = number_in(
+        "kappa",
+        kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa,
+        *KAPPA,
+    )
 
     def stiffness(p: float) -> float:
         return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
@@ -237,17 +314,24 @@ def _table(
     """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
     law, length, stress = exported.law, exported.length, exported.stress
     fine_x, fine_y = _curve(exported, quantity, end, scale, gas)
-    x_name, x_unit = ("overclosure", length) if quantity == "pressure" else ("pressure", stress)
+    x_name, x_unit = (
+        ("overclosure", length) if quantity == "pressure" else ("pressure", stress)
+    )
     y_name = quantity if exported.force is None else "force"
     floor = FLOOR * float(fine_y[-1])
     if quantity in FLOWS:
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
-            floor = float(exported.leakage(separation=law.separation(area=LARGEST_AREA))) ** FLOWS[quantity]
+            floor = (
+                float(exported.leakage(separation=law.separation(area=LARGEST_AREA)))
+                ** FLOWS[quantity]
+            )
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
-        floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
+        floor = (
+            least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
+        )
     if slope := quantity in ("conductance", "tangential_stiffness"):
         # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
@@ -257,7 +341,11 @@ def _table(
         fine_y[1:] /= np.asarray(kappa(np.asarray(law.at_pressure(fine_x[1:]).area)))
         floor = float(fine_y[1:].min()) * (1 - 1e-9)
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or not exported.ends)
-    why = "where the law ends" if law.turning_point is None else "where the force of this surface has its maximum"
+    why = (
+        "where the law ends"
+        if law.turning_point is None
+        else "where the force of this surface has its maximum"
+    )
     if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - end:
         why = "where contact blocks the gaps"
     elif end < exported.c_turn * (1 - ROUNDING):
@@ -271,12 +359,30 @@ def _table(
         f"{x_name} from 0 to {number(x[-1])} {x_unit}, {why}",
         _of_rows(y_name, x.size, error, f"{y_name} {about(floor)} {y_unit}"),
         *of_others,
-        *([] if exported.ends else ["the first row is zero, whatever the theory has up to the second"]),
+        *(
+            []
+            if exported.ends
+            else ["the first row is zero, whatever the theory has up to the second"]
+        ),
         *said,
         end=end,
         leakage=quantity in FLOWS,
     )
-    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, law.theory, floor, behaviour, more, facts)
+    return LawTable(
+        x,
+        y,
+        x_name,
+        y_name,
+        x_unit,
+        y_unit,
+        error,
+        comments,
+        law.theory,
+        floor,
+        behaviour,
+        more,
+        facts,
+    )
 
 
 def _of_rows(name: str, rows: int, error: float, above: str) -> str:
@@ -285,7 +391,11 @@ def _of_rows(name: str, rows: int, error: float, above: str) -> str:
 
 
 def _of_aperture(
-    exported: ExportedLaw, x: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float
+    exported: ExportedLaw,
+    x: FloatArray,
+    fine_x: FloatArray,
+    fine_y: FloatArray,
+    floor: float,
 ) -> tuple[dict[str, tuple[FloatArray, str]], list[str]]:
     """Columns beside the hydraulic aperture, at pressures x, and the lines of a header on their rows."""
     law = exported.law
@@ -296,40 +406,70 @@ def _of_aperture(
     columns = {
         "aperture": (u, exported.length),
         "derivative": (by_u, "1"),
-        "stiffness": (np.asarray(at_rows.stiffness), f"{exported.stress}/{exported.length}"),
+        "stiffness": (
+            np.asarray(at_rows.stiffness),
+            f"{exported.stress}/{exported.length}",
+        ),
     }
-    fine = {"aperture": fine_u, "derivative": fine_derivative, "stiffness": np.asarray(at_fine.stiffness)}
-    # where the main column is above its floor, and beyond the first row, below which stiffness is that of no contact
+    fine = {
+        "aperture": fine_u,
+        "derivative": fine_derivative,
+        "stiffness": np.asarray(at_fine.stiffness),
+    }
+    # where the main column is above its floor, and beyond the first row, below which
+    # stiffness is that of no contact
     inside = (fine_y > floor) & (fine_x >= x[1])
     lines = []
     for name, (values, _) in columns.items():
-        error = np.abs(np.interp(fine_x[inside], x, values) / fine[name][inside] - 1).max(initial=0.0)
+        error = np.abs(np.interp(fine_x[inside], x, values) / fine[name][inside] - 1).max(
+            initial=0.0
+        )
         above = f"hydraulic_aperture {about(floor)} {exported.length}, from pressure {about(x[1])} {exported.stress} on"
         lines.append(_of_rows(name, x.size, float(error), above))
     return columns, lines
 
 
-def _range(exported: ExportedLaw, pressures: tuple[float | str, float | str] | None) -> tuple[float | None, float]:
+def _range(
+    exported: ExportedLaw, pressures: tuple[float | str, float | str] | None
+) -> tuple[float | None, float]:
     """Smallest pressure for the error, and largest overclosure, from a range of pressures."""
     law, units = exported.law, exported.law.units
     if pressures is None:
         return None, exported.c_turn
     two = isinstance(pressures, tuple | list | np.ndarray) and len(pressures) == 2
-    ends = [number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in (pressures if two else ())]
+    ends = [
+        number_in("pressures", units.number("pressure", p), 1e-300, 1e300)
+        for p in (pressures if two else ())
+    ]
     if not two or ends[0] >= ends[1]:
         raise InputError(f"pressures must be two rising numbers, got {pressures!r}")
     low, high = ends
     found = (law.h_max - float(law.at_pressure(high).separation)) / 2
     if found <= 0:
         least = f"{about(law.pressure(law.h_max))} {units.stress}"
-        raise InputError(f"pressures must reach above {least}, that at c = 0, where rows begin, got {high:g}")
+        raise InputError(
+            f"pressures must reach above {least}, that at c = 0, where rows begin, got {high:g}"
+        )
     return low, found
 
 
-def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float, peklenik: float | None) -> LawTable:
+def _film_rows(
+    exported: ExportedLaw,
+    rows: int,
+    least: float | None,
+    end: float,
+    peklenik: float | None,
+) -> LawTable:
     """Flow factors and asperity pressure at mean gaps whose ratios are equal."""
-    h_rms, h_max, length, stress = float(exported.surface.h_rms), exported.law.h_max, exported.length, exported.stress
-    u = rounded(np.geomspace(max(FILM_RANGE[0] * h_rms, h_max - end), FILM_RANGE[1] * h_rms, rows))
+    h_rms, h_max, length, stress = (
+        float(exported.surface.h_rms),
+        exported.law.h_max,
+        exported.length,
+        exported.stress,
+    )
+    u = rounded(
+        np.geomspace(max(FILM_RANGE[0] * h_rms, h_max - end), FILM_RANGE[1] * h_rms, rows)
+    )
     at = functools.partial(
         flow_factors, exported.surface, peklenik=peklenik, theory=exported.theory, E_star=exported.modulus,
         hardness=exported.hardness,
@@ -347,7 +487,10 @@ def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float
     listed = ", ".join(f"{name} {value:.1e}" for name, value in errors.items())
     units = dict.fromkeys((*FILM_NAMES, "area", "scatter"), "1") | {"pressure": stress}
     columns = {name: (getattr(found, name), unit) for name, unit in units.items()}
-    columns["stiffness"] = (np.asarray(exported.answer(u).unloading_stiffness), f"{stress}/{length}")
+    columns["stiffness"] = (
+        np.asarray(exported.answer(u).unloading_stiffness),
+        f"{stress}/{length}",
+    )
     gaps = {reason: found.mean_separation[bad] for reason, bad in found.reasons.items()}
     comments = exported.header(
         f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
@@ -367,4 +510,6 @@ def _film_rows(exported: ExportedLaw, rows: int, least: float | None, end: float
     facts = exported.facts | {"peklenik": (found.peklenik, "1")}
     y, unit = columns.pop("phi_x")
     names, theory = ("mean_separation", "phi_x"), exported.law.theory
-    return LawTable(u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts)
+    return LawTable(
+        u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts
+    )

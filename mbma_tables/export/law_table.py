@@ -1,8 +1,9 @@
 """Rows of a law, common to all files of rows, and their choice by the error of linear interpolation.
 
-Linear interpolation over a step h has an error of about h^2 y''/8. Rows are spaced so that this is the same fraction of
-y everywhere above a floor, and are then moved by half of it, so that the error has both signs; the last row stays on
-the curve, because a solver has no rows beyond it.
+Linear interpolation over a step h has an error of about h^2 y''/8. Rows are spaced so that
+this is the same fraction of y everywhere above a floor, and are then moved by half of it,
+so that the error has both signs; the last row stays on the curve, because a solver has no
+rows beyond it.
 """
 
 from __future__ import annotations
@@ -39,14 +40,19 @@ class LawTable(Displayed):
     y_name: str
     x_unit: str
     y_unit: str
-    largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
+    # relative, of linear interpolation between rows as written, where y is above `floor`
+    largest_error: float
     comments: tuple[str, ...]  # notes for the reader of the file
     theory: str  # whose law it is
     floor: float = 0.0  # value below which errors are relative to it
-    behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
-    more: Mapping[str, tuple[FloatArray, str]] = dataclasses.field(default_factory=dict)  # other columns, their units
-    # of the joint; of friction the coefficient, and `stick`, the shear stress over displacement before slip, at one
-    # pressure, `stick_pressure`
+    behaviour: LawTable | None = (
+        None  # the pressure of the same joint, with its conductance
+    )
+    more: Mapping[str, tuple[FloatArray, str]] = dataclasses.field(
+        default_factory=dict
+    )  # other columns, their units
+    # of the joint; of friction the coefficient, and `stick`, the shear stress over
+    # displacement before slip, at one pressure, `stick_pressure`
     facts: Mapping[str, tuple[float, str]] = dataclasses.field(default_factory=dict)
 
     @property
@@ -57,18 +63,34 @@ class LawTable(Displayed):
     @property
     def columns(self) -> dict[str, tuple[FloatArray, str]]:
         """All columns by their names, with their units."""
-        return {self.x_name: (self.x, self.x_unit), self.y_name: (self.y, self.y_unit), **self.more}
+        return {
+            self.x_name: (self.x, self.x_unit),
+            self.y_name: (self.y, self.y_unit),
+            **self.more,
+        }
 
     def _facts(self) -> dict[str, str]:
-        columns = {name: shown(values, unit) for name, (values, unit) in self.columns.items()}
-        return columns | {"rows": str(self.x.size), "theory": self.theory, "largest error": shown(self.largest_error)}
+        columns = {
+            name: shown(values, unit) for name, (values, unit) in self.columns.items()
+        }
+        return columns | {
+            "rows": str(self.x.size),
+            "theory": self.theory,
+            "largest error": shown(self.largest_error),
+        }
 
     def _variables(self) -> dict[str, Variable]:
         dims = (self.x_name,)
-        return {name: Variable(values, unit, name, dims) for name, (values, unit) in self.columns.items()}
+        return {
+            name: Variable(values, unit, name, dims)
+            for name, (values, unit) in self.columns.items()
+        }
 
     def _figure(self) -> Figure:
-        labels = (f"{name} [{unit}]" for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit)))
+        labels = (
+            f"{name} [{unit}]"
+            for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit))
+        )
         return draw_line(self.x[1:], self.y[1:], *labels)
 
 
@@ -84,8 +106,8 @@ def chosen_rows(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Rows of a curve given on fine points, as written to a file, and their largest relative error above `floor`.
 
-    Where a program holds `most_rows` alone and neither their number nor their error is asked for, there are that many
-    where fewer do not reach the usual error.
+    Where a program holds `most_rows` alone and neither their number nor their error is
+    asked for, there are that many where fewer do not reach the usual error.
     """
     # with a jump the first two fine points are rows
     begin = fine_x[:1], fine_y[:1]
@@ -96,21 +118,31 @@ def chosen_rows(
 
     def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
         count -= jump
-        places = np.linspace(fine_x[0], fine_x[-1], count) if evenly else spread(fine_x, fine_y, count, floor)
+        places = (
+            np.linspace(fine_x[0], fine_x[-1], count)
+            if evenly
+            else spread(fine_x, fine_y, count, floor)
+        )
         x = rounded(places)
         y = np.interp(x, fine_x, fine_y)
         y = rounded(y if evenly else balanced(x, y, fine_x, fine_y, floor))
         x[-1], y[-1] = _not_below(fine_x[-1]), _not_below(fine_y[-1])
         kept = fine_y > floor
         error = float(np.abs(np.interp(fine_x[kept], x, y) / fine_y[kept] - 1).max())
-        return (np.append(begin[0], x), np.append(begin[1], y), error) if jump else (x, y, error)
+        return (
+            (np.append(begin[0], x), np.append(begin[1], y), error)
+            if jump
+            else (x, y, error)
+        )
 
     if rows is not None:
         x, y, error = with_rows(whole_number_in("rows", rows, MIN_ROWS, MAX_ROWS))
     else:
         asked = number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5)
         # the error falls with the number of rows
-        fewest = bisect.bisect_left(range(MAX_ROWS + 1), -asked, MIN_ROWS, key=lambda count: -with_rows(count)[2])
+        fewest = bisect.bisect_left(
+            range(MAX_ROWS + 1), -asked, MIN_ROWS, key=lambda count: -with_rows(count)[2]
+        )
         if most_rows is not None and fewest > most_rows:
             if rtol is not None:
                 raise InputError(
@@ -119,10 +151,14 @@ def chosen_rows(
                 )
             fewest = most_rows
         if fewest > MAX_ROWS:
-            raise InputError(f"rtol = {asked:g} needs more than {MAX_ROWS} rows under linear interpolation")
+            raise InputError(
+                f"rtol = {asked:g} needs more than {MAX_ROWS} rows under linear interpolation"
+            )
         x, y, error = with_rows(fewest)
     if (np.diff(x) <= 0).any():
-        raise InputError("rows are too close to be told apart: take fewer rows, or a larger smallest pressure")
+        raise InputError(
+            "rows are too close to be told apart: take fewer rows, or a larger smallest pressure"
+        )
     return x, y, error
 
 
@@ -133,19 +169,29 @@ def rounded(values: FloatArray) -> FloatArray:
 
 def _not_below(value: float) -> float:
     """A number as written to a file, rounded up so that rows reach it, unless it equals one up to rounding."""
-    return float(Context(prec=DIGITS, rounding=ROUND_CEILING).create_decimal(float(value) * (1 - 1e-13)))
+    return float(
+        Context(prec=DIGITS, rounding=ROUND_CEILING).create_decimal(
+            float(value) * (1 - 1e-13)
+        )
+    )
 
 
 def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray:
     """Places of `count` rows along x whose chords have equal errors relative to max(y, floor), by iteration."""
 
-    def cut(filled: FloatArray, along: FloatArray) -> FloatArray:  # places between which `filled` grows equally
-        inner: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, along)[1:-1]
+    def cut(
+        filled: FloatArray, along: FloatArray
+    ) -> FloatArray:  # places between which `filled` grows equally
+        inner: FloatArray = np.interp(
+            np.linspace(filled[0], filled[-1], count), filled, along
+        )[1:-1]
         return np.concatenate([x[:1], inner, x[-1:]])
 
     scale = np.maximum(y, floor)
     # logarithmic in y above the floor to begin with, linear below
-    filled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]) + np.linspace(0, 3, x.size)
+    filled = np.concatenate(
+        [[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]
+    ) + np.linspace(0, 3, x.size)
     places = cut(filled, x)
     best, found = np.inf, places
     for _ in range(ROUNDS):
@@ -162,7 +208,9 @@ def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray
     return found
 
 
-def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float) -> FloatArray:
+def balanced(
+    x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float
+) -> FloatArray:
     """Rows moved by half of the error of the chords beside them, which halves the largest error."""
     scale = np.maximum(fine_y, floor)
     over = (np.interp(fine_x, x, y) - fine_y) / scale
@@ -174,8 +222,12 @@ def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArra
     beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
     moved = np.maximum(y - beside * np.maximum(y, floor), 0.0)
     moved[0], moved[-1] = y[0], y[-1]
-    # pressure increases and leakage decreases; conductance may decrease where the model's stiffness jumps
-    for keeps, accumulated in ((np.greater_equal, np.maximum), (np.less_equal, np.minimum)):
+    # pressure increases and leakage decreases; conductance may decrease where the model's
+    # stiffness jumps
+    for keeps, accumulated in (
+        (np.greater_equal, np.maximum),
+        (np.less_equal, np.minimum),
+    ):
         if keeps(np.diff(fine_y), 0).all():
             moved = accumulated.accumulate(moved)
     return np.asarray(moved)

@@ -55,40 +55,72 @@ def joint_files(
 ) -> Mapping[str, bytes]:
     """The files of a target by the ends of their names, as `Joint.export` describes them.
 
-    Options of some targets alone, such as `rows` or `leakage`, are refused by name where others get them.
+    Options of some targets alone, such as `rows` or `leakage`, are refused by name where
+    others get them.
     """
     program = _target_of_laws(target)
     units = _units(program, length_unit, stress_unit)
     given = {key: value for key, value in options.items() if value not in (None, False)}
     _refuse(target, [key for key in given if key not in program.takes])
     shared = {"theory": joint.theory, "hardness": joint.hardness, **units, **given}
-    made_by = made_by or (f"written from Python by mbma_tables {__version__}: a joint for {target}",)
+    made_by = made_by or (
+        f"written from Python by mbma_tables {__version__}: a joint for {target}",
+    )
     if name is not None and "name" not in program.takes and not program.end:
         # the format has no place for it but the comments
         made_by = (f"name: {name}", *made_by)
-    named = {"name": name} if name is not None and ("name" in program.takes or program.end) else {}
+    named = (
+        {"name": name}
+        if name is not None and ("name" in program.takes or program.end)
+        else {}
+    )
     if program.end:
         # what belongs together is found by the file's name
         if out is not None and out.suffix != program.end:
-            raise InputError(f"the path of {target} must be NAME{program.end}, got {out.name!r}")
+            raise InputError(
+                f"the path of {target} must be NAME{program.end}, got {out.name!r}"
+            )
         if out is not None and name not in (None, out.stem):
-            raise InputError(f"{target} is called by the name of its file, {out.stem!r}: leave name out, got {name!r}")
+            raise InputError(
+                f"{target} is called by the name of its file, {out.stem!r}: leave name out, got {name!r}"
+            )
         named = {"name": name or ("joint" if out is None else out.stem)}
     if out is None and not program.alone:
-        raise InputError(f"{target} is several files, of which the first needs the others: give path")
+        raise InputError(
+            f"{target} is several files, of which the first needs the others: give path"
+        )
     shared["made_by"] = made_by
     if not program.rows:
-        _refuse(target, [key for key, value in {"pressures": pressures, "quantity": quantity}.items() if value])
+        _refuse(
+            target,
+            [
+                key
+                for key, value in {"pressures": pressures, "quantity": quantity}.items()
+                if value
+            ],
+        )
         _refuse(target, ["friction_pressure"] if friction_pressure is not None else [])
         if target == "abaqus-uinter" and joint.friction is not None:
             note = f"the joint's friction, {joint.friction:g}, is left out: the faces slide freely"
             shared["made_by"] = (note, *made_by)
-        return program.files(joint.surface, joint.E_star, **_of_code(joint, target, units, heat), **shared, **named)
-    wanted = [quantity] if isinstance(quantity, str) else list(quantity or [_usual(program, heat)])
+        return program.files(
+            joint.surface,
+            joint.E_star,
+            **_of_code(joint, target, units, heat),
+            **shared,
+            **named,
+        )
+    wanted = (
+        [quantity]
+        if isinstance(quantity, str)
+        else list(quantity or [_usual(program, heat)])
+    )
     if len(wanted) > 1 and not program.several:
         raise InputError(f"{target} has one quantity a file: give one of {wanted}")
     if pressures is None and wanted != ["film"]:
-        raise InputError(f"{target} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')")
+        raise InputError(
+            f"{target} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')"
+        )
     if pressures is not None:
         shared["pressures"] = pressures
     rubbed = joint.friction is not None and "friction" in program.takes
@@ -102,9 +134,13 @@ def joint_files(
 
 def _target_of_laws(target: str) -> Target:
     """The target of this name, unless it is the whole model."""
-    of_laws = {key: each for key, each in targets().items() if each.rows or "kappa" in each.takes}
+    of_laws = {
+        key: each for key, each in targets().items() if each.rows or "kappa" in each.takes
+    }
     if target not in of_laws:
-        raise InputError(f"no target of laws is called {target!r}: {nearest(target, of_laws)}")
+        raise InputError(
+            f"no target of laws is called {target!r}: {nearest(target, of_laws)}"
+        )
     return of_laws[target]
 
 
@@ -113,7 +149,9 @@ def _units(program: Target, length: str | None, stress: str | None) -> dict[str,
     prescribed = program.units or (length or "mm", stress or "MPa")
     asked = (length or prescribed[0], stress or prescribed[1])
     if asked != prescribed:
-        raise InputError(f"{program.name} is written in {' and '.join(prescribed)}, got {' and '.join(asked)}")
+        raise InputError(
+            f"{program.name} is written in {' and '.join(prescribed)}, got {' and '.join(asked)}"
+        )
     return {"length_unit": asked[0], "stress_unit": asked[1]}
 
 
@@ -129,13 +167,18 @@ def _usual(program: Target, heat: bool) -> str:
     return program.quantity
 
 
-def _conductivity(joint: ExportedJoint, units: Mapping[str, str]) -> tuple[dict[str, Any], float]:
+def _conductivity(
+    joint: ExportedJoint, units: Mapping[str, str]
+) -> tuple[dict[str, Any], float]:
     """k_s in units of the law: of power mW with N, mm and MPa, else W; and one W/(m^2 K) in those of conductance."""
     length = units["length_unit"]
     metre = factor("m", length)
     consistent = (length, units["stress_unit"]) == ("mm", "MPa")
     power, symbol = (MILLI, "mW") if consistent else (1.0, "W")
-    arguments = {"conductivity": power * joint.conductivity / metre, "conductivity_unit": f"{symbol}/({length} K)"}
+    arguments = {
+        "conductivity": power * joint.conductivity / metre,
+        "conductivity_unit": f"{symbol}/({length} K)",
+    }
     return arguments, power / metre**2
 
 
@@ -162,7 +205,9 @@ def _rows(
     return describe_law(joint.surface, joint.E_star, quantity=quantity, **asked)
 
 
-def _of_code(joint: ExportedJoint, target: str, units: Mapping[str, str], heat: bool) -> dict[str, Any]:
+def _of_code(
+    joint: ExportedJoint, target: str, units: Mapping[str, str], heat: bool
+) -> dict[str, Any]:
     """Arguments of a law as code: the stiffness before slip, and with `heat` conductance, as far as it has them."""
     if target in LOADING_ALONE and not _is_infinite(joint.hardness):
         note = (
@@ -172,7 +217,9 @@ def _of_code(joint: ExportedJoint, target: str, units: Mapping[str, str], heat: 
         return {"notes": (note,)}
     arguments: dict[str, Any] = {}
     if joint.kappa_varies:
-        arguments["notes"] = ("without tangential stiffness, whose ratio varies with the area: rows have it",)
+        arguments["notes"] = (
+            "without tangential stiffness, whose ratio varies with the area: rows have it",
+        )
     else:
         arguments["kappa"] = float(joint.kappa(None))
     if heat:
@@ -184,7 +231,9 @@ def _of_code(joint: ExportedJoint, target: str, units: Mapping[str, str], heat: 
             )
         conductivity, unit = _conductivity(joint, units)
         arguments |= conductivity
-        arguments["gas"] = GasInGaps(joint.gas, joint.temperature, joint.gas_pressure, unit)
+        arguments["gas"] = GasInGaps(
+            joint.gas, joint.temperature, joint.gas_pressure, unit
+        )
     return arguments
 
 

@@ -70,7 +70,9 @@ def python_words() -> frozenset[str]:
 
 def modelica_words() -> frozenset[str]:
     """Words that name no package with a law in Modelica."""
-    return small_words(MODELICA_KEYWORDS, "elastic", words_of_code(template("law.mo"), "//"))
+    return small_words(
+        MODELICA_KEYWORDS, "elastic", words_of_code(template("law.mo"), "//")
+    )
 
 
 def law_in_matlab_words() -> frozenset[str]:

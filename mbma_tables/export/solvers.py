@@ -1,8 +1,10 @@
 """Contact laws in the formats of other programs; each target is a `Grammar` of rows.
 
-CalculiX 2.20 and GetDP 3.2 were run. The others follow manuals and sources: MBDyn's `GreenwoodTrippCM`, `LinFDMesh` and
-`LugreFriction` of `module-hydrodynamic_plain_bearing2.cc`; GEOS's `TableFunction`, `HydraulicApertureTable` and
-`BartonBandis`; MOOSE's `PiecewiseTabularBase` and `GapFluxModelConduction`; Lethe's `particle_heat_transfer.cc`.
+CalculiX 2.20 and GetDP 3.2 were run. The others follow manuals and sources: MBDyn's
+`GreenwoodTrippCM`, `LinFDMesh` and `LugreFriction` of
+`module-hydrodynamic_plain_bearing2.cc`; GEOS's `TableFunction`, `HydraulicApertureTable`
+and `BartonBandis`; MOOSE's `PiecewiseTabularBase` and `GapFluxModelConduction`; Lethe's
+`particle_heat_transfer.cc`.
 """
 
 import math
@@ -20,7 +22,10 @@ from mbma_tables.materials import tangential_ratio
 
 # columns of a number: CalculiX reads no more of it, so that a longer one may lose its exponent
 CARD_WIDTH = 20
-LSDYNA_WIDTH, OPTISTRUCT_WIDTH = 20, 16  # columns of a field, of which OptiStruct's are its long ones
+LSDYNA_WIDTH, OPTISTRUCT_WIDTH = (
+    20,
+    16,
+)  # columns of a field, of which OptiStruct's are its long ones
 MIN_CALCULIX_STEP = 1e-10  # closer overclosures are moved apart by the reader
 PAIR = "*CONTACT PAIR, INTERACTION={name}, TYPE="
 CALCULIX_TABULAR = (
@@ -44,14 +49,23 @@ CALCULIX_HEAT = (
 )
 
 
-# p = 4.4086e-5 K E* (4 - (u - delta)/sigma)^6.804, K = 16 sqrt(2) pi/15 (eta beta sigma)^2 sqrt(sigma/beta)
-GREENWOOD_TRIPP, POWER, END, OF_K = 4.4086e-5, 6.804, 4.0, 16 * math.sqrt(2) * math.pi / 15
+# p = 4.4086e-5 K E* (4 - (u - delta)/sigma)^6.804, K = 16 sqrt(2) pi/15 (eta beta sigma)^2
+# sqrt(sigma/beta)
+GREENWOOD_TRIPP, POWER, END, OF_K = (
+    4.4086e-5,
+    6.804,
+    4.0,
+    16 * math.sqrt(2) * math.pi / 15,
+)
 CROWDING = 0.05  # eta beta sigma; the result depends on K only
 HEAVY, FEWEST = 0.1, 3  # largest A/A0 of that fit, and its rows
 NU = 0.3  # of the micro-slip stiffness
 BANDIS = 9.0  # w = w0/(1 + 9 stress/reference)
 STEEPEST = 0.999  # slope of the last two rows for GEOS, which rejects 1 and more
-YOVANOVICH, EXPONENT = 1.25, 0.96  # h = 1.25 k_s m/sigma (p/H)^0.96, of which Lethe has the mean over Hertz's pressure
+YOVANOVICH, EXPONENT = (
+    1.25,
+    0.96,
+)  # h = 1.25 k_s m/sigma (p/H)^0.96, of which Lethe has the mean over Hertz's pressure
 MBDYN = """\
 # in the element "hydrodynamic plain bearing2", at their places:
 #   mesh, linear finite difference,
@@ -84,7 +98,9 @@ def _field(value: float) -> str:
 
 def _friction(law: LawTable) -> tuple[float, float, float]:
     """Coefficient, stick slope, and the displacement at which slip begins."""
-    friction, slope, pressure = (law.facts[name][0] for name in ("friction", "stick", "stick_pressure"))
+    friction, slope, pressure = (
+        law.facts[name][0] for name in ("friction", "stick", "stick_pressure")
+    )
     return friction, slope, friction * pressure / slope
 
 
@@ -102,14 +118,18 @@ def _calculix(law: LawTable, name: str) -> str:
             "rows or a smaller unit of length"
         )
     behaviour = _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law)
-    return _notes(CALCULIX_TABULAR, name=name) + _interaction(name, behaviour, _stick(law))
+    return _notes(CALCULIX_TABULAR, name=name) + _interaction(
+        name, behaviour, _stick(law)
+    )
 
 
 def _calculix_heat(law: LawTable, name: str) -> str:
     """Conductance beside the exponential closure that is nearest to the law, the only pair of the two in 2.20."""
     rows = law.behaviour
     assert rows is not None
-    c = np.linspace(np.interp(max(rows.floor, law.x[1]), rows.y, rows.x), rows.x[-1], 1001)
+    c = np.linspace(
+        np.interp(max(rows.floor, law.x[1]), rows.y, rows.x), rows.x[-1], 1001
+    )
     p = np.interp(c, rows.x, rows.y)
     # for concave ln p, the chord has the slope of the line with the least largest distance
     u0 = (c[-1] - c[0]) / math.log(p[-1] / p[0])
@@ -135,7 +155,9 @@ def _calculix_heat(law: LawTable, name: str) -> str:
 
 
 def _abaqus(law: LawTable, name: str) -> str:
-    cards = [_card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)]
+    cards = [
+        _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)
+    ]
     if "friction" in law.facts:
         friction, _, slip = _friction(law)
         cards.append(f"*FRICTION, ELASTIC SLIP={_field(slip)}\n{_field(friction)}\n")
@@ -155,18 +177,34 @@ def _lsdyna(law: LawTable, curve: int = 1) -> str:
 
 
 def _lsdyna_curves(laws: Sequence[LawTable]) -> str:
-    titles = [f"$ curve {curve}: {law.y_name} against {law.x_name}\n" for curve, law in enumerate(laws, 1)]
-    return "".join(titles) + "".join(_lsdyna(law, curve) for curve, law in enumerate(laws, 1))
+    titles = [
+        f"$ curve {curve}: {law.y_name} against {law.x_name}\n"
+        for curve, law in enumerate(laws, 1)
+    ]
+    return "".join(titles) + "".join(
+        _lsdyna(law, curve) for curve, law in enumerate(laws, 1)
+    )
 
 
 def _optistruct(law: LawTable) -> str:
     """PCONT 1 and TABLES1 2, in long fields of 16 columns."""
     values = np.column_stack([law.x, law.y]).ravel()
-    pairs = [number(value, width=OPTISTRUCT_WIDTH).ljust(OPTISTRUCT_WIDTH) for value in values]
-    # the keyword stands where a line begins: on the first one that field is the friction coefficient
-    lines = ["PCONT,1", "+,STFTAB,2", f"{'TABLES1*':<8}{2:<16d}{'':<16}{'':<16}{'':<16}*", f"{'*':<8}"]
+    pairs = [
+        number(value, width=OPTISTRUCT_WIDTH).ljust(OPTISTRUCT_WIDTH) for value in values
+    ]
+    # the keyword stands where a line begins: on the first one that field is the friction
+    # coefficient
+    lines = [
+        "PCONT,1",
+        "+,STFTAB,2",
+        f"{'TABLES1*':<8}{2:<16d}{'':<16}{'':<16}{'':<16}*",
+        f"{'*':<8}",
+    ]
     fields = [*pairs, f"{'ENDT':<16}"]
-    lines += [f"{'*':<8}{''.join(fields[start : start + 4])}".rstrip() for start in range(0, len(fields), 4)]
+    lines += [
+        f"{'*':<8}{''.join(fields[start : start + 4])}".rstrip()
+        for start in range(0, len(fields), 4)
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -179,18 +217,28 @@ def _matrix(law: LawTable, name: str) -> str:
     return f"double {name}({law.x.size},{len(law.columns)})\n{_columns(law)}"
 
 
-def _nearest(shape: Callable[[float], FloatArray], log_y: FloatArray) -> tuple[float, float, FloatArray]:
+def _nearest(
+    shape: Callable[[float], FloatArray], log_y: FloatArray
+) -> tuple[float, float, FloatArray]:
     """t and f that minimise the mean square of shape(exp(t)) + f - log_y, and this difference."""
     from scipy.optimize import minimize_scalar
 
-    t = math.exp(minimize_scalar(lambda t: np.var(shape(math.exp(t)) - log_y), bounds=(-9.0, 9.0), method="bounded").x)
+    t = math.exp(
+        minimize_scalar(
+            lambda t: np.var(shape(math.exp(t)) - log_y),
+            bounds=(-9.0, 9.0),
+            method="bounded",
+        ).x
+    )
     factor = float(np.mean(log_y - shape(t)))
     return t, factor, shape(t) + factor - log_y
 
 
 def _mbdyn(law: LawTable, name: str) -> str:
     """Greenwood-Tripp numbers by the rows from the least pressure that counts to A/A0 = 0.1."""
-    pressure, area, stiffness = (law.more[key][0] for key in ("pressure", "area", "stiffness"))
+    pressure, area, stiffness = (
+        law.more[key][0] for key in ("pressure", "area", "stiffness")
+    )
     sigma, E_star = law.facts["h_rms"][0], law.facts["E_star"][0]
     kept = (pressure >= law.floor) & (area <= HEAVY)
     if kept.sum() < FEWEST:
@@ -199,12 +247,23 @@ def _mbdyn(law: LawTable, name: str) -> str:
         )
     u, pressure, length = law.x[kept], pressure[kept], law.x_unit
     far = u / sigma
-    last, factor, misfit = _nearest(lambda beyond: POWER * np.log(far[-1] + beyond - far), np.log(pressure))
+    last, factor, misfit = _nearest(
+        lambda beyond: POWER * np.log(far[-1] + beyond - far), np.log(pressure)
+    )
     delta = far[-1] + last - END
     beta = sigma * (OF_K * CROWDING**2 * GREENWOOD_TRIPP * E_star / math.exp(factor)) ** 2
-    numbers = {"sigma": sigma, "eta": CROWDING / (sigma * beta), "beta": beta, "delta": float(delta * sigma)}
+    numbers = {
+        "sigma": sigma,
+        "eta": CROWDING / (sigma * beta),
+        "beta": beta,
+        "delta": float(delta * sigma),
+    }
     slip = stiffness[kept] / (pressure * tangential_ratio(NU))
-    numbers |= {"H0": float(far[0] - delta), "E": E_star, "sigma0": math.exp(np.log(slip).mean())}
+    numbers |= {
+        "H0": float(far[0] - delta),
+        "E": E_star,
+        "sigma0": math.exp(np.log(slip).mean()),
+    }
     numbers |= {"Rq": sigma / math.sqrt(2), "lambdax": law.facts["peklenik"][0]}
     said = (
         f"Greenwood-Tripp numbers fitted from p = {about(pressure[-1])} to {about(pressure[0])} "
@@ -216,7 +275,9 @@ def _mbdyn(law: LawTable, name: str) -> str:
         f"{length}, of nu = {NU:g}; for another nu times {about(tangential_ratio(NU))} (2 - 2 nu)/(2 - nu).",
         "Flow factors are those of Patir and Cheng in MBDyn, of two faces that share h_rms^2; x is around the bearing.",
     )
-    sets = "".join(f"set: real {name}_{key} = {number(value)};\n" for key, value in numbers.items())
+    sets = "".join(
+        f"set: real {name}_{key} = {number(value)};\n" for key, value in numbers.items()
+    )
     return f"{opening(said, '#')}\n{sets}{MBDYN.format(name)}"
 
 
@@ -224,7 +285,8 @@ def _geos(law: LawTable, name: str) -> str:
     """Hydraulic aperture against the jump u - h_max; it, the aperture and its derivative against the normal stress."""
     open_ = law.y > 0
     stress, aperture, slope, stiffness = (
-        law.columns[key][0][open_] for key in ("pressure", "aperture", "derivative", "stiffness")
+        law.columns[key][0][open_]
+        for key in ("pressure", "aperture", "derivative", "stiffness")
     )
     jump, w = (aperture - aperture[0])[::-1] + 0.0, law.y[open_][::-1]
     if w[-1] - w[-2] >= STEEPEST * (jump[-1] - jump[-2]):
@@ -232,9 +294,14 @@ def _geos(law: LawTable, name: str) -> str:
         jump, w = np.insert(jump, -1, -step), np.insert(w, -1, w[-1] - STEEPEST * step)
     kept = stress >= stress[1]
     t, factor, misfit = _nearest(
-        lambda t: -np.log1p(BANDIS * stress[kept] / (t * stress[-1])), np.log(law.y[open_][kept])
+        lambda t: -np.log1p(BANDIS * stress[kept] / (t * stress[-1])),
+        np.log(law.y[open_][kept]),
     )
-    tables = {"byJump": (jump, w), "aperture": (stress, aperture), "hydraulicAperture": (stress, law.y[open_])}
+    tables = {
+        "byJump": (jump, w),
+        "aperture": (stress, aperture),
+        "hydraulicAperture": (stress, law.y[open_]),
+    }
     tables["derivative"] = (stress[1:], -slope[1:] / stiffness[1:])
     functions = "".join(
         f'    <TableFunction name="{name}_{key}" coordinates="{{ {", ".join(map(number, x))} }}"\n'
@@ -264,7 +331,9 @@ def _moose_several(laws: Sequence[LawTable], name: str) -> str:
 
 def _moose_blocks(law: LawTable, name: str) -> str:
     x, *others = law.columns
-    texts = {key: " ".join(map(number, values)) for key, (values, _) in law.columns.items()}
+    texts = {
+        key: " ".join(map(number, values)) for key, (values, _) in law.columns.items()
+    }
     return "".join(
         f"  [{name}_{key}]\n    type = PiecewiseLinear\n    x = '{texts[x]}'\n    y = '{texts[key]}'\n  []\n"
         for key in others
@@ -286,18 +355,32 @@ def _getdp_several(laws: Sequence[LawTable], name: str) -> str:
 def _getdp_lines(law: LawTable, name: str, rows: str) -> list[str]:
     """Lists of columns, whose names begin with `rows`, and functions, whose names begin with `name`."""
     x, *others = law.columns
-    lines = [f"{rows}_{key}() = {{{', '.join(map(number, values))}}};" for key, (values, _) in law.columns.items()]
-    lines += [f"{name}_{key}[] = InterpolationLinear[$1]{{ListAlt[{rows}_{x}(), {rows}_{key}()]}};" for key in others]
+    lines = [
+        f"{rows}_{key}() = {{{', '.join(map(number, values))}}};"
+        for key, (values, _) in law.columns.items()
+    ]
+    lines += [
+        f"{name}_{key}[] = InterpolationLinear[$1]{{ListAlt[{rows}_{x}(), {rows}_{key}()]}};"
+        for key in others
+    ]
     return lines
 
 
 def _lethe(law: LawTable) -> str:
     """Numbers of two faces that are alike: Lethe adds squares of roughness and slope, and averages hardness."""
     kept = (law.x > 0) & (law.y >= law.floor)
-    sigma, gradient, k_s = (law.facts[key][0] for key in ("h_rms", "rms_gradient", "conductivity"))
+    sigma, gradient, k_s = (
+        law.facts[key][0] for key in ("h_rms", "rms_gradient", "conductivity")
+    )
     slope = gradient / math.sqrt(math.pi)
-    logs = np.log(law.x[kept]) - np.log(law.y[kept] * sigma / (YOVANOVICH * k_s * slope)) / EXPONENT
-    middle, spread = (logs.max() + logs.min()) / 2, EXPONENT * (logs.max() - logs.min()) / 2
+    logs = (
+        np.log(law.x[kept])
+        - np.log(law.y[kept] * sigma / (YOVANOVICH * k_s * slope)) / EXPONENT
+    )
+    middle, spread = (
+        (logs.max() + logs.min()) / 2,
+        EXPONENT * (logs.max() - logs.min()) / 2,
+    )
     said = (
         f"Lethe's conductance 1.25 k m/sigma (p/H)^0.96 is within {about(math.expm1(spread), 2)} of the law's from "
         f"p = {about(law.x[kept][0])} to {about(law.x[-1])} {law.x_unit} with this microhardness H, which is fitted "
@@ -306,7 +389,10 @@ def _lethe(law: LawTable) -> str:
     numbers = {"microhardness": math.exp(middle), "surface slope": slope / math.sqrt(2)}
     numbers |= {"surface roughness": sigma / math.sqrt(2)}
     particles, wall = (
-        "".join(f"{indent}set {key} {of} = {number(value)}\n" for key, value in numbers.items())
+        "".join(
+            f"{indent}set {key} {of} = {number(value)}\n"
+            for key, value in numbers.items()
+        )
         for of, indent in (("particles", "    "), ("wall", "  "))
     )
     return (
@@ -336,7 +422,9 @@ abaqus = Grammar(
 )
 STAY = "Stay within the rows: the solver's behaviour beyond them was not tested."
 LSDYNA_TAKES = ("pressure", "conductance", "tangential_stiffness", "leakage")
-lsdyna = Grammar("LS-DYNA", "$", dict.fromkeys(LSDYNA_TAKES, _lsdyna), STAY, several=_lsdyna_curves)
+lsdyna = Grammar(
+    "LS-DYNA", "$", dict.fromkeys(LSDYNA_TAKES, _lsdyna), STAY, several=_lsdyna_curves
+)
 optistruct = Grammar("OptiStruct", "$", {"pressure": _optistruct}, STAY)
 comsol = Grammar(
     "COMSOL",
@@ -360,7 +448,14 @@ modelica = Grammar(
     named="law",
     first="#1\n",
 )
-mbdyn = Grammar("MBDyn", "#", {"film": _mbdyn}, "Include this file above the element.", named="rough", units=SI)
+mbdyn = Grammar(
+    "MBDyn",
+    "#",
+    {"film": _mbdyn},
+    "Include this file above the element.",
+    named="rough",
+    units=SI,
+)
 geos = Grammar(
     "GEOS",
     "<!--",
@@ -396,8 +491,25 @@ lethe = Grammar(
     units=SI,
     conducts_gas=False,
 )
-SOLVERS = calculix, abaqus, lsdyna, optistruct, comsol, moose, modelica, mbdyn, geos, moose_function, getdp, lethe
+SOLVERS = (
+    calculix,
+    abaqus,
+    lsdyna,
+    optistruct,
+    comsol,
+    moose,
+    modelica,
+    mbdyn,
+    geos,
+    moose_function,
+    getdp,
+    lethe,
+)
 TARGETS = tuple(
-    grammar.target("moose-function" if grammar is moose_function else grammar.program.lower().replace("-", ""))
+    grammar.target(
+        "moose-function"
+        if grammar is moose_function
+        else grammar.program.lower().replace("-", "")
+    )
     for grammar in SOLVERS
 )

@@ -14,12 +14,20 @@ from mbma_tables.common.files import write_file
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.text import checked_name, comment
 
-LAW = frozenset({"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"})
+LAW = frozenset(
+    {"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"}
+)
 ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "direction"}
 CODE = LAW | {"name", "leakage", "direction"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
-GROUPS = {"SOLVERS": "solvers", "DATA": "data", "LAWS": "law_code", "FMUS": "fmu", "CODE": "c_code"}
+GROUPS = {
+    "SOLVERS": "solvers",
+    "DATA": "data",
+    "LAWS": "law_code",
+    "FMUS": "fmu",
+    "CODE": "c_code",
+}
 SI = ("m", "Pa")
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
 # by quantity: options for it alone, and the abscissa of its rows
@@ -37,25 +45,39 @@ class Target:
     """Declaration of the output for one program, or in one format."""
 
     name: str  # in the command `mbma export`
-    # of a `LawTable` and options by name; of surface, E_star and options where `rows` is False. Text or bytes, or
-    # several files by how their names end after that of the first, whose own end is ""
+    # of a `LawTable` and options by name; of surface, E_star and options where `rows` is
+    # False. Text or bytes, or several files by how their names end after that of the first,
+    # whose own end is ""
     write: Callable[..., Any]
     takes: frozenset[str] = ROWS  # options of the command
     rows: bool = True
-    end: str = ""  # of the first file's name, where it must be that; functions are then called by the rest of it
+    # of the first file's name, where it must be that; functions are then called by the rest
+    # of it
+    end: str = ""
     quantity: str = "pressure"  # of the rows, where none is asked for
-    units: tuple[str, str] | None = None  # of length and of stress, where the program prescribes them
-    most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that the program keeps, by quantity
-    quantities: tuple[str, ...] = ()  # of rows, which the program takes; several in one file where `several`
+    units: tuple[str, str] | None = (
+        None  # of length and of stress, where the program prescribes them
+    )
+    most: Mapping[str, int] = dataclasses.field(
+        default_factory=dict
+    )  # rows that the program keeps, by quantity
+    quantities: tuple[
+        str, ...
+    ] = ()  # of rows, which the program takes; several in one file where `several`
     several: bool = False
-    conducts_gas: bool = True  # whether conductance may be that of solid spots and gas together
+    conducts_gas: bool = (
+        True  # whether conductance may be that of solid spots and gas together
+    )
     alone: bool = True  # whether the first file can be used without those beside it
 
     def files(self, *given: Any, **options: Any) -> Mapping[str, bytes]:
         """The files by the ends of their names, that of the first being ""."""
         made = self.write(*given, **options)
         files = made if isinstance(made, Mapping) else {"": made}
-        return {end: text if isinstance(text, bytes) else text.encode() for end, text in files.items()}
+        return {
+            end: text if isinstance(text, bytes) else text.encode()
+            for end, text in files.items()
+        }
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,29 +86,49 @@ class Grammar:
 
     program: str
     mark: str  # of comments
-    body: Mapping[str, Callable[..., str]]  # by quantity: text below the comments, from the law and the names
-    beyond: str  # behaviour of the program outside the rows, and further notes for its user
-    most: Mapping[str, int] = dataclasses.field(default_factory=dict)  # rows that it holds, by quantity
+    body: Mapping[
+        str, Callable[..., str]
+    ]  # by quantity: text below the comments, from the law and the names
+    beyond: (
+        str  # behaviour of the program outside the rows, and further notes for its user
+    )
+    most: Mapping[str, int] = dataclasses.field(
+        default_factory=dict
+    )  # rows that it holds, by quantity
     named: str | None = None  # default name; None if there is none
     first: str = ""  # line of the file
-    units: tuple[str, str] | None = None  # of length and of stress, if they are prescribed
+    units: tuple[str, str] | None = (
+        None  # of length and of stress, if they are prescribed
+    )
     friction: str = ""  # notes for the user of its friction card; empty without one
-    closure: bool = False  # whether rows of conductance stand beside those of the pressure of the same joint
-    # the text of several laws below the comments, where a file may have them, from the laws and the names
+    # whether rows of conductance stand beside those of the pressure of the same joint
+    closure: bool = False
+    # the text of several laws below the comments, where a file may have them, from the laws
+    # and the names
     several: Callable[..., str] | None = None
     conducts_gas: bool = True
 
-    def __call__(self, law: LawTable | Sequence[LawTable], name: str | None = None) -> str:
+    def __call__(
+        self, law: LawTable | Sequence[LawTable], name: str | None = None
+    ) -> str:
         """The text of a file of one law, or of several; what the program does not take raises an `InputError`."""
         laws = [law] if isinstance(law, LawTable) else list(law)
         if len(laws) > 1 and self.several is None:
-            raise InputError(f"{self.program} takes one quantity a file, got {len(laws)}: write a file for each")
-        named = {} if self.named is None else {"name": checked_name(self.named if name is None else name, MAX_NAME)}
+            raise InputError(
+                f"{self.program} takes one quantity a file, got {len(laws)}: write a file for each"
+            )
+        named = (
+            {}
+            if self.named is None
+            else {"name": checked_name(self.named if name is None else name, MAX_NAME)}
+        )
         for one in laws:
             self._check(one)
         # those of the first law, and what else the others have to say
         comments = list(laws[0].comments)
-        closures = [one.behaviour for one in laws if self.closure and one.behaviour is not None]
+        closures = [
+            one.behaviour for one in laws if self.closure and one.behaviour is not None
+        ]
         for other in (*laws[1:], *closures):
             comments += [line for line in other.comments if line not in comments]
         comments += [self.friction] if "friction" in laws[0].facts else []
@@ -97,11 +139,18 @@ class Grammar:
 
     def _check(self, law: LawTable) -> None:
         """Refuse a law that the program does not take."""
-        own, most = tuple(law.facts[fact][1] for fact in ("h_rms", "E_star")), self.most.get(law.y_name, law.x.size)
+        own, most = (
+            tuple(law.facts[fact][1] for fact in ("h_rms", "E_star")),
+            self.most.get(law.y_name, law.x.size),
+        )
         taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
         for allowed, takes, got in (
             (law.quantity in self.body, taken, f"{law.y_name} against {law.x_name}"),
-            (self.units in (None, own), " and ".join(self.units or ()), " and ".join(own)),
+            (
+                self.units in (None, own),
+                " and ".join(self.units or ()),
+                " and ".join(own),
+            ),
             (law.x.size <= most, f"{most} rows of {law.y_name} at most", f"{law.x.size}"),
             ("friction" not in law.facts or self.friction, "no friction", "friction"),
         ):
@@ -110,9 +159,18 @@ class Grammar:
 
     def target(self, name: str) -> Target:
         """The target of this name."""
-        takes = ROWS | ({"name"} if self.named else set()) | (FRICTION if self.friction else set())
+        takes = (
+            ROWS
+            | ({"name"} if self.named else set())
+            | (FRICTION if self.friction else set())
+        )
         for quantity, options in OPTIONS.items():
-            takes -= options if quantity not in self.body and not (self.friction and "kappa" in options) else set()
+            takes -= (
+                options
+                if quantity not in self.body
+                and not (self.friction and "kappa" in options)
+                else set()
+            )
         return Target(
             name,
             self,
@@ -135,7 +193,9 @@ def write_files(out: pathlib.Path, files: Mapping[str, bytes]) -> list[pathlib.P
         Where a file beside the first one would have its name.
     """
     if out.suffix and any(out.name == f"{out.stem}{end}" for end in files):
-        raise InputError(f"{out.name}: a file beside the first one has this name, take another")
+        raise InputError(
+            f"{out.name}: a file beside the first one has this name, take another"
+        )
     paths = []
     # files that the first one needs are written before it
     for end in sorted(files, reverse=True):
@@ -148,5 +208,8 @@ def write_files(out: pathlib.Path, files: Mapping[str, bytes]) -> list[pathlib.P
 @functools.cache
 def targets(*groups: str) -> dict[str, Target]:
     """Targets of some of `GROUPS`, or of all, by their names."""
-    modules = [importlib.import_module(f"mbma_tables.export.{GROUPS[name]}") for name in groups or GROUPS]
+    modules = [
+        importlib.import_module(f"mbma_tables.export.{GROUPS[name]}")
+        for name in groups or GROUPS
+    ]
     return {target.name: target for module in modules for target in module.TARGETS}

@@ -16,7 +16,14 @@ from mbma_tables.common.errors import InputError
 
 COMMENT_WIDTH = 108
 _ROOT = pathlib.Path(__file__).parent
-_ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
+_ASCII = str.maketrans(
+    {
+        "\N{MICRO SIGN}": "u",
+        "\N{GREEK SMALL LETTER MU}": "u",
+        "\N{MIDDLE DOT}": ".",
+        "²": "2",
+    }
+)
 # what some reader takes for more than text, even in a comment
 _ACTIVE = re.compile(
     r"\*(?=/)|/(?=\*)"  # end and begin of a comment of C
@@ -32,7 +39,9 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 def printable(text: str) -> str:
     """Text as printable ASCII on one line; other characters as escapes."""
     return "".join(
-        letter if " " <= letter <= "~" else letter.encode("unicode_escape").decode("ascii")
+        letter
+        if " " <= letter <= "~"
+        else letter.encode("unicode_escape").decode("ascii")
         for letter in text.translate(_ASCII)
     )
 
@@ -47,13 +56,17 @@ def inert(line: str) -> str:
 def comment(lines: Iterable[str], mark: str) -> str:
     """Lines as comments that reach from a mark to the end of the line, "<!--" for comments of XML."""
     if mark == "<!--":
-        return "".join(f"<!-- {inert(line).replace('--', '-%2D')} -->\n" for line in lines)
+        return "".join(
+            f"<!-- {inert(line).replace('--', '-%2D')} -->\n" for line in lines
+        )
     return "".join(f"{mark} {inert(line)}".rstrip() + "\n" for line in lines)
 
 
 def opening(paragraphs: Iterable[str], mark: str) -> str:
     """Head of a source file: wrapped paragraphs as comments by their mark, "/*" for one comment of C and JavaScript."""
-    wrap = textwrap.TextWrapper(COMMENT_WIDTH, break_long_words=False, break_on_hyphens=False).wrap
+    wrap = textwrap.TextWrapper(
+        COMMENT_WIDTH, break_long_words=False, break_on_hyphens=False
+    ).wrap
     lines = [line for text in paragraphs for line in wrap(text)]
     if mark != "/*":
         return comment(lines, mark).rstrip()
@@ -81,15 +94,25 @@ def template(name: str) -> str:
 def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
     """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty.
 
-    @EACH@ ... @END@ is repeated for each function that is a slope times a ratio: @WHAT@, @PLACE@ and @RATIO@.
+    @EACH@ ... @END@ is repeated for each function that is a slope times a ratio: @WHAT@,
+    @PLACE@ and @RATIO@.
     """
     chosen = re.compile(r"@(?:IF ([A-Z]+)|EACH)@(\n)?(.*?)@END@(?(2)\n)", re.S)
 
     def repeated(text: str) -> str:
-        places = ((("@WHAT@", what), ("@PLACE@", what.upper()), ("@RATIO@", ratio)) for what, ratio in each.items())
-        return "".join(functools.reduce(lambda part, place: part.replace(*place), own, text) for own in places)
+        places = (
+            (("@WHAT@", what), ("@PLACE@", what.upper()), ("@RATIO@", ratio))
+            for what, ratio in each.items()
+        )
+        return "".join(
+            functools.reduce(lambda part, place: part.replace(*place), own, text)
+            for own in places
+        )
 
-    text = chosen.sub(lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]), template(name))
+    text = chosen.sub(
+        lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]),
+        template(name),
+    )
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
@@ -104,12 +127,16 @@ def csv_cell(text: str) -> str:
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
-def checked_name(name: str, max_length: int, reserved: Container[str] = (), target: str = "this target") -> str:
+def checked_name(
+    name: str, max_length: int, reserved: Container[str] = (), target: str = "this target"
+) -> str:
     """A name for a target: an ASCII letter, then letters, digits and underscores; none of its reserved words.
 
     Case does not matter to reserved words, which are in small letters.
     """
-    if not isinstance(name, str) or not re.fullmatch(rf"[A-Za-z][A-Za-z0-9_]{{0,{max_length - 1}}}", name):
+    if not isinstance(name, str) or not re.fullmatch(
+        rf"[A-Za-z][A-Za-z0-9_]{{0,{max_length - 1}}}", name
+    ):
         raise InputError(
             f"a name must be a letter, then letters, digits and underscores, {max_length} at most, got {name!r}"
         )
@@ -137,10 +164,11 @@ def number(
     ----------
     value : float
     digits : int
-        Significant digits. The default reads back as the same double, written as shortly as that allows.
+        Significant digits. The default reads back as the same double, written as shortly as
+        that allows.
     width : int, optional
-        Columns of a field. Where the number needs more, it has as many digits as fit: 13 in 20 columns and 9 in
-        16 at least, hence relative errors of at most 5e-13 and 5e-9.
+        Columns of a field. Where the number needs more, it has as many digits as fit: 13 in
+        20 columns and 9 in 16 at least, hence relative errors of at most 5e-13 and 5e-9.
     exponent : str
         Letter of an exponent that must be there, such as "d" for double precision in Fortran.
     infinity, missing : str, optional
@@ -149,7 +177,8 @@ def number(
     Raises
     ------
     InputError
-        For a number that is not finite where the language has no word for it, and for one that no field holds.
+        For a number that is not finite where the language has no word for it, and for one
+        that no field holds.
 
     Examples
     --------
@@ -164,7 +193,9 @@ def number(
     if math.isnan(double) and missing is not None:
         return missing
     if not math.isfinite(double):
-        raise InputError(f"a number in a file for another program must be finite, got {double}")
+        raise InputError(
+            f"a number in a file for another program must be finite, got {double}"
+        )
     text = _pointed(repr(float(f"{double:.{digits}g}")), exponent)
     if width is None or len(text) <= width:
         return text
@@ -173,7 +204,9 @@ def number(
         mantissa, _, power = f"{double:.{decimals}e}".partition("e")
         text = _pointed(f"{mantissa.rstrip('0').rstrip('.')}e{power}", exponent)
         # next to the largest double fewer digits may round beyond it
-        if len(text) <= width and math.isfinite(float(text.replace(exponent or "e", "e"))):
+        if len(text) <= width and math.isfinite(
+            float(text.replace(exponent or "e", "e"))
+        ):
             return text
     raise InputError(f"{double!r} does not fit into a field of {width} columns")
 

@@ -13,7 +13,13 @@ from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core
 
 DEGREE = 8
-CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = 0, 1, 2, 3 + DEGREE, 4 + 2 * DEGREE  # in a record
+CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = (
+    0,
+    1,
+    2,
+    3 + DEGREE,
+    4 + 2 * DEGREE,
+)  # in a record
 RECORD = 5 + 2 * DEGREE
 # names of the quantities
 QUANTITIES = ("pressure", "area", "stiffness", "area_slope", "energy")
@@ -34,38 +40,65 @@ Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)
 OCTAVES = 100  # below the largest value; lighter loads are found by iteration
 LEAST = float(np.finfo(float).tiny)
 POINTS = chebyshev.chebpts1(INVERSE_DEGREE + 1)
-TRANSFORM: Any = np.linalg.inv(np.vander(POINTS, increasing=True)).T  # values there to monomials
+TRANSFORM: Any = np.linalg.inv(
+    np.vander(POINTS, increasing=True)
+).T  # values there to monomials
 
-SAMPLES = 16  # of these Chebyshev coefficients DEGREE + 1 are kept; the others bound the error of value and of slope
+# of these Chebyshev coefficients DEGREE + 1 are kept; the others bound the error of value
+# and of slope
+SAMPLES = 16
 MAX_RECORDS = 4000
-TAIL_SHARE = 4.0  # factor on the last two coefficients for all later ones, which fall at least by 2 each
-NEAR = 1e-7  # relative width of a bucket too narrow to fit, for which its neighbour's polynomials are used
-FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # initial buckets of the octaves below x = 1, with curved Gaussians; 2 below
+# factor on the last two coefficients for all later ones, which fall at least by 2 each
+TAIL_SHARE = 4.0
+# relative width of a bucket too narrow to fit, for which its neighbour's polynomials are
+# used
+NEAR = 1e-7
+FIRST_BUCKETS = {
+    -1: 16,
+    -2: 8,
+    -3: 4,
+}  # initial buckets of the octaves below x = 1, with curved Gaussians; 2 below
 SLOPES = 100.0  # ratio of the tolerance of slopes (over F/x if that is larger) to that of values
-COARSE, COARSE_SLOPES = 1e-7, 10.0  # tolerance above which octaves begin with one bucket; and that of slopes there
+COARSE, COARSE_SLOPES = (
+    1e-7,
+    10.0,
+)  # tolerance above which octaves begin with one bucket; and that of slopes there
 FOR_SLOPES = 4  # largest factor of additional buckets for slopes
 KEPT = DEGREE + 1
 
 _POINTS, _DEGREES = chebyshev.chebpts1(SAMPLES), np.arange(SAMPLES)
-PLACES = np.stack([1 - _POINTS, 1 + _POINTS]) / 2  # from an interval's ends to samples, and from values there to a
-SERIES: Any = np.linalg.inv(chebyshev.chebvander(_POINTS, SAMPLES - 1)).T.copy()  # Chebyshev series
+PLACES = (
+    np.stack([1 - _POINTS, 1 + _POINTS]) / 2
+)  # from an interval's ends to samples, and from values there to a
+SERIES: Any = np.linalg.inv(
+    chebyshev.chebvander(_POINTS, SAMPLES - 1)
+).T.copy()  # Chebyshev series
 # the even and odd parts of what is left out are in the first two terms, so that neighbours join
 for _odd in (0, 1):
     SERIES[:, _odd] += SERIES[:, KEPT + 1 - _odd :: 2].sum(axis=1)
 # on the errors of value and of slope by t, of the sizes of terms that are left out
-BOUNDS = np.where(_DEGREES < KEPT, 0.0, np.stack([np.full(SAMPLES, 2.0), _DEGREES**2 + 1]))
+BOUNDS = np.where(
+    _DEGREES < KEPT, 0.0, np.stack([np.full(SAMPLES, 2.0), _DEGREES**2 + 1])
+)
 BOUNDS[:, -2:] += TAIL_SHARE * np.array([[2], [SAMPLES**2]])
-# from the series to monomials, from monomials in [-1, 1] to those in [0, 1] and to the Bernstein series of the slope
+# from the series to monomials, from monomials in [-1, 1] to those in [0, 1] and to the
+# Bernstein series of the slope
 MONOMIALS, FROM_ZERO = np.zeros((2, KEPT, KEPT))
 for _k in range(KEPT):
     MONOMIALS[_k, : _k + 1] = chebyshev.cheb2poly(np.eye(KEPT)[_k, : _k + 1])
     FROM_ZERO[_k] = [math.comb(_k, j) * 2.0**j * (-1.0) ** (_k - j) for j in range(KEPT)]
 _LOW, _HIGH, _N = Polynomial([0.5, -0.5]), Polynomial([0.5, 0.5]), DEGREE - 1
-_BASIS: Any = np.stack([(_LOW ** (_N - j) * _HIGH**j * math.comb(_N, j)).coef for j in range(DEGREE)])
-BERNSTEIN = np.concatenate([np.zeros((1, DEGREE)), np.arange(1.0, KEPT)[:, None] * np.linalg.inv(_BASIS)])
+_BASIS: Any = np.stack(
+    [(_LOW ** (_N - j) * _HIGH**j * math.comb(_N, j)).coef for j in range(DEGREE)]
+)
+BERNSTEIN = np.concatenate(
+    [np.zeros((1, DEGREE)), np.arange(1.0, KEPT)[:, None] * np.linalg.inv(_BASIS)]
+)
 
 Values = Callable[[FloatArray], FloatArray]
-First = tuple[FloatArray, FloatArray, tuple[float, float]]  # record below where x begins, its errors, its powers
+First = tuple[
+    FloatArray, FloatArray, tuple[float, float]
+]  # record below where x begins, its errors, its powers
 
 
 class Side(NamedTuple):
@@ -82,7 +115,9 @@ class Pieces(NamedTuple):
 
     records: FloatArray
     errors: FloatArray
-    rows: list[tuple[int, int]]  # (shift, base) of the octaves up to 1, counted from this side's first record
+    rows: list[
+        tuple[int, int]
+    ]  # (shift, base) of the octaves up to 1, counted from this side's first record
 
 
 def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
@@ -90,15 +125,21 @@ def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
     found = positive(values((ends @ PLACES).ravel())).reshape(2, -1, SAMPLES)
     # sums independent of the number of threads, unlike matrix products
     terms = np.einsum("rki,ij->rkj", found, SERIES)
-    left = np.einsum("rki,ji->rkj", np.abs(terms), BOUNDS) / found.min(axis=-1, keepdims=True)
+    left = np.einsum("rki,ji->rkj", np.abs(terms), BOUNDS) / found.min(
+        axis=-1, keepdims=True
+    )
     low, high = ends.T
     half = (high - low) / 2
     reach = high / half
     steep = np.maximum(1.0, reach / 2 * (found.max(axis=-1) / found.min(axis=-1) - 1))
-    errors = np.stack([left[..., 0], left[..., 1] * reach, left[..., 1] * reach / steep]).max(axis=1)
+    errors = np.stack(
+        [left[..., 0], left[..., 1] * reach, left[..., 1] * reach / steep]
+    ).max(axis=1)
     errors[:, high - low <= NEAR * low] = 0.0
     series = np.einsum("rki,ij->krj", terms[..., :KEPT], MONOMIALS).reshape(len(ends), -1)
-    return np.column_stack([(low + high) / 2, 1 / half, series, np.zeros(len(ends)), errors.T])
+    return np.column_stack(
+        [(low + high) / 2, 1 / half, series, np.zeros(len(ends)), errors.T]
+    )
 
 
 def side_pieces(side: Side, rtol: float) -> Pieces:
@@ -113,7 +154,9 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
         pending = [e for e in counts if e not in done]
         cuts |= {e: _buckets(side, e, counts[e]) for e in pending}
         stops = list(itertools.accumulate(len(cuts[e]) for e in pending))
-        made = _fit_intervals(side.values, np.array([ends for e in pending for ends in cuts[e]]))
+        made = _fit_intervals(
+            side.values, np.array([ends for e in pending for ends in cuts[e]])
+        )
         worst = np.maximum.reduceat(made[:, RECORD:], [0, *stops[:-1]]).tolist()
         for e, stop, (value, _, slope) in zip(pending, stops, worst, strict=True):
             if value <= rtol:
@@ -124,7 +167,10 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
             else:
                 counts[e] *= 2
         if sum(counts.values()) > MAX_RECORDS:
-            raise ConvergenceError(f"the law needs more than {MAX_RECORDS} pieces for {rtol:.1e}", np.array(True))
+            raise ConvergenceError(
+                f"the law needs more than {MAX_RECORDS} pieces for {rtol:.1e}",
+                np.array(True),
+            )
     rows, place = [], 0
     for e, count in counts.items():
         power, start = count.bit_length() - 1, cuts[e][0][0]
@@ -136,7 +182,9 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
     for k, (low, high) in enumerate(ends for e in counts for ends in cuts[e]):
         if high - low <= NEAR * low:
             # too narrow for slopes: use the neighbour on the side without a kink
-            whole[k] = whole[min(max(k + 1 if low in side.kinks else k - 1, 0), place - 1)]
+            whole[k] = whole[
+                min(max(k + 1 if low in side.kinks else k - 1, 0), place - 1)
+            ]
     return Pieces(whole[:, :RECORD], whole[:, RECORD:-1], rows)
 
 
@@ -145,7 +193,10 @@ def _buckets(side: Side, e: int, count: int) -> list[tuple[float, float]]:
     edges = [2.0**e * (1 + k / count) for k in range(count)]
     inside = {kink for kink in side.kinks if 2.0**e < kink < 2.0 ** (e + 1)}
     if side.start > 2.0**e or inside:
-        edges = sorted({low if low > side.start * (1 + 1e-15) else side.start for low in edges} | inside)
+        edges = sorted(
+            {low if low > side.start * (1 + 1e-15) else side.start for low in edges}
+            | inside
+        )
     return list(itertools.pairwise([*edges, 2.0 ** (e + 1)]))
 
 
@@ -156,7 +207,9 @@ def positive(found: FloatArray) -> FloatArray:
     return found
 
 
-def first_record(make: Callable[[float], First], octaves: Iterable[int], rtol: float) -> tuple[float, First]:
+def first_record(
+    make: Callable[[float], First], octaves: Iterable[int], rtol: float
+) -> tuple[float, First]:
     """The first of some powers of 1/2 below which a record meets a tolerance, or the last; and the record."""
     for number in octaves:
         start = 2.0**-number
@@ -169,7 +222,9 @@ def first_record(make: Callable[[float], First], octaves: Iterable[int], rtol: f
 def power_record(values: Values, start: float, powers: tuple[float, float]) -> First:
     """The record below `start` where force and area are these powers of x times polynomials."""
     exponents = np.array(powers)[:, None]
-    made = _fit_intervals(lambda x: values(x) / (x / start) ** exponents, np.array([[0.0, start]]))[0]
+    made = _fit_intervals(
+        lambda x: values(x) / (x / start) ** exponents, np.array([[0.0, start]])
+    )[0]
     record, (value, slope, _) = made[:RECORD], made[RECORD:]
     record[CENTRE], record[RATE] = 0.0, 1 / start
     series = record[FORCE_AT:ENERGY_AT].reshape(2, KEPT)
@@ -187,13 +242,24 @@ def straight_record(values: Values, start: float) -> First:
     missed = np.abs(basis @ constants - logs.T).max(axis=0)
     record, lead = np.zeros(RECORD), np.exp(constants[0])
     record[RATE] = 1 / start
-    record[[FORCE_AT, AREA_AT]], record[[FORCE_AT + 1, AREA_AT + 1]] = lead, lead * constants[2]
-    powers, value = (float(constants[1, 0]), float(constants[1, 1])), np.expm1(missed) + constants[2] ** 2
+    record[[FORCE_AT, AREA_AT]], record[[FORCE_AT + 1, AREA_AT + 1]] = (
+        lead,
+        lead * constants[2],
+    )
+    powers, value = (
+        (float(constants[1, 0]), float(constants[1, 1])),
+        np.expm1(missed) + constants[2] ** 2,
+    )
     return record, np.array([value.max(), (value * powers + 2 * missed).max()]), powers
 
 
 def assemble(
-    h_max: float, scale: float, sides: list[Side], pieces: list[Pieces], first: First, ends: tuple[float, float]
+    h_max: float,
+    scale: float,
+    sides: list[Side],
+    pieces: list[Pieces],
+    first: First,
+    ends: tuple[float, float],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The block of one side, or of two: s = -1 for d >= 0 and s = 1 below; its records, a part of it; their errors."""
     low = min(side.start for side in sides)
@@ -206,10 +272,30 @@ def assemble(
         of_side[:, 1] += start - (every - len(side.kinks))
         start += len(piece.records)
     # sign d > kink scale^-1 - h_max: x beyond the kink
-    kinks = [number for side in sides for kink in side.kinks for number in (side.sign, kink / scale - h_max)]
+    kinks = [
+        number
+        for side in sides
+        for kink in side.kinks
+        for number in (side.sign, kink / scale - h_max)
+    ]
     kinks += [0.0, 1.0] * (2 - every)
     signs = sides[0].sign, sides[-1].sign
-    head = np.array([h_max, scale, low, math.nextafter(1.0, 0.0), *signs, *kinks, *first[2], *ends, 0, 0, 0, 0])
+    head = np.array(
+        [
+            h_max,
+            scale,
+            low,
+            math.nextafter(1.0, 0.0),
+            *signs,
+            *kinks,
+            *first[2],
+            *ends,
+            0,
+            0,
+            0,
+            0,
+        ]
+    )
     below = -lowest if len(sides) > 1 else 0
     head.view(np.int64)[EXPONENT:] = lowest + 1023, below, HEAD + rows.size, signs[0] < 0
     parts = [head, rows.view(np.float64), first[0], *(piece.records for piece in pieces)]
@@ -218,7 +304,14 @@ def assemble(
     return block, block[head.size + rows.size :].reshape(-1, RECORD), errors
 
 
-def fill_energies(records: FloatArray, order: Any, signs: FloatArray, scale: float, power: float, last: float) -> None:
+def fill_energies(
+    records: FloatArray,
+    order: Any,
+    signs: FloatArray,
+    scale: float,
+    power: float,
+    last: float,
+) -> None:
     """Energies, integrals of force over d, into the records; `last` is that beyond the gaps covered."""
     first, begins, k = records[0], signs[0] < 0, np.arange(1, KEPT + 1)
     if not first[RATE]:
@@ -232,7 +325,9 @@ def fill_energies(records: FloatArray, order: Any, signs: FloatArray, scale: flo
     reached = np.concatenate([[of_first if begins else last], upper - lower]).cumsum()
     records[order, ENERGY_AT] = reached[:-1] + np.where(signs > 0, upper, -lower)
     if not begins:
-        first[ENERGY_AT] = reached[-1] + of_first if first[CENTRE] == 0 else records[1, ENERGY_AT]
+        first[ENERGY_AT] = (
+            reached[-1] + of_first if first[CENTRE] == 0 else records[1, ENERGY_AT]
+        )
 
 
 def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[float | None, float]]:
@@ -240,7 +335,9 @@ def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[float | None, 
     series = own[:, FORCE_AT:ENERGY_AT].reshape(-1, KEPT)
     found: list[tuple[float | None, float]] = [(None, 0.0), (None, 0.0)]
     # a polynomial whose Bernstein coefficients are positive is positive
-    for k in np.flatnonzero((series @ BERNSTEIN * -np.repeat(signs, 2)[:, None]).min(axis=1) <= 0).tolist():
+    for k in np.flatnonzero(
+        (series @ BERNSTEIN * -np.repeat(signs, 2)[:, None]).min(axis=1) <= 0
+    ).tolist():
         place, row = divmod(k, 2)
         sign = float(signs[place])
         t = None if found[row][0] is not None else _first_fall(-sign * series[k], sign)
@@ -257,7 +354,11 @@ def _first_fall(series: FloatArray, end: float) -> float | None:
     real = roots[np.isreal(roots) & (np.abs(roots) < 1)].real
     # slopes at double roots do not change sign
     way = [*sorted(real, key=lambda t: abs(t - end)), -end]
-    falls = (float(root) for root, following in itertools.pairwise(way) if slope((root + following) / 2) < 0)
+    falls = (
+        float(root)
+        for root, following in itertools.pairwise(way)
+        if slope((root + following) / 2) < 0
+    )
     return next(falls, None)
 
 
@@ -266,7 +367,12 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     ends = bool(block.view(np.int64)[ENDS])
     top = block[H_MAX] - block[LOW] / block[SCALE] if ends else block[HIGHEST]
     values = np.empty(3)
-    core.law_fill(np.array([top, end, 0.0]), block, *((None, values) if which == AREA else (values, None)), *[None] * 3)
+    core.law_fill(
+        np.array([top, end, 0.0]),
+        block,
+        *((None, values) if which == AREA else (values, None)),
+        *[None] * 3,
+    )
     least, most, middle = values.tolist()
     bottom = min(max(least, most * 2.0**-OCTAVES, LEAST), most)
     turn = middle if block[PLUS] != block[MINUS] and end < 0 else math.inf
@@ -275,14 +381,18 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     edges = (np.arange(first, last + 2) << bits).view(np.float64)
     edges[0], edges[-1] = bottom, max(most, edges[-2])
     if turn < most:
-        edges = np.insert(edges, np.searchsorted(edges, max(turn, bottom)), max(turn, bottom))
+        edges = np.insert(
+            edges, np.searchsorted(edges, max(turn, bottom)), max(turn, bottom)
+        )
     centre, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
     wanted = (centre[:, None] + half[:, None] * POINTS).ravel()
     x, side = np.empty((2, wanted.size))
     core.inverse_nodes(wanted, block, which, end, x, side)
     records = np.zeros((centre.size, INVERSE_RECORD))
     records[:, 0] = centre
-    records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > np.finfo(float).tiny)
+    records[:, 1] = np.divide(
+        1.0, half, out=np.zeros_like(half), where=half > np.finfo(float).tiny
+    )
     records[:, 2] = side.reshape(-1, POINTS.size)[:, POINTS.size // 2]
     records[:, 3:] = x.reshape(-1, POINTS.size) @ TRANSFORM
     head = np.zeros(INVERSE_HEAD)

@@ -14,12 +14,21 @@ from mbma_tables.common.arguments import FloatArray, Numbers, finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
-from mbma_tables.contacts.interface import OF_LAY, OF_YIELDING, NormalOfLaw, Tangential, ratio_of
+from mbma_tables.contacts.interface import (
+    OF_LAY,
+    OF_YIELDING,
+    NormalOfLaw,
+    Tangential,
+    ratio_of,
+)
 
 if TYPE_CHECKING:
     from mbma_tables.law.leakage import LeakageLaw
 
-LIGHT, HEAVY = 1e-2, 0.99  # overclosures of the default ends of a continued law, over that of the law's last
+LIGHT, HEAVY = (
+    1e-2,
+    0.99,
+)  # overclosures of the default ends of a continued law, over that of the law's last
 SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors of the polynomials
 
@@ -28,15 +37,18 @@ DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors 
 class ContinuedLaw:
     """Pressure of a `ContactLaw` between two mean separations, and straight lines that continue it with its slope.
 
-    Towards wide gaps the line crosses zero: pressure is negative there, which attracts separated bodies in trial steps.
-    Neither end is a law of contact: check with `inside` that a solution lies between them.
+    Towards wide gaps the line crosses zero: pressure is negative there, which attracts
+    separated bodies in trial steps. Neither end is a law of contact: check with `inside`
+    that a solution lies between them.
     """
 
     law: Any
     light: float  #: mean separation of the end towards wide gaps [length]
     heavy: float  #: and of the other
 
-    def pressure_and_stiffness(self, mean_separation: ArrayLike | str) -> tuple[Numbers, Numbers]:
+    def pressure_and_stiffness(
+        self, mean_separation: ArrayLike | str
+    ) -> tuple[Numbers, Numbers]:
         """F/A0 and its derivative -dp/du, in one pass."""
         u = self._given(mean_separation)
         held = np.clip(u, self.heavy, self.light)
@@ -57,18 +69,24 @@ class ContinuedLaw:
         return (self.heavy <= u) & (u <= self.light)
 
     def _given(self, mean_separation: ArrayLike | str) -> FloatArray:
-        return finite_array("mean_separation", self.law.units.number("mean_separation", mean_separation))
+        return finite_array(
+            "mean_separation", self.law.units.number("mean_separation", mean_separation)
+        )
 
 
 class Derived:
     """The part of a `ContactLaw` that is computed on first access."""
 
     def unloading_stiffness(
-        self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
+        self: Any,
+        mean_separation: ArrayLike | None = None,
+        *,
+        separation: ArrayLike | None = None,
     ) -> Numbers:
         """-dp/du of a small unloading at constant contact area [stress/length]; `stiffness` where nothing yields.
 
-        With a hardness it is made from the law of the elastic contact, which is fitted when this is first called.
+        With a hardness it is made from the law of the elastic contact, which is fitted when
+        this is first called.
         """
         law, factor = self.unloading
         found: Numbers = factor * law.stiffness(mean_separation, separation=separation)
@@ -81,7 +99,9 @@ class Derived:
             return self, 1.0
         from mbma_tables.theories.yielding.formulas import frozen_factor
 
-        factor = frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient)))
+        factor = frozen_factor(
+            self.hardness / (self.E_star * float(self.surface.rms_gradient))
+        )
         return dataclasses.replace(self.elastic(), units=self.units), float(factor)
 
     def tangential(
@@ -101,7 +121,10 @@ class Derived:
             u = self.units.number("mean_separation", mean_separation)
             held = self.pressure(u)
         else:
-            u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
+            u, held = (
+                self.at_pressure(pressure).mean_separation,
+                self.units.number("pressure", pressure),
+            )
         ratio = ratio_of(nu, E, self.materials, direction, self.surface, self.area(u))
         normal: NormalOfLaw | str = NormalOfLaw(self)
         if self.hardness < math.inf:
@@ -122,15 +145,16 @@ class Derived:
     def continued(self: Any, pressures: tuple[Any, Any] | None = None) -> ContinuedLaw:
         """The law continued by its tangents beyond two pressures, for the trial steps of Newton's method.
 
-        With the tangents, Newton's method returns from trial steps without contact, where the law has neither pressure
-        nor stiffness, and from steps beyond full compression, where it raises an error. Check `inside` at the solution;
-        if the bodies are apart there, continue the iteration with the law itself.
+        With the tangents, Newton's method returns from trial steps without contact, where
+        the law has neither pressure nor stiffness, and from steps beyond full compression,
+        where it raises an error. Check `inside` at the solution; if the bodies are apart
+        there, continue the iteration with the law itself.
 
         Parameters
         ----------
         pressures : pair of float or str, optional
-            Pressures between which the law itself is used; default: those at 1% and 99% of its compression, or where
-            its stiffness begins to decrease.
+            Pressures between which the law itself is used; default: those at 1% and 99% of
+            its compression, or where its stiffness begins to decrease.
 
         Examples
         --------
@@ -145,15 +169,24 @@ class Derived:
         """
         if pressures is None:
             end = self.lowest if self.turning_point is None else self.turning_point
-            light, heavy = (self.h_max - share * (self.h_max - end) / 2 for share in (LIGHT, HEAVY))
-            if self.softening is not None:  # beyond it tangents fall, to zero where pressure turns down
+            light, heavy = (
+                self.h_max - share * (self.h_max - end) / 2 for share in (LIGHT, HEAVY)
+            )
+            if (
+                self.softening is not None
+            ):  # beyond it tangents fall, to zero where pressure turns down
                 heavy = max(heavy, self.softening)
         elif isinstance(pressures, tuple | list | np.ndarray) and len(pressures) == 2:
-            light, heavy = (float(self.at_pressure(pressure).mean_separation) for pressure in pressures)
+            light, heavy = (
+                float(self.at_pressure(pressure).mean_separation)
+                for pressure in pressures
+            )
         else:
             raise InputError(f"pressures must be two rising numbers, got {pressures!r}")
         if not heavy < light or not float(self.stiffness(light)) > 0:
-            raise InputError(f"pressures must be two rising numbers above zero, got {pressures!r}")
+            raise InputError(
+                f"pressures must be two rising numbers above zero, got {pressures!r}"
+            )
         return ContinuedLaw(self, light, heavy)
 
     @functools.cached_property
@@ -171,7 +204,11 @@ class Derived:
             return None
         peak = int(falls.argmax())
         low, high = u[peak + 1], min(u[peak] + step, self.h_max)
-        near = {"bounds": (low, high), "method": "bounded", "options": {"xatol": 1e-7 * high}}
+        near = {
+            "bounds": (low, high),
+            "method": "bounded",
+            "options": {"xatol": 1e-7 * high},
+        }
         return float(minimize_scalar(lambda x: -self.stiffness(x), **near).x)
 
     @functools.cached_property
@@ -195,6 +232,12 @@ class Derived:
     def _figure(self: Any) -> Any:
         held = self._variables()
         lines = (held[name].values for name in ("mean_separation", "pressure", "area"))
-        pressure, gap = pressure_label(unit_of("pressure", self.units)), self.units.length or "length"
-        curve, gap = Curve(theory_label(self.theory), *lines), f"mean separation u [{gap}]"
+        pressure, gap = (
+            pressure_label(unit_of("pressure", self.units)),
+            self.units.length or "length",
+        )
+        curve, gap = (
+            Curve(theory_label(self.theory), *lines),
+            f"mean separation u [{gap}]",
+        )
         return draw_compression([curve], pressure_label=pressure, gap_label=gap)

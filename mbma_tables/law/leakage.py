@@ -17,8 +17,13 @@ from mbma_tables.law import block as fit
 from mbma_tables.quantities.effective_medium import wide_gap
 from mbma_tables.surfaces.any_surface import AnySurface, apply
 
-RTOL, SHARE = 1e-4, 0.1  # tolerance of the polynomials, or this share of the law's own error
-MOST_OCTAVES = 20  # octaves of gaps from the blocked one; nearer to it the flow is a power
+RTOL, SHARE = (
+    1e-4,
+    0.1,
+)  # tolerance of the polynomials, or this share of the law's own error
+MOST_OCTAVES = (
+    20  # octaves of gaps from the blocked one; nearer to it the flow is a power
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -27,17 +32,24 @@ class LeakageLaw:
 
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
-    #: mean separation u [length] at and below which contact percolates and nothing flows; with a hardness the flow is
-    #: not known there; -infinity where contact never percolates
+    # : mean separation u [length] at and below which contact percolates and nothing flows;
+    # with a hardness the flow is : not known there; -infinity where contact never
+    # percolates
     blocked_at: float
-    # bound on the polynomials' relative error at the law's area, whose own errors come on top times -d ln k/d ln A
+    # bound on the polynomials' relative error at the law's area, whose own errors come on
+    # top times -d ln k/d ln A
     error: float
-    block: FloatArray  # as a law's, with flow in place of force and hydraulic aperture in place of area
+    # as a law's, with flow in place of force and hydraulic aperture in place of area
+    block: FloatArray
 
     def along(self, direction: str | float) -> LeakageLaw:
         """Of a simulated map, the same along an axis, "x" or "y", or in a direction in degrees from x; else itself."""
         found = number_in("direction", degrees(direction), -360.0, 360.0)
-        return self if self.law.gaps is None else leakage_law(self.law, self.law.surface, found)
+        return (
+            self
+            if self.law.gaps is None
+            else leakage_law(self.law, self.law.surface, found)
+        )
 
     def __call__(
         self,
@@ -48,10 +60,14 @@ class LeakageLaw:
     ) -> Numbers:
         """Flow coefficient at mean separations, separations or pressures; exactly 0 where blocked.
 
-        With a hardness NaN there: yielded patches are compact and leave channels, which only a simulation of the
-        yielded gaps knows.
+        With a hardness NaN there: yielded patches are compact and leave channels, which
+        only a simulation of the yielded gaps knows.
         """
-        asked = {"mean_separation": mean_separation, "separation": separation, "pressure": pressure}
+        asked = {
+            "mean_separation": mean_separation,
+            "separation": separation,
+            "pressure": pressure,
+        }
         given = {name: known for name, known in asked.items() if known is not None}
         if len(given) != 1:
             raise InputError("give one of mean_separation, separation and pressure")
@@ -67,15 +83,21 @@ class LeakageLaw:
         gap = (self.law.h_max + flat[apart]) / 2
         found[apart] = gap**3 * wide_gap(gap / self.h_rms)
         # what percolates in the elastic contact is not known to block the yielded one
-        if self.law.hardness < np.inf and not getattr(self.law.gaps, "of_yielded_gaps", False):
+        if self.law.hardness < np.inf and not getattr(
+            self.law.gaps, "of_yielded_gaps", False
+        ):
             found[found == 0] = np.nan
         return found.reshape(np.shape(d))[()]
 
 
-def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -> LeakageLaw:
+def leakage_law(
+    law: Any, surface: AnySurface, direction: float | None = None
+) -> LeakageLaw:
     """Leakage of a contact law's surface; of a simulated map in a direction in degrees, or the mean of both axes."""
     h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
-    top = min(law.h_max, law.highest) if law.block.view(np.int64)[fit.ENDS] else law.highest
+    top = (
+        min(law.h_max, law.highest) if law.block.view(np.int64)[fit.ENDS] else law.highest
+    )
     turns: tuple[float, ...] = ()
     if law.gaps is None:
         threshold = shipped_flow().constants.threshold
@@ -83,7 +105,9 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
         blocked = bool(law.area(separation=deepest) >= threshold)
         bottom = float(law.separation(area=threshold)) if blocked else law.lowest
         head = law.block
-        turns = tuple(head[k] * head[k + 1] for k in (fit.KINK_SIGN, fit.KINK_SIGN_2) if head[k])
+        turns = tuple(
+            head[k] * head[k + 1] for k in (fit.KINK_SIGN, fit.KINK_SIGN_2) if head[k]
+        )
     else:
         bottom, turns = _ends(law, direction)
         blocked = bottom > law.lowest
@@ -95,7 +119,9 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
         if law.gaps is None:
             return h_rms**3 * flow(surface, u, np.asarray(law.area(separation=d)))
         x, y, xy = law.gaps.flow(surface, u)
-        return np.asarray(np.sqrt(x * y) if direction is None else along(direction, x, y, xy))
+        return np.asarray(
+            np.sqrt(x * y) if direction is None else along(direction, x, y, xy)
+        )
 
     def values(x: FloatArray) -> FloatArray:
         K = coefficient(bottom + span * x)
@@ -104,18 +130,26 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
     # gaps close as u under full compression
     known = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)
     start, first = fit.first_record(
-        lambda start: fit.straight_record(values, start) if blocked else fit.power_record(values, start, known),
+        lambda start: (
+            fit.straight_record(values, start)
+            if blocked
+            else fit.power_record(values, start, known)
+        ),
         range(MOST_OCTAVES if blocked else 6, MOST_OCTAVES + 1),
         rtol,
     )
     kinks = [(turn - bottom) / span for turn in turns]
-    side = fit.Side(1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1)))
+    side = fit.Side(
+        1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1))
+    )
     try:
         pieces = fit.side_pieces(side, rtol)
     except ConvergenceError:
         # jumps between the law's polynomials are amplified towards the blocked gap
         pieces = fit.side_pieces(side, max(RTOL, law.error))
-    block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[fit.LOWEST], top))
+    block, _, errors = fit.assemble(
+        -bottom, 1 / span, [side], [pieces], first, (law.block[fit.LOWEST], top)
+    )
     block.view(np.int64)[fit.ENDS] = blocked
     error = float(errors[:, 0].max()) + _between_nodes(pieces.records, values)
     if law.gaps is not None:
@@ -129,14 +163,22 @@ def leakage_law(law: Any, surface: AnySurface, direction: float | None = None) -
 def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
     """Separation of a simulated map from which on it is open, and separations of kinks."""
     ends = [2 * end - law.h_max for _, end, _ in law.gaps.closing]
-    shares = np.abs(np.sin(np.deg2rad([90.0, 0.0] if direction is None else [90.0 + direction, direction])))
+    shares = np.abs(
+        np.sin(
+            np.deg2rad(
+                [90.0, 0.0] if direction is None else [90.0 + direction, direction]
+            )
+        )
+    )
     if direction is None:
         bottom = max(ends)
     else:
         bottom = min(end for end, share in zip(ends, shares, strict=True) if share > 1e-9)
     first = 2 * float(law.gaps.rows[2, 0]) - law.h_max
     if not bottom < first:
-        raise InputError("the map is blocked in this direction at its lightest simulated load: there is no leakage law")
+        raise InputError(
+            "the map is blocked in this direction at its lightest simulated load: there is no leakage law"
+        )
     return bottom, tuple(turn for turn in {max(ends), first} if turn > bottom)
 
 

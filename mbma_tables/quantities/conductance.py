@@ -21,15 +21,20 @@ def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
 
 
 def cooper_mikic_yovanovich(
-    surface: Any, pressure: ArrayLike, k_s: ArrayLike, E_star: ArrayLike, hardness: ArrayLike
+    surface: Any,
+    pressure: ArrayLike,
+    k_s: ArrayLike,
+    E_star: ArrayLike,
+    hardness: ArrayLike,
 ) -> Numbers:
     """Conductance of plastic contacts, h = 1.25 k_s (m/sigma) (p/H)^0.95; E* does not matter.
 
-    Model of M. G. Cooper, B. B. Mikic, M. M. Yovanovich, Int. J. Heat Mass Transfer 12 (1969) 279-300, in the power law
-    of M. M. Yovanovich, "Thermal contact correlations" (1982); the first paper's own is taken to be 1.45 (p/H)^0.985.
-    Both were found in public programs only, neither paper was consulted. This one is within 1.6% of the model for p/H
-    of 1e-6 to 0.023, the other up to 28% below it. m is the mean absolute slope of a Gaussian profile, sqrt(2 m2/pi),
-    sigma is h_rms.
+    Model of M. G. Cooper, B. B. Mikic, M. M. Yovanovich, Int. J. Heat Mass Transfer 12
+    (1969) 279-300, in the power law of M. M. Yovanovich, "Thermal contact correlations"
+    (1982); the first paper's own is taken to be 1.45 (p/H)^0.985. Both were found in public
+    programs only, neither paper was consulted. This one is within 1.6% of the model for p/H
+    of 1e-6 to 0.023, the other up to 28% below it. m is the mean absolute slope of a
+    Gaussian profile, sqrt(2 m2/pi), sigma is h_rms.
 
     Examples
     --------

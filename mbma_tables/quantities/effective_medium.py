@@ -25,7 +25,11 @@ from mbma_tables.theories.calibrated.formulas import (
 
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
 BANDS = 64  # bands of a spectrum, graded towards both ends
-NODES, LOWEST_GAP, REACH = 80, 1e-6, 8.0  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
+NODES, LOWEST_GAP, REACH = (
+    80,
+    1e-6,
+    8.0,
+)  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
 NO_SLOPE = 1e-12  # share of the squared gradient that the last bands hold at least
 NO_COVER = 1e-13  # share of the surface between two magnifications
 NEAREST = 1e-4  # least distance of A/A0 to the threshold
@@ -48,18 +52,24 @@ class FlowConstants:
     def closed_form(self, u: ArrayLike, area: ArrayLike) -> FloatArray:
         """k at mean gaps u [h_rms] and A/A0 without a spectrum, for zeta_1 up to 32; 0 at and above the threshold."""
         left = np.maximum(1 - np.asarray(area, float) / self.threshold, 0)
-        return np.asarray(self.prefactor * np.asarray(u, float) ** 3 * left**self.exponent)
+        return np.asarray(
+            self.prefactor * np.asarray(u, float) ** 3 * left**self.exponent
+        )
 
     def obstructed(self, area: ArrayLike) -> FloatArray:
         """Contribution of the contact to the balance of an effective medium."""
-        return np.asarray((1 - self.threshold) * (np.asarray(area, float) / self.threshold) ** self.obstruction)
+        return np.asarray(
+            (1 - self.threshold)
+            * (np.asarray(area, float) / self.threshold) ** self.obstruction
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Gaps:
     """Gaps of the endless Gaussian surface by the calibrated law, at a row of loads."""
 
-    share: FloatArray  # of the surface that leaves contact within a band of magnification, (loads, bands),
+    # of the surface that leaves contact within a band of magnification, (loads, bands),
+    share: FloatArray
     mean: FloatArray  # and u1 of it [h_rms]
     spread: FloatArray  # rms height of the wavenumbers above each band [h_rms]
     area: FloatArray  # A/A0 at each load,
@@ -73,10 +83,14 @@ class Gaps:
         node, weight = np.polynomial.legendre.leggauss(NODES)
         half = (high - low)[..., None] / 2
         t = np.exp(low[..., None] + half * (1 + node))
-        density = np.exp(-((t - centre[..., None]) ** 2) / 2) + np.exp(-((t + centre[..., None]) ** 2) / 2)
+        density = np.exp(-((t - centre[..., None]) ** 2) / 2) + np.exp(
+            -((t + centre[..., None]) ** 2) / 2
+        )
         share = self.share[..., None] * density * t * half * weight / np.sqrt(2 * np.pi)
         rows = len(self.area)
-        return share.reshape(rows, -1), 3 * np.log(t * self.spread[:, None]).reshape(rows, -1)
+        return share.reshape(rows, -1), 3 * np.log(t * self.spread[:, None]).reshape(
+            rows, -1
+        )
 
 
 def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -85,7 +99,10 @@ def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
     edges = log_x[-1] * 0.5 * (1 - np.cos(np.pi * np.arange(BANDS + 1) / BANDS))
     band = np.clip(np.searchsorted(edges, log_x, side="right") - 1, 0, BANDS - 1)
     x, variance = spectrum.x, spectrum.variance
-    parts = [np.bincount(band, v, BANDS).astype(float) for v in (variance, variance * x**2, variance * x)]
+    parts = [
+        np.bincount(band, v, BANDS).astype(float)
+        for v in (variance, variance * x**2, variance * x)
+    ]
     # the last wavenumbers of a map may be rounding errors
     held = (parts[0] > 0) & (np.cumsum(parts[1][::-1])[::-1] > NO_SLOPE * parts[1].sum())
     return parts[0][held], parts[1][held] / parts[1].sum(), parts[2][held]
@@ -103,7 +120,8 @@ def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS)
     spread = np.sqrt(above[:-1])
     mean, middle = np.zeros((load.size, variance.size + 1)), (below[:-1] + below[1:]) / 2
     for first in range(variance.size):
-        # wavenumbers from this band on as a spectrum of their own, lengths over `spread`, loads over its gradient
+        # wavenumbers from this band on as a spectrum of their own, lengths over `spread`,
+        # loads over its gradient
         left = 1 - below[first]
         part = Spectrum(
             wave[first:] / variance[first:],
@@ -128,7 +146,10 @@ def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS)
 
 
 def contact_factor(
-    spectrum: Spectrum, contact: ArrayLike, flow: FlowConstants, constants: Constants = CONSTANTS
+    spectrum: Spectrum,
+    contact: ArrayLike,
+    flow: FlowConstants,
+    constants: Constants = CONSTANTS,
 ) -> FloatArray:
     """ln R at contact fractions A/A0 above zero and below the threshold."""
     load = force_at_area(contact, light_factor(spectrum.alpha, constants), constants)
@@ -139,19 +160,30 @@ def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
     """ln R for the gaps of a spectrum, scaled by their mean; -infinity where blocked."""
     share, log_cube = found.quadrature
     mean = np.sum(share * np.exp(log_cube / 3), axis=1)
-    log_k = effective_medium(share, log_cube, flow.obstructed(np.minimum(found.area, flow.threshold - NEAREST)))
+    log_k = effective_medium(
+        share, log_cube, flow.obstructed(np.minimum(found.area, flow.threshold - NEAREST))
+    )
     factor = log_k - 3 * np.log(mean) - np.log(wide_gap(found.separation))
     return np.where(found.area < flow.threshold, factor, -np.inf)
 
 
-def effective_medium(share: FloatArray, log_cube: FloatArray, blocked: FloatArray) -> FloatArray:
+def effective_medium(
+    share: FloatArray, log_cube: FloatArray, blocked: FloatArray
+) -> FloatArray:
     """Solution ln k of sum share (h^3 - k)/(h^3 + k) = blocked."""
     from scipy.optimize.elementwise import find_root
 
     def miss(log_k: FloatArray, load: FloatArray) -> FloatArray:
         row = load.astype(int)
-        return np.asarray(np.sum(share[row] * np.tanh((log_cube[row] - log_k[..., None]) / 2), axis=-1) - blocked[row])
+        return np.asarray(
+            np.sum(share[row] * np.tanh((log_cube[row] - log_k[..., None]) / 2), axis=-1)
+            - blocked[row]
+        )
 
     return np.asarray(
-        find_root(miss, (log_cube.min(axis=1), log_cube.max(axis=1)), args=(np.arange(float(len(share))),)).x
+        find_root(
+            miss,
+            (log_cube.min(axis=1), log_cube.max(axis=1)),
+            args=(np.arange(float(len(share))),),
+        ).x
     )

@@ -14,9 +14,15 @@ from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared
 
 BEND, LIGHT, SOFT, POWER = 0.3, 0.004, 0.3, 1.2  # constants of q
-DEEP, DEEPEST = 2.5, 1.25  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
+DEEP, DEEPEST = (
+    2.5,
+    1.25,
+)  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
 FIRST = 1e-5  # A/A0 below which gaps go over to those before contact, without a jump
-TAIL, NODES = 8.0, 96  # range of heights in standard deviations, and number of quadrature nodes
+TAIL, NODES = (
+    8.0,
+    96,
+)  # range of heights in standard deviations, and number of quadrature nodes
 FULLEST = 1 - 1e-12
 BLOCK = 1 << 12  # contacts between two checks for Ctrl-C, each with NODES gaps
 R = 8.314462618  # J/(mol K)
@@ -33,15 +39,29 @@ class Gas(NamedTuple):
     viscosity: tuple[float, ...]  # Pa s, likewise
 
 
-# conductivities: engineersedge.com/heat_transfer/thermal-conductivity-gases.htm; viscosities: air by 1.4592e-6
-# T^1.5/(T + 109.1) (cableizer.com/documentation/eta_gas), helium NIST SRD 134, nitrogen and argon M. L. Huber and A. H.
-# Harvey in the CRC handbook (docslib.org/doc/166791/viscosity-of-gases-references); thermal accommodation near 0.95 of
-# argon, 0.85 of nitrogen and 0.45 of helium on most metals: W. M. Trott et al., Sandia National Laboratories, 2010.
-# Hydrogen is left out: that table ends at 400 K, and its accommodation on machined metals was not found
-AIR = (0.0184, 0.0262, 0.0333, 0.0397, 0.0457), (13.35e-6, 18.53e-6, 22.93e-6, 26.79e-6, 30.25e-6)
-HELIUM = (0.1193, 0.1567, 0.1906, 0.2223, 0.2524), (15.1e-6, 19.9e-6, 24.3e-6, 28.3e-6, 32.2e-6)
-NITROGEN = (0.0187, 0.0260, 0.0323, 0.0383, 0.0440), (12.9e-6, 17.9e-6, 22.2e-6, 26.1e-6, 29.6e-6)
-ARGON = (0.0124, 0.0179, 0.0226, 0.0268, 0.0306), (15.9e-6, 22.7e-6, 28.6e-6, 33.9e-6, 38.8e-6)
+# conductivities: engineersedge.com/heat_transfer/thermal-conductivity-gases.htm;
+# viscosities: air by 1.4592e-6 T^1.5/(T + 109.1) (cableizer.com/documentation/eta_gas),
+# helium NIST SRD 134, nitrogen and argon M. L. Huber and A. H. Harvey in the CRC handbook
+# (docslib.org/doc/166791/viscosity-of-gases-references); thermal accommodation near 0.95 of
+# argon, 0.85 of nitrogen and 0.45 of helium on most metals: W. M. Trott et al., Sandia
+# National Laboratories, 2010. Hydrogen is left out: that table ends at 400 K, and its
+# accommodation on machined metals was not found
+AIR = (
+    (0.0184, 0.0262, 0.0333, 0.0397, 0.0457),
+    (13.35e-6, 18.53e-6, 22.93e-6, 26.79e-6, 30.25e-6),
+)
+HELIUM = (
+    (0.1193, 0.1567, 0.1906, 0.2223, 0.2524),
+    (15.1e-6, 19.9e-6, 24.3e-6, 28.3e-6, 32.2e-6),
+)
+NITROGEN = (
+    (0.0187, 0.0260, 0.0323, 0.0383, 0.0440),
+    (12.9e-6, 17.9e-6, 22.2e-6, 26.1e-6, 29.6e-6),
+)
+ARGON = (
+    (0.0124, 0.0179, 0.0226, 0.0268, 0.0306),
+    (15.9e-6, 22.7e-6, 28.6e-6, 33.9e-6, 38.8e-6),
+)
 GASES = {
     "air": Gas(28.97e-3, 1.4, 0.85, *AIR),
     "helium": Gas(4.0026e-3, 5 / 3, 0.45, *HELIUM),
@@ -58,7 +78,10 @@ def checked_gas(gas: str, temperature: ArrayLike, pressure: ArrayLike) -> None:
 
 
 def jump_of(
-    gas: str, temperature: ArrayLike, pressure: ArrayLike, accommodation: ArrayLike | None = None
+    gas: str,
+    temperature: ArrayLike,
+    pressure: ArrayLike,
+    accommodation: ArrayLike | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Conductivity [W/(m K)] and temperature jump of both faces together [m] of a gas by name.
 
@@ -78,16 +101,24 @@ def jump_of(
     '0.0262 W/(m K), 0.30 um'
     """
     if not isinstance(gas, str) or gas not in GASES:
-        raise InputError(f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, VACUUM])}")
+        raise InputError(
+            f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, VACUUM])}"
+        )
     one = GASES[gas]
-    T, P = finite_array("temperature", temperature), finite_array("gas_pressure", pressure)
-    share = finite_array("accommodation", one.accommodation if accommodation is None else accommodation)
+    T, P = (
+        finite_array("temperature", temperature),
+        finite_array("gas_pressure", pressure),
+    )
+    share = finite_array(
+        "accommodation", one.accommodation if accommodation is None else accommodation
+    )
     low, high = TEMPERATURES[0], TEMPERATURES[-1]
     require("temperature", T, (low <= T) & (high >= T), f"from {low:g} to {high:g} K")
     require("gas_pressure", P, P > 0, "positive; 'vacuum' is without a gas")
     require("accommodation", share, (share > 0) & (share <= 1), "in (0, 1]")
     k, eta = (
-        np.exp(np.interp(np.log(T), np.log(TEMPERATURES), np.log(row))) for row in (one.conductivity, one.viscosity)
+        np.exp(np.interp(np.log(T), np.log(TEMPERATURES), np.log(row)))
+        for row in (one.conductivity, one.viscosity)
     )
     prandtl = one.gamma / (one.gamma - 1) * R / one.mass * eta / k
     path = eta / P * np.sqrt(math.pi * R * T / (2 * one.mass))
@@ -103,7 +134,11 @@ def _rule() -> tuple[Any, Any]:
 
 
 def mean_inverse(
-    u: ArrayLike, area: ArrayLike, jump: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf
+    u: ArrayLike,
+    area: ArrayLike,
+    jump: ArrayLike,
+    h_rms: ArrayLike,
+    eta: ArrayLike = np.inf,
 ) -> FloatArray:
     """Mean over the nominal area of 1/(g + M) where bodies do not touch [1/length].
 
@@ -135,25 +170,39 @@ def mean_inverse(
 
 
 def open_gaps(
-    u: ArrayLike, area: ArrayLike, h_rms: ArrayLike, eta: ArrayLike = np.inf, blended: bool = False
+    u: ArrayLike,
+    area: ArrayLike,
+    h_rms: ArrayLike,
+    eta: ArrayLike = np.inf,
+    blended: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Shares of the nominal area and gaps there [length] on a last axis of `NODES`, of contacts as for `mean_inverse`.
 
-    The shares add up to that of the open gaps; the mean gap over the nominal area is u. Those of light contacts
-    go over into those before contact, `blended` ones from larger areas on.
+    The shares add up to that of the open gaps; the mean gap over the nominal area is u.
+    Those of light contacts go over into those before contact, `blended` ones from larger
+    areas on.
     """
     from scipy.special import ndtri
 
-    gap, share, height, cap = (part[..., None] for part in np.broadcast_arrays(u, area, h_rms, eta))
+    gap, share, height, cap = (
+        part[..., None] for part in np.broadcast_arrays(u, area, h_rms, eta)
+    )
     share = np.minimum(share, FULLEST)
     with np.errstate(divide="ignore"):
-        d = np.minimum(-ndtri(share), TAIL if blended else np.maximum(DEEPEST * gap / height, DEEP))
+        d = np.minimum(
+            -ndtri(share), TAIL if blended else np.maximum(DEEPEST * gap / height, DEEP)
+        )
     weight = share / (share + (LIGHT if blended else FIRST))
     d = gap / height + (d - gap / height) * weight
     q = 1 + BEND * share / (share + LIGHT) * -np.expm1(-((cap / SOFT) ** POWER))
     node, share_of_node = _rule()
     low, high = np.maximum(d - TAIL, 0.0), np.maximum(d + TAIL, 0.0)
     y = low + (high - low) * node
-    density = np.exp(-((d - y) ** 2) / 2) / math.sqrt(2 * math.pi) * share_of_node * (high - low)
+    density = (
+        np.exp(-((d - y) ** 2) / 2)
+        / math.sqrt(2 * math.pi)
+        * share_of_node
+        * (high - low)
+    )
     bent = y**q
     return density, gap * bent / (density * bent).sum(axis=-1, keepdims=True)

@@ -13,11 +13,19 @@ from mbma_tables.quantities.effective_medium import NEAREST, FlowConstants
 from mbma_tables.quantities.gas import NODES, open_gaps
 
 ROUNDS, RESOLVED = 200, 1e-11
-# root mean square of ln(medium/simulation) at 16 surfaces with gamma from 1 to 8, `python -m generate film`:
-# phi without contact; addition by a lay per e-fold of gamma and A/A0 to the power 1.2; phi_s
+# root mean square of ln(medium/simulation) at 16 surfaces with gamma from 1 to 8, `python
+# -m generate film`: phi without contact; addition by a lay per e-fold of gamma and A/A0 to
+# the power 1.2; phi_s
 OPEN, LAY, SHEAR = 0.022, (12.0, 1.2), 0.15
-WIDEST_LAY = 8.5  # gamma, or its inverse, up to which flow, and anisotropy up to which stiffness was simulated
-CONSTANTS = 1.441, 0.217, 0.714, 0.445  # exponent, its growth, excess and its power in `stress_shares`
+# gamma, or its inverse, up to which flow, and anisotropy up to which stiffness was
+# simulated
+WIDEST_LAY = 8.5
+CONSTANTS = (
+    1.441,
+    0.217,
+    0.714,
+    0.445,
+)  # exponent, its growth, excess and its power in `stress_shares`
 TESTED_AREA = (0.015, 0.43)
 
 
@@ -26,8 +34,9 @@ def anisotropic_medium(
 ) -> tuple[FloatArray, FloatArray]:
     """Conductivities k [length^3] and gaps h_c [length] along x and y, each of shape (2, n).
 
-    `share` and `gap`, shape (n, m), are shares of the nominal area and open gaps there [length]; `blocked`, shape (n,),
-    is (1 - Ac) (A/Ac)^m, and `peklenik`, shape (n,), is gamma.
+    `share` and `gap`, shape (n, m), are shares of the nominal area and open gaps there
+    [length]; `blocked`, shape (n,), is (1 - Ac) (A/Ac)^m, and `peklenik`, shape (n,), is
+    gamma.
     """
     scale = np.sum(share * gap, axis=1)
     cube = (gap / scale[:, None]) ** 3
@@ -44,16 +53,22 @@ def anisotropic_medium(
         by_factor = -np.sum(share * part**2, axis=-1) - blocked / (1 - factor) ** 2
         turn = by_factor * factor[0] * factor[1] / 2  # derivative of L by ln k
         (a, d), (b, c) = own + turn, -turn
-        step = np.stack([miss[0] * d - b * miss[1], a * miss[1] - c * miss[0]]) / (a * d - b * c)
+        step = np.stack([miss[0] * d - b * miss[1], a * miss[1] - c * miss[0]]) / (
+            a * d - b * c
+        )
         log_k -= np.where(active, np.clip(step, -1, 1), 0.0)
         active &= np.abs(step).max(axis=0) >= RESOLVED
         if not active.any():
             break
     else:
-        raise ConvergenceError(f"the effective medium of gaps did not converge to {RESOLVED:g} in {ROUNDS} steps")
+        raise ConvergenceError(
+            f"the effective medium of gaps did not converge to {RESOLVED:g} in {ROUNDS} steps"
+        )
     factor = _depolarisation(log_k, peklenik)
     weight = share / (1 + factor[..., None] * (cube / np.exp(log_k)[..., None] - 1))
-    carried = np.sum(weight * gap, axis=-1) / (weight.sum(axis=-1) + blocked / (1 - factor))
+    carried = np.sum(weight * gap, axis=-1) / (
+        weight.sum(axis=-1) + blocked / (1 - factor)
+    )
     return np.exp(log_k) * scale**3, carried
 
 
@@ -62,7 +77,9 @@ def _depolarisation(log_k: FloatArray, peklenik: FloatArray) -> FloatArray:
     return np.stack([along, 1 - along])
 
 
-def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowConstants) -> tuple[FloatArray, FloatArray]:
+def factors(
+    u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowConstants
+) -> tuple[FloatArray, FloatArray]:
     """phi over the isotropic phi, and phi_s, along x and y, shape (2, n); u in h_rms, A/A0 below the threshold.
 
     Examples
@@ -96,7 +113,10 @@ def factors(u: FloatArray, area: FloatArray, peklenik: ArrayLike, flow: FlowCons
 
 
 def stress_shares(
-    anisotropy: ArrayLike, area: ArrayLike, nu: ArrayLike, constants: Sequence[float] | FloatArray = CONSTANTS
+    anisotropy: ArrayLike,
+    area: ArrayLike,
+    nu: ArrayLike,
+    constants: Sequence[float] | FloatArray = CONSTANTS,
 ) -> tuple[FloatArray, FloatArray]:
     """c, the share of stress that varies along shear, along and across the lay at contact fractions; docs/joints.md.
 
@@ -114,8 +134,15 @@ def stress_shares(
     """
     r, A, poisson = (np.asarray(each, float) for each in (anisotropy, area, nu))
     low, high = TESTED_AREA
-    require("anisotropy", r, (r >= 1) & (r <= WIDEST_LAY), f"from 1 to {WIDEST_LAY}, which was simulated")
-    require("area", A, (low <= A) & (high >= A), f"from {low} to {high}, which was simulated")
+    require(
+        "anisotropy",
+        r,
+        (r >= 1) & (r <= WIDEST_LAY),
+        f"from 1 to {WIDEST_LAY}, which was simulated",
+    )
+    require(
+        "area", A, (low <= A) & (high >= A), f"from {low} to {high}, which was simulated"
+    )
     exponent, growth, excess, power = constants
     p = 1 / (1 + r ** (exponent + growth * np.log(A)))
     both = 1 + excess * poisson / (2 - poisson) * A**power * 4 * p * (1 - p)

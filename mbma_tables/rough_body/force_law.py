@@ -1,9 +1,9 @@
 """Contact of a sphere or a cylinder with an elastic half-space whose surface layer is a contact law, and its force law.
 
-At the approach delta from where the smooth bodies would touch, with p = law(u), u = r^2/(2 R) - delta + w, and w the
-displacement of the half-space under p: the problem of J. A. Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153)
-with any law. Newton's unknown is w at the nodes of `theories.mbma.half_space`. Forces are over E*; a cylinder's are per
-length.
+At the approach delta from where the smooth bodies would touch, with p = law(u), u = r^2/(2
+R) - delta + w, and w the displacement of the half-space under p: the problem of J. A.
+Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153) with any law. Newton's unknown is w
+at the nodes of `theories.mbma.half_space`. Forces are over E*; a cylinder's are per length.
 """
 
 from __future__ import annotations
@@ -30,31 +30,45 @@ from mbma_tables.theories.mbma.half_space import Basis, basis, gauss_legendre, m
 
 RTOL = 1e-7  # tolerance of the force of one contact
 NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn
-STEPS, SETTLED = 100, 1e-12  # steps of Newton's method, and size of the last one over the lengths that add up
+STEPS, SETTLED = (
+    100,
+    1e-12,
+)  # steps of Newton's method, and size of the last one over the lengths that add up
 EDGE = 1e-10  # share of the largest pressure that defines the edge
-JUMPS = 0.05  # share of a law's error, by which its polynomials differ where they meet: sufficient accuracy of forces
+# share of a law's error, by which its polynomials differ where they meet: sufficient
+# accuracy of forces
+JUMPS = 0.05
 PLACES = 4  # points per node in the search for the edge
 FLAT = 0.01  # share of h_max by which a fully compressed layer may be thinner than its law allows
 LIGHT = 1e-9  # share of the largest force at which laws without a last contact begin
 NEWTONS = {"uN": 1e-6, "mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6}
-_FORCE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N)\s*(?:/\s*(\w+))?\s*")
+_FORCE = re.compile(
+    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([umkM]?N)\s*(?:/\s*(\w+))?\s*"
+)
 
 
 @functools.lru_cache(maxsize=64)
 def plane_basis(nodes: int) -> Basis:
     """The basis of pressures that are even in x, at nodes in (0, 1), v = (x/a)^2; w is against a point at x = a.
 
-    Of Legendre polynomials of even degree under the kernel -(2/pi) ln|x - s|, by Neumann's integral 2 Q_n of P_n.
+    Of Legendre polynomials of even degree under the kernel -(2/pi) ln|x - s|, by Neumann's
+    integral 2 Q_n of P_n.
     """
     x, weights = (part[nodes:] for part in gauss_legendre(2 * nodes))
     x = 2 * x - 1
     m, n = 2.0 * np.arange(nodes)[:, None], 2.0 * np.arange(nodes)
     with np.errstate(divide="ignore", invalid="ignore"):
-        overlap = 4 / (2 * n + 1) * (1 / ((m - n + 1) * (m + n)) - 1 / ((m - n - 1) * (m + n + 2)))
+        overlap = (
+            4
+            / (2 * n + 1)
+            * (1 / ((m - n + 1) * (m + n)) - 1 / ((m - n - 1) * (m + n + 2)))
+        )
     overlap[0, 0] = 6 - 4 * np.log(2)
     odd = 2 * n + 1
     values = legendre.legvander(x, 2 * nodes - 1)[:, ::2]
-    return made(x**2, 2 * weights, values, odd, overlap * np.sqrt(np.outer(odd, odd)) / np.pi)
+    return made(
+        x**2, 2 * weights, values, odd, overlap * np.sqrt(np.outer(odd, odd)) / np.pi
+    )
 
 
 class Solved(NamedTuple):
@@ -91,7 +105,9 @@ class Body:
         """Mean separations of the law: at full compression or at the maximum of pressure, and at the end of contact."""
         law = self.law
         low = law.lowest if law.turning_point is None else law.turning_point
-        return (law.h_max + low) / 2, (law.h_max + min(law.highest, law.h_max if self.touches else np.inf)) / 2
+        return (law.h_max + low) / 2, (
+            law.h_max + min(law.highest, law.h_max if self.touches else np.inf)
+        ) / 2
 
     @property
     def touches(self) -> bool:
@@ -104,25 +120,33 @@ class Body:
         held = np.clip(u, low, high)
         p, k = self.law.pressure_and_stiffness(held)
         apart = u > high
-        return np.where(apart, 0.0, p + k * (held - u)) / self.law.E_star, np.where(apart, 0.0, k) / self.law.E_star
+        return np.where(apart, 0.0, p + k * (held - u)) / self.law.E_star, np.where(
+            apart, 0.0, k
+        ) / self.law.E_star
 
     def integral(self, at: Solved, values: FloatArray) -> float:
         """Over the contact, of a cylinder per length."""
         shares = np.asarray(at.basis.root_weights) ** 2
-        return float(np.sum(shares * values)) * (2 * at.radius if self.plane else math.pi * at.radius**2)
+        return float(np.sum(shares * values)) * (
+            2 * at.radius if self.plane else math.pi * at.radius**2
+        )
 
     def between(self, at: Solved, values: FloatArray, t: FloatArray) -> FloatArray:
         """Values at the nodes, at radii of t times that of the contact, t up to 1."""
         degrees = np.arange(len(values)) * (2 if self.plane else 1)
         series = np.zeros(degrees[-1] + 1)
-        series[degrees] = at.basis.modes @ (values * at.basis.root_weights) * np.sqrt(2 * degrees + 1)
+        series[degrees] = (
+            at.basis.modes @ (values * at.basis.root_weights) * np.sqrt(2 * degrees + 1)
+        )
         return np.asarray(legendre.legval(t if self.plane else 2 * t**2 - 1, series))
 
     def _newton(self, approach: float, radius: float, nodes: int) -> Solved:
         known = plane_basis(nodes) if self.plane else basis(nodes)
         root, operator = known.root_weights, radius * known.operator
         if self.plane:
-            operator = operator + 4 / math.pi * radius * math.log(self.reference / radius) * np.outer(root, root)
+            operator = operator + 4 / math.pi * radius * math.log(
+                self.reference / radius
+            ) * np.outer(root, root)
         rigid = known.v * radius**2 / (2 * self.radius) - approach
         w, scale = np.zeros(nodes), abs(approach) + float(np.abs(rigid).max())
         for _ in range(STEPS):
@@ -133,18 +157,25 @@ class Body:
             if np.abs(step / root).max() <= SETTLED * scale:
                 break
         else:
-            raise ConvergenceError(f"the half-space at the approach {approach:.6g} is not found in {STEPS} steps")
+            raise ConvergenceError(
+                f"the half-space at the approach {approach:.6g} is not found in {STEPS} steps"
+            )
         u = rigid + w / root
         return Solved(radius, known, u, self.layer(u)[0], jacobian, math.inf)
 
     def solved(self, approach: float, rtol: float) -> Solved:
         """The contact at an approach, with a relative change of force up to `rtol` at the last number of nodes."""
-        found = self._newton(approach, math.sqrt(2 * self.radius * (approach + self.ends[1])), NODES[0])
+        found = self._newton(
+            approach, math.sqrt(2 * self.radius * (approach + self.ends[1])), NODES[0]
+        )
         for nodes in NODES:
             t = np.linspace(0, 1, PLACES * nodes + 1)
             p = self.layer(self.between(found, found.u, t))[0]
             edge = t[min(int(np.flatnonzero(p > EDGE * p.max())[-1]) + 1, len(t) - 1)]
-            before, found = self.integral(found, found.p), self._newton(approach, found.radius * edge, nodes)
+            before, found = (
+                self.integral(found, found.p),
+                self._newton(approach, found.radius * edge, nodes),
+            )
             error = abs(before / self.integral(found, found.p) - 1)
             if error <= max(rtol, JUMPS * self.law.error):
                 break
@@ -158,10 +189,19 @@ class Body:
         """Force over E*, its derivative by the approach over E*, and the real area."""
         middle, low = finite_array("mean_separation", at.u.min()), self.ends[0]
         allowed = f"at least {low:.6g}, where the law of {self.law.theory!r} ends"
-        require("mean_separation in the middle", middle, middle >= low - FLAT * self.law.h_max, allowed)
+        require(
+            "mean_separation in the middle",
+            middle,
+            middle >= low - FLAT * self.law.h_max,
+            allowed,
+        )
         stiffness = at.raised(self.layer(at.u)[1])
         area: Any = self.law.area(np.clip(at.u, *self.ends))
-        return self.integral(at, at.p), self.integral(at, stiffness), self.integral(at, np.where(at.p > 0, area, 0.0))
+        return (
+            self.integral(at, at.p),
+            self.integral(at, stiffness),
+            self.integral(at, np.where(at.p > 0, area, 0.0)),
+        )
 
     @property
     def name(self) -> str:
@@ -194,12 +234,26 @@ class Body:
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
     """Units by quantity, and the factor from stress times area to the unit of force."""
-    length, force, newtons = unit_of("approach", units), unit_of("energy" if plane else "island_force", units), 1.0
+    length, force, newtons = (
+        unit_of("approach", units),
+        unit_of("energy" if plane else "island_force", units),
+        1.0,
+    )
     if units.length is not None and units.stress in SIZES["stress"]:
         force, per = ("N/mm", 1e-3) if plane else ("N", 1.0)
-        newtons = per * factor(units.stress, "Pa", "stress") * factor(units.length, "m", power=1 if plane else 2)
-    known = {"force": force, "stiffness": f"{force}/{length}", "area": length if plane else f"{length}^2"}
-    known |= dict.fromkeys(("approach", "contact_radius", "position", "mean_separation"), length)
+        newtons = (
+            per
+            * factor(units.stress, "Pa", "stress")
+            * factor(units.length, "m", power=1 if plane else 2)
+        )
+    known = {
+        "force": force,
+        "stiffness": f"{force}/{length}",
+        "area": length if plane else f"{length}^2",
+    }
+    known |= dict.fromkeys(
+        ("approach", "contact_radius", "position", "mean_separation"), length
+    )
     return known | {"pressure": unit_of("pressure", units)}, newtons
 
 
@@ -211,9 +265,19 @@ def forces(given: Any, body: Body, length: str | None) -> Any:
         return given
     found, unit = _FORCE.fullmatch(given), body.units["force"]
     if found is None or (found[3] is None) == body.plane or unit not in ("N", "N/mm"):
-        known = "the units of surface and E_star are known" if unit not in ("N", "N/mm") else "it"
-        raise InputError(f"force must be a number or, where {known} is, like '10 {unit}', got {given!r}")
-    return float(found[1]) * NEWTONS[found[2]] * (1.0 if found[3] is None else factor("mm", found[3]))
+        known = (
+            "the units of surface and E_star are known"
+            if unit not in ("N", "N/mm")
+            else "it"
+        )
+        raise InputError(
+            f"force must be a number or, where {known} is, like '10 {unit}', got {given!r}"
+        )
+    return (
+        float(found[1])
+        * NEWTONS[found[2]]
+        * (1.0 if found[3] is None else factor("mm", found[3]))
+    )
 
 
 def _of(quantity: str, meaning: str) -> Any:
@@ -232,10 +296,12 @@ class ForceLaw:
     Approaches are numbers in the surface's unit or texts, "0.8 um"; zero force below `first`.
     """
 
-    #: the same in the layout of contact laws, against the approach that is left to the largest one: "pressure" is force
-    #: and "area" real area, `error` bounds the relative error of both
+    # : the same in the layout of contact laws, against the approach that is left to the
+    # largest one: "pressure" is force : and "area" real area, `error` bounds the relative
+    # error of both
     law: ContactLaw
-    #: approach of first contact; of a layer without one, at a thousand-millionth of the largest force [length]
+    # : approach of first contact; of a layer without one, at a thousand-millionth of the
+    # largest force [length]
     first: float
     body: Body
 
@@ -246,11 +312,17 @@ class ForceLaw:
 
     def approach(self, force: Any) -> Numbers:
         """Approach at a force."""
-        left: FloatArray = self.law.at_pressure(forces(force, self.body, self.law.units.length)).mean_separation
+        left: FloatArray = self.law.at_pressure(
+            forces(force, self.body, self.law.units.length)
+        ).mean_separation
         return self.law.h_max + self.first - left
 
     def _left(self, approach: ArrayLike | str) -> FloatArray:
-        return self.law.h_max + self.first - finite_array("approach", self.law.units.number("approach", approach))
+        return (
+            self.law.h_max
+            + self.first
+            - finite_array("approach", self.law.units.number("approach", approach))
+        )
 
 
 class _Pressed(Theory):
@@ -263,9 +335,19 @@ class _Pressed(Theory):
     def answer(self, surface: Any, mean_separation: FloatArray) -> TheoryAnswer:
         """Force over E*, real area and stiffness."""
         approaches = self._top - np.asarray(mean_separation, float)
-        found = [self._body.solved(approach, self._rtol) for approach in map(float, approaches.ravel())]
-        rows = np.array([(*self._body.quantities(at), at.error + self._body.law.error) for at in found])
-        force, stiffness, area, error = (part.reshape(approaches.shape) for part in rows.T)
+        found = [
+            self._body.solved(approach, self._rtol)
+            for approach in map(float, approaches.ravel())
+        ]
+        rows = np.array(
+            [
+                (*self._body.quantities(at), at.error + self._body.law.error)
+                for at in found
+            ]
+        )
+        force, stiffness, area, error = (
+            part.reshape(approaches.shape) for part in rows.T
+        )
         return TheoryAnswer(force, area, stiffness, error)
 
     def energy(self, surface: Any, mean_separation: FloatArray) -> FloatArray:
@@ -282,6 +364,10 @@ def force_law(body: Body, top: float, rtol: float) -> ForceLaw:
         first = body.approach_at(LIGHT * body.integral(largest, largest.p))
     # in place of a surface: first contact is where so much of the approach is left
     span: Any = types.SimpleNamespace(h_max=top - first)
-    facts = {"surface": span, "E_star": body.law.E_star * body.newtons, "units": Units(body.law.units.length)}
+    facts = {
+        "surface": span,
+        "E_star": body.law.E_star * body.newtons,
+        "units": Units(body.law.units.length),
+    }
     law = theory_law(span, _Pressed(body, top, 0.01 * rtol), rtol, facts)
     return ForceLaw(dataclasses.replace(law, surface=None), first, body)

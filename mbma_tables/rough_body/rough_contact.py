@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, hinted, nearest, number_in, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    Numbers,
+    finite_array,
+    hinted,
+    nearest,
+    number_in,
+    require,
+)
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import new_figure
@@ -18,21 +26,34 @@ from mbma_tables.contacts.contact import chosen_theory, contact
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.materials import Metal, Pair
-from mbma_tables.rough_body.force_law import RTOL, Body, ForceLaw, Solved, force_law, forces, units_of
+from mbma_tables.rough_body.force_law import (
+    RTOL,
+    Body,
+    ForceLaw,
+    Solved,
+    force_law,
+    forces,
+    units_of,
+)
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import Spectrum, spectrum_of
 from mbma_tables.theories.mbma.half_space import basis
 
 SHAPES = ("sphere", "cylinder")
-JOHNSON = 2 / math.e  # reference over R: approaches are Johnson's (5.57) in Hertz's contact
+JOHNSON = (
+    2 / math.e
+)  # reference over R: approaches are Johnson's (5.57) in Hertz's contact
 LAYER_RTOL = 1e-8  # tolerance of the layer's law, as far as its theory allows
-ROUNDING = 1e-3  # share of h_max by which a law exceeds the largest approach, so that it has the largest force
+# share of h_max by which a law exceeds the largest approach, so that it has the largest
+# force
+ROUNDING = 1e-3
 MOMENTS = 128  # nodes of the effective radius
 POINTS = 101  # points of a profile
 COUNTED = 0.1  # share of the force above which a reason against the layer's law applies
-# c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the width of the contact over the
-# mean wavelength, and the least n: of boundary elements of 24 spheres, `python -m generate rough_spheres`
+# c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the
+# width of the contact over the mean wavelength, and the least n: of boundary elements of 24
+# spheres, `python -m generate rough_spheres`
 CELLS, NARROWEST = (0.62, 0.8), 1.5
 WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 
@@ -48,7 +69,9 @@ class RoughContact(Displayed):
     layer: ContactLaw  #: the law of the surface
     units: dict[str, str]
     _body: Body
-    approach: Numbers = quantity("approach beyond touching mean planes [length]; negative if only peaks are in contact")
+    approach: Numbers = quantity(
+        "approach beyond touching mean planes [length]; negative if only peaks are in contact"
+    )
     force: Numbers = quantity("normal force; N where units are known, of a cylinder N/mm")
     stiffness: Numbers = quantity("derivative of force by approach")
     area: Numbers = quantity("real contact area [length^2]")
@@ -56,10 +79,16 @@ class RoughContact(Displayed):
         "effective contact radius [length]; 3 pi/4 times the mean of r weighted by p dr, Hertz's radius in his contact "
         "(Greenwood, Tripp 1967)"
     )
-    position: FloatArray = quantity("distance from the middle [length]; up to the last contact")
+    position: FloatArray = quantity(
+        "distance from the middle [length]; up to the last contact"
+    )
     pressure: FloatArray = quantity("mean pressure [stress]")
-    mean_separation: FloatArray = quantity("mean separation of the deformed faces [length]")
-    error: Numbers = quantity("estimate of the relative numerical error of force; including that of the layer's law")
+    mean_separation: FloatArray = quantity(
+        "mean separation of the deformed faces [length]"
+    )
+    error: Numbers = quantity(
+        "estimate of the relative numerical error of force; including that of the layer's law"
+    )
     scatter: Numbers = quantity(
         "standard deviation of ln F at the approach; from the model uncertainty of the layer's law, and from the mean "
         "plane below the contact, which depends on the place on the faces"
@@ -75,7 +104,8 @@ class RoughContact(Displayed):
         Parameters
         ----------
         rtol : float
-            Relative error of the polynomials, in [1e-6, 0.1]; at 1e-5 about 400 contacts are solved.
+            Relative error of the polynomials, in [1e-6, 0.1]; at 1e-5 about 400 contacts
+            are solved.
 
         Examples
         --------
@@ -91,13 +121,18 @@ class RoughContact(Displayed):
     def _facts(self) -> dict[str, str]:
         names = ("approach", "force", "stiffness", "area", "contact_radius", "valid")
         facts = {"body": self._body.name}
-        facts |= {name: shown(getattr(self, name), self.units.get(name, "1")) for name in names}
+        facts |= {
+            name: shown(getattr(self, name), self.units.get(name, "1")) for name in names
+        }
         return facts | {"theory": self.layer.theory, "surface": repr(self._body.surface)}
 
     def _variables(self) -> dict[str, Variable]:
         loads = np.ndim(self.approach)
         known = super()._variables()
-        return {n: v._replace(dims=("load", "place")[1 - loads :][: np.ndim(v.values)]) for n, v in known.items()}
+        return {
+            n: v._replace(dims=("load", "place")[1 - loads :][: np.ndim(v.values)])
+            for n, v in known.items()
+        }
 
     def _figure(self) -> Any:
         figure, units = new_figure(10, 4), self.units
@@ -107,11 +142,20 @@ class RoughContact(Displayed):
         order = np.argsort(approach)
         for k in order[np.unique(np.linspace(0, len(order) - 1, 5).astype(int))]:
             profile.plot(rows[0][k], rows[1][k], label=f"{force[k]:.3g} {units['force']}")
-        profile.set(xlabel=f"distance from the middle [{units['position']}]", ylabel=f"pressure [{units['pressure']}]")
+        profile.set(
+            xlabel=f"distance from the middle [{units['position']}]",
+            ylabel=f"pressure [{units['pressure']}]",
+        )
         curve.plot(approach[order], force[order], marker=".", label="rough")
-        smooth = self._body.smooth_approach(force / (self.layer.E_star * self._body.newtons))
+        smooth = self._body.smooth_approach(
+            force / (self.layer.E_star * self._body.newtons)
+        )
         curve.plot(smooth[order], force[order], "--", label="smooth (Hertz)")
-        curve.set(xlabel=f"approach [{units['approach']}]", ylabel=f"force [{units['force']}]", yscale="log")
+        curve.set(
+            xlabel=f"approach [{units['approach']}]",
+            ylabel=f"force [{units['force']}]",
+            yscale="log",
+        )
         for axes in (profile, curve):
             axes.legend()
             axes.grid(True, alpha=0.3)
@@ -134,8 +178,9 @@ def rough_contact(
 ) -> RoughContact:
     """Press a rough sphere or cylinder on a flat: an elastic half-space behind the layer of a contact law.
 
-    Roughness is a layer whose mean pressure is that of the law at the local mean separation (Greenwood and Tripp 1967),
-    so contacts must be wide compared with its longest wavelength. Without roughness the contact is Hertz's.
+    Roughness is a layer whose mean pressure is that of the law at the local mean separation
+    (Greenwood and Tripp 1967), so contacts must be wide compared with its longest
+    wavelength. Without roughness the contact is Hertz's.
 
     Parameters
     ----------
@@ -146,12 +191,15 @@ def rough_contact(
     shape : {"sphere", "cylinder"}
         A cylinder is long, in plane strain.
     approach, force : array_like or str
-        One of them, in one dimension at most: the approach [length], or F: numbers, "10 N", or "5 N/mm" of a cylinder.
+        One of them, in one dimension at most: the approach [length], or F: numbers, "10 N",
+        or "5 N/mm" of a cylinder.
     reference : float or str, optional
-        For a cylinder, the distance along the face [length] with zero displacement; by default 2 R/e, so that Hertz's
-        approach is that of a cylinder's axis (K. L. Johnson, Contact Mechanics, 1985, Eq. 5.57).
+        For a cylinder, the distance along the face [length] with zero displacement; by
+        default 2 R/e, so that Hertz's approach is that of a cylinder's axis (K. L. Johnson,
+        Contact Mechanics, 1985, Eq. 5.57).
     theory, E_star, hardness, materials : optional
-        As for `contact`. With a hardness, the roughness yields and the bodies do not; results are for loading only.
+        As for `contact`. With a hardness, the roughness yields and the bodies do not;
+        results are for loading only.
 
     Returns
     -------
@@ -175,8 +223,17 @@ def rough_contact(
     [ 134. 1974.] MPa in the middle
     """
     if shape not in SHAPES:
-        raise InputError(f"shape must be one of {SHAPES}, got {shape!r}{nearest(str(shape), SHAPES)}")
-    law = contact_law(surface, theory, rtol=LAYER_RTOL, E_star=E_star, hardness=hardness, materials=materials)
+        raise InputError(
+            f"shape must be one of {SHAPES}, got {shape!r}{nearest(str(shape), SHAPES)}"
+        )
+    law = contact_law(
+        surface,
+        theory,
+        rtol=LAYER_RTOL,
+        E_star=E_star,
+        hardness=hardness,
+        materials=materials,
+    )
     units, plane, largest = law.units, shape == "cylinder", 1e30 * law.h_max
     R = number_in("radius", units.number("radius", radius), law.h_max, largest)
     fixed = JOHNSON * R if reference is None else units.number("reference", reference)
@@ -190,14 +247,23 @@ def rough_contact(
     if force is None:
         wanted = finite_array("approach", units.number("approach", approach))
         apart = -body.ends[1]
-        require("approach", wanted, wanted > apart, f"above {apart:.6g}, below which bodies are apart")
+        require(
+            "approach",
+            wanted,
+            wanted > apart,
+            f"above {apart:.6g}, below which bodies are apart",
+        )
     else:
         given = finite_array("force", forces(force, body, units.length))
         require("force", given, given > 0, "positive")
         scale = law.E_star * body.newtons
-        wanted = np.reshape([body.approach_at(value / scale) for value in given.ravel()], given.shape)
+        wanted = np.reshape(
+            [body.approach_at(value / scale) for value in given.ravel()], given.shape
+        )
     if wanted.ndim > 1:
-        raise InputError(f"approach or force must be one number or a list, got shape {wanted.shape}")
+        raise InputError(
+            f"approach or force must be one number or a list, got shape {wanted.shape}"
+        )
     return pressed(body, wanted)
 
 
@@ -210,11 +276,16 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
         found = body.solved(approach, RTOL)
         force, stiffness, area = body.quantities(found)
         spread = rule.root_weights**2 * body.between(found, found.p, rule.v)
-        a = float(0.75 * math.pi * found.radius * np.sum(spread * rule.v) / np.sum(spread))
+        a = float(
+            0.75 * math.pi * found.radius * np.sum(spread * rule.v) / np.sum(spread)
+        )
         scatter, against = _trust(body, found, force)
         width = 2 * a / mean_wavelength(body.surface)
         # the mean plane below the contact: that of a cell
-        scatter = math.hypot(scatter, CELLS[0] / width ** CELLS[1] * float(body.surface.h_rms) * stiffness / force)
+        scatter = math.hypot(
+            scatter,
+            CELLS[0] / width ** CELLS[1] * float(body.surface.h_rms) * stiffness / force,
+        )
         if width < NARROWEST:
             against.append(f"the contact is narrower than {NARROWEST:g} mean wavelengths")
         for text in against:
@@ -223,8 +294,12 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
         p, u = (body.between(found, values, t) for values in (found.p, found.u))
         rows.append((scale * force, scale * stiffness, area, a, found.error, scatter))
         profiles.append((found.radius * t, np.maximum(p, 0) * body.law.E_star, u))
-    F, stiffness, area, a, error, scatter = (part.reshape(wanted.shape)[()] for part in np.array(rows).T)
-    position, pressure, u = np.array(profiles).swapaxes(0, 1).reshape(3, *wanted.shape, POINTS)
+    F, stiffness, area, a, error, scatter = (
+        part.reshape(wanted.shape)[()] for part in np.array(rows).T
+    )
+    position, pressure, u = (
+        np.array(profiles).swapaxes(0, 1).reshape(3, *wanted.shape, POINTS)
+    )
     masks = {text: np.reshape(mask, wanted.shape) for text, mask in reasons.items()}
     masks |= {"the contact is wider than a tenth of the radius": a > WIDEST * body.radius}
     masks = {text: mask for text, mask in masks.items() if np.any(mask)}
@@ -239,18 +314,31 @@ def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
     """Standard deviation of ln F by that of the law, alike at all places, and reasons against the law."""
     law, ends = body.law, body.ends
     u = np.clip(found.u, *ends)
-    known = contact(body.surface, mean_separation=u, theory=body.theory, E_star=law.E_star, hardness=law.hardness)
+    known = contact(
+        body.surface,
+        mean_separation=u,
+        theory=body.theory,
+        E_star=law.E_star,
+        hardness=law.hardness,
+    )
     spread = np.nan_to_num(known.scatter, nan=0.0)
     scatter = body.integral(found, found.raised(spread * found.p)) / force
     if body.integral(found, found.p * np.isnan(known.scatter)) > COUNTED * force:
         scatter = math.nan
-    shares = {text: body.integral(found, found.p * mask) / force for text, mask in known.reasons.items()}
+    shares = {
+        text: body.integral(found, found.p * mask) / force
+        for text, mask in known.reasons.items()
+    }
     return scatter, [text for text, share in shares.items() if share > COUNTED]
 
 
 def mean_wavelength(surface: Any) -> float:
     """2 pi over the mean wavenumber, weighted by height variance [length]."""
     known = getattr(surface, "q", None) is not None
-    spectrum = spectrum_of(surface) if known else Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
+    spectrum = (
+        spectrum_of(surface)
+        if known
+        else Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
+    )
     steep = float(surface.rms_gradient) / float(surface.h_rms) / spectrum.gradient
     return 2 * math.pi / (steep * float(np.sum(spectrum.variance * spectrum.x)))

@@ -86,7 +86,11 @@ class Costs(NamedTuple):
 
         NaN if none was measured.
         """
-        rows = [row for row in self.rows if row.island_model == island_model and row.what == what]
+        rows = [
+            row
+            for row in self.rows
+            if row.island_model == island_model and row.what == what
+        ]
         if not rows:
             return math.nan
         # calls and opening a table have one row, without a tolerance
@@ -167,7 +171,9 @@ class Step:
     rtol: float | None  # relative tolerance of the totals, the law or the solver
     count: int  # gaps, islands or points evaluated
     error: float  # certified beforehand; NaN if known from the results only
-    seconds: float  # by the measured costs, without first use; NaN where nothing was measured
+    seconds: (
+        float  # by the measured costs, without first use; NaN where nothing was measured
+    )
     theory: str | None = None  # name of the scene's theory, in steps that use it
 
     @property
@@ -197,7 +203,9 @@ class Plan:
     @property
     def error(self) -> float:
         """Largest error of a step of the scene's theory; those compared state their own."""
-        of_theory = [step for step in self.steps if step.island_model is not None or step.theory]
+        of_theory = [
+            step for step in self.steps if step.island_model is not None or step.theory
+        ]
         return max((step.error for step in of_theory), default=0.0)
 
     def text(self) -> str:
@@ -258,12 +266,16 @@ def make_plan(problem: Problem) -> Plan:
             source = f"step {unmeasured.name!r}"
             if unmeasured.theory:
                 source = f"theory {unmeasured.theory!r}"
-            raise InputError(f"the cost of {source} is not known: give rtol instead of seconds")
+            raise InputError(
+                f"the cost of {source} is not known: give rtol instead of seconds"
+            )
         if plan.seconds <= problem.seconds:
             return plan
         least = plan.seconds
     budget = f"seconds = {problem.seconds:g}"
-    raise InputError(f"{budget} is too little: the cheapest plan takes about {least:.3g} s")
+    raise InputError(
+        f"{budget} is too little: the cheapest plan takes about {least:.3g} s"
+    )
 
 
 def certified_error(island_model: str | AnyModel, rtol: float) -> float:
@@ -272,7 +284,9 @@ def certified_error(island_model: str | AnyModel, rtol: float) -> float:
         from mbma_tables.theories.mbma.tables import open_table
 
         certificate = open_table(island_model).content.attributes
-        return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))
+        return max(
+            float(certificate["largest_error_F"]), float(certificate["largest_error_A"])
+        )
     if island_model == "exact":
         # it works to a tenth of the requested tolerance
         return 0.1 * rtol
@@ -294,7 +308,9 @@ class _Planner:
     def plan(self) -> Plan:
         problem = self.problem
         steps = self.steps()
-        shipped = {step.island_model for step in steps if isinstance(step.island_model, str)}
+        shipped = {
+            step.island_model for step in steps if isinstance(step.island_model, str)
+        }
         imports = [self.costs.of(island_model, "import") for island_model in shipped]
         return Plan(
             steps=tuple(steps),
@@ -321,11 +337,15 @@ class _Planner:
             steps.append(self.contact(of_contact))
         if hertz:
             what = "adaptive sum over islands with eta = 1, the Hertz area"
-            steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
+            steps.append(
+                self.summed("hertz area", "area without subscale_area", what, "island4d")
+            )
         if "island_statistics" in outputs:
             islands = f"{problem.points} islands of the distribution (Eq. 42)"
             what = f"number of islands at {self.count} gaps, {islands}"
-            steps.append(self.summed("island statistics", "island_statistics", what, "rigid"))
+            steps.append(
+                self.summed("island statistics", "island_statistics", what, "rigid")
+            )
         if "pressure_profile" in outputs:
             steps.append(self.profiles())
         steps += [self.compared(name) for name in problem.theories]
@@ -438,7 +458,9 @@ class _Planner:
         # a law has force and area only
         if not self.problem.outputs & set(OF_CONTACT) <= {"pressure", "area"}:
             return step
-        rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL)
+        rtol = max(
+            (1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL
+        )
         lookup = self.costs.of("law", "lookup")
         if "inverse" in parts:
             lookup += self.costs.of("law", "invert")
@@ -472,7 +494,9 @@ class _Planner:
         island_model = self.island_model(tolerance)
         rtol = (1 - ISLAND_SHARE) * tolerance
         priced = priced_as or _name(island_model)
-        by_gap = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", rtol)
+        by_gap = self.costs.of(priced, "call") + self.count * self.costs.of(
+            priced, "gap", rtol
+        )
         # its islands are answered once, as for a law
         seconds = min(by_gap, self.costs.of(priced, "law", rtol))
         error = factor * (rtol + certified_error(island_model, rtol))

@@ -93,7 +93,9 @@ class Problem:
         self._choose_effects()
         require_surface(self.surface)
         if self.surface.labelled or self.surface.shape != ():
-            raise InputError("a scene has one surface, not a batch: make a scene for each")
+            raise InputError(
+                "a scene has one surface, not a batch: make a scene for each"
+            )
         self._set_numbers()
         if self.theory is None:
             vars(self).update(theory=self._default_theory())
@@ -129,13 +131,17 @@ class Problem:
 
     def _set_tolerance(self) -> None:
         """Set `rtol`: as given, by default, or None where a time budget is given."""
-        rtol: float | None = DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
+        rtol: float | None = (
+            DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
+        )
         if self.rtol is not None:
             rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)
         if self.seconds is not None:
             if self.rtol is not None:
                 both = "rtol and seconds are both given"
-                raise InputError(f"{both}: give the accuracy or the time budget, one of them")
+                raise InputError(
+                    f"{both}: give the accuracy or the time budget, one of them"
+                )
             number_in("seconds", self.seconds, 1e-9, MAX_SECONDS)
             rtol = None
         vars(self).update(rtol=rtol)
@@ -155,7 +161,9 @@ class Problem:
             # refinements are those of an elastic theory
             elastic = sorted(dropped | outputs & set(ELASTIC))
             if elastic:
-                excluded = f"{elastic[0]!r} is for elastic contacts, and effect 'yield' is on"
+                excluded = (
+                    f"{elastic[0]!r} is for elastic contacts, and effect 'yield' is on"
+                )
                 raise InputError(f"{excluded}: leave one of the two out")
         if "finite_height" in dropped:
             needs_end = sorted(outputs & set(OF_CONTACT[2:]))
@@ -173,7 +181,9 @@ class Problem:
         prescribed = [name for name in PRESCRIBED if getattr(self, name) is not None]
         choice = ", ".join(PRESCRIBED)
         if len(prescribed) > 1:
-            raise InputError(f"{' and '.join(prescribed)} are given: prescribe one of {choice}")
+            raise InputError(
+                f"{' and '.join(prescribed)} are given: prescribe one of {choice}"
+            )
         if self.outputs == {"pressure_profile"}:
             # profiles are those of islands at approaches
             if prescribed:
@@ -185,7 +195,9 @@ class Problem:
         (name,) = prescribed
         numbers = finite_array(name, getattr(self, name))
         if numbers.ndim > 1:
-            raise InputError(f"{name} must be one number or a list, got shape {numbers.shape}")
+            raise InputError(
+                f"{name} must be one number or a list, got shape {numbers.shape}"
+            )
         h_max = float(self.surface.h_max)
         least = 0.0
         allowed = "at least 0: there is no adhesion in the model"
@@ -268,4 +280,6 @@ class Problem:
     @property
     def prescribed(self) -> str | None:
         """Name of the given quantity of `PRESCRIBED`."""
-        return next((name for name in PRESCRIBED if getattr(self, name) is not None), None)
+        return next(
+            (name for name in PRESCRIBED if getattr(self, name) is not None), None
+        )

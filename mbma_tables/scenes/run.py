@@ -59,7 +59,9 @@ class Run:
     quantities: dict[str, tuple[tuple[str, ...], ArrayLike]] = dataclasses.field(
         default_factory=dict,
     )
-    errors: dict[str, float] = dataclasses.field(default_factory=dict)  # bounds that steps reached
+    errors: dict[str, float] = dataclasses.field(
+        default_factory=dict
+    )  # bounds that steps reached
     reasons: dict[str, list[int]] | None = None
 
     def keep(self, values: Mapping[str, ArrayLike], *dims: str) -> None:
@@ -183,7 +185,11 @@ def _shape(surface: AnySurface) -> Shape:
     """The surface as profiles take it."""
     if not isinstance(surface, Surface):
         return cast("Shape", surface)
-    return float(surface.hurst), float(surface.zeta_1), float(surface.h_max / surface.h_rms)
+    return (
+        float(surface.hurst),
+        float(surface.zeta_1),
+        float(surface.h_max / surface.h_rms),
+    )
 
 
 def hertz_area(run: Run, step: Step) -> None:
@@ -396,7 +402,10 @@ OF_SCENES = {
     "profile_delta": ("delta", "approach of the island"),
     "profile_radius": ("R_d", "radius r in the island"),
     "profile_pressure": ("pressure", "pressure p(r) (Eq. 36)"),
-    "profile_gap": ("separation", "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
+    "profile_gap": (
+        "separation",
+        "d(r), deformed sphere to mid-plane of the summits (Eq. 34)",
+    ),
 }
 
 

@@ -29,17 +29,21 @@ class Scene(Problem):
     effects : sequence of str
         Requested effects, names of `mbma_tables.scenes.problem.OUTPUTS`.
     without : sequence of str
-        Refinements of the model switched off: "subscale_area", "sphere_deformation", "finite_height".
+        Refinements of the model switched off: "subscale_area", "sphere_deformation",
+        "finite_height".
     separations, mean_separations, pressures, areas : array_like, one of them
-        d [length], u [length], F/A0 in the unit of `E_star`, or A/A0; one number or a list. Texts such as "0.8 um" are
-        converted to the units of the surface and the modulus.
+        d [length], u [length], F/A0 in the unit of `E_star`, or A/A0; one number or a list.
+        Texts such as "0.8 um" are converted to the units of the surface and the modulus.
     E_star : float or str
-        Effective modulus, as a number or as text with a unit ("100 GPa"); stresses are in its unit, over E* if it is 1.
+        Effective modulus, as a number or as text with a unit ("100 GPa"); stresses are in
+        its unit, over E* if it is 1.
     hardness : float or str, optional
-        Largest pressure that the softer body supports, in the unit of `E_star`, for "yield": the theory's elastic
-        result is corrected by `mbma_tables.theories.yielding`, and conductance is that at constant contact area.
+        Largest pressure that the softer body supports, in the unit of `E_star`, for
+        "yield": the theory's elastic result is corrected by
+        `mbma_tables.theories.yielding`, and conductance is that at constant contact area.
     rtol : float, optional
-        Requested relative error, in [1e-10, 0.1]; without `seconds` by default 1e-6, or 1e-4 for other theories.
+        Requested relative error, in [1e-10, 0.1]; without `seconds` by default 1e-6, or
+        1e-4 for other theories.
     seconds : float, optional
         Time budget instead of `rtol`; the measured costs determine the accuracy that it allows.
     variant : str or Variant
@@ -47,8 +51,8 @@ class Scene(Problem):
     island_model : str or IslandModel, optional
         Island model, as for `contact`; without it the plan chooses between "universal" and "exact".
     theory : str or theory, optional
-        One of `mbma_tables.theories.THEORIES` or an object, as for `contact`. Refinements, island model and variant
-        are MBMA's.
+        One of `mbma_tables.theories.THEORIES` or an object, as for `contact`. Refinements,
+        island model and variant are MBMA's.
     conductivities : pair of float or str, optional
         Of the two bodies, thermal or electrical, for "conductance", as for `Contact.conductance`.
     deltas : array_like, optional
@@ -96,13 +100,21 @@ class Scene(Problem):
 
     @classmethod
     def from_mapping(
-        cls, content: Mapping[str, Any], folder: pathlib.Path = pathlib.Path(), title: str = "scene"
+        cls,
+        content: Mapping[str, Any],
+        folder: pathlib.Path = pathlib.Path(),
+        title: str = "scene",
     ) -> Scene:
         """The scene of the content of a TOML file; paths in it are relative to `folder`, the current one by default."""
         check(content, schema())
         specimen = from_tables(content, folder, title)
-        if content.get("island_statistics") and "island_statistics" not in content["effects"]["on"]:
-            raise InputError("[island_statistics] is given and the effect is off: add it to on, or leave the table out")
+        if (
+            content.get("island_statistics")
+            and "island_statistics" not in content["effects"]["on"]
+        ):
+            raise InputError(
+                "[island_statistics] is given and the effect is off: add it to on, or leave the table out"
+            )
         found: dict[str, Any] = {
             "surface": specimen.surface,
             "effects": content["effects"]["on"],
@@ -110,11 +122,25 @@ class Scene(Problem):
             "E_star": specimen.modulus,
             "title": title,
         }
-        found |= {name: content[name] for name in ("title", "theory", "variant") if name in content}
-        for name in ("prescribed", "pressure_profile", "accuracy", "island_statistics", "comparison", "yield"):
+        found |= {
+            name: content[name]
+            for name in ("title", "theory", "variant")
+            if name in content
+        }
+        for name in (
+            "prescribed",
+            "pressure_profile",
+            "accuracy",
+            "island_statistics",
+            "comparison",
+            "yield",
+        ):
             found |= content.get(name, {})
         if "conductance" in content:
-            found["conductivities"] = (content["conductance"]["k1"], content["conductance"]["k2"])
+            found["conductivities"] = (
+                content["conductance"]["k1"],
+                content["conductance"]["k2"],
+            )
         return cls(**found)
 
     def plan(self) -> Plan:
@@ -131,8 +157,8 @@ class Scene(Problem):
         Returns
         -------
         xarray.Dataset
-            Quantities with units; in its attributes the plan, the error bound reached, the variant and the hashes
-            of the tables that were used.
+            Quantities with units; in its attributes the plan, the error bound reached, the
+            variant and the hashes of the tables that were used.
 
         Raises
         ------

@@ -29,7 +29,11 @@ MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
 NUMBERS = tuple(dict.fromkeys(PARAMETERS + MAGNIFICATION + MOMENTS + ROUGHNESS))
 MATERIAL = ("E_star", "E1", "nu1", "E2", "nu2")
-MAP_OPTIONS = (*OPTIONS[1:], "extrapolate_to", "extrapolate_hurst")  # for a measured map; its unit is separate
+MAP_OPTIONS = (
+    *OPTIONS[1:],
+    "extrapolate_to",
+    "extrapolate_hurst",
+)  # for a measured map; its unit is separate
 MAX_TOML_BYTES = 2**20
 
 
@@ -67,31 +71,44 @@ class Specimen:
             if modulus is not None and unit is not None:
                 modulus *= factor(unit, stress, "stress")
             unit = stress
-        return dataclasses.replace(self, surface=in_unit(self.surface, length), E_star=modulus, stress_unit=unit)
+        return dataclasses.replace(
+            self, surface=in_unit(self.surface, length), E_star=modulus, stress_unit=unit
+        )
 
 
 def _from_map(path: pathlib.Path, options: dict[str, Any], unit: str | None) -> Specimen:
     """The surface of a measured map or line scan, with options of `Surface.from_map`, or of its simulation's table."""
     if is_own(path):
         if options:
-            raise InputError(f"{_printable(path)} is a table of a simulated map: leave {', '.join(options)} out")
+            raise InputError(
+                f"{_printable(path)} is a table of a simulated map: leave {', '.join(options)} out"
+            )
         from mbma_tables.theories import BoundaryElements
 
         surface = BoundaryElements.from_netcdf(path).surface
         return Specimen(in_unit(surface, unit), f"simulated map: {_printable(path)}")
-    fitted, surface = options.pop("model", "") == "self-affine", measured(path, options | {"unit": unit})[1]
+    fitted, surface = (
+        options.pop("model", "") == "self-affine",
+        measured(path, options | {"unit": unit})[1],
+    )
     title = f"{'fitted to the map' if fitted else 'measured:'} {_printable(path)}"
     return Specimen(surface.fit() if fitted else surface, title)
 
 
-def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated, MeasuredSurface]:
+def measured(
+    path: pathlib.Path, treatment: Mapping[str, Any]
+) -> tuple[Treated, MeasuredSurface]:
     """Treated heights of a map or line scan, and the surface that they are."""
     from mbma_tables.surfaces.maps import measured_surface, prepared
 
     if is_own(path):
-        raise InputError(f"{_printable(path)} is a table of a simulated map, not the map: mbma curve --map reads it")
+        raise InputError(
+            f"{_printable(path)} is a table of a simulated map, not the map: mbma curve --map reads it"
+        )
     options = dict(treatment)
-    further = [options.pop(name, None) for name in ("extrapolate_to", "extrapolate_hurst")]
+    further = [
+        options.pop(name, None) for name in ("extrapolate_to", "extrapolate_hurst")
+    ]
     treated = prepared(path, options, None)
     return treated, MeasuredSurface.of(measured_surface(treated, None, *further))
 
@@ -102,7 +119,9 @@ def _printable(path: pathlib.Path) -> str:
 
 
 def from_numbers(
-    given: Mapping[str, Any], unit: str | None = None, title: str = "surface given by numbers"
+    given: Mapping[str, Any],
+    unit: str | None = None,
+    title: str = "surface given by numbers",
 ) -> Specimen:
     """The surface with one complete set of numbers, plain ones in `unit`."""
     if set(given) & set(ROUGHNESS) - {"nominal_area"}:
@@ -111,7 +130,9 @@ def from_numbers(
             raise InputError(
                 f"{', '.join(alien)} beside numbers of a drawing: leave them out, or give longest or shortest"
             )
-        return Specimen(Surface.from_roughness(**{"hurst": None, **given}, unit=unit), title)
+        return Specimen(
+            Surface.from_roughness(**{"hurst": None, **given}, unit=unit), title
+        )
     if {"h_max" if key == "nominal_area" else key for key in given} not in map(
         set, (PARAMETERS, MAGNIFICATION, MOMENTS)
     ):
@@ -125,12 +146,19 @@ def from_numbers(
         return Specimen(Surface.from_moments(**numbers, unit=unit), title)
     if "zeta_1" in numbers:
         zeta_1 = numbers.pop("zeta_1")
-        require("zeta_1", zeta_1, zeta_1 > MIN_ZETA_1, "greater than 3, so that the smallest island has a band")
+        require(
+            "zeta_1",
+            zeta_1,
+            zeta_1 > MIN_ZETA_1,
+            "greater than 3, so that the smallest island has a band",
+        )
         numbers["q1"] = numbers["q0"] * zeta_1
     return Specimen(Surface(**numbers, unit=unit), title)
 
 
-def effective_modulus_of(given: Mapping[str, Any], unit: str | None = None) -> tuple[float | None, str | None]:
+def effective_modulus_of(
+    given: Mapping[str, Any], unit: str | None = None
+) -> tuple[float | None, str | None]:
     """E* from a material's numbers, None if there are none, and its unit: the one given, or the first named."""
     plain, unit = resolve(given, unit, "stress")
     if not given:
@@ -140,7 +168,9 @@ def effective_modulus_of(given: Mapping[str, Any], unit: str | None = None) -> t
         require("E_star", numbers["E_star"], numbers["E_star"] > 0, "positive")
         return float(numbers["E_star"]), unit
     if set(numbers) != set(MATERIAL[1:]):
-        raise InputError(f"a material is E_star alone, or all of E1, nu1, E2, nu2; got {', '.join(given)}")
+        raise InputError(
+            f"a material is E_star alone, or all of E1, nu1, E2, nu2; got {', '.join(given)}"
+        )
     return float(effective_modulus(**numbers)), unit
 
 
@@ -154,7 +184,15 @@ def read_specimen(path: pathlib.Path) -> Specimen:
             f"`mbma joint {path} --export TARGET --pressures 1MPa:50MPa --out FILE` writes it for other programs"
         )
     try:
-        check(entries, {"type": "object", "required": ["surface"], "additionalProperties": False, "properties": tables})
+        check(
+            entries,
+            {
+                "type": "object",
+                "required": ["surface"],
+                "additionalProperties": False,
+                "properties": tables,
+            },
+        )
         return from_tables(entries, path.parent, f"surface of {_printable(path)}")
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None
@@ -163,7 +201,9 @@ def read_specimen(path: pathlib.Path) -> Specimen:
 def from_tables(entries: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
     """The specimen of the tables [surface] and [material]; files that they name are relative to `folder`."""
     material = dict(entries.get("material", {}))
-    modulus, stress_unit = effective_modulus_of(material, material.pop("stress_unit", None))
+    modulus, stress_unit = effective_modulus_of(
+        material, material.pop("stress_unit", None)
+    )
     found = _from_table(entries["surface"], folder, title)
     return dataclasses.replace(found, E_star=modulus, stress_unit=stress_unit)
 
@@ -171,14 +211,26 @@ def from_tables(entries: Mapping[str, Any], folder: pathlib.Path, title: str) ->
 def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
     """The surface of a table [surface]."""
     numbers = dict(surface)
-    name, source, unit = (numbers.pop(key, None) for key in ("name", "map", "length_unit"))
-    treatment = {key: numbers.pop(key) for key in (*MAP_OPTIONS, "model") if key in numbers}
-    given = ["name"] * (name is not None) + ["map"] * (source is not None) + ["numbers"] * bool(numbers)
+    name, source, unit = (
+        numbers.pop(key, None) for key in ("name", "map", "length_unit")
+    )
+    treatment = {
+        key: numbers.pop(key) for key in (*MAP_OPTIONS, "model") if key in numbers
+    }
+    given = (
+        ["name"] * (name is not None)
+        + ["map"] * (source is not None)
+        + ["numbers"] * bool(numbers)
+    )
     if len(given) > 1:
         listed = f" ({', '.join(numbers)})" if numbers else ""
-        raise InputError(f"[surface]: {' and '.join(given)}{listed} are given: one of name, map or numbers")
+        raise InputError(
+            f"[surface]: {' and '.join(given)}{listed} are given: one of name, map or numbers"
+        )
     if treatment and source is None:
-        raise InputError(f"[surface]: {', '.join(treatment)}: for a measured map, which is missing: give map = ...")
+        raise InputError(
+            f"[surface]: {', '.join(treatment)}: for a measured map, which is missing: give map = ..."
+        )
     if name is not None:
         return Specimen(Surface.named(name), CASES[name].title).in_units(unit, None)
     if source is None:
@@ -218,16 +270,33 @@ def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:
 
     faults = list(jsonschema.Draft202012Validator(rules).iter_errors(entries))
     # a misspelt name is the cause of a missing one
-    fault = jsonschema.exceptions.best_match([f for f in faults if f.validator == "additionalProperties"] or faults)
+    fault = jsonschema.exceptions.best_match(
+        [f for f in faults if f.validator == "additionalProperties"] or faults
+    )
     if fault is None:
         return
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault.absolute_path)[1:]
+    place = "".join(
+        f"[{part}]" if isinstance(part, int) else f".{part}"
+        for part in fault.absolute_path
+    )[1:]
     table = f"[{place}]" if place else "top level"
     if fault.validator == "additionalProperties":
         known = fault.schema["properties"]
         unknown = next(name for name in fault.instance if name not in known)
-        tables = [name for name, entry in schema()["properties"].items() if unknown in entry.get("properties", ())]
-        hint = f"it belongs to [{' or ['.join(f'{name}]' for name in tables)}" if tables else nearest(unknown, known)
+        tables = [
+            name
+            for name, entry in schema()["properties"].items()
+            if unknown in entry.get("properties", ())
+        ]
+        hint = (
+            f"it belongs to [{' or ['.join(f'{name}]' for name in tables)}"
+            if tables
+            else nearest(unknown, known)
+        )
         raise InputError(f"{table}: unknown key {unknown!r}; {hint}")
-    hint = f"; write [{place}]" if fault.validator == "type" and fault.schema["type"] == "object" else ""
+    hint = (
+        f"; write [{place}]"
+        if fault.validator == "type" and fault.schema["type"] == "object"
+        else ""
+    )
     raise InputError(f"{place or table}: {fault.message}{hint}")

@@ -52,7 +52,9 @@ def _doubts(provenance: Iterable[Mapping[str, Any]]) -> Iterator[str]:
 class AnySurface(Displayed, abc.ABC):
     """A rough surface, or a batch of them: the interface that theories and their users need."""
 
-    parameters: ClassVar[tuple[str, ...]] = ()  # names of the numbers that define it; empty if a spectrum does
+    parameters: ClassVar[
+        tuple[str, ...]
+    ] = ()  # names of the numbers that define it; empty if a spectrum does
 
     # fields in one class, properties in the other; `MEANINGS` describes them
     q0: Any
@@ -114,13 +116,19 @@ class AnySurface(Displayed, abc.ABC):
         Surface(hurst=0.8, q0=0.0005, q1=0.1, h_rms=200.0, h_max=600.0, unit='um')
         """
         if self.unit is None:
-            raise InputError(f"the surface's unit is not known: make it with unit=..., then ask for {unit!r}")
+            raise InputError(
+                f"the surface's unit is not known: make it with unit=..., then ask for {unit!r}"
+            )
         return self.scaled(factor(self.unit, unit), unit)
 
     @property
     def resolution(self) -> str:
         """Shortest wavelength of a measured surface, and the influence of shorter ones; empty for other surfaces."""
-        told = [entry["told"] for entry in self.provenance if entry["step"] in ("resolution", "extrapolated")]
+        told = [
+            entry["told"]
+            for entry in self.provenance
+            if entry["step"] in ("resolution", "extrapolated")
+        ]
         return "; ".join(told)
 
     @functools.cached_property
@@ -161,20 +169,34 @@ class AnySurface(Displayed, abc.ABC):
     def _facts(self) -> dict[str, str]:
         titles = {"hurst": "Hurst exponent", "rms_gradient": "rms gradient"}
         names = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "rms_gradient")
-        known = {name: value for name in names if (value := getattr(self, name)) is not None}
-        return {titles.get(name, name): shown(value, unit_of(name, Units(self.unit))) for name, value in known.items()}
+        known = {
+            name: value for name in names if (value := getattr(self, name)) is not None
+        }
+        return {
+            titles.get(name, name): shown(value, unit_of(name, Units(self.unit)))
+            for name, value in known.items()
+        }
 
     def _variables(self) -> dict[str, Variable]:
         units = Units(self.unit)
         known = {name: getattr(self, name) for name in MEANINGS}
-        return {n: Variable(v, unit_of(n, units), MEANINGS[n]) for n, v in known.items() if v is not None}
+        return {
+            n: Variable(v, unit_of(n, units), MEANINGS[n])
+            for n, v in known.items()
+            if v is not None
+        }
 
     def _figure(self) -> Any:
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum to draw: take one surface")
         q = np.geomspace(self.q0, self.q1, 200)[1:-1]
         length = self.unit or "length"
-        return draw_line(q, self.power_spectrum(q), f"wavenumber q [1/{length}]", f"spectrum C(q) [{length}^4]")
+        return draw_line(
+            q,
+            self.power_spectrum(q),
+            f"wavenumber q [1/{length}]",
+            f"spectrum C(q) [{length}^4]",
+        )
 
     def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
         """The equivalent rough surface of two in contact: spectra add, heights convolve.
@@ -189,8 +211,8 @@ class AnySurface(Displayed, abc.ABC):
         Returns
         -------
         MeasuredSurface
-            Its h_max is exceeded by as small a share of heights as those of both: for Gaussian surfaces the root of the
-            sum of squares. It has the unit of the first.
+            Its h_max is exceeded by as small a share of heights as those of both: for
+            Gaussian surfaces the root of the sum of squares. It has the unit of the first.
 
         Raises
         ------
@@ -207,7 +229,11 @@ class AnySurface(Displayed, abc.ABC):
         'h_rms = 5.00, h_max = 15.0, q from 0.01 to 5'
         """
         both = self.sampled().added(other.sampled())
-        return both if nominal_area is None else dataclasses.replace(both, h_max=None, nominal_area=nominal_area)
+        return (
+            both
+            if nominal_area is None
+            else dataclasses.replace(both, h_max=None, nominal_area=nominal_area)
+        )
 
 
 def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
@@ -242,7 +268,9 @@ def refuse_plain(arguments: Mapping[str, Any]) -> None:
     """Reject arrays without names beside DataArrays."""
     for name, given in arguments.items():
         if not is_labelled(given) and np.ndim(given):
-            raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
+            raise InputError(
+                f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}"
+            )
 
 
 def agree(**arguments: Any) -> None:
@@ -253,10 +281,14 @@ def agree(**arguments: Any) -> None:
         broadcast_shape(**arguments)
 
 
-def apply_to_surface(answer: Any, surface: AnySurface, arrays: Mapping[str, Any], outputs: int) -> Any:
+def apply_to_surface(
+    answer: Any, surface: AnySurface, arrays: Mapping[str, Any], outputs: int
+) -> Any:
     """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are errors."""
     count = len(surface.parameters)
-    arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(arrays)
+    arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(
+        arrays
+    )
     refuse_plain(arguments)
 
     def block(*numbers: Any) -> Any:

@@ -10,12 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, positive_array, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    positive_array,
+    require,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 
 _TAIL = np.logspace(-6, -1, 61)[:-1]
-SHARES = np.concatenate([[0.0], _TAIL, np.linspace(0.1, 0.9, 81), 1 - _TAIL[::-1], [1.0]])  # of a surface, from its top
+SHARES = np.concatenate(
+    [[0.0], _TAIL, np.linspace(0.1, 0.9, 81), 1 - _TAIL[::-1], [1.0]]
+)  # of a surface, from its top
 MIN_SHARE = 1e-300  # smallest share of a surface, above underflow
 TAIL_NODES = 400  # shares at which heights are convolved
 LEAST = 2.0  # h_max/h_rms above which maxima are rare
@@ -27,7 +35,9 @@ ENDS = (0.16, 0.84)  # shares of surfaces below the two ends of the stated sprea
 class Heights:
     """The height distribution of a surface about its mean."""
 
-    quantiles: FloatArray  # above which `SHARES` of the surface lie, highest first [length]
+    quantiles: (
+        FloatArray  # above which `SHARES` of the surface lie, highest first [length]
+    )
     h_rms: float
     h_max: float
     skewness: float  # 0 if Gaussian
@@ -59,7 +69,9 @@ class Heights:
         from scipy.special import ndtr, ndtri
 
         quantiles = np.clip(-h_rms * ndtri(SHARES), -h_max, h_max)
-        return cls(quantiles, h_rms, h_max, 0.0, 3.0, max(float(ndtr(-h_max / h_rms)), MIN_SHARE))
+        return cls(
+            quantiles, h_rms, h_max, 0.0, 3.0, max(float(ndtr(-h_max / h_rms)), MIN_SHARE)
+        )
 
     def scaled(self, factor: float) -> Heights:
         """The same distribution in another unit."""
@@ -81,7 +93,10 @@ class Heights:
         edges = ndtr(np.linspace(-6.0, 6.0, TAIL_NODES + 1))
         share, weight = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
         one, two = (np.interp(share, SHARES, each.quantiles) for each in (self, other))
-        sums, weights = np.add.outer(one, two).ravel(), np.multiply.outer(weight, weight).ravel()
+        sums, weights = (
+            np.add.outer(one, two).ravel(),
+            np.multiply.outer(weight, weight).ravel(),
+        )
         order = np.argsort(-sums)
         above = np.cumsum(weights[order]) - weights[order] / 2
         deviates = ndtri(np.clip(above / weights.sum(), MIN_SHARE, 1 - 1e-16))
@@ -91,8 +106,12 @@ class Heights:
             return np.asarray(np.interp(ndtri(share), deviates, sums[order]))
 
         h_max = float(height(top))
-        skewness = (self.skewness * self.h_rms**3 + other.skewness * other.h_rms**3) / h_rms**3
-        excess = ((self.kurtosis - 3) * self.h_rms**4 + (other.kurtosis - 3) * other.h_rms**4) / h_rms**4
+        skewness = (
+            self.skewness * self.h_rms**3 + other.skewness * other.h_rms**3
+        ) / h_rms**3
+        excess = (
+            (self.kurtosis - 3) * self.h_rms**4 + (other.kurtosis - 3) * other.h_rms**4
+        ) / h_rms**4
         quantiles = np.clip(height(np.clip(SHARES, top, 1 - top)), None, h_max)
         return Heights(quantiles, h_rms, h_max, skewness, 3 + excess, top)
 
@@ -102,19 +121,21 @@ class Heights:
         return self.skewness == 0 and self.kurtosis == 3
 
 
-def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, probability: ArrayLike = 0.5) -> FloatArray:
+def highest_point(
+    h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, probability: ArrayLike = 0.5
+) -> FloatArray:
     """Height below which the highest point of a Gaussian surface lies with a probability [length]; default the median.
 
-    The expected number of maxima above x = h/h_rms, of an area A0 and a variance m2 of a profile's slope (R. J. Adler,
-    The Geometry of Random Fields, 1981), for high levels::
+    The expected number of maxima above x = h/h_rms, of an area A0 and a variance m2 of a
+    profile's slope (R. J. Adler, The Geometry of Random Fields, 1981), for high levels::
 
         N(x) = A0 (m2/h_rms^2) (2 pi)^(-3/2) x exp(-x^2/2),    P(max < x) = exp(-N(x))
 
     Parameters
     ----------
     h_rms, m2, nominal_area : array_like
-        Root-mean-square height [length], variance of a profile's slope, A0 [length^2]: so large that the highest point
-        is above 2 h_rms.
+        Root-mean-square height [length], variance of a profile's slope, A0 [length^2]: so
+        large that the highest point is above 2 h_rms.
     probability : array_like
         In (0, 1).
 
@@ -128,7 +149,12 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
     >>> round(float(joint.h_max), 2), highest_point(1.0, joint.m2, 20e3**2, [0.16, 0.84]).round(2)
     (5.33, array([5.13, 5.59]))
     """
-    given = {"h_rms": h_rms, "m2": m2, "nominal_area": nominal_area, "probability": probability}
+    given = {
+        "h_rms": h_rms,
+        "m2": m2,
+        "nominal_area": nominal_area,
+        "probability": probability,
+    }
     arrays = {name: positive_array(name, value) for name, value in given.items()}
     height, slope, chance = arrays["h_rms"], arrays["m2"], arrays["probability"]
     require("probability", chance, chance < 1, "between 0 and 1")
@@ -137,7 +163,9 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
         reach = -np.log(chance) * (2 * math.pi) ** 1.5 * height * height / slope
         c = reach / area
     least = reach / (LEAST * math.exp(-(LEAST**2) / 2))
-    allowed = f"at least {float(np.max(least)):.4g}, where the highest point is at 2 h_rms"
+    allowed = (
+        f"at least {float(np.max(least)):.4g}, where the highest point is at 2 h_rms"
+    )
     require("nominal_area", area, area >= least, allowed)
     x = np.sqrt(-2 * np.log(np.minimum(c, 0.5)))
     for _ in range(STEPS):
@@ -145,18 +173,31 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
     return np.asarray(height * x)
 
 
-def of_area(surface: Any, nominal_area: Any, h_max: Any) -> tuple[Any, tuple[Mapping[str, Any], ...]]:
+def of_area(
+    surface: Any, nominal_area: Any, h_max: Any
+) -> tuple[Any, tuple[Mapping[str, Any], ...]]:
     """h_max of a surface of that area, and its provenance."""
     if h_max is not None:
         raise InputError("h_max and nominal_area are both given: give one of them")
     if surface.labelled:
-        raise InputError("nominal_area is of numbers and arrays: give DataArrays h_max, of heights.highest_point")
-    area = finite_array("nominal_area", Units(surface.unit).number("nominal_area", nominal_area))
-    median, *ends = (highest_point(surface.h_rms, surface.m2, area, chance) for chance in (0.5, *ENDS))
+        raise InputError(
+            "nominal_area is of numbers and arrays: give DataArrays h_max, of heights.highest_point"
+        )
+    area = finite_array(
+        "nominal_area", Units(surface.unit).number("nominal_area", nominal_area)
+    )
+    median, *ends = (
+        highest_point(surface.h_rms, surface.m2, area, chance) for chance in (0.5, *ENDS)
+    )
     told = "h_max is the median over Gaussian surfaces of the nominal area; two of three are between from and to"
     # of which a theory's validity depends; it does not change with the unit of length
     longest = 2 * np.pi / np.asarray(getattr(surface, "longest", surface.q0))
     waves = np.sqrt(area) / longest
-    record = {"step": "nominal_area", "nominal_area": area.tolist(), "from": ends[0].tolist(), "to": ends[1].tolist()}
+    record = {
+        "step": "nominal_area",
+        "nominal_area": area.tolist(),
+        "from": ends[0].tolist(),
+        "to": ends[1].tolist(),
+    }
     record["waves_a_side"] = waves.tolist()
     return median[()], (*surface.provenance, record | {"assumed": [told]})

@@ -9,7 +9,9 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 
-MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary elements are too large
+MIN_POINTS = (
+    4.0  # sampling steps a wave, below which areas of boundary elements are too large
+)
 ROUNDING = 1e-6  # relative, of wavelengths and sampling steps
 
 
@@ -30,15 +32,25 @@ class MapSimulation:
     flow_gaps: FloatArray  # mean gaps, falling, shape (m,),
     flow: FloatArray  # and flow coefficients xx, yy, xy there [length^3], shape (m, 3)
     points: float  # sampling steps along the shortest wavelength
-    left_out: float  # wavelength [length] below which a large map was cut off; 0 if it was not
+    left_out: (
+        float  # wavelength [length] below which a large map was cut off; 0 if it was not
+    )
     origin: str  # description of the map and of the simulation
 
-    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
+    def flows(
+        self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
         """`flow_gaps` and `flow`."""
         return self.flow_gaps, self.flow
 
     def resized(self, up: float, along: float) -> MapSimulation:
         """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
         by = np.array([[up / along], [1.0], [up], [up**2 / along]])
-        gaps, flow, left_out = self.flow_gaps * up, self.flow * up**3, self.left_out * along
-        return dataclasses.replace(self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out)
+        gaps, flow, left_out = (
+            self.flow_gaps * up,
+            self.flow * up**3,
+            self.left_out * along,
+        )
+        return dataclasses.replace(
+            self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out
+        )

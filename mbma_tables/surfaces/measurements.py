@@ -22,7 +22,10 @@ MAX_TEXT_BYTES, MAX_HEADER_BYTES = 256 * 2**20, 2**14
 TEXTS = (".csv", ".txt", ".asc", ".xyz")  # names of files that hold numbers as text
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # bytes that no text has
 INFINITE = re.compile(rb"(?i)(?<![a-z])inf(inity)?(?![a-z])")
-MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: their fourth powers, as in C, neither overflow nor underflow
+MIN_LENGTH, MAX_LENGTH = (
+    1e-30,
+    1e30,
+)  # in any unit: their fourth powers, as in C, neither overflow nor underflow
 
 
 def library() -> Any:
@@ -41,25 +44,35 @@ def read_measurement(
 ) -> Any:
     """The topography or line scan in a file: any format of SurfaceTopography, and text; "-" is stdin.
 
-    Sampling steps, in `unit`, are of files that have none, and so is the unit. A list of points may name units in the
-    header of its columns, like "x [um]". Rows of a matrix without lengths are x, as those of an array. Numbers of a
-    text are separated by semicolons, tabs, blanks or commas; a comma is a decimal mark where another separator is used.
+    Sampling steps, in `unit`, are of files that have none, and so is the unit. A list of
+    points may name units in the header of its columns, like "x [um]". Rows of a matrix
+    without lengths are x, as those of an array. Numbers of a text are separated by
+    semicolons, tabs, blanks or commas; a comma is a decimal mark where another separator is
+    used.
     """
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"
     if not piped and not os.path.isfile(place):
-        raise InputError(f"there is no file {os.fspath(path)!r}{': it is a folder' if os.path.isdir(place) else ''}")
+        raise InputError(
+            f"there is no file {os.fspath(path)!r}{': it is a folder' if os.path.isdir(place) else ''}"
+        )
     suffix = place.suffix.lower()
     with warnings.catch_warnings():
         # its readers warn of faults that they correct
         warnings.simplefilter("ignore")
         try:
             # opened here, because its readers leave unreadable files open
-            with io.BytesIO(sys.stdin.buffer.read()) if piped else open(place, "rb") as stream:
+            with (
+                io.BytesIO(sys.stdin.buffer.read())
+                if piped
+                else open(place, "rb") as stream
+            ):
                 start = stream.read(MAX_HEADER_BYTES)
                 if suffix in TEXTS and CONTROL.search(start):
                     # a binary format would be recognised in nearly any bytes
-                    raise InputError(f"{place.name} is no text, as its name says: rename it to its own format")
+                    raise InputError(
+                        f"{place.name} is no text, as its name says: rename it to its own format"
+                    )
                 named = _units_of_header(start)
                 stream.seek(0)
                 with module.open_topography(stream) as reader:
@@ -72,11 +85,17 @@ def read_measurement(
         except Exception as fault:
             reason = str(fault).strip().splitlines() or [type(fault).__name__]
             name = type(fault).__name__
-            why = "no reader supports its format" if name == "CannotDetectFileFormat" else f"{name}: {reason[0]}"
+            why = (
+                "no reader supports its format"
+                if name == "CannotDetectFileFormat"
+                else f"{name}: {reason[0]}"
+            )
         if suffix in TEXTS:
             with module.open_topography(io.BytesIO(_plain_matrix(place, why))) as reader:
                 return _channel_of(reader, place, dx, dy, unit, channel, named)
-        raise InputError(f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}")
+        raise InputError(
+            f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}"
+        )
 
 
 def _refuse_infinite(reader: Any, stream: Any, name: str) -> None:
@@ -88,9 +107,13 @@ def _refuse_infinite(reader: Any, stream: Any, name: str) -> None:
         infinite = bool(np.isinf(np.load(stream, allow_pickle=False)).any())
     elif kind == "AscReader":
         stream.seek(0)
-        infinite = any(INFINITE.search(line) for line in stream if not line.lstrip().startswith(b"#"))
+        infinite = any(
+            INFINITE.search(line) for line in stream if not line.lstrip().startswith(b"#")
+        )
     if infinite:
-        raise InputError(f"{name} holds infinite heights: write NaN where a height is undefined")
+        raise InputError(
+            f"{name} holds infinite heights: write NaN where a height is undefined"
+        )
 
 
 def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
@@ -101,8 +124,14 @@ def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
     try:
         text = read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{path.name} cannot be read as a map: it is no text in UTF-8") from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        raise InputError(
+            f"{path.name} cannot be read as a map: it is no text in UTF-8"
+        ) from None
+    lines = [
+        line
+        for line in text.splitlines()
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
     rows = _separated(lines, path.name)
     try:
         numbers = numbers_of([" ".join(row) for row in rows], None)
@@ -112,7 +141,9 @@ def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
             f"semicolons, tabs, blanks or commas: {fault}"
         ) from None
     if np.isinf(numbers).any():
-        raise InputError(f"{path.name} holds infinite heights: write NaN where a height is undefined")
+        raise InputError(
+            f"{path.name} holds infinite heights: write NaN where a height is undefined"
+        )
     content = io.BytesIO()
     np.savetxt(content, numbers)
     content.seek(0)
@@ -122,8 +153,8 @@ def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
 def _separated(lines: Sequence[str], name: str) -> list[list[str]]:
     """The numbers of each line as text with decimal points.
 
-    The separator is the first of semicolon, tab, comma with a blank, blank, comma that occurs. Beside another
-    separator a comma is the decimal mark.
+    The separator is the first of semicolon, tab, comma with a blank, blank, comma that
+    occurs. Beside another separator a comma is the decimal mark.
     """
     text = "\n".join(lines)
     points = "." in text
@@ -160,8 +191,9 @@ def _separated(lines: Sequence[str], name: str) -> list[list[str]]:
 def _refuse_ambiguous(rows: Sequence[Sequence[str]], name: str) -> None:
     """Raise an error for whole numbers between commas that may be numbers with decimal commas.
 
-    Every second one of these is a fraction: it has no sign, and either zeros in front, which no whole number has, or
-    always the same number of digits, unlike the whole numbers.
+    Every second one of these is a fraction: it has no sign, and either zeros in front,
+    which no whole number has, or always the same number of digits, unlike the whole
+    numbers.
     """
     if any(len(row) % 2 for row in rows):
         return
@@ -171,7 +203,9 @@ def _refuse_ambiguous(rows: Sequence[Sequence[str]], name: str) -> None:
         return
     widths = {len(number) for number in fractions}
     padded = any(len(number) > 1 and number.startswith("0") for number in fractions)
-    alike = len(widths) == 1 and (widths == {1} or {len(number.lstrip("+-")) for number in wholes} != widths)
+    alike = len(widths) == 1 and (
+        widths == {1} or {len(number.lstrip("+-")) for number in wholes} != widths
+    )
     if padded or alike:
         raise InputError(
             f"{name} has commas only: it cannot be told whether they separate numbers or are decimal commas. Write "
@@ -183,7 +217,11 @@ def _units_of_header(content: bytes) -> list[str]:
     """Units in brackets, as instruments write them beside the names of columns, above the numbers of a text."""
     found: list[str] = []
     # no text has zero bytes; what is no UTF-8 is the micro sign of Latin-1
-    text = "" if b"\0" in content else content.decode("utf-8", "replace").replace("\ufffd", "u")
+    text = (
+        ""
+        if b"\0" in content
+        else content.decode("utf-8", "replace").replace("\ufffd", "u")
+    )
     for line in text.splitlines():
         if re.fullmatch(r"[\s,;]*[-+.]?\d[-+.\deE\s,;]*", line):
             break
@@ -205,16 +243,24 @@ def _channel_of(
     """A channel of an open file; `named` are the units of its header, that of heights last."""
     channels = reader.channels
     if channel is not None and not 0 <= channel < len(channels):
-        raise InputError(f"{path.name} has channels 0 to {len(channels) - 1}, not {channel}")
+        raise InputError(
+            f"{path.name} has channels 0 to {len(channels) - 1}, not {channel}"
+        )
     chosen = reader.default_channel if channel is None else channels[channel]
     given: dict[str, Any] = {} if channel is None else {"channel_index": channel}
     # a plain matrix of text, whose rows are x as those of an array; that library takes its columns
-    turned = type(reader).__name__ == "AscReader" and chosen.physical_sizes is None and len(chosen.nb_grid_pts) == 2
+    turned = (
+        type(reader).__name__ == "AscReader"
+        and chosen.physical_sizes is None
+        and len(chosen.nb_grid_pts) == 2
+    )
     own = chosen.unit
     if own is None and named:
         *lateral, height = named
         if len(set(lateral)) > 1:
-            raise InputError(f"{path.name} names the units {', '.join(named)}: write x and y in one unit")
+            raise InputError(
+                f"{path.name} names the units {', '.join(named)}: write x and y in one unit"
+            )
         given["unit"] = own = (lateral or named)[0]
         if height != own:
             given["height_scale_factor"] = factor(height, own)
@@ -231,9 +277,13 @@ def _channel_of(
         scale = 1.0 if own is None or unit is None else factor(unit, own)
         steps = [("dx", dx), ("dy", dx if dy is None else dy)][:: -1 if turned else 1]
         sides = zip(chosen.nb_grid_pts, steps, strict=False)
-        given["physical_sizes"] = tuple(count * scale * sampling_step(*step) for count, step in sides)
+        given["physical_sizes"] = tuple(
+            count * scale * sampling_step(*step) for count, step in sides
+        )
     elif dx is not None or dy is not None:
-        raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit=... sets their unit)")
+        raise InputError(
+            f"{path.name} has its own lengths: leave dx and dy out (unit=... sets their unit)"
+        )
     found = reader.topography(**given)
     return found.transpose() if turned else found
 
@@ -241,7 +291,12 @@ def _channel_of(
 def sampling_step(name: str, value: Any) -> float:
     """A sampling step [length] as a number."""
     step = one_number(name, value)
-    require(name, step, (step >= MIN_LENGTH) & (step <= MAX_LENGTH), "positive, in [1e-30, 1e30]")
+    require(
+        name,
+        step,
+        (step >= MIN_LENGTH) & (step <= MAX_LENGTH),
+        "positive, in [1e-30, 1e30]",
+    )
     return float(step)
 
 
@@ -251,32 +306,50 @@ def grid_of(
     """Heights, sampling steps, periodicity and unit, from an array or a topography."""
     if not callable(getattr(source, "heights", None)):
         if dx is None:
-            raise InputError("dx is missing: the sampling step of a plain array of heights")
-        steps = tuple(sampling_step(*step) for step in (("dx", dx), ("dy", dx if dy is None else dy))[:dimensions])
+            raise InputError(
+                "dx is missing: the sampling step of a plain array of heights"
+            )
+        steps = tuple(
+            sampling_step(*step)
+            for step in (("dx", dx), ("dy", dx if dy is None else dy))[:dimensions]
+        )
         # of a DataArray
         stated = getattr(source, "attrs", {}).get("units")
         return source, steps, bool(periodic), None if stated in ("", "1") else stated
     if dx is not None or dy is not None:
-        raise InputError("dx and dy belong to a plain array; a topography has its own physical_sizes")
+        raise InputError(
+            "dx and dy belong to a plain array; a topography has its own physical_sizes"
+        )
     if not getattr(source, "is_uniform", True):
         # its points are nearly as dense where they are not even
         try:
             source = source.to_uniform(nb_points=source.nb_grid_pts[0])
         except RuntimeError:
-            raise InputError("the points of a line scan must be in the order of rising x") from None
+            raise InputError(
+                "the points of a line scan must be in the order of rising x"
+            ) from None
     grid = source.heights()
     sizes = getattr(source, "physical_sizes", None)
     if np.ndim(grid) != dimensions or sizes is None or np.shape(sizes) != (dimensions,):
-        other = "Surface.from_profile takes line scans" if dimensions == 2 else "Surface.from_map takes maps"
+        other = (
+            "Surface.from_profile takes line scans"
+            if dimensions == 2
+            else "Surface.from_map takes maps"
+        )
         raise InputError(
             f"a topography must have heights along {dimensions} axes and as many physical_sizes, got shape "
             f"{np.shape(grid)} and {sizes}; {other}"
         )
     extent = finite_array("physical_sizes", sizes)
     allowed = "in [1e-30, 1e30], x and y rising"
-    require("physical_sizes", extent, (extent >= MIN_LENGTH) & (extent <= MAX_LENGTH), allowed)
+    require(
+        "physical_sizes", extent, (extent >= MIN_LENGTH) & (extent <= MAX_LENGTH), allowed
+    )
     whole = getattr(source, "is_periodic", False) if periodic is None else periodic
-    found = tuple(float(size) / max(count, 1) for size, count in zip(extent, np.shape(grid), strict=True))
+    found = tuple(
+        float(size) / max(count, 1)
+        for size, count in zip(extent, np.shape(grid), strict=True)
+    )
     return grid, found, bool(whole), getattr(source, "unit", None)
 
 
@@ -287,7 +360,9 @@ def heights_of(grid: Any, dimensions: int = 2) -> Any:
     except (TypeError, ValueError) as fault:
         raise InputError(f"heights must be an array of numbers: {fault}") from None
     if values.ndim != dimensions:
-        raise InputError(f"heights must be {('one', 'two')[dimensions - 1]}-dimensional, got shape {values.shape}")
+        raise InputError(
+            f"heights must be {('one', 'two')[dimensions - 1]}-dimensional, got shape {values.shape}"
+        )
     if values.dtype.kind not in "fiu":
         raise InputError(f"heights must be real numbers: entries of type {values.dtype}")
     numbers = np.ma.getdata(values).astype(float)

@@ -1,9 +1,9 @@
 """Line scans: the isotropic surface of a measured profile.
 
-A profile's spectrum C_1D, with h_rms^2 = integral C_1D dq/pi, follows from the isotropic one:
-C_1D(q) = 4 pi integral from q of C q' dq'/sqrt(q'^2 - q^2), an Abel transform. Its inverse is sought as a power law
-between nodes, as straight in its logarithms as the scatter of the measurement allows, with the profile's variance of
-height and gradient.
+A profile's spectrum C_1D, with h_rms^2 = integral C_1D dq/pi, follows from the isotropic
+one: C_1D(q) = 4 pi integral from q of C q' dq'/sqrt(q'^2 - q^2), an Abel transform. Its
+inverse is sought as a power law between nodes, as straight in its logarithms as the scatter
+of the measurement allows, with the profile's variance of height and gradient.
 """
 
 import dataclasses
@@ -23,10 +23,15 @@ from mbma_tables.surfaces.treatment import MIN_POWER, Treated
 PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # panels between two nodes
 BLOCK = 10_000  # wavenumbers whose panels are in memory at a time: 40 MB, 0.1 s
-STRAIGHT = 1.0  # standard deviation of the change of slope, d ln C/d ln q, from node to node
+STRAIGHT = (
+    1.0  # standard deviation of the change of slope, d ln C/d ln q, from node to node
+)
 HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
 END = 1e-3  # share of the squared gradient in the wavelengths above the surface's last
-LONGEST, ROLLED_OFF = 4, 0.5  # longest wavelengths of a trace: with half of the variance there is no roll-off
+LONGEST, ROLLED_OFF = (
+    4,
+    0.5,
+)  # longest wavelengths of a trace: with half of the variance there is no roll-off
 MIN_NODES = 5
 ONE_TRACE = (
     "one trace cannot tell lay, heights and gradient of a surface as well as the stated scatter: measure a map, "
@@ -39,29 +44,48 @@ def measured_profile(treated: Treated) -> SpectralSurface:
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
     step, (low, high) = treated.steps[0] / scale, (scale * wave for wave in treated.waves)
-    # oblique wavelengths appear longer along the line: the cut-off applies to the spectrum, not to the trace
-    trace = dataclasses.replace(treated, heights=(treated.heights if treated.uncut is None else treated.uncut) / scale)
+    # oblique wavelengths appear longer along the line: the cut-off applies to the spectrum,
+    # not to the trace
+    trace = dataclasses.replace(
+        treated,
+        heights=(treated.heights if treated.uncut is None else treated.uncut) / scale,
+    )
     heights, length = Heights.of(treated.heights / scale), treated.heights.size * step
     unit, overlap = 2 * math.pi / length, treated.overlap
     q, C = _components(trace, step, low)
     edges, number = _bins(q, unit)
     count, slopes = np.bincount(number).astype(float), C * q**2
-    h_rms, gradient = float(trace.heights.std()), math.sqrt(2 * slopes.sum() * unit / np.pi)
+    h_rms, gradient = (
+        float(trace.heights.std()),
+        math.sqrt(2 * slopes.sum() * unit / np.pi),
+    )
     # panels between nodes, evenly spaced in ln q
     place = np.arange(PANELS * (edges.size - 1) + 1) / PANELS
     fine = np.exp(np.interp(place, np.arange(edges.size), np.log(edges)))
     kernel = _panel_sums(fine, q, np.searchsorted(number, np.arange(count.size)))
     mean, squares = np.bincount(number, C) / count, (h_rms**2, gradient**2)
-    nodes = _isotropic(edges, fine, mean, count / overlap, kernel / count[:, None], squares)
-    longest, notes = float(C[:LONGEST].sum() / C.sum()), _limits(length * gradient / h_rms)
+    nodes = _isotropic(
+        edges, fine, mean, count / overlap, kernel / count[:, None], squares
+    )
+    longest, notes = (
+        float(C[:LONGEST].sum() / C.sum()),
+        _limits(length * gradient / h_rms),
+    )
     # powers are exponentially distributed: the mean of squares is twice the square of the mean
     kept = q <= high * (1 + 1e-9)
-    errors = [math.sqrt(each @ each / 2) / each.sum() / 2 for each in (C[kept], slopes[kept])]
+    errors = [
+        math.sqrt(each @ each / 2) / each.sum() / 2 for each in (C[kept], slopes[kept])
+    ]
     told = (
         f"h_rms is known to {errors[0]:.1%} and the rms gradient to {math.sqrt(overlap) * errors[1]:.1%} (one standard "
         "error, of a Gaussian surface)"
     )
-    found = {"step": "errors", "h_rms": errors[0], "rms_gradient": math.sqrt(overlap) * errors[1], "told": told}
+    found = {
+        "step": "errors",
+        "h_rms": errors[0],
+        "rms_gradient": math.sqrt(overlap) * errors[1],
+        "told": told,
+    }
     if longest > ROLLED_OFF:
         # the distribution needs more than a few wavelengths
         heights = Heights.gaussian(h_rms, heights.h_max)
@@ -72,8 +96,13 @@ def measured_profile(treated: Treated) -> SpectralSurface:
         notes += ({"step": "no roll-off", "share": longest, "told": told},)
     end = min(high, float(edges[-1]))
     q = np.append(edges[edges < end], end)
-    own, samples = PowerLaws(edges, nodes).at(q), np.interp(np.log(q), np.log(edges[:-1]), count / overlap)
-    surface = SpectralSurface(q, own, heights=heights, samples=samples).scaled(scale, treated.unit)
+    own, samples = (
+        PowerLaws(edges, nodes).at(q),
+        np.interp(np.log(q), np.log(edges[:-1]), count / overlap),
+    )
+    surface = SpectralSurface(q, own, heights=heights, samples=samples).scaled(
+        scale, treated.unit
+    )
     return dataclasses.replace(surface, provenance=treated.history(found, *notes))
 
 
@@ -108,7 +137,9 @@ def _bins(q: FloatArray, unit: float) -> tuple[FloatArray, Any]:
     """Wavenumbers between logarithmic bins that are not empty, and the bin of each wavenumber."""
     bins = math.ceil(PER_DECADE * math.log10(q[-1] / q[0])) if q.size > 1 else 0
     if bins < MIN_NODES:
-        raise InputError(f"the line scan holds {q.size} wavelengths: too few for a spectrum")
+        raise InputError(
+            f"the line scan holds {q.size} wavelengths: too few for a spectrum"
+        )
     edges = np.geomspace(q[0] - unit / 2, q[-1] + unit / 2, bins + 1)
     filled = np.unique(np.searchsorted(edges, q, side="right") - 1)
     edges = np.append(edges[filled], edges[-1])
@@ -121,22 +152,28 @@ def _isotropic(
 ) -> FloatArray:  # fmt: skip
     """C at the edges of bins [length^4], h_rms^2 = 2 pi integral C q dq.
 
-    `fine` are the ends of panels, `mean` is C_1D of each bin, `count` its independent components, `kernel` its C_1D for
-    C = 1 on each panel, `squares` are the mean squares of height and gradient.
+    `fine` are the ends of panels, `mean` is C_1D of each bin, `count` its independent
+    components, `kernel` its C_1D for C = 1 on each panel, `squares` are the mean squares of
+    height and gradient.
     """
     from scipy.optimize import least_squares
     from scipy.special import digamma
 
     log_q = np.log(edges)
     middle = np.log(fine[1:] * fine[:-1]) / 2
-    between = np.stack([np.interp(middle, log_q, row) for row in np.eye(log_q.size)], axis=1)
+    between = np.stack(
+        [np.interp(middle, log_q, row) for row in np.eye(log_q.size)], axis=1
+    )
     independent = np.maximum(count, 1.0)
     # bins without power, as for a square profile, are omitted
     lit = mean > MIN_POWER * mean.max()
     weight, mean = np.sqrt(independent) * lit, np.where(lit, mean, 1.0)
     # the logarithm of a mean of few samples is biased low
     wanted = np.log(mean) - digamma(independent) + np.log(independent)
-    bend = np.diff(np.diff(np.eye(log_q.size), axis=0) / np.diff(log_q)[:, None], axis=0) / STRAIGHT
+    bend = (
+        np.diff(np.diff(np.eye(log_q.size), axis=0) / np.diff(log_q)[:, None], axis=0)
+        / STRAIGHT
+    )
     sums = np.stack([np.pi * np.diff(fine**2), np.pi / 2 * np.diff(fine**4)])
     totals = np.log(squares)
 
@@ -152,7 +189,9 @@ def _isotropic(
         return np.vstack([weight[:, None] * seen, bend, HELD * held])
 
     middles = np.sqrt(edges[1:] * edges[:-1])
-    start = np.interp(log_q, np.log(middles[lit]), np.log(mean[lit] / (2 * np.pi * middles[lit])))
+    start = np.interp(
+        log_q, np.log(middles[lit]), np.log(mean[lit] / (2 * np.pi * middles[lit]))
+    )
     return np.asarray(np.exp(least_squares(deviations, start, jac=jacobian).x))
 
 

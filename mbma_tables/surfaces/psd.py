@@ -12,19 +12,31 @@ from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
-BINS_PER_DECADE = 20  # 12% wide: accuracy of a break's position; bins of a dense spectrum still average many entries
+# 12% wide: accuracy of a break's position; bins of a dense spectrum still average many
+# entries
+BINS_PER_DECADE = 20
 MIN_POINTS = 6  # two define the line, four test it
 MIN_PIECE = 3  # bins in a roll-off or in what follows a cut; fewer would fit noise
-SCATTER = 0.1  # scatter of ln C of real surfaces about a power law, besides counting statistics
-HURST_TOLERANCE = 0.05  # bias of H on small windowed maps: fitted values up to this far above 1 are set to 1
+SCATTER = (
+    0.1  # scatter of ln C of real surfaces about a power law, besides counting statistics
+)
+# bias of H on small windowed maps: fitted values up to this far above 1 are set to 1
+HURST_TOLERANCE = 0.05
 MARGIN = 6.0  # differences of Bayesian information above this count as strong evidence
-TYPICAL_SLOPE = 3.5  # C q^3.5 is nearly flat for every H, so that averages within a bin do not depend on its filling
-MAX_RESIDUAL = 0.2  # deviation of log10 C, a factor 1.6: larger ones make the fit meaningless at single wavelengths
+# C q^3.5 is nearly flat for every H, so that averages within a bin do not depend on its
+# filling
+TYPICAL_SLOPE = 3.5
+# deviation of log10 C, a factor 1.6: larger ones make the fit meaningless at single
+# wavelengths
+MAX_RESIDUAL = 0.2
 MAX_HURST_ERROR = 0.1  # the model's results at H and H +- 0.1 differ by tens of percent
 MAX_EXCESS = 10.0  # C over the law in a single bin; random with a probability below 1e-4
-MAX_PEAK = 100.0  # C over both its neighbourhoods; random in single samples with a probability of 2e-4
+# C over both its neighbourhoods; random in single samples with a probability of 2e-4
+MAX_PEAK = 100.0
 MAX_ANISOTROPY = 1.36  # twice the mean squared gradient one way than across it
-MIN_VARIANCE_SHARE = 0.1  # a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
+MIN_VARIANCE_SHARE = (
+    0.1  # a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,15 +53,21 @@ class SpectrumFit:
     'H = 0.70 +- 0.00 of 40 points, roll-off None'
     """
 
-    hurst: float  # fitted: where it lies above 1 within its uncertainty, the surface has 1
+    hurst: (
+        float  # fitted: where it lies above 1 within its uncertainty, the surface has 1
+    )
     hurst_error: float  # its standard error
     q0: float  # the surface's band
     q1: float
     q_low: float  # least and largest wavenumber of the points that the line was fitted to
     q_high: float
     points: int  # number of these spectral points (logarithmic bins)
-    residual: float  # rms deviation of log10 C from the law, bins weighted by what they average
-    roll_off: float | None  # wavenumber below which the spectrum is flat; None if it is not
+    residual: (
+        float  # rms deviation of log10 C from the law, bins weighted by what they average
+    )
+    roll_off: (
+        float | None
+    )  # wavenumber below which the spectrum is flat; None if it is not
     cut_off: float | None  # wavenumber above which it departs from the law, likewise
     variance_share: float  # of the measured variance of height, inside [q0, q1]
 
@@ -90,10 +108,14 @@ def log_bins(q: FloatArray, C: FloatArray, counts: FloatArray) -> Bins:
     relative = q / np.exp(log_q)[np.cumsum(filled)[place] - 1]
     mean = np.bincount(place, counts * C * relative**TYPICAL_SLOPE)[filled] / total
     floor = np.finfo(float).tiny  # a gap in the spectrum: as a logarithm, far off any law
-    return Bins(np.exp(log_q), np.log(np.maximum(mean, floor)), 1 / (1 / total + SCATTER**2))
+    return Bins(
+        np.exp(log_q), np.log(np.maximum(mean, floor)), 1 / (1 / total + SCATTER**2)
+    )
 
 
-def _straight(x: FloatArray, bins: Bins, start: int, stop: int) -> tuple[float, float, float, float]:
+def _straight(
+    x: FloatArray, bins: Bins, start: int, stop: int
+) -> tuple[float, float, float, float]:
     """Weighted line through bins[start:stop]: (intercept, slope, chi^2, weighted spread of x)."""
     w, x, y = bins.weight[start:stop], x[start:stop], bins.log_c[start:stop]
     x_mean, y_mean = np.average(x, weights=w), np.average(y, weights=w)
@@ -111,7 +133,11 @@ def _roll_off(x: FloatArray, bins: Bins, stop: int) -> tuple[float, int, float |
     level = float(np.average(y, weights=w))
     flat = float(w @ (y - level) ** 2)
     _, slope, rising, _ = _straight(x, bins, 0, stop)
-    return (rising, 3, None) if slope > 0 and rising + math.log(len(x)) < flat else (flat, 2, level)
+    return (
+        (rising, 3, None)
+        if slope > 0 and rising + math.log(len(x)) < flat
+        else (flat, 2, level)
+    )
 
 
 def find_law(bins: Bins, unit: float, breaks: bool) -> PowerLaw:
@@ -122,27 +148,35 @@ def find_law(bins: Bins, unit: float, breaks: bool) -> PowerLaw:
         starts += range(MIN_PIECE, count - MIN_POINTS + 1)
         stops += range(MIN_POINTS, count - MIN_PIECE + 1)
     roll_offs = {start: _roll_off(x, bins, start) for start in starts}
-    departures = {stop: _straight(x, bins, stop, count)[2] if stop < count else 0.0 for stop in stops}
+    departures = {
+        stop: _straight(x, bins, stop, count)[2] if stop < count else 0.0
+        for stop in stops
+    }
     laws = []
     for start, stop in ((i, j) for i in starts for j in stops if j - i >= MIN_POINTS):
         log_k, slope, chi2, spread = _straight(x, bins, start, stop)
         before, more, level = roll_offs[start]
-        # each piece by its own scatter, or a tail that no line fits would hide the misfit of the law; the scatter
-        # expected anyway, 1, is not fitted
+        # each piece by its own scatter, or a tail that no line fits would hide the misfit
+        # of the law; the scatter expected anyway, 1, is not fitted
         pieces = ((before, start), (chi2, stop - start), (departures[stop], count - stop))
-        information = sum(size * math.log(1 + misfit / size) for misfit, size in pieces if size)
+        information = sum(
+            size * math.log(1 + misfit / size) for misfit, size in pieces if size
+        )
         information += (2 + more + 3 * (stop < count)) * math.log(count)
         error = math.sqrt(chi2 / (stop - start - 2) / spread)
         laws.append(PowerLaw(start, stop, log_k, -slope, error, level, information))
     best = min(laws, key=lambda law: law.criterion)
-    # a roll-off and its law can also be described as a law and its departure: only one of them is self-affine
+    # a roll-off and its law can also be described as a law and its departure: only one of
+    # them is self-affine
     wide = [law for law in laws if bins.q[law.stop - 1] > MIN_ZETA_1 * bins.q[law.start]]
     likely = [law for law in wide if 0 < law.slope / 2 - 1 <= 1 + HURST_TOLERANCE]
     chosen = min(likely, key=lambda law: law.criterion, default=best)
     return chosen if chosen.criterion <= best.criterion + MARGIN else best
 
 
-def _band_of(bins: Bins, law: PowerLaw, unit: float, ends: tuple[float, float]) -> tuple[float, float]:
+def _band_of(
+    bins: Bins, law: PowerLaw, unit: float, ends: tuple[float, float]
+) -> tuple[float, float]:
     """The band that the law holds in, within `ends`."""
     (q0, q1), q = ends, bins.q
     if law.start:
@@ -157,7 +191,9 @@ def _checked(band: Any, low: float, high: float) -> tuple[float, float]:
     """A forced band as two numbers inside [low, high], the range that the measurement holds."""
     pair = finite_array("band", band)
     if pair.shape != (2,) or not pair[0] < pair[1]:
-        raise InputError(f"band must be two wavenumbers (q_low, q_high) with q_low < q_high, got {band!r}")
+        raise InputError(
+            f"band must be two wavenumbers (q_low, q_high) with q_low < q_high, got {band!r}"
+        )
     good = (pair >= low * (1 - 1e-9)) & (pair <= high * (1 + 1e-9))
     require("band", pair, good, f"within the measured range [{low:.6g}, {high:.6g}]")
     return float(pair[0]), float(pair[1])
@@ -174,8 +210,8 @@ def fit_spectrum(
 ) -> dict[str, Any]:
     """Numbers of the `Surface` whose band fits C of the paper's convention, with their `fit`.
 
-    `counts` and `variances` are independent samples and variance of height of each entry; wavenumbers below `low` are
-    not fitted.
+    `counts` and `variances` are independent samples and variance of height of each entry;
+    wavenumbers below `low` are not fitted.
     """
     unit, last = float(q.min()), float(q.max())
     band = None if band is None else _checked(band, unit, last)
@@ -187,24 +223,41 @@ def fit_spectrum(
             f"only {len(bins.q)} spectral points between q = {least:.6g} and {most:.6g}; "
             f"a power law needs at least {MIN_POINTS}"
         )
-    rise = bins.log_c[MIN_PIECE:-MIN_PIECE] - np.maximum(bins.log_c[: -2 * MIN_PIECE], bins.log_c[2 * MIN_PIECE :])
-    _refuse_peak(bins.q[MIN_PIECE:-MIN_PIECE], rise, MAX_PEAK, "what it is on either side")
+    rise = bins.log_c[MIN_PIECE:-MIN_PIECE] - np.maximum(
+        bins.log_c[: -2 * MIN_PIECE], bins.log_c[2 * MIN_PIECE :]
+    )
+    _refuse_peak(
+        bins.q[MIN_PIECE:-MIN_PIECE], rise, MAX_PEAK, "what it is on either side"
+    )
     law = find_law(bins, unit, breaks=band is None)
-    hurst, error, used = law.slope / 2 - 1, law.slope_error / 2, bins[law.start : law.stop]
+    hurst, error, used = (
+        law.slope / 2 - 1,
+        law.slope_error / 2,
+        bins[law.start : law.stop],
+    )
     if not 0 < hurst <= 1 + max(HURST_TOLERANCE, 2 * error):
         raise NotSelfAffineError(
             f"between q = {used.q[0]:.4g} and {used.q[-1]:.4g} the spectrum goes like "
             f"q^{-law.slope:.3g}: a Hurst exponent of {hurst:.3g} +- {error:.2g}, "
-            + ("above 1 (a smooth surface)" if hurst > 0 else "not above 0 (white noise has -1)")
+            + (
+                "above 1 (a smooth surface)"
+                if hurst > 0
+                else "not above 0 (white noise has -1)"
+            )
         )
     exponent, log_k = min(hurst, 1.0), law.log_k
     if hurst > 1:
-        log_k = float(np.average(used.log_c + 4 * np.log(used.q / unit), weights=used.weight))
+        log_k = float(
+            np.average(used.log_c + 4 * np.log(used.q / unit), weights=used.weight)
+        )
 
     def beyond(points: Bins) -> FloatArray:
-        return np.asarray(points.log_c - log_k + (2 + 2 * exponent) * np.log(points.q / unit))
+        return np.asarray(
+            points.log_c - log_k + (2 + 2 * exponent) * np.log(points.q / unit)
+        )
 
-    # without roll-off the band extends to the map's size, though its longest wavelengths are not fitted
+    # without roll-off the band extends to the map's size, though its longest wavelengths
+    # are not fitted
     q0, q1 = band or _band_of(bins, law, unit, (unit, last))
     fit = SpectrumFit(
         hurst=hurst,
@@ -214,16 +267,24 @@ def fit_spectrum(
         q_low=float(used.q[0]),
         q_high=float(used.q[-1]),
         points=law.stop - law.start,
-        residual=math.sqrt(np.average(beyond(used) ** 2, weights=used.weight)) / math.log(10),
+        residual=math.sqrt(np.average(beyond(used) ** 2, weights=used.weight))
+        / math.log(10),
         roll_off=q0 if law.start else None,
         cut_off=q1 if law.stop < len(bins.q) else None,
         variance_share=float(variances[(q >= q0) & (q <= q1)].sum() / variances.sum()),
     )
     below = every[every.q <= fit.q_high]
-    _refuse_peak(below.q, beyond(below), MAX_EXCESS, f"the power law between {fit.q_low:.4g} and {fit.q_high:.4g}")
+    _refuse_peak(
+        below.q,
+        beyond(below),
+        MAX_EXCESS,
+        f"the power law between {fit.q_low:.4g} and {fit.q_high:.4g}",
+    )
     _refuse_poor(fit, anisotropy or 1.0, forced=band is not None)
     # h_rms^2 is the integral of (6) between q0 and q1
-    growth = -math.expm1(-2 * exponent * math.log(q1 / q0)) * (q0 / unit) ** (-2 * exponent)
+    growth = -math.expm1(-2 * exponent * math.log(q1 / q0)) * (q0 / unit) ** (
+        -2 * exponent
+    )
     h_rms = unit * math.sqrt(math.pi * math.exp(log_k) * growth / exponent)
     return {"hurst": exponent, "q0": q0, "q1": q1, "h_rms": h_rms, "fit": fit}
 

@@ -1,7 +1,8 @@
 """Roughness parameters: the surface with those of a drawing, each assumption stated; those of a height map.
 
-A profile along any line of an isotropic surface has its variance of height m0 and, for the variance of slope, m2, while
-the gradient of the surface has 2 m2. Everything else that is assumed follows from Gaussian heights.
+A profile along any line of an isotropic surface has its variance of height m0 and, for the
+variance of slope, m2, while the gradient of the surface has 2 m2. Everything else that is
+assumed follows from Gaussian heights.
 """
 
 from __future__ import annotations
@@ -56,13 +57,17 @@ def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str) -> str:
     """The one of the names that is given, "" for none; an error for several."""
     several = [name for name in names if name in given]
     if len(several) > 1:
-        raise InputError(f"{what}: give one of {', '.join(names)}; got {' and '.join(several)}")
+        raise InputError(
+            f"{what}: give one of {', '.join(names)}; got {' and '.join(several)}"
+        )
     return several[0] if several else ""
 
 
 def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of `Surface` from numbers of a drawing; see `Surface.from_roughness`."""
-    given, unit = resolve({name: value for name, value in numbers.items() if value is not None}, unit)
+    given, unit = resolve(
+        {name: value for name, value in numbers.items() if value is not None}, unit
+    )
     height = _one_of(HEIGHTS, given, "the height of roughness")
     slope = _one_of(SLOPES, given, "the slope of roughness")
     top = _one_of(TOPS, given, "the highest point")
@@ -71,14 +76,22 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     if not height:
         missing.append(f"the height of roughness, one of {', '.join(HEIGHTS)}")
     if "hurst" not in given:
-        missing.append("hurst, which a drawing does not tell (0.8 is common, and `sensitivity` gives its influence)")
+        missing.append(
+            "hurst, which a drawing does not tell (0.8 is common, and `sensitivity` gives its influence)"
+        )
     if len(band) < 2:
         others = " and ".join(band) or "none"
-        missing.append(f"the band of wavelengths, two of longest, shortest and Rdq (or Sdq, Rsm); got {others}")
+        missing.append(
+            f"the band of wavelengths, two of longest, shortest and Rdq (or Sdq, Rsm); got {others}"
+        )
     if not top:
-        missing.append(f"the highest point, one of {', '.join(TOPS)}, which Rq and Ra do not determine ({TYPICAL})")
+        missing.append(
+            f"the highest point, one of {', '.join(TOPS)}, which Rq and Ra do not determine ({TYPICAL})"
+        )
     if missing:
-        raise InputError(f"roughness has {', '.join(given) or 'no numbers'}; missing: {'; '.join(missing)}")
+        raise InputError(
+            f"roughness has {', '.join(given) or 'no numbers'}; missing: {'; '.join(missing)}"
+        )
     if len(band) > 2:
         raise InputError(
             f"the band of wavelengths needs two of longest, shortest and Rdq (or Sdq, Rsm); got {' and '.join(band)}"
@@ -90,19 +103,39 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     h_rms = at[height] * (math.sqrt(math.pi / 2) if height in ("Ra", "Sa") else 1.0)
     said = f" [{unit}]" if unit else ""
     if top != "nominal_area":
-        require(f"{top}{said}", at[top], at[top] > h_rms, f"above the rms height; {TYPICAL}")
+        require(
+            f"{top}{said}", at[top], at[top] > h_rms, f"above the rms height; {TYPICAL}"
+        )
     if not slope:
         long, short = at["longest"], at["shortest"]
         few = long <= spectrum.MIN_ZETA_1 * short
-        require(f"longest{said}", long, ~few, f"more than 3 times shortest, {describe_entries(short, few)}")
+        require(
+            f"longest{said}",
+            long,
+            ~few,
+            f"more than 3 times shortest, {describe_entries(short, few)}",
+        )
     if slope and "rolloff" in at:
         q0, q1 = _band_with_rolloff(at, h_rms, slope)
     else:
         q0, q1 = _band(at, h_rms, slope)
     used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
-    shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
-    record = {"given": shown, "unit": unit, "assumed": [ASSUMED, *(SAID[name] for name in used)]}
-    surface: dict[str, Any] = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms, "unit": unit}
+    shown = {
+        name: given[name].tolist() if hasattr(given[name], "tolist") else given[name]
+        for name in used
+    }
+    record = {
+        "given": shown,
+        "unit": unit,
+        "assumed": [ASSUMED, *(SAID[name] for name in used)],
+    }
+    surface: dict[str, Any] = {
+        "hurst": at["hurst"],
+        "q0": q0,
+        "q1": q1,
+        "h_rms": h_rms,
+        "unit": unit,
+    }
     surface |= {"provenance": ({"step": "from_roughness", **record},)}
     surface["nominal_area" if top == "nominal_area" else "h_max"] = at[top]
     return surface if "rolloff" not in given else _rolled_off(surface, at["rolloff"])
@@ -112,7 +145,9 @@ def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
     """Arguments of a surface whose spectrum is flat down to a wavelength."""
     if rolloff.ndim:
         raise InputError(f"rolloff is of one surface, got shape {rolloff.shape}")
-    hurst, q0, q1, h_rms = (float(surface.pop(name)) for name in ("hurst", "q0", "q1", "h_rms"))
+    hurst, q0, q1, h_rms = (
+        float(surface.pop(name)) for name in ("hurst", "q0", "q1", "h_rms")
+    )
     start = 2 * math.pi / float(rolloff)
     good = np.asarray(q0 < start < q1 / spectrum.MIN_ZETA_1)
     allowed = f"between 3 times shortest, {6 * math.pi / q1:.6g}, and longest, {2 * math.pi / q0:.6g}"
@@ -123,7 +158,9 @@ def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
     return surface | {"q": np.array([q0, start, q1]), "C": C}
 
 
-def _band(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> tuple[FloatArray, FloatArray]:
+def _band(
+    at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str
+) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest wavenumber: q1/q0 is where m2/m0 over q0^2, or over q1^2, has the wanted value."""
     end, *other = (2 * math.pi / at[wave] for wave in WAVES if wave in at)
     if not slope:
@@ -135,27 +172,45 @@ def _band(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> tuple[
 
     def ratio(x: Any, h: Any) -> Any:
         zeta = np.exp(x)
-        return spectrum.band_moment(2, h, 1.0, zeta) / spectrum.band_moment(0, h, 1.0, zeta) / zeta**power
+        return (
+            spectrum.band_moment(2, h, 1.0, zeta)
+            / spectrum.band_moment(0, h, 1.0, zeta)
+            / zeta**power
+        )
 
     ends = math.log(spectrum.MIN_ZETA_1), math.log(spectrum.MAX_ZETA_1)
     least, most = np.sort(np.stack([ratio(x, at["hurst"]) for x in ends]), axis=0)
-    bounds = np.stack([at[slope] * (each / wanted) ** (-0.5 if slope == "Rsm" else 0.5) for each in (least, most)])
+    bounds = np.stack(
+        [
+            at[slope] * (each / wanted) ** (-0.5 if slope == "Rsm" else 0.5)
+            for each in (least, most)
+        ]
+    )
     allowed = f"between {bounds.min():.4g} and {bounds.max():.4g}, for a band of 3 < q1/q0 < 1e8 at these wavelengths"
     require(slope, at[slope], (wanted > least) & (wanted < most), allowed)
     args = (at["hurst"], wanted)
-    found = find_root(lambda x, h, goal: np.log(ratio(x, h) / goal), ends, args=args, tolerances={"xrtol": 1e-15})
+    found = find_root(
+        lambda x, h, goal: np.log(ratio(x, h) / goal),
+        ends,
+        args=args,
+        tolerances={"xrtol": 1e-15},
+    )
     zeta = np.asarray(np.exp(found.x))
     return (end, end * zeta) if power == 0 else (end / zeta, end)
 
 
-def _slope_variance(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> FloatArray:
+def _slope_variance(
+    at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str
+) -> FloatArray:
     """m2 of a slope of roughness."""
     if slope == "Rsm":
         return np.asarray((2 * math.pi * h_rms / at["Rsm"]) ** 2)
     return np.asarray(at[slope] ** 2 / (2 if slope == "Sdq" else 1))
 
 
-def _band_with_rolloff(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str) -> tuple[FloatArray, FloatArray]:
+def _band_with_rolloff(
+    at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str
+) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest wavenumber of a spectrum that is flat down to a wavelength and has a given slope."""
     if h_rms.ndim:
         raise InputError(f"rolloff is of one surface, got shape {h_rms.shape}")
@@ -168,7 +223,8 @@ def _band_with_rolloff(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: s
     def excess(longer: float, zeta: float) -> float:
         """ln of m2/(m0 start^2) over the wanted one, for q0 = start/longer and q1 = zeta start.
 
-        m0 = 2 pi C (flat_0 + law_0) and m2 = pi C (flat_2 + law_2), with the integrals of q dq and q^3 dq.
+        m0 = 2 pi C (flat_0 + law_0) and m2 = pi C (flat_2 + law_2), with the integrals of q
+        dq and q^3 dq.
         """
         flat_0 = (1 - longer**-2) / 2
         flat_2 = (1 - longer**-4) / 4
@@ -178,11 +234,14 @@ def _band_with_rolloff(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: s
             law_2 = math.expm1((2 - 2 * hurst) * math.log(zeta)) / (2 - 2 * hurst)
         return math.log((flat_2 + law_2) / (2 * (flat_0 + law_0)) / wanted)
 
-    # the wavelength that is not given follows from the slope: it rises with q1, and falls with the longest
+    # the wavelength that is not given follows from the slope: it rises with q1, and falls
+    # with the longest
     if "longest" in at:
         longer = float(at["longest"]) * start / (2 * math.pi)
         if longer < 1:
-            raise InputError("rolloff must be at most longest, from which on the spectrum is flat")
+            raise InputError(
+                "rolloff must be at most longest, from which on the spectrum is flat"
+            )
         ends = spectrum.MIN_ZETA_1 * (1 + 1e-9), spectrum.MAX_ZETA_1
 
         def residual(x: float) -> float:
@@ -190,7 +249,9 @@ def _band_with_rolloff(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: s
     else:
         zeta = 2 * math.pi / float(at["shortest"]) / start
         if zeta <= spectrum.MIN_ZETA_1:
-            raise InputError("rolloff must be more than 3 times shortest, between which the spectrum falls")
+            raise InputError(
+                "rolloff must be more than 3 times shortest, between which the spectrum falls"
+            )
         ends = 1 + 1e-9, spectrum.MAX_ZETA_1
 
         def residual(x: float) -> float:
@@ -200,7 +261,9 @@ def _band_with_rolloff(at: Mapping[str, FloatArray], h_rms: FloatArray, slope: s
     # of m2 over the wanted one at both ends, its root; of Rsm the inverse
     ratios = sorted(math.exp(residual(x) / 2) for x in (low, high))
     number = float(at[slope])
-    bounds = sorted(number / ratio if slope == "Rsm" else number * ratio for ratio in ratios)
+    bounds = sorted(
+        number / ratio if slope == "Rsm" else number * ratio for ratio in ratios
+    )
     allowed = f"between {bounds[0]:.4g} and {bounds[1]:.4g}, which spectra with this rolloff have"
     require(slope, at[slope], np.asarray(bounds[0] < number < bounds[1]), allowed)
     found = math.exp(brentq(residual, low, high, xtol=1e-14, rtol=1e-14))
@@ -222,8 +285,9 @@ def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str
     Returns
     -------
     dict of float
-        Lengths in the unit of the map; `Smr1` and `Smr2` as shares; `Sdq` by central differences; `lay` in degrees from
-        the x axis towards y, in [0, 180): the direction along which the mean squared gradient is least.
+        Lengths in the unit of the map; `Smr1` and `Smr2` as shares; `Sdq` by central
+        differences; `lay` in degrees from the x axis towards y, in [0, 180): the direction
+        along which the mean squared gradient is least.
 
     Examples
     --------
@@ -263,9 +327,10 @@ def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str
 def core(heights: FloatArray) -> dict[str, float]:
     """Sk, Spk, Svk, Smr1 and Smr2 of heights of any shape.
 
-    A line is fitted to the 40% of the material ratio curve where its secant is least steep. Sk is the line's height
-    difference between ratios 0 and 1, and Smr1 and Smr2 are the ratios at which the curve has these heights. Spk and
-    Svk are the heights of triangles over Smr1 and 1 - Smr2 of the area of the curve beyond.
+    A line is fitted to the 40% of the material ratio curve where its secant is least steep.
+    Sk is the line's height difference between ratios 0 and 1, and Smr1 and Smr2 are the
+    ratios at which the curve has these heights. Spk and Svk are the heights of triangles
+    over Smr1 and 1 - Smr2 of the area of the curve beyond.
     """
     curve = np.sort(heights, axis=None)[::-1]
     count = curve.size
@@ -275,7 +340,9 @@ def core(heights: FloatArray) -> dict[str, float]:
     least = np.flatnonzero(secants <= secants.min() * (1 + 1e-12))
     part = slice(first := int(least[least.size // 2]), first + width)
     centre, level = ratio[part].mean(), curve[part].mean()
-    slope = ((ratio[part] - centre) @ (curve[part] - level)) / np.sum((ratio[part] - centre) ** 2)
+    slope = ((ratio[part] - centre) @ (curve[part] - level)) / np.sum(
+        (ratio[part] - centre) ** 2
+    )
     upper, lower = level - slope * centre, level + slope * (1 - centre)
     peaks, valleys = np.maximum(curve - upper, 0.0), np.maximum(lower - curve, 0.0)
     above, below = np.count_nonzero(peaks) / count, np.count_nonzero(valleys) / count

@@ -41,30 +41,60 @@ class Case(NamedTuple):
 
     title: str
     unit: str | None  # of length; None if lengths are over h_rms
-    numbers: Mapping[str, Any]  # arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments
+    numbers: Mapping[
+        str, Any
+    ]  # arguments of `Surface`, or of `Surface.from_moments` if the paper gives moments
 
 
-def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, top: float) -> dict[str, float]:
-    return {"hurst": hurst, "q0": q0, "q1": q0 * zeta_1, "h_rms": h_rms, "h_max": top * h_rms}
+def _band(
+    hurst: float, q0: float, zeta_1: float, h_rms: float, top: float
+) -> dict[str, float]:
+    return {
+        "hurst": hurst,
+        "q0": q0,
+        "q1": q0 * zeta_1,
+        "h_rms": h_rms,
+        "h_max": top * h_rms,
+    }
 
 
-def _moments(hurst: float, m0: float, m2: float, m4: float, h_max: float) -> dict[str, float]:
+def _moments(
+    hurst: float, m0: float, m2: float, m4: float, h_max: float
+) -> dict[str, float]:
     return {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4, "h_max": h_max}
 
 
 CASES = {
     "yang-persson": Case(
-        "Yang-Persson molecular dynamics (Fig. 11)", "nm", _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0)
+        "Yang-Persson molecular dynamics (Fig. 11)",
+        "nm",
+        _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0),
     ),
     "papangelo": Case(
-        "Papangelo Green's function simulation (Fig. 12)", "um", _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0)
+        "Papangelo Green's function simulation (Fig. 12)",
+        "um",
+        _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0),
     ),
-    "concrete": Case("concrete road of Lorenz (Figs. 13a, 14a)", "mm", _moments(0.7, 0.071, 0.27, 62.0, 1.1)),
-    "asphalt": Case("asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _moments(0.85, 0.091, 2.67, 21000.0, 1.37)),
-    "challenge": Case("contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7)),
+    "concrete": Case(
+        "concrete road of Lorenz (Figs. 13a, 14a)",
+        "mm",
+        _moments(0.7, 0.071, 0.27, 62.0, 1.1),
+    ),
+    "asphalt": Case(
+        "asphalt road of Lorenz (Figs. 13b, 14b)",
+        "mm",
+        _moments(0.85, 0.091, 2.67, 21000.0, 1.37),
+    ),
+    "challenge": Case(
+        "contact-mechanics challenge (Fig. 15)",
+        "um",
+        _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7),
+    ),
 } | {
     f"resolution-{z}": Case(
-        f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)", None, _band(0.7, 0.1, z, 1.0, 3.0)
+        f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)",
+        None,
+        _band(0.7, 0.1, z, 1.0, 3.0),
     )
     for z in (125, 250, 500, 1000)
 }
@@ -83,7 +113,9 @@ class SelfAffine(AnySurface):
     spectral: ClassVar[Any]  # `MeasuredSurface`
     unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
-    provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
+    provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(
+        default=(), repr=False, kw_only=True
+    )
     nominal_area: dataclasses.InitVar[Any] = dataclasses.field(default=None, kw_only=True)
 
     def __post_init__(self, nominal_area: Any) -> None:
@@ -91,27 +123,55 @@ class SelfAffine(AnySurface):
         vars(self).update(unit=units.length)
         if nominal_area is not None:
             # derived from the other numbers, which are checked for that
-            numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
-            like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
+            numbers = [
+                units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]
+            ]
+            like = dataclasses.replace(
+                self,
+                **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)),
+                nominal_area=None,
+            )
             h_max, provenance = of_area(like, nominal_area, self.h_max)
             vars(self).update(h_max=h_max, provenance=provenance)
         elif self.h_max is None:
-            raise InputError("h_max is missing: the highest point above the mid-plane, or give the nominal_area")
+            raise InputError(
+                "h_max is missing: the highest point above the mid-plane, or give the nominal_area"
+            )
         if self.labelled:
             for name in PARAMETERS:
                 units.number(name, getattr(self, name))
             # perhaps lazy: checked block by block, where numbers are computed
             return
         given = {name: finite_array(name, getattr(self, name)) for name in PARAMETERS}
-        require("hurst", given["hurst"], (given["hurst"] >= np.finfo(float).tiny) & (given["hurst"] <= 1), "in (0, 1]")
+        require(
+            "hurst",
+            given["hurst"],
+            (given["hurst"] >= np.finfo(float).tiny) & (given["hurst"] <= 1),
+            "in (0, 1]",
+        )
         for name in ("q0", "q1", "h_rms", "h_max"):
             require(name, given[name], given[name] > 0, "positive")
             sized = (given[name] >= 1 / LARGEST) & (given[name] <= LARGEST)
-            require(name, given[name], sized, f"from {1 / LARGEST:g} to {LARGEST:g}: take another unit of length")
+            require(
+                name,
+                given[name],
+                sized,
+                f"from {1 / LARGEST:g} to {LARGEST:g}: take another unit of length",
+            )
         shape = broadcast_shape(**given)
-        vars(self).update({name: frozen(np.array(spread(array, shape)))[()] for name, array in given.items()})
+        vars(self).update(
+            {
+                name: frozen(np.array(spread(array, shape)))[()]
+                for name, array in given.items()
+            }
+        )
         zeta_1 = np.asarray(self.zeta_1)
-        require("q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3: q1 is the largest wavenumber")
+        require(
+            "q1/q0",
+            zeta_1,
+            zeta_1 > spectrum.MIN_ZETA_1,
+            "greater than 3: q1 is the largest wavenumber",
+        )
         require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
 
     def __repr__(self) -> str:
@@ -143,7 +203,8 @@ class SelfAffine(AnySurface):
         ----------
         hurst, h_max, nominal_area, unit : as for `Surface`
         m0, m2, m4 : array_like
-            Variance of height [length^2], of a profile's slope, of its second derivative [1/length^2].
+            Variance of height [length^2], of a profile's slope, of its second derivative
+            [1/length^2].
 
         Returns
         -------
@@ -188,8 +249,9 @@ class SelfAffine(AnySurface):
     ) -> Any:
         """A surface from the roughness parameters of a drawing or a profilometer.
 
-        Required are one height, one highest point, the Hurst exponent, and two of slope, longest and shortest
-        wavelength. `provenance` contains the assumed meaning of each number; docs/surfaces.md has typical values.
+        Required are one height, one highest point, the Hurst exponent, and two of slope,
+        longest and shortest wavelength. `provenance` contains the assumed meaning of each
+        number; docs/surfaces.md has typical values.
 
         Parameters
         ----------
@@ -199,12 +261,13 @@ class SelfAffine(AnySurface):
         Rq, Ra, Sq, Sa : array_like, one of them
             Root-mean-square or mean absolute height of a profile or of a map [length].
         Rdq, Sdq, Rsm : array_like, one of them, optional
-            Root-mean-square slope of a profile, gradient of a map, or mean spacing of a profile's elements [length].
+            Root-mean-square slope of a profile, gradient of a map, or mean spacing of a
+            profile's elements [length].
         longest, shortest : array_like, optional
             Wavelengths at which the roughness ends [length].
         rolloff : float or str, optional
-            Longest wavelength of the power law [length]; between `longest` and it the spectrum is flat, as for most
-            machined faces. Default: `longest`.
+            Longest wavelength of the power law [length]; between `longest` and it the
+            spectrum is flat, as for most machined faces. Default: `longest`.
 
         Returns
         -------
@@ -225,7 +288,9 @@ class SelfAffine(AnySurface):
         >>> ground.provenance[0]["assumed"][2]
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
-        given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
+        given = {
+            name: value for name, value in locals().items() if name not in ("cls", "unit")
+        }
         numbers = surface_of_roughness(unit, given)
         return cls.spectral(**numbers) if "C" in numbers else cls(**numbers)
 
@@ -246,7 +311,9 @@ class SelfAffine(AnySurface):
         (0.762, 'um')
         """
         if not isinstance(name, str) or name not in CASES:
-            raise InputError(f"no surface is named {name!r}; there are {', '.join(CASES)}")
+            raise InputError(
+                f"no surface is named {name!r}; there are {', '.join(CASES)}"
+            )
         _, unit, numbers = CASES[name]
         return (cls.from_moments if "m0" in numbers else cls)(**numbers, unit=unit)
 
@@ -268,12 +335,16 @@ class SelfAffine(AnySurface):
     @property
     def m2(self) -> Any:
         """Variance of a profile's slope, Eq. (7)."""
-        return (self.s * self.q0) ** 2 * spectrum.band_moment(2, self.hurst, 1.0, self.zeta_1)
+        return (self.s * self.q0) ** 2 * spectrum.band_moment(
+            2, self.hurst, 1.0, self.zeta_1
+        )
 
     @property
     def m4(self) -> Any:
         """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
-        return (self.s * self.q0**2) ** 2 * spectrum.band_moment(4, self.hurst, 1.0, self.zeta_1)
+        return (self.s * self.q0**2) ** 2 * spectrum.band_moment(
+            4, self.hurst, 1.0, self.zeta_1
+        )
 
     def with_numbers(self, *numbers: Any) -> Self:
         """Another surface, in the same unit; the records of one surface go with it."""
@@ -285,7 +356,9 @@ class SelfAffine(AnySurface):
         wavenumber = positive_array("q", q)
         scale = self.hurst / math.pi * (self.s / self.q0) ** 2
         inside = (wavenumber >= self.q0) & (wavenumber <= self.q1)
-        return np.where(inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0)[()]
+        return np.where(
+            inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0
+        )[()]
 
 
 def _shown(value: Any) -> str:

@@ -24,31 +24,49 @@ from mbma_tables.surfaces.treatment import Treated
 if TYPE_CHECKING:
     from mbma_tables.surfaces.map_simulation import MapSimulation
 
-# ranges of the surfaces of the data set's group elastic. If they are taken as isotropic Gaussian ones, area is within
-# 20% between 1% and 10% contact; outside the ranges it is wrong by 30% to factors
+# ranges of the surfaces of the data set's group elastic. If they are taken as isotropic
+# Gaussian ones, area is within 20% between 1% and 10% contact; outside the ranges it is
+# wrong by 30% to factors
 BY_SPECTRUM = {
     "skewness of heights": (-0.4, 0.4),
     "kurtosis of heights": (2.4, 4.4),
     "kurtosis of slopes": (2.8, 3.3),
     "anisotropy": (1.0, 4.1),
 }
-# ranges of maps with the stated scatter; and of all kinds of which several were simulated (also of its group machined),
-# for which the law by their map is wrong by up to 80%
+# ranges of maps with the stated scatter; and of all kinds of which several were simulated
+# (also of its group machined), for which the law by their map is wrong by up to 80%
 BY_MAP = {
     "skewness of heights": (-0.5, 0.5),
     "kurtosis of heights": (2.0, 4.0),
     "kurtosis of slopes": (2.9, 3.1),
     "anisotropy": (1.0, 1.2),
 }
-PRESSED = {"skewness of heights": (-3.1, 3.3), "kurtosis of slopes": (2.6, 16.5), "anisotropy": (1.0, 17.6)}
-WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried
-SAME_LAW = 0.01  # largest deviation of ln C from one power law for which a spectrum counts as self-affine
-FINE = 1.02  # ratio of wavenumbers in a sum of spectra, which deviates from power laws between them by at most 1e-4
+PRESSED = {
+    "skewness of heights": (-3.1, 3.3),
+    "kurtosis of slopes": (2.6, 16.5),
+    "anisotropy": (1.0, 17.6),
+}
+WIDEST, SCAN = (
+    1.5,
+    400,
+)  # ends of the largest islands' band (27a); wavenumbers at which it is tried
+# largest deviation of ln C from one power law for which a spectrum counts as self-affine
+SAME_LAW = 0.01
+# ratio of wavenumbers in a sum of spectra, which deviates from power laws between them by
+# at most 1e-4
+FINE = 1.02
 NO_POWER = 1e-3  # share of the squared gradient beyond the last wavelengths that count
-# the same for boundary elements: rounding to single precision, or to the 16 bits of an instrument, is 1e-13 or 1e-7
+# the same for boundary elements: rounding to single precision, or to the 16 bits of an
+# instrument, is 1e-13 or 1e-7
 ROUNDED = 1e-6
 SIDE = 1e-12  # beside a wavenumber, relative
-NO_MAP: dict[str, Any] = {"bearing": None, "bands": None, "map": None, "table": None, "scans": ()}
+NO_MAP: dict[str, Any] = {
+    "bearing": None,
+    "bands": None,
+    "map": None,
+    "table": None,
+    "scans": (),
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,14 +78,15 @@ class SpectralSurface(AnySurface):
     q : array_like, shape (n,)
         Wavenumber [1/length], positive, in any order; a repeated one is a jump of the spectrum.
     C : array_like, shape (n,)
-        Spectrum [length^4] as h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), not negative: a power law between
-        neighbours, nothing beyond the ends or beside a zero.
+        Spectrum [length^4] as h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), not negative: a
+        power law between neighbours, nothing beyond the ends or beside a zero.
     h_max : float, optional
         Height of the highest point above the mid-plane [length]; that of `heights` if not given.
     heights : Heights, optional
         Distribution of heights; a Gaussian that ends at h_max if not given.
     bearing : Bearing, optional
-        Curves of a periodic map: shape of its highest and lowest parts (`mbma_tables.surfaces.bearing_curve`).
+        Curves of a periodic map: shape of its highest and lowest parts
+        (`mbma_tables.surfaces.bearing_curve`).
     bands : RadialSpectrum, optional
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
     map : Treated, optional
@@ -79,18 +98,21 @@ class SpectralSurface(AnySurface):
     samples : array_like, shape (n,), optional
         Independent samples behind each entry of C, as weights of a fit.
     anisotropy : float, optional
-        Root of the ratio of the gradient tensor's eigenvalues, 1 if isotropic; None where not measured.
+        Root of the ratio of the gradient tensor's eigenvalues, 1 if isotropic; None where
+        not measured.
     unit : str, optional
         Unit of length, such as "um", of the numbers and the results; None if it is not known.
     provenance : sequence of mapping, optional
-        The treatment of the measurement, a plain record for each step: {"step": "detrend", "kind": "plane"}, ...
+        The treatment of the measurement, a plain record for each step: {"step": "detrend",
+        "kind": "plane"}, ...
     nominal_area : float or str, optional
         Instead of h_max, as for `Surface`.
 
     Raises
     ------
     InputError, OutOfRangeError
-        For an invalid spectrum: NaN, wrong shapes, negative values, less than a factor 3 of wavenumbers.
+        For an invalid spectrum: NaN, wrong shapes, negative values, less than a factor 3 of
+        wavenumbers.
 
     Examples
     --------
@@ -120,12 +142,16 @@ class SpectralSurface(AnySurface):
     def __post_init__(self, nominal_area: Any) -> None:
         q, C = finite_array("q", self.q), finite_array("C", self.C)
         if q.ndim != 1 or q.shape != C.shape:
-            raise InputError(f"q and C must be two columns of one length, got shapes {q.shape} and {C.shape}")
+            raise InputError(
+                f"q and C must be two columns of one length, got shapes {q.shape} and {C.shape}"
+            )
         require("q", q, q > 0, "positive (leave q = 0 out)")
         require("C", C, C >= 0, "zero or positive")
         keep = {"q": q, "C": C}
         if self.samples is not None:
-            keep["samples"] = np.broadcast_to(positive_array("samples", self.samples), q.shape)
+            keep["samples"] = np.broadcast_to(
+                positive_array("samples", self.samples), q.shape
+            )
         order = np.argsort(q, kind="stable")
         held = np.flatnonzero(C[order] > 0)
         inside = order[held[0] : held[-1] + 1] if held.size else order[:0]
@@ -136,13 +162,26 @@ class SpectralSurface(AnySurface):
                 "the largest more than 3 times the smallest"
             )
         if held.size < 2 or not self.laws.width.size:
-            raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
-        numbers = {"q0": self.q[0], "q1": self.q[-1], "h_rms": math.sqrt(self.laws.moment(0))}
+            raise InputError(
+                "the spectrum holds no height: no two neighbours in q have positive C"
+            )
+        numbers = {
+            "q0": self.q[0],
+            "q1": self.q[-1],
+            "h_rms": math.sqrt(self.laws.moment(0)),
+        }
         numbers |= {f"m{order}": self.laws.moment(order) for order in (2, 4)}
         vars(self).update({name: np.float64(number) for name, number in numbers.items()})
-        require("largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3")
+        require(
+            "largest q over smallest",
+            np.asarray(self.zeta_1),
+            self.zeta_1 > MIN_ZETA_1,
+            "greater than 3",
+        )
         if not all(math.isfinite(m) and m > 0 for m in (self.m0, self.m2, self.m4)):
-            raise OutOfRangeError("the spectrum's moments overflow or vanish: choose another length unit")
+            raise OutOfRangeError(
+                "the spectrum's moments overflow or vanish: choose another length unit"
+            )
         vars(self).update(unit=Units(self.unit).length)
         heights, top, provenance = self.heights, self.h_max, tuple(self.provenance)
         if nominal_area is not None:
@@ -152,7 +191,11 @@ class SpectralSurface(AnySurface):
             raise InputError(
                 "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
             )
-        top = heights.h_max if top is None else float(positive_array("h_max", one_number("h_max", top)))
+        top = (
+            heights.h_max
+            if top is None
+            else float(positive_array("h_max", one_number("h_max", top)))
+        )
         heights = Heights.gaussian(self.h_rms, top) if heights is None else heights
         vars(self).update(heights=heights, h_max=top, provenance=provenance)
 
@@ -165,7 +208,12 @@ class SpectralSurface(AnySurface):
         length = self.unit or "length"
         spectrum = {
             "q": Variable(self.q, f"1/{length}", "wavenumber", ("q",)),
-            "C": Variable(self.C, f"{length}^4", "power spectrum, h_rms^2 = 2 pi integral C q dq", ("q",)),
+            "C": Variable(
+                self.C,
+                f"{length}^4",
+                "power spectrum, h_rms^2 = 2 pi integral C q dq",
+                ("q",),
+            ),
         }
         return super()._variables() | spectrum
 
@@ -191,13 +239,18 @@ class SpectralSurface(AnySurface):
         slope, level = np.polyfit(x, y, 1)
         exponent = -slope / 2 - 1
         straight = np.abs(y - level - slope * x).max() <= SAME_LAW
-        return float(min(exponent, 1.0)) if straight and 0 < exponent <= 1 + SAME_LAW else None
+        return (
+            float(min(exponent, 1.0))
+            if straight and 0 < exponent <= 1 + SAME_LAW
+            else None
+        )
 
     @functools.cached_property
     def longest(self) -> float:
         """Wavenumber q_L from which a band as wide as the largest islands' holds most height [1/length].
 
-        The lowest of a self-affine spectrum, near the roll-off of one with a plateau. MBMA's floors refer to it.
+        The lowest of a self-affine spectrum, near the roll-off of one with a plateau.
+        MBMA's floors refer to it.
         """
         q = np.unique(np.append(self.q, np.geomspace(self.q0, self.q1, SCAN)))[:-1]
         start, end = self.laws.place(q), self.laws.place(np.minimum(WIDEST * q, self.q1))
@@ -207,16 +260,23 @@ class SpectralSurface(AnySurface):
         """Reasons why it is unlike the surfaces compared with BEM, as a map or as an isotropic Gaussian one."""
         return (*self.doubts, *self.outside(BY_MAP if by_map else BY_SPECTRUM, by_map))
 
-    def outside(self, tested: Mapping[str, tuple[float, float]], by_map: bool = False) -> tuple[str, ...]:
+    def outside(
+        self, tested: Mapping[str, tuple[float, float]], by_map: bool = False
+    ) -> tuple[str, ...]:
         """Statistics that lie outside tested ranges, and the remedy."""
-        known = {"skewness of heights": self.skewness, "kurtosis of heights": self.kurtosis}
+        known = {
+            "skewness of heights": self.skewness,
+            "kurtosis of heights": self.kurtosis,
+        }
         if self.bearing is not None:
             known["kurtosis of slopes"] = self.bearing.slope_kurtosis
         if self.anisotropy is not None:
             known["anisotropy"] = self.anisotropy
         remedy = "beyond, only 'calibrated' by a map was tested"
         if by_map and self.scans:
-            remedy = "contact(surface.scans[0], ..., theory='simulated') simulates one scan"
+            remedy = (
+                "contact(surface.scans[0], ..., theory='simulated') simulates one scan"
+            )
         elif by_map:
             remedy = "theory='simulated' simulates the map"
             if self.map is not None:
@@ -248,25 +308,41 @@ class SpectralSurface(AnySurface):
         if known is not None:
             moved = dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), up)
             moved |= dict.fromkeys(("gradient", "tension_force", "tension"), up / along)
-            known = dataclasses.replace(known, **{name: by * getattr(known, name) for name, by in moved.items()})
+            known = dataclasses.replace(
+                known, **{name: by * getattr(known, name) for name, by in moved.items()}
+            )
         if bands is not None:
-            bands = dataclasses.replace(bands, q=bands.q / along, variance=bands.variance * up**2)
+            bands = dataclasses.replace(
+                bands, q=bands.q / along, variance=bands.variance * up**2
+            )
         if whole is not None:
             steps = tuple(along * step for step in whole.steps)
             whole = dataclasses.replace(whole, heights=up * whole.heights, steps=steps)
         table = None if self.table is None else self.table.resized(up, along)
         scans = tuple(scan.resized(up, along) for scan in self.scans)
-        parts: dict[str, Any] = {"bearing": known, "bands": bands, "map": whole, "table": table, "scans": scans}
+        parts: dict[str, Any] = {
+            "bearing": known,
+            "bands": bands,
+            "map": whole,
+            "table": table,
+            "scans": scans,
+        }
         parts |= {"q": self.q / along, "C": self.C * (up * along) ** 2}
-        return dataclasses.replace(self, **parts, h_max=self.h_max * up, heights=self.heights.scaled(up))
+        return dataclasses.replace(
+            self, **parts, h_max=self.h_max * up, heights=self.heights.scaled(up)
+        )
 
     def between(self, low: float, high: float) -> Self:
         """The wavelengths from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
         inside = (self.q > low) & (self.q < high)
         q = np.concatenate([[low], self.q[inside], [high]])
-        C = np.concatenate([self.power_spectrum(q[:1]), self.C[inside], self.power_spectrum(q[-1:])])
+        C = np.concatenate(
+            [self.power_spectrum(q[:1]), self.C[inside], self.power_spectrum(q[-1:])]
+        )
         less = dataclasses.replace(self, **NO_MAP, q=q, C=C, samples=None)
-        return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
+        return dataclasses.replace(
+            less, heights=self.heights.scaled(float(less.h_rms / self.h_rms))
+        )
 
     def added(self, other: SpectralSurface) -> Self:
         """The equivalent surface of two; see `AnySurface.combined`."""
@@ -278,7 +354,9 @@ class SpectralSurface(AnySurface):
         if self.unit is not None:
             other = other.to(self.unit)
         low, high = min(self.q0, other.q0), max(self.q1, other.q1)
-        fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
+        fine = np.geomspace(
+            low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1
+        )
         grid = np.unique(np.clip(np.concatenate([fine, self.q, other.q]), low, high))
         # both sides of every wavenumber, since the sum jumps at the ends of bands
         sides = np.stack([grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)], axis=1).ravel()
@@ -291,17 +369,30 @@ class SpectralSurface(AnySurface):
             )
         if self.anisotropy is not None or other.anisotropy is not None:
             # the largest of a sum: parallel, their tensors of mean gradients have the same axes
-            parts = [(float(one.m2), (one.anisotropy or 1.0) ** 2) for one in (self, other)]
-            stretch = math.sqrt(sum(m2 * a / (1 + a) for m2, a in parts) / sum(m2 / (1 + a) for m2, a in parts))
-            told.append(f"lays are assumed to be parallel: anisotropy {stretch:.3g} at most")
-        record = {"step": "combined", "of": [list(self.provenance), list(other.provenance)]}
+            parts = [
+                (float(one.m2), (one.anisotropy or 1.0) ** 2) for one in (self, other)
+            ]
+            stretch = math.sqrt(
+                sum(m2 * a / (1 + a) for m2, a in parts)
+                / sum(m2 / (1 + a) for m2, a in parts)
+            )
+            told.append(
+                f"lays are assumed to be parallel: anisotropy {stretch:.3g} at most"
+            )
+        record = {
+            "step": "combined",
+            "of": [list(self.provenance), list(other.provenance)],
+        }
         both = type(self)(
             q[kept],
             C[kept],
             heights=self.heights.convolved(other.heights),
             anisotropy=stretch,
             unit=self.unit,
-            provenance=(record | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),),
+            provenance=(
+                record
+                | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),
+            ),
         )
         return both.resolved() if self.resolution or other.resolution else both
 
@@ -310,16 +401,27 @@ class SpectralSurface(AnySurface):
         unit = f" {self.unit}" if self.unit else ""
         # the map may be sampled more finely than its shortest wavelength
         shortest, sampled = self.shortest(NO_POWER), 2 * math.pi / float(self.q[-1])
-        before = float(self.laws.below(2, self.laws.place(np.asarray(math.pi / shortest))))
+        before = float(
+            self.laws.below(2, self.laws.place(np.asarray(math.pi / shortest)))
+        )
         gradient = math.sqrt(before / float(self.laws.moment(2)))
-        finer = f" (sampled to {sampled:.4g}{unit}, without power there)" if sampled < shortest else ""
+        finer = (
+            f" (sampled to {sampled:.4g}{unit}, without power there)"
+            if sampled < shortest
+            else ""
+        )
         told = (
             f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the "
             f"last octave of them the rms gradient would be {gradient:.2f} times as large"
         )
         if self.map is not None:
             told += f"; a simulation with short_cutoff={2 * shortest:.4g} gives the area without them"
-        record = {"step": "resolution", "shortest": shortest, "gradient_without_last_octave": gradient, "told": told}
+        record = {
+            "step": "resolution",
+            "shortest": shortest,
+            "gradient_without_last_octave": gradient,
+            "told": told,
+        }
         return dataclasses.replace(self, provenance=(*self.provenance, record))
 
     def shortest(self, without: float) -> float:

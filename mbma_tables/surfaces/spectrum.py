@@ -1,7 +1,8 @@
 """Moments of isotropic spectra: self-affine ones (Eqs. 2, 3, 6, 7, 22, 31), and power laws between samples.
 
-Self-affine ones have heights in s = h_rms / sqrt(1 - zeta_1^(-2H)) and lengths in 1/q0. So that narrow bands keep
-their accuracy, a band [za, zb] is given by log(za) and log(zb/za), and a place between samples by its `Place`.
+Self-affine ones have heights in s = h_rms / sqrt(1 - zeta_1^(-2H)) and lengths in 1/q0. So
+that narrow bands keep their accuracy, a band [za, zb] is given by log(za) and log(zb/za),
+and a place between samples by its `Place`.
 """
 
 from __future__ import annotations
@@ -12,12 +13,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    require,
+)
 
 NAYAK = 6 * math.pi * math.sqrt(3)  # summit density is m4 / (NAYAK m2), Eq. (2)
 RADIUS = 3 * math.sqrt(math.pi) / 8  # summit radius is RADIUS / sqrt(m4), Eq. (2)
 BROADENING = 0.8968  # summit variance is (1 - BROADENING/alpha) m0, Eq. (2)
-MIN_ZETA_1, MAX_ZETA_1 = 3.0, 1e8  # limits for a surface; above 3 for the floors 1.5 and 3 of (27), (30)
+MIN_ZETA_1, MAX_ZETA_1 = (
+    3.0,
+    1e8,
+)  # limits for a surface; above 3 for the floors 1.5 and 3 of (27), (30)
 SHARES = {0: 1.0, 2: 1 / 2, 4: 3 / 8}  # m_n = share 2 pi integral C q^(n + 1) dq, Eq. (7)
 BISECTIONS = 56  # bisections of log(zeta_1), to rounding
 TINY = 1e-300  # in place of 0, where a quotient tends to 1
@@ -33,14 +42,25 @@ def growth(power: Any, log_ratio: Any) -> Any:
 def moment_of(order: int, hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of height, of a profile's slope or of its curvature over the band, Eq. (7), in (s q0^(n/2))^2."""
     power = order - 2.0 * hurst
-    return 2 * SHARES[order] * hurst * np.exp(power * log_za) * log_ratio * growth(power, log_ratio)
+    return (
+        2
+        * SHARES[order]
+        * hurst
+        * np.exp(power * log_za)
+        * log_ratio
+        * growth(power, log_ratio)
+    )
 
 
 def alpha_of(hurst: Any, log_ratio: Any) -> Any:
     """Nayak's bandwidth parameter m0 m4/m2^2, Eq. (3): a function of zb/za alone, 1.5 where that is 1."""
     g2 = growth(2.0 - 2.0 * hurst, log_ratio)
     # grouped to avoid overflow
-    return 1.5 * (growth(-2.0 * hurst, log_ratio) / g2) * (growth(4.0 - 2.0 * hurst, log_ratio) / g2)
+    return (
+        1.5
+        * (growth(-2.0 * hurst, log_ratio) / g2)
+        * (growth(4.0 - 2.0 * hurst, log_ratio) / g2)
+    )
 
 
 def summit_rate(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
@@ -53,15 +73,22 @@ def band_moment(order: int, hurst: Any, zeta_a: Any, zeta_b: Any) -> Any:
     """Spectral moment m_n, n = 0, 2, 4, over the band [zeta_a, zeta_b]; arrays broadcast (Eq. 31)."""
     start = np.asarray(zeta_a, dtype=float)
     width = np.asarray(zeta_b, dtype=float) - start
-    return moment_of(order, np.asarray(hurst, dtype=float), np.log(start), np.log1p(width / start))
+    return moment_of(
+        order, np.asarray(hurst, dtype=float), np.log(start), np.log1p(width / start)
+    )
 
 
 def band_from_moments(
     hurst: ArrayLike, m0: ArrayLike, m2: ArrayLike, m4: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(q0, q1, h_rms) of the self-affine band with these moments; arrays broadcast. See `Surface.from_moments`."""
-    given = {name: finite_array(name, value) for name, value in {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4}.items()}
-    require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
+    given = {
+        name: finite_array(name, value)
+        for name, value in {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4}.items()
+    }
+    require(
+        "hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]"
+    )
     for name in ("m0", "m2", "m4"):
         require(name, given[name], given[name] > 0, "positive")
     shape = broadcast_shape(**given)
@@ -83,7 +110,9 @@ def band_from_moments(
         more = alpha_of(h, log_zeta) < alpha
         ends = np.where(more, log_zeta, ends[0]), np.where(more, ends[1], log_zeta)
     zeta_1 = np.exp(log_zeta)
-    q0 = np.sqrt(b / a / (band_moment(2, h, 1.0, zeta_1) / band_moment(0, h, 1.0, zeta_1)))
+    q0 = np.sqrt(
+        b / a / (band_moment(2, h, 1.0, zeta_1) / band_moment(0, h, 1.0, zeta_1))
+    )
     return q0, q0 * zeta_1, np.sqrt(a)
 
 
@@ -97,7 +126,8 @@ class Place(NamedTuple):
 class PowerLaws:
     """Power laws between samples of C(q) [length^4], h_rms^2 = 2 pi integral C q dq, not negative.
 
-    q [1/length] rises; a repeated one is a jump. Where C is zero at a sample, nothing lies on either side of it.
+    q [1/length] rises; a repeated one is a jump. Where C is zero at a sample, nothing lies
+    on either side of it.
     """
 
     def __init__(self, q: FloatArray, C: FloatArray) -> None:
@@ -108,8 +138,14 @@ class PowerLaws:
         # overflow appears as a moment that is not finite
         with np.errstate(all="ignore"):
             self.slope = np.log(self.high / self.low) / self.width
-            whole = {order: self._content(order, np.arange(self.width.size), self.width) for order in SHARES}
-            self._before = {order: np.append(0.0, np.cumsum(content)) for order, content in whole.items()}
+            whole = {
+                order: self._content(order, np.arange(self.width.size), self.width)
+                for order in SHARES
+            }
+            self._before = {
+                order: np.append(0.0, np.cumsum(content))
+                for order, content in whole.items()
+            }
             # summed from the shortest wavelength, for accurate small sums
             self._after = np.append(np.cumsum(whole[0][::-1])[::-1], 0.0)
 
@@ -117,12 +153,23 @@ class PowerLaws:
         """m_0, m_2 or m_4 of all wavelengths."""
         return float(self._before[order][-1])
 
-    def _content(self, order: int, piece: Any, width: Any, rest: Any = None) -> FloatArray:
+    def _content(
+        self, order: int, piece: Any, width: Any, rest: Any = None
+    ) -> FloatArray:
         """Part of a moment of a width above a piece's lower end, or above a distance `rest` below its upper end."""
-        C, log_q = (self.low, self.log_low) if rest is None else (self.high, self.log_high)
+        C, log_q = (
+            (self.low, self.log_low) if rest is None else (self.high, self.log_high)
+        )
         power = self.slope[piece] + order + 2
-        start = 2 * math.pi * SHARES[order] * C[piece] * np.exp((order + 2) * log_q[piece])
-        return np.asarray(start * np.exp(-power * (0.0 if rest is None else rest)) * width * growth(power, width))
+        start = (
+            2 * math.pi * SHARES[order] * C[piece] * np.exp((order + 2) * log_q[piece])
+        )
+        return np.asarray(
+            start
+            * np.exp(-power * (0.0 if rest is None else rest))
+            * width
+            * growth(power, width)
+        )
 
     def place(self, q: Any) -> Place:
         """The place of wavenumbers inside the band; between two pieces, the end of the lower."""
@@ -136,7 +183,10 @@ class PowerLaws:
 
     def above(self, place: Place) -> FloatArray:
         """T(q) = m_0 of all shorter wavelengths [length^2]."""
-        return np.asarray(self._after[place.piece + 1] + self._content(0, place.piece, place.rest, place.rest))
+        return np.asarray(
+            self._after[place.piece + 1]
+            + self._content(0, place.piece, place.rest, place.rest)
+        )
 
     def where_above_is(self, variance: Any) -> Place:
         """Places at which T(q) has these values, at most m_0."""
@@ -149,19 +199,26 @@ class PowerLaws:
         power = self.slope[piece] + 2
         x = -power * y
         flat = x == 0
-        rest = y * np.where(flat, 1.0, np.log1p(np.maximum(x, -1 + 1e-16)) / np.where(flat, 1.0, x))
+        rest = y * np.where(
+            flat, 1.0, np.log1p(np.maximum(x, -1 + 1e-16)) / np.where(flat, 1.0, x)
+        )
         return Place(piece, np.minimum(rest, self.width[piece]))
 
     def below(self, order: int, place: Place) -> FloatArray:
         """m_n of all longer wavelengths."""
         rise = self.width[place.piece] - place.rest
-        return np.asarray(self._before[order][place.piece] + self._content(order, place.piece, rise))
+        return np.asarray(
+            self._before[order][place.piece] + self._content(order, place.piece, rise)
+        )
 
     def between(self, order: int, start: Place, end: Place) -> FloatArray:
         """m_n of the wavelengths from one place to a higher one."""
         width = np.where(start.piece == end.piece, start.rest - end.rest, start.rest)
         inside = self._content(order, start.piece, width, start.rest)
-        whole = self._before[order][end.piece] - self._before[order][np.minimum(start.piece + 1, end.piece)]
+        whole = (
+            self._before[order][end.piece]
+            - self._before[order][np.minimum(start.piece + 1, end.piece)]
+        )
         last = self._content(order, end.piece, self.width[end.piece] - end.rest)
         return np.asarray(inside + np.where(start.piece == end.piece, 0.0, whole + last))
 

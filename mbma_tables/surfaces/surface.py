@@ -28,8 +28,9 @@ UNNAMED = (
 class Surface(SelfAffine):
     """A self-affine surface with the spectrum C(q) ~ q^(-2-2H) between q0 and q1 (Eq. 6).
 
-    Lengths are in one unit. Every argument may be an array; they broadcast to a batch of surfaces. Where one is
-    an xarray DataArray, dask-backed or not, `contact` returns DataArrays and checks the arguments then.
+    Lengths are in one unit. Every argument may be an array; they broadcast to a batch of
+    surfaces. Where one is an xarray DataArray, dask-backed or not, `contact` returns
+    DataArrays and checks the arguments then.
 
     Parameters
     ----------
@@ -40,7 +41,8 @@ class Surface(SelfAffine):
     h_rms : array_like
         Root-mean-square height, length.
     h_max, nominal_area : array_like, one of them
-        Highest point above the mid-plane, length; or A0, length^2: h_max is its median over Gaussian surfaces of A0.
+        Highest point above the mid-plane, length; or A0, length^2: h_max is its median over
+        Gaussian surfaces of A0.
     unit : str, optional
         Unit of length, such as "um", of the numbers and the results; None if it is not known.
     fit : SpectrumFit, optional
@@ -87,16 +89,18 @@ class Surface(SelfAffine):
         q : array_like, shape (n,)
             Wavenumber, 1/length, positive, in any order and spacing.
         C : array_like, shape (n,)
-            Spectrum [length^4], not negative, interpolated by power laws. Masked entries are left out.
+            Spectrum [length^4], not negative, interpolated by power laws. Masked entries
+            are left out.
         h_max, nominal_area, unit : as for `Surface`
             The highest point is that of `heights` if none is given.
         heights : array_like, optional
-            Heights measured anywhere on the surface [length], of any shape; their mean is subtracted. Default: a
-            Gaussian distribution that ends at h_max.
+            Heights measured anywhere on the surface [length], of any shape; their mean is
+            subtracted. Default: a Gaussian distribution that ends at h_max.
         convention : {"paper", "isotropic"}, optional
-            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi). If it is not named, that of the
-            paper is taken, and results are not `valid`. The one-dimensional spectrum of a trace [length^3] is neither:
-            `from_profile` takes the trace.
+            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi). If it
+            is not named, that of the paper is taken, and results are not `valid`. The
+            one-dimensional spectrum of a trace [length^3] is neither: `from_profile` takes
+            the trace.
         model : {"measured", "self-affine"}, optional
             The spectrum itself, or the five numbers of its `MeasuredSurface.fit(band)`.
         band : tuple of float, optional
@@ -129,9 +133,13 @@ class Surface(SelfAffine):
             shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
             q, C = np.asarray(q)[shown], np.asarray(C)[shown]
         known = None if heights is None else Heights.of(heights)
-        own = finite_array("C", C) * (1 / (4 * math.pi**2) if convention == "isotropic" else 1.0)
+        own = finite_array("C", C) * (
+            1 / (4 * math.pi**2) if convention == "isotropic" else 1.0
+        )
         unnamed = () if convention else ({"step": "convention", "not_valid": UNNAMED},)
-        surface = MeasuredSurface(q, own, h_max, known, unit=unit, provenance=unnamed, nominal_area=nominal_area)
+        surface = MeasuredSurface(
+            q, own, h_max, known, unit=unit, provenance=unnamed, nominal_area=nominal_area
+        )
         return _modelled(surface, model, band)
 
     @classmethod
@@ -163,29 +171,32 @@ class Surface(SelfAffine):
         Parameters
         ----------
         heights : array_like, shape (nx, ny), path or topography
-            Heights [length], at least 32 x 32, NaN or masked where undefined; a file of any format that
-            SurfaceTopography reads (the extra `maps`); or an object with that library's `heights()`,
-            `physical_sizes` and `is_periodic`.
+            Heights [length], at least 32 x 32, NaN or masked where undefined; a file of any
+            format that SurfaceTopography reads (the extra `maps`); or an object with that
+            library's `heights()`, `physical_sizes` and `is_periodic`.
         dx, dy : float, optional
-            Sampling steps along the first and the second axis [length]; dy is dx if not given. Topographies
-            and most files contain them.
+            Sampling steps along the first and the second axis [length]; dy is dx if not
+            given. Topographies and most files contain them.
         periodic : bool, optional
-            Whether the map continues periodically; else a Hann window is applied. A topography's own flag, False for
-            an array.
+            Whether the map continues periodically; else a Hann window is applied. A
+            topography's own flag, False for an array.
         detrend : str, optional
-            What to subtract: mean, plane, quadratic, or another mode of SurfaceTopography's `detrend`; by default the
-            mean of a periodic map, the plane of any other.
+            What to subtract: mean, plane, quadratic, or another mode of SurfaceTopography's
+            `detrend`; by default the mean of a periodic map, the plane of any other.
         h_max : float, optional
-            Height of the highest point above the mid-plane [length]; by default the map's, after detrending.
+            Height of the highest point above the mid-plane [length]; by default the map's,
+            after detrending.
         model, band : as for `from_spectrum`
         extrapolate_to, extrapolate_hurst : float, optional
-            Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; its
-            influence is recorded.
+            Continue the measured spectrum to this wavelength [length] by a power law of
+            this Hurst exponent; its influence is recorded.
         outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter : optional
-            As in `mbma_tables.surfaces.treatment.Treatment`; the treatment is recorded in `provenance`.
+            As in `mbma_tables.surfaces.treatment.Treatment`; the treatment is recorded in
+            `provenance`.
         unit : str, optional
-            Unit of the result and of plain lengths; lengths of a file are converted to it, or taken to be in it if the
-            file names none. dx may have its own, such as "195 nm", which is then that of heights if `unit` is missing.
+            Unit of the result and of plain lengths; lengths of a file are converted to it,
+            or taken to be in it if the file names none. dx may have its own, such as "195
+            nm", which is then that of heights if `unit` is missing.
         channel : int, optional
             Index of the map in a file with several maps.
 
@@ -197,7 +208,8 @@ class Surface(SelfAffine):
         Raises
         ------
         InputError, OutOfRangeError, NotSelfAffineError
-            For holes, a missing or negative step, an unknown trend, nothing but a plane; as `MeasuredSurface.fit`.
+            For holes, a missing or negative step, an unknown trend, nothing but a plane; as
+            `MeasuredSurface.fit`.
 
         Examples
         --------
@@ -214,9 +226,15 @@ class Surface(SelfAffine):
         treatment = {name: value for name, value in locals().items() if name in OPTIONS}
         from mbma_tables.surfaces.maps import measured_surface, prepared
 
-        if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
-            raise InputError("extrapolate_to and extrapolate_hurst belong to model='measured'")
-        known = measured_surface(prepared(heights, treatment), h_max, extrapolate_to, extrapolate_hurst)
+        if model != "measured" and (
+            extrapolate_to is not None or extrapolate_hurst is not None
+        ):
+            raise InputError(
+                "extrapolate_to and extrapolate_hurst belong to model='measured'"
+            )
+        known = measured_surface(
+            prepared(heights, treatment), h_max, extrapolate_to, extrapolate_hurst
+        )
         return _modelled(MeasuredSurface.of(known), model, band)
 
     @staticmethod
@@ -235,8 +253,8 @@ class Surface(SelfAffine):
         Parameters
         ----------
         heights : array_like, shape (n,), path or line scan
-            Heights [length], at least 32; a file that SurfaceTopography reads as a line scan, of two columns for
-            instance; or such a line scan.
+            Heights [length], at least 32; a file that SurfaceTopography reads as a line
+            scan, of two columns for instance; or such a line scan.
         dx : float, optional
             Sampling step [length], of an array.
         extrapolate_to, extrapolate_hurst, **treatment : as for `from_map`
@@ -246,7 +264,8 @@ class Surface(SelfAffine):
         Returns
         -------
         MeasuredSurface
-            Its `provenance` has the accuracy of h_rms and gradient, and the limitations of a single trace.
+            Its `provenance` has the accuracy of h_rms and gradient, and the limitations of
+            a single trace.
 
         Raises
         ------
@@ -268,14 +287,22 @@ class Surface(SelfAffine):
         treated = prepared(heights, treatment | {"dx": dx}, 1)
         known = measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst)
         given = known.h_max if nominal_area is None else h_max
-        return dataclasses.replace(MeasuredSurface.of(known), h_max=given, nominal_area=nominal_area)
+        return dataclasses.replace(
+            MeasuredSurface.of(known), h_max=given, nominal_area=nominal_area
+        )
 
     def sampled(self) -> MeasuredSurface:
         """The same surface given by its spectrum, of which two samples suffice; not available for a batch."""
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum: take one surface at a time")
         ends = np.array([self.q0, self.q1])
-        return MeasuredSurface(ends, self.power_spectrum(ends), self.h_max, unit=self.unit, provenance=self.provenance)
+        return MeasuredSurface(
+            ends,
+            self.power_spectrum(ends),
+            self.h_max,
+            unit=self.unit,
+            provenance=self.provenance,
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -285,7 +312,12 @@ class MeasuredSurface(SpectralSurface):
     @classmethod
     def of(cls, known: SpectralSurface) -> MeasuredSurface:
         """The same spectrum, with the fit of five numbers."""
-        return cls(**{field.name: getattr(known, field.name) for field in dataclasses.fields(known)})
+        return cls(
+            **{
+                field.name: getattr(known, field.name)
+                for field in dataclasses.fields(known)
+            }
+        )
 
     def fit(self, band: tuple[float, float] | None = None) -> Surface:
         """The self-affine surface nearest to it: five numbers, and the quality of the fit.
@@ -293,9 +325,10 @@ class MeasuredSurface(SpectralSurface):
         Parameters
         ----------
         band : tuple of float, optional
-            (q0, q1) to fit and to take as a plain power law; else a roll-off below and a departure above are found and
-            left out. Without a roll-off q0 is the lowest wavenumber, though of a map under a window the line is fitted
-            from twice that on; without a departure q1 is the largest.
+            (q0, q1) to fit and to take as a plain power law; else a roll-off below and a
+            departure above are found and left out. Without a roll-off q0 is the lowest
+            wavenumber, though of a map under a window the line is fitted from twice that
+            on; without a departure q1 is the largest.
 
         Returns
         -------
@@ -305,8 +338,8 @@ class MeasuredSurface(SpectralSurface):
         Raises
         ------
         NotSelfAffineError
-            Where no power law with 0 < H <= 1 describes it, and for maps of edges or with a lay; the message has the
-            numbers.
+            Where no power law with 0 < H <= 1 describes it, and for maps of edges or with a
+            lay; the message has the numbers.
 
         Examples
         --------
@@ -319,8 +352,12 @@ class MeasuredSurface(SpectralSurface):
         from mbma_tables.surfaces.maps import points_of_fit
         from mbma_tables.surfaces.psd import fit_spectrum
 
-        numbers = fit_spectrum(**points_of_fit(self), band=band, anisotropy=self.anisotropy)
-        return Surface(**numbers, h_max=self.h_max, unit=self.unit, provenance=self.provenance)
+        numbers = fit_spectrum(
+            **points_of_fit(self), band=band, anisotropy=self.anisotropy
+        )
+        return Surface(
+            **numbers, h_max=self.h_max, unit=self.unit, provenance=self.provenance
+        )
 
 
 def assumptions(surface: Any) -> list[str]:
@@ -339,14 +376,18 @@ def _assumed(provenance: Iterable[Mapping[str, Any]]) -> Iterator[str]:
             yield from _assumed(face)
 
 
-def _modelled(surface: MeasuredSurface, model: str, band: Any) -> Surface | MeasuredSurface:
+def _modelled(
+    surface: MeasuredSurface, model: str, band: Any
+) -> Surface | MeasuredSurface:
     """A measured surface, or the five numbers fitted to it."""
     if model not in ("measured", "self-affine"):
         raise InputError(f"model must be 'measured' or 'self-affine', got {model!r}")
     if model == "self-affine":
         return surface.fit(band)
     if band is not None:
-        raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
+        raise InputError(
+            "band belongs to model='self-affine': a measured surface is not fitted"
+        )
     return surface
 
 

@@ -14,21 +14,49 @@ from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
-DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
-DETRENDS = ("mean", "plane", "quadratic", "median", "height", "mad-tilt", "slope", "curvature", "mad-curvature")
+DEGREES = {
+    "mean": 0,
+    "plane": 1,
+    "quadratic": 2,
+    "height": 1,
+    "curvature": 2,
+}  # of least-squares polynomials
+DETRENDS = (
+    "mean",
+    "plane",
+    "quadratic",
+    "median",
+    "height",
+    "mad-tilt",
+    "slope",
+    "curvature",
+    "mad-curvature",
+)
 MIN_GRID = 32  # points along each side: 16 wavenumbers, the first of which is distorted by a window
 FREE_HOLES = 0.05  # share of undefined points that is filled without being requested
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
-USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
-OVERLAP = 35 / 18  # Fourier components along an axis under a Hann window that count as one independent component
-MIN_POWER = 1e-24  # power over that of the strongest wavelength: lower values are rounding
+USUAL, USUAL_DEVIATES = (
+    0.99,
+    2.576,
+)  # share of points that set the scale of differences, and where it ends if Gaussian
+OVERLAP = (
+    35 / 18
+)  # Fourier components along an axis under a Hann window that count as one independent component
+MIN_POWER = (
+    1e-24  # power over that of the strongest wavelength: lower values are rounding
+)
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
-USUAL_LIMIT, FEW = 10.0, 1e-3  # standard deviations of an outlier; share of points up to which they are reported
-# a spike differs this many times as much from the median of its neighbourhood as its neighbours do but two, which may
-# be spikes too: on 130 maps of machined surfaces one point does, and also stands out by `USUAL_LIMIT`
+USUAL_LIMIT, FEW = (
+    10.0,
+    1e-3,
+)  # standard deviations of an outlier; share of points up to which they are reported
+# a spike differs this many times as much from the median of its neighbourhood as its
+# neighbours do but two, which may be spikes too: on 130 maps of machined surfaces one point
+# does, and also stands out by `USUAL_LIMIT`
 ISOLATED, OTHER_SPIKES = 4.0, 2
-# share of filled points above which results are not valid: with 0.2% of the points missing at random, pressures at a
-# gap change by up to 0.3%, and by 0.7 to 5% with 1 to 3% missing in patches, more than the scatter of a simulation
+# share of filled points above which results are not valid: with 0.2% of the points missing
+# at random, pressures at a gap change by up to 0.3%, and by 0.7 to 5% with 1 to 3% missing
+# in patches, more than the scatter of a simulation
 MOST_FILLED = 1e-3
 # a line between two rows is a seam if the median step across it is this many times those beside it, and all but those
 # of so many seams, and as large as what the step varies by along the line: on 130 maps of machined surfaces, at most
@@ -36,7 +64,9 @@ MOST_FILLED = 1e-3
 SEAM, SEAM_SPREAD, MOST_SEAMS = 2.5, 1.0, 3
 CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
 CALLED |= {"s_filter": "an S-filter", "l_filter": "an L-filter"}
-GAUSSIAN = math.log(2)  # factor in the filter's exponent: wavelengths equal to the nesting index are halved
+GAUSSIAN = math.log(
+    2
+)  # factor in the filter's exponent: wavelengths equal to the nesting index are halved
 LAST_WAVES = 0.01  # amplitude below which wavelengths count as removed by an S-filter
 Provenance = tuple[Mapping[str, Any], ...]
 
@@ -48,19 +78,24 @@ class Treatment:
     Attributes
     ----------
     outliers : float, optional
-        Points further from the median of their 3 x 3 neighbourhood than this many standard deviations of such
-        differences, by their 99% quantile, are removed and filled; 10 finds bad pixels and little else.
+        Points further from the median of their 3 x 3 neighbourhood than this many standard
+        deviations of such differences, by their 99% quantile, are removed and filled; 10
+        finds bad pixels and little else.
     fill : {"harmonic"}, optional
-        How undefined points are filled (`interpolate_undefined_data`). By default up to 5% are filled harmonically.
+        How undefined points are filled (`interpolate_undefined_data`). By default up to 5%
+        are filled harmonically.
     detrend : str, optional
-        Mode of `detrend`: mean, median, height (or plane), mad-tilt, slope, curvature (or quadratic), mad-curvature.
-        By default the mean of periodic data, the plane of any other.
+        Mode of `detrend`: mean, median, height (or plane), mad-tilt, slope, curvature (or
+        quadratic), mad-curvature. By default the mean of periodic data, the plane of any
+        other.
     short_cutoff, long_cutoff : float, optional
-        Wavelengths [length]: shorter ones, below the instrument's resolution, and longer ones, form, are left out
-        (`shortcut`, `longcut`). Data that are not periodic are continued by their mirror images for that.
+        Wavelengths [length]: shorter ones, below the instrument's resolution, and longer
+        ones, form, are left out (`shortcut`, `longcut`). Data that are not periodic are
+        continued by their mirror images for that.
     s_filter, l_filter : float, optional
-        Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve this wavelength. An
-        S-filter removes shorter ones, completely below 0.39 times the index, an L-filter longer ones.
+        Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve
+        this wavelength. An S-filter removes shorter ones, completely below 0.39 times the
+        index, an L-filter longer ones.
     """
 
     outliers: float | None = None
@@ -74,14 +109,27 @@ class Treatment:
     def __post_init__(self) -> None:
         for name in ("outliers", *CALLED):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, number_in(name, getattr(self, name), MIN_LENGTH, MAX_LENGTH))
+                object.__setattr__(
+                    self,
+                    name,
+                    number_in(name, getattr(self, name), MIN_LENGTH, MAX_LENGTH),
+                )
         for name, allowed in (("fill", ("harmonic",)), ("detrend", DETRENDS)):
             if getattr(self, name) not in (None, *allowed):
-                raise InputError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+                raise InputError(
+                    f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}"
+                )
 
 
 # options of `Surface.from_map` and `Surface.from_profile` on reading and treatment
-OPTIONS = ("unit", "dx", "dy", "channel", "periodic", *(field.name for field in dataclasses.fields(Treatment)))
+OPTIONS = (
+    "unit",
+    "dx",
+    "dy",
+    "channel",
+    "periodic",
+    *(field.name for field in dataclasses.fields(Treatment)),
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -93,7 +141,8 @@ class Treated:
     periodic: bool  # else they are continued by their mirror images if needed
     unit: str | None  # of length, that the file names
     waves: tuple[float, float] = (0.0, math.inf)  # smallest and largest wavenumber kept
-    provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
+    # each step: its name ("step"), its numbers, and a sentence ("told")
+    provenance: Provenance = ()
     uncut: Any = None  # heights before the short cut-off, where there is one
     form: Any = None  # what detrending removed, if more than a plane
 
@@ -105,38 +154,62 @@ class Treated:
     def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
         """The heights after a step, with its record."""
         record = {"step": step, **numbers, "told": told}
-        return dataclasses.replace(self, heights=heights, provenance=(*self.provenance, record))
+        return dataclasses.replace(
+            self, heights=heights, provenance=(*self.provenance, record)
+        )
 
     def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
         """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
         shape, unit = self.heights.shape, f" {self.unit}" if self.unit else ""
-        sides = " x ".join(f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True))
+        sides = " x ".join(
+            f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True)
+        )
         told = (
             f"{'map' if len(shape) == 2 else 'line scan'} of {' x '.join(map(str, shape))} points, {sides}{unit}, "
             f"heights read in {self.unit or 'the same unit, which is not known'}"
         )
-        read = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit, "told": told}
-        edges = ("periodic" if self.periodic else "under a window for the spectrum") + more
+        read = {
+            "step": "read",
+            "points": list(shape),
+            "steps": list(self.steps),
+            "unit": self.unit,
+            "told": told,
+        }
+        edges = (
+            "periodic" if self.periodic else "under a window for the spectrum"
+        ) + more
         return (read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
 
     def windowed(self) -> FloatArray:
         """Heights under a Hann window of unit mean square, their mean under it removed; as they are where periodic."""
         if self.periodic:
             return np.asarray(self.heights)
-        windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
+        windows = [
+            np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2
+            for count in self.heights.shape
+        ]
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
         values = self.heights - np.average(self.heights, weights=window)
         return np.asarray(values * (window / math.sqrt(np.mean(window**2))))
 
 
 def treat(
-    grid: Any, steps: tuple[float, ...], periodic: bool, treatment: Treatment, unit: str | None = None
+    grid: Any,
+    steps: tuple[float, ...],
+    periodic: bool,
+    treatment: Treatment,
+    unit: str | None = None,
 ) -> Treated:
     """Heights [length] made ready for their spectrum; NaN and masked points are undefined."""
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
-        own, least = (" x ".join(map(str, shape)) for shape in (heights.shape, (MIN_GRID,) * heights.ndim))
-        raise InputError(f"{own} points have too few wavelengths; needed are at least {least}")
+        own, least = (
+            " x ".join(map(str, shape))
+            for shape in (heights.shape, (MIN_GRID,) * heights.ndim)
+        )
+        raise InputError(
+            f"{own} points have too few wavelengths; needed are at least {least}"
+        )
     known = Treated(heights, steps, periodic, unit)
     with warnings.catch_warnings():
         # warnings of numpy inside that library are ignored
@@ -155,21 +228,33 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
     heights, trend = known.heights, mode or ("mean" if known.periodic else "plane")
     degree = DEGREES.get(trend)
     if degree is None:
-        flat = np.asarray(wrapped(heights, known.steps, known.periodic).detrend(trend).heights(), float)
+        flat = np.asarray(
+            wrapped(heights, known.steps, known.periodic).detrend(trend).heights(), float
+        )
     else:
         flat = without_polynomial(heights, degree)
     size = float(np.abs(heights).max())
     if not float(np.abs(flat).max()) > max(1e3 * np.finfo(float).eps * size, MIN_LENGTH):
         raise InputError(f"the map is flat: without its {trend} it is zero")
     before, after = float(np.std(heights)), float(np.std(flat))
-    told = f"{trend} subtracted" + (f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else "")
-    for more, form, remedy in ((1, "tilt", "plane"), (2, "bow", "quadratic")) if degree is not None else ():
-        share = 1 - (float(np.std(without_polynomial(flat, more))) / after) ** 2 if more > (degree or 0) else 0.0
+    told = f"{trend} subtracted" + (
+        f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else ""
+    )
+    for more, form, remedy in (
+        ((1, "tilt", "plane"), (2, "bow", "quadratic")) if degree is not None else ()
+    ):
+        share = (
+            1 - (float(np.std(without_polynomial(flat, more))) / after) ** 2
+            if more > (degree or 0)
+            else 0.0
+        )
         if share > FORM:
             told += f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} removes it"
             break
     removed = None if trend in ("mean", "plane") else heights - flat
-    known = known.after(flat, "detrend", told, mode=trend, h_rms_before=before, h_rms_after=after)
+    known = known.after(
+        flat, "detrend", told, mode=trend, h_rms_before=before, h_rms_after=after
+    )
     return dataclasses.replace(known, form=removed)
 
 
@@ -199,7 +284,10 @@ def _without_outliers(known: Treated, asked: float | None) -> Treated:
     isolated = measured & _isolated(whole, median, known.periodic)
     # spikes on more than 1% of the points do not set the scale
     usual = measured & ~isolated
-    scale = float(np.quantile(difference[usual if usual.any() else measured], USUAL)) / USUAL_DEVIATES
+    scale = (
+        float(np.quantile(difference[usual if usual.any() else measured], USUAL))
+        / USUAL_DEVIATES
+    )
     limit = USUAL_LIMIT if asked is None else asked
     outliers = measured & (difference > limit * scale)
     out = f"out by more than {limit:g} standard deviations: "
@@ -251,7 +339,9 @@ def _without_seams(known: Treated) -> Treated:
         spread = np.median(np.abs(steps - across[:, None]), axis=1)
         beside = np.maximum(np.append(0.0, size[:-1]), np.append(size[1:], 0.0))
         usual = np.maximum(beside, np.sort(size)[-1 - MOST_SEAMS])
-        seams = (size > SEAM * usual) & (size > SEAM_SPREAD * spread) & (size > MIN_LENGTH)
+        seams = (
+            (size > SEAM * usual) & (size > SEAM_SPREAD * spread) & (size > MIN_LENGTH)
+        )
         if not seams.any():
             continue
         place = int(np.argmax(np.where(seams, size, 0.0)))
@@ -265,7 +355,14 @@ def _without_seams(known: Treated) -> Treated:
             f"{told}: give each part as a map of its own, Surface.from_map(heights[{parts[0]}], ...) and "
             f"Surface.from_map(heights[{parts[1]}], ...)"
         )
-        return known.after(known.heights, "seam", told, between=[place, place + 1], axis=axis, not_valid=reason)
+        return known.after(
+            known.heights,
+            "seam",
+            told,
+            between=[place, place + 1],
+            axis=axis,
+            not_valid=reason,
+        )
     return known
 
 
@@ -291,7 +388,15 @@ def _filled(known: Treated, fill: str | None) -> Treated:
             f"{share:.2g} of the points are filled, more than {MOST_FILLED:g}: contact and gaps there were not "
             "measured. Cut out a part without holes, Surface.from_map(heights[i:j, k:l], ...), or measure again"
         )
-    return known.after(_harmonic(known), "fill", told, method="harmonic", points=count, share=share, **more)
+    return known.after(
+        _harmonic(known),
+        "fill",
+        told,
+        method="harmonic",
+        points=count,
+        share=share,
+        **more,
+    )
 
 
 def _within(known: Treated, treatment: Treatment) -> Treated:
@@ -303,8 +408,14 @@ def _within(known: Treated, treatment: Treatment) -> Treated:
             f"sampled, got {short:g}"
         )
     if short is not None and long is not None and not long > short:
-        raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
-    own = {name: getattr(treatment, name) for name in CALLED if getattr(treatment, name) is not None}
+        raise InputError(
+            f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}"
+        )
+    own = {
+        name: getattr(treatment, name)
+        for name in CALLED
+        if getattr(treatment, name) is not None
+    }
     values = known.heights if known.periodic or not own else mirrored(known.heights)
     whole = tuple(slice(count) for count in known.heights.shape)
     for name, wavelength in own.items():
@@ -314,27 +425,43 @@ def _within(known: Treated, treatment: Treatment) -> Treated:
         values = filtered(values, known.steps, name, wavelength)
         after = squares(values, known.steps)
         if not after[0] > MIN_POWER * before[0]:
-            raise InputError(f"{name} {wavelength:g} leaves no wavelength of the measurement")
-        of_variance, of_gradient = (max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True))
+            raise InputError(
+                f"{name} {wavelength:g} leaves no wavelength of the measurement"
+            )
+        of_variance, of_gradient = (
+            max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True)
+        )
         length = f"{wavelength:.4g} {known.unit or ''}".rstrip()
         told = f"{CALLED[name]} at {length} removes {of_gradient:.0%} of the squared gradient"
         if name in ("short_cutoff", "s_filter"):
             told += f": the rms gradient is {math.sqrt(after[1] / before[1]):.2f} times that without"
         told += f"; it removes {of_variance:.0%} of the height variance"
-        known = known.after(values, name, told, wavelength=wavelength, of_gradient=of_gradient, of_variance=of_variance)
+        known = known.after(
+            values,
+            name,
+            told,
+            wavelength=wavelength,
+            of_gradient=of_gradient,
+            of_variance=of_variance,
+        )
     return dataclasses.replace(known, heights=values[whole]) if own else known
 
 
 def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
     """Heights less their least-squares polynomial of that total degree: same as SurfaceTopography's modes."""
     bases = [
-        np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), degree))[0] for count in heights.shape
+        np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), degree))[
+            0
+        ]
+        for count in heights.shape
     ]
     if heights.ndim == 1:
         return np.asarray(heights - bases[0] @ (bases[0].T @ heights))
     along, across = bases
     wanted = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree
-    return np.asarray(heights - along @ (wanted * (along.T @ heights @ across)) @ across.T)
+    return np.asarray(
+        heights - along @ (wanted * (along.T @ heights @ across)) @ across.T
+    )
 
 
 def last_wave(nesting: float) -> float:
@@ -344,11 +471,18 @@ def last_wave(nesting: float) -> float:
 
 def _squared_waves(shape: tuple[int, ...], steps: tuple[float, ...]) -> Any:
     """Squares of the wavenumbers of a grid's Fourier components."""
-    waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(shape, steps, strict=True)]
-    return np.add.outer(waves[0] ** 2, waves[1] ** 2) if len(shape) == 2 else waves[0] ** 2
+    waves = [
+        2 * np.pi * np.fft.fftfreq(count, step)
+        for count, step in zip(shape, steps, strict=True)
+    ]
+    return (
+        np.add.outer(waves[0] ** 2, waves[1] ** 2) if len(shape) == 2 else waves[0] ** 2
+    )
 
 
-def filtered(values: FloatArray, steps: tuple[float, ...], name: str, wavelength: float) -> FloatArray:
+def filtered(
+    values: FloatArray, steps: tuple[float, ...], name: str, wavelength: float
+) -> FloatArray:
     """Periodic heights after a cut-off or a filter, an option of `Treatment`, at a wavelength."""
     q2, cut = _squared_waves(values.shape, steps), (2 * math.pi / wavelength) ** 2
     if name == "short_cutoff":
@@ -357,7 +491,11 @@ def filtered(values: FloatArray, steps: tuple[float, ...], name: str, wavelength
         left = q2 >= cut * (1 - 1e-12)
     else:
         left = np.exp(-GAUSSIAN * q2 / cut)
-        left = 1 - left if name == "l_filter" else np.where(q2 < last_wave(wavelength) ** 2, left, 0.0)
+        left = (
+            1 - left
+            if name == "l_filter"
+            else np.where(q2 < last_wave(wavelength) ** 2, left, 0.0)
+        )
     return np.asarray(np.fft.ifftn(np.fft.fftn(values) * left).real)
 
 
@@ -369,7 +507,9 @@ def mirrored(values: FloatArray) -> FloatArray:
 
 
 def squares(
-    values: FloatArray, steps: tuple[float, ...], band: tuple[float, float] = (0.0, math.inf)
+    values: FloatArray,
+    steps: tuple[float, ...],
+    band: tuple[float, float] = (0.0, math.inf),
 ) -> tuple[float, float]:
     """Mean squares of periodic heights and of their gradient, of the wavelengths between two wavenumbers."""
     power = np.abs(np.fft.fftn(values) / values.size) ** 2

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
     from mbma_tables.theories.mbma.theory import Mbma
     from mbma_tables.theories.persson import Method, Persson
-    from mbma_tables.theories.simulated.yielded import BoundaryElements as BoundaryElements
+    from mbma_tables.theories.simulated.yielded import (
+        BoundaryElements as BoundaryElements,
+    )
 
 __all__ = [
     "THEORIES",
@@ -35,7 +37,9 @@ __all__ = [
 ]
 
 THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")
-_NAMED = dict(zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True))
+_NAMED = dict(
+    zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True)
+)
 # a theory's module is imported when first needed
 _HOMES = {
     "Mbma": "mbma.theory",
@@ -50,7 +54,12 @@ _HOMES = {
 }
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by simulating it
 # of MBMA
-OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise"}
+OPTIONS = {
+    "island_model": "universal",
+    "variant": "reported",
+    "rtol": 1e-8,
+    "outside": "raise",
+}
 
 
 def __getattr__(name: str) -> Any:
@@ -62,13 +71,14 @@ def __getattr__(name: str) -> Any:
 def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory:
     """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
 
-    "simulated" and "corrected" are theories of one `surface`, made from a map: `BoundaryElements.of`
-    and `Corrected.of` that surface, kept for the last eight of them.
+    "simulated" and "corrected" are theories of one `surface`, made from a map:
+    `BoundaryElements.of` and `Corrected.of` that surface, kept for the last eight of them.
 
     Raises
     ------
     InputError
-        For an unknown name, an object that is not a theory, and theories of a map for a surface without one.
+        For an unknown name, an object that is not a theory, and theories of a map for a
+        surface without one.
 
     Examples
     --------
@@ -83,7 +93,11 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
         from mbma_tables.theories.simulated.yielded import of_map
 
         return of_map(theory, surface)
-    found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
+    found: Any = (
+        __getattr__(_NAMED[theory])()
+        if isinstance(theory, str) and theory in _NAMED
+        else theory
+    )
     if isinstance(found, Theory):
         return found
     if isinstance(found, UserTheory) and not isinstance(found, type):
@@ -115,17 +129,19 @@ def theory_name(
     theory : str, theory or None
         What the caller gave; anything but None is returned as it is.
     by : str, optional
-        The quantity at which the contact is asked for, "separation", "mean_separation", "pressure" or "area";
-        None for laws and curves, which are functions of the mean separation.
+        The quantity at which the contact is asked for, "separation", "mean_separation",
+        "pressure" or "area"; None for laws and curves, which are functions of the mean
+        separation.
     **options
         Values of `OPTIONS`, MBMA's own.
 
     Returns
     -------
     str or theory
-        By default "mbma" at a given separation d, which is MBMA's coordinate, or where an option of MBMA differs from
-        its default; else "simulated" for a surface opened from the table of its simulation, "corrected" for a map
-        that is resolved and of at most 2^18 points, and "calibrated" for every other surface.
+        By default "mbma" at a given separation d, which is MBMA's coordinate, or where an
+        option of MBMA differs from its default; else "simulated" for a surface opened from
+        the table of its simulation, "corrected" for a map that is resolved and of at most
+        2^18 points, and "calibrated" for every other surface.
 
     Examples
     --------

@@ -16,8 +16,14 @@ from mbma_tables.core import core
 
 NAME = "calibrated.nc"
 QUANTITIES = ("area", "pressure", "stiffness")
-COMPARED = (5e-4, 0.98)  # A/A0 of the lightest and the heaviest contacts whose errors were averaged
-FEW, MIN_SHARED = 64, 40  # most surfaces, and least entries per surface, for which polynomials are made
+COMPARED = (
+    5e-4,
+    0.98,
+)  # A/A0 of the lightest and the heaviest contacts whose errors were averaged
+FEW, MIN_SHARED = (
+    64,
+    40,
+)  # most surfaces, and least entries per surface, for which polynomials are made
 
 Owners = NDArray[np.int64]
 
@@ -30,7 +36,9 @@ class SurfaceSpline:
     step: FloatArray  # and their distance, shape (3,)
     covered: FloatArray  # first and last that are answered, shape (3, 2) or (2, 2)
     coefficients: FloatArray  # float32
-    law_constants: tuple[float, float, float]  # constants of the law other than the spline, for the core
+    law_constants: tuple[
+        float, float, float
+    ]  # constants of the law other than the spline, for the core
 
     @shared_property
     def cells(self) -> Any:
@@ -45,13 +53,23 @@ class SurfaceSpline:
     @shared_property
     def core_table(self) -> tuple[Any, FloatArray, Any]:
         """Coefficients, numbers and cells in the core's format."""
-        numbers = [*self.first, *(1 / self.step), *self.covered[:2].ravel(), *self.law_constants]
+        numbers = [
+            *self.first,
+            *(1 / self.step),
+            *self.covered[:2].ravel(),
+            *self.law_constants,
+        ]
         return np.pad(self.coefficients.ravel(), (0, 2)), np.array(numbers), self.cells
 
     def covers(self, hurst: FloatArray, log_zeta_1: FloatArray) -> Any:
         """Mask of surfaces inside the table."""
         (low, high), (start, stop) = self.covered[:2]
-        return (low <= hurst) & (hurst <= high) & (start <= log_zeta_1) & (log_zeta_1 <= stop)
+        return (
+            (low <= hurst)
+            & (hurst <= high)
+            & (start <= log_zeta_1)
+            & (log_zeta_1 <= stop)
+        )
 
     def shared(self, surfaces: FloatArray, entries: int) -> FloatArray | None:
         """Polynomials of surfaces whose first rows are H and ln zeta_1, where these are worth making."""
@@ -59,7 +77,9 @@ class SurfaceSpline:
         if count > FEW or entries < MIN_SHARED * count:
             return None
         pieces = np.empty((count, int(self.cells[2]), 6))
-        core.spline_pieces(*self.core_table, surfaces[0], surfaces[1], None, None, None, pieces)
+        core.spline_pieces(
+            *self.core_table, surfaces[0], surfaces[1], None, None, None, pieces
+        )
         return pieces
 
 
@@ -71,10 +91,14 @@ def known_at(places: FloatArray, row: FloatArray, x: FloatArray) -> FloatArray:
 
 def nodes_of(axes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """First node and step of axes."""
-    return np.array([axis[0] for axis in axes]), np.array([(axis[-1] - axis[0]) / (axis.size - 1) for axis in axes])
+    return np.array([axis[0] for axis in axes]), np.array(
+        [(axis[-1] - axis[0]) / (axis.size - 1) for axis in axes]
+    )
 
 
-def read_group(path: pathlib.Path, group: str = "") -> tuple[dict[str, FloatArray], dict[str, Any], dict[str, Any]]:
+def read_group(
+    path: pathlib.Path, group: str = ""
+) -> tuple[dict[str, FloatArray], dict[str, Any], dict[str, Any]]:
     """Variables and attributes of a file of the calibrated law, or of a group of it, and what its axes cover."""
     import netCDF4
 
@@ -83,11 +107,21 @@ def read_group(path: pathlib.Path, group: str = "") -> tuple[dict[str, FloatArra
         if getattr(data, "mbma_kind", None) != "calibrated":
             raise TableFileError(f"{path}: is no table of the calibrated law")
         if group and group not in data.groups:
-            raise TableFileError(f"{path}: has no group {group!r}, only {sorted(data.groups)}")
+            raise TableFileError(
+                f"{path}: has no group {group!r}, only {sorted(data.groups)}"
+            )
         data.set_auto_mask(False)
         part = data[group] if group else data
-        covered = {name: x.getncattr("covered") for name, x in part.variables.items() if "covered" in x.ncattrs()}
-        return {name: np.array(x[...]) for name, x in part.variables.items()}, part.__dict__, covered
+        covered = {
+            name: x.getncattr("covered")
+            for name, x in part.variables.items()
+            if "covered" in x.ncattrs()
+        }
+        return (
+            {name: np.array(x[...]) for name, x in part.variables.items()},
+            part.__dict__,
+            covered,
+        )
 
 
 @shared()
@@ -101,9 +135,13 @@ class Deviations:
     """Distances of theories from simulations, as measured on surfaces that no fit saw."""
 
     log_area: FloatArray  # ln of contact fractions
-    log_rms: dict[str, FloatArray]  # by theory: ln of rms of ln(theory/simulation), rows `QUANTITIES`, by `log_area`
+    log_rms: dict[
+        str, FloatArray
+    ]  # by theory: ln of rms of ln(theory/simulation), rows `QUANTITIES`, by `log_area`
 
-    def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:
+    def standard_deviation(
+        self, theory: str, quantity: str, area: FloatArray
+    ) -> FloatArray:
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""
         if theory not in self.log_rms:
             return np.full(np.shape(area), np.nan)
@@ -119,5 +157,7 @@ class Deviations:
 def shipped_deviations() -> Deviations:
     """Those in the shipped file, read once."""
     values, facts = shipped_part("")
-    log_rms = dict(zip(facts["theories"].split(), np.log(values["stated_scatter"]), strict=True))
+    log_rms = dict(
+        zip(facts["theories"].split(), np.log(values["stated_scatter"]), strict=True)
+    )
     return Deviations(np.log(values["contact"]), log_rms)

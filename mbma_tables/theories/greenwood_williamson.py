@@ -11,7 +11,9 @@ from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 
 EPSILON = 1e-13  # accuracy of the height integrals
-MAX_DEPTH = 37.0  # largest d over the summits' standard deviation without underflow of force
+MAX_DEPTH = (
+    37.0  # largest d over the summits' standard deviation without underflow of force
+)
 MAX_AREA = 0.1  # A/A0 up to which asperities are nearly independent
 
 
@@ -32,19 +34,37 @@ class GreenwoodWilliamson(Theory):
     ends_at_h_max = False
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
+        density, radius, sigma = (
+            surface.summit_density,
+            surface.summit_radius,
+            surface.summit_sigma,
+        )
         x = (2 * np.asarray(mean_separation) - np.asarray(surface.h_max)) / sigma
         strength = density * np.sqrt(radius * sigma)
         pressure = 4 / 3 * strength * sigma * height_integral(1.5, x)
         area = math.pi * density * radius * sigma * height_integral(1.0, x)
         # d(F_3/2)/dx = -3/2 F_1/2, and du = dd/2
-        return TheoryAnswer(pressure, area, 4 * strength * height_integral(0.5, x), np.full(np.shape(x), EPSILON))
+        return TheoryAnswer(
+            pressure,
+            area,
+            4 * strength * height_integral(0.5, x),
+            np.full(np.shape(x), EPSILON),
+        )
 
-    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
+    def interval(
+        self, surface: AnySurface, quantity: str = "pressure"
+    ) -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from u = 0 to the underflow of force."""
-        high = np.asarray((surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float)
+        high = np.asarray(
+            (surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float
+        )
         return np.zeros_like(high), high
 
-    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        dense = {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}
+    def reasons(
+        self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
+    ) -> dict[str, Any]:
+        dense = {
+            f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area
+            > MAX_AREA
+        }
         return {**super().reasons(surface, answer, mean_separation), **dense}

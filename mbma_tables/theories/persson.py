@@ -11,7 +11,14 @@ from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import Theory, TheoryAnswer
-from mbma_tables.theories.calibrated.formulas import LAW_ERROR, YANG_PERSSON, Law, area, self_affine_law, spectrum_of
+from mbma_tables.theories.calibrated.formulas import (
+    LAW_ERROR,
+    YANG_PERSSON,
+    Law,
+    area,
+    self_affine_law,
+    spectrum_of,
+)
 
 Method = Literal["full", "simplified"]
 
@@ -55,7 +62,8 @@ class Persson(Theory):
     Parameters
     ----------
     method : {"full", "simplified"}
-        The double integral (19), to 1e-11, or its light-load form (20), which ends at u = 0, where the force is lambda.
+        The double integral (19), to 1e-11, or its light-load form (20), which ends at u =
+        0, where the force is lambda.
 
     Raises
     ------
@@ -81,23 +89,36 @@ class Persson(Theory):
             raise InputError(f"method must be 'full' or 'simplified', got {method!r}")
         self.method: Method = method
 
-    def _by_law(self, surface: AnySurface, quantity: str, given: FloatArray) -> FloatArray:
+    def _by_law(
+        self, surface: AnySurface, quantity: str, given: FloatArray
+    ) -> FloatArray:
         """Rows of what a method of each distinct law answers to its entries, in their places."""
         if isinstance(surface, MeasuredSurface):
             if self.method == "simplified":
-                raise InputError("the simplified form (20) needs self-affine surfaces: method='full', or surface.fit()")
+                raise InputError(
+                    "the simplified form (20) needs self-affine surfaces: method='full', or surface.fit()"
+                )
             return np.asarray(getattr(_own_law(surface), quantity)(given))
         assert isinstance(surface, Surface)
         pairs = np.stack([np.ravel(surface.hurst), np.ravel(surface.zeta_1)])
         known, number = np.unique(pairs, axis=1, return_inverse=True)
-        laws: list[Any] = [self_affine_law(*pair, None, YANG_PERSSON) for pair in known.T.tolist()]
+        laws: list[Any] = [
+            self_affine_law(*pair, None, YANG_PERSSON) for pair in known.T.tolist()
+        ]
         laws = [_Light(law) for law in laws] if self.method == "simplified" else laws
         if len(laws) == 1:
             return np.asarray(getattr(laws[0], quantity)(given))
-        groups = grouped(np.broadcast_to(number.reshape(surface.shape), given.shape).ravel())
-        parts = [np.asarray(getattr(laws[k], quantity)(given.ravel()[mine])) for k, mine in groups]
+        groups = grouped(
+            np.broadcast_to(number.reshape(surface.shape), given.shape).ravel()
+        )
+        parts = [
+            np.asarray(getattr(laws[k], quantity)(given.ravel()[mine]))
+            for k, mine in groups
+        ]
         out = np.empty((*parts[0].shape[:-1], given.size))
-        out[..., np.concatenate([mine for _, mine in groups])] = np.concatenate(parts, axis=-1)
+        out[..., np.concatenate([mine for _, mine in groups])] = np.concatenate(
+            parts, axis=-1
+        )
         return out.reshape(*out.shape[:-1], *given.shape)
 
     def scatter_name(self, surface: AnySurface) -> str:
@@ -109,32 +130,67 @@ class Persson(Theory):
         u = finite_array("mean_separation", mean_separation)
         u = np.broadcast_to(u, np.broadcast_shapes(u.shape, surface.shape))
         allowed = u >= 0 if self.method == "simplified" else u > 0
-        require("mean_separation", u, allowed, "zero or positive, and positive for the full form")
+        require(
+            "mean_separation",
+            u,
+            allowed,
+            "zero or positive, and positive for the full form",
+        )
         h_rms, gradient = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient)
         pressure, _, stiffness = self._by_law(surface, "contact", u / h_rms)
         normal = np.isfinite(stiffness) & (pressure >= LEAST)
-        require("mean_separation", u, normal, "where force and stiffness are normal numbers")
+        require(
+            "mean_separation", u, normal, "where force and stiffness are normal numbers"
+        )
         pressure = pressure * gradient
-        error = np.full(pressure.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
-        return TheoryAnswer(pressure, self.area_at(surface, pressure), stiffness * gradient / h_rms, error)
+        error = np.full(
+            pressure.shape,
+            LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL,
+        )
+        return TheoryAnswer(
+            pressure, self.area_at(surface, pressure), stiffness * gradient / h_rms, error
+        )
 
-    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
+    def interval(
+        self, surface: AnySurface, quantity: str = "pressure"
+    ) -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] covered by the theory, whose heights are unbounded."""
         low = np.zeros(surface.shape)
         return low, np.full_like(low, np.inf)
 
-    def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
+    def mean_separation_at(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* (19, 20) or an area (18); zero where it underflows."""
         if quantity == "area":
-            require("area", wanted, wanted < 1, "below 1, which Persson's theory reaches at infinite load")
+            require(
+                "area",
+                wanted,
+                wanted < 1,
+                "below 1, which Persson's theory reaches at infinite load",
+            )
             from scipy.special import erfinv
 
             wanted = erfinv(wanted) * np.sqrt(surface.m2)
         pressure = finite_array("pressure", wanted)
-        require("pressure", pressure, pressure > 0, "positive: u is infinite at zero load")
-        pressure = np.broadcast_to(pressure, np.broadcast_shapes(pressure.shape, surface.shape))
-        u = self._by_law(surface, "separation_persson", pressure / np.asarray(surface.rms_gradient))[0] * surface.h_rms
-        require("pressure", pressure, u >= 0, "at most lambda E*, where the simplified form (20) reaches u = 0")
+        require(
+            "pressure", pressure, pressure > 0, "positive: u is infinite at zero load"
+        )
+        pressure = np.broadcast_to(
+            pressure, np.broadcast_shapes(pressure.shape, surface.shape)
+        )
+        u = (
+            self._by_law(
+                surface, "separation_persson", pressure / np.asarray(surface.rms_gradient)
+            )[0]
+            * surface.h_rms
+        )
+        require(
+            "pressure",
+            pressure,
+            u >= 0,
+            "at most lambda E*, where the simplified form (20) reaches u = 0",
+        )
         return np.asarray(u)
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
@@ -144,4 +200,6 @@ class Persson(Theory):
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         gradient = np.asarray(surface.rms_gradient)
         load = self.answer(surface, mean_separation).pressure / gradient
-        return np.asarray(self._by_law(surface, "energy", load) * gradient * surface.h_rms)
+        return np.asarray(
+            self._by_law(surface, "energy", load) * gradient * surface.h_rms
+        )

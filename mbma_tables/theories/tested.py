@@ -20,7 +20,8 @@ HEIGHTS = (2.5, 8.0)
 # longest wavelengths along a side of the nominal area from which surfaces of one spectrum differ by
 # the stated scatter; with two, the gap of some is 7-14% off where 2-3% are stated
 SIDE = 4.0
-BROADEST = 256.0  # longest over shortest wavelength of the broadest surface that was simulated, once
+# longest over shortest wavelength of the broadest surface that was simulated, once
+BROADEST = 256.0
 ROUNDING = 1e-9  # relative, of numbers beside the ends of these ranges
 
 
@@ -58,7 +59,8 @@ def _of_the_surface(surface: AnySurface) -> dict[str, Any]:
         f"the Hurst exponent is below {HURST:g}": hurst < HURST * (1 - ROUNDING),
         narrow: ratio < least * (1 - ROUNDING),
         broad: ratio > most * (1 + ROUNDING),
-        f"h_max/h_rms is outside {HEIGHTS}": (heights < HEIGHTS[0]) | (heights > HEIGHTS[1]),
+        f"h_max/h_rms is outside {HEIGHTS}": (heights < HEIGHTS[0])
+        | (heights > HEIGHTS[1]),
     }
 
 

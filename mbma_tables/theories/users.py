@@ -7,12 +7,21 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.base import FEW_LOOKS, Curve, Theory, TheoryAnswer, UserTheory, select
+from mbma_tables.theories.base import (
+    FEW_LOOKS,
+    Curve,
+    Theory,
+    TheoryAnswer,
+    UserTheory,
+    select,
+)
 
 ENOUGH = 2e-8  # relative error of stiffnesses
 
 
-def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
+def answer_where_finite(
+    theory: Theory, surface: AnySurface, mean_separation: FloatArray
+) -> TheoryAnswer:
     """A theory's results at mean separations u, shape (n,), on one surface; NaN where the force is not finite."""
     u = np.asarray(mean_separation, dtype=float)
     places = np.arange(u.size)
@@ -22,7 +31,11 @@ def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: Fl
             with np.errstate(all="ignore"):
                 found = theory.answer(surface, u[places])
         except OutOfRangeError as fault:
-            if fault.mask is None or np.shape(fault.mask) != places.shape or not np.any(fault.mask):
+            if (
+                fault.mask is None
+                or np.shape(fault.mask) != places.shape
+                or not np.any(fault.mask)
+            ):
                 raise
             places = places[~np.asarray(fault.mask)]
         else:
@@ -60,12 +73,19 @@ class Wrapped(Theory):
 
         u = np.asarray(mean_separation, dtype=float)
         found = self._theory.answer(surface, u)
-        pressure, area = (np.array(np.broadcast_to(part, u.shape), dtype=float) for part in found)
+        pressure, area = (
+            np.array(np.broadcast_to(part, u.shape), dtype=float) for part in found
+        )
 
         def force(x: FloatArray, place: FloatArray) -> FloatArray:
-            return np.broadcast_to(self._theory.answer(select(surface, u.shape, place), x)[0], x.shape)
+            return np.broadcast_to(
+                self._theory.answer(select(surface, u.shape, place), x)[0], x.shape
+            )
 
-        place, step = np.arange(float(u.size)).reshape(u.shape), 0.01 * np.asarray(surface.h_rms)
+        place, step = (
+            np.arange(float(u.size)).reshape(u.shape),
+            0.01 * np.asarray(surface.h_rms),
+        )
         known = {"order": 4, "initial_step": step, "tolerances": {"rtol": ENOUGH}}
         slope = derivative(force, u, args=(place,), **known).df
         return TheoryAnswer(pressure, area, -slope, np.full(u.shape, np.nan))
@@ -73,7 +93,9 @@ class Wrapped(Theory):
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
-            found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)
+            found = np.asarray(
+                self._theory.answer(surface, u)[int(quantity == "area")], dtype=float
+            )
             return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False
 
         return values

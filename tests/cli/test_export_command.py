@@ -15,8 +15,30 @@ from mbma_tables.cli import main
 from mbma_tables.export import CODE, c_code
 from mbma_tables.export.targets import ROWS, targets
 
-LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
-NUMBERS = ["--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3"]
+LAW = [
+    "--surface",
+    "concrete",
+    "--E-star",
+    "13.3",
+    "--length-unit",
+    "mm",
+    "--stress-unit",
+    "MPa",
+    "--rows",
+    "20",
+]
+NUMBERS = [
+    "--hurst",
+    "0.8",
+    "--q0",
+    "0.1",
+    "--zeta-1",
+    "50",
+    "--h-rms",
+    "1",
+    "--h-max",
+    "3",
+]
 
 
 def run(*arguments):
@@ -25,13 +47,27 @@ def run(*arguments):
 
 @pytest.mark.parametrize(
     "target",
-    ["calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica", "csv", "json", "netcdf", "matlab"],
+    [
+        "calculix",
+        "abaqus",
+        "lsdyna",
+        "optistruct",
+        "comsol",
+        "moose",
+        "modelica",
+        "csv",
+        "json",
+        "netcdf",
+        "matlab",
+    ],
 )
 def test_files_of_laws(target, tmp_path):
     result = run(target, "--out", tmp_path / "law.mat", *LAW)
     assert result.exit_code == 0, result.output
     assert (tmp_path / "law.mat").stat().st_size > 500
-    assert {p.name for p in tmp_path.iterdir()} == {"law.mat"} | ({"law.m"} if target == "matlab" else set())
+    assert {p.name for p in tmp_path.iterdir()} == {"law.mat"} | (
+        {"law.m"} if target == "matlab" else set()
+    )
 
 
 def test_pressures_asked_for_that_are_not_valid_are_told(tmp_path):
@@ -45,12 +81,21 @@ def test_fortran_writes_its_c_too(tmp_path):
     law = [*LAW[:-2], "--name", "road", "--theory", "calibrated", "--out"]
     assert run("fortran-law", *law, tmp_path / "own.f90").exit_code == 0
     assert run("c-law", *law, tmp_path / "own.c").exit_code == 0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["own.c", "own.f90", "own.h", "own_c.c"]
-    beside, own = ((tmp_path / name).read_text().partition("*/")[2] for name in ("own_c.c", "own.c"))
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "own.c",
+        "own.f90",
+        "own.h",
+        "own_c.c",
+    ]
+    beside, own = (
+        (tmp_path / name).read_text().partition("*/")[2] for name in ("own_c.c", "own.c")
+    )
     assert beside == own
 
 
-@pytest.mark.parametrize(("target", "name"), [("c-law", "own.h"), ("javascript-law", "own.cjs")])
+@pytest.mark.parametrize(
+    ("target", "name"), [("c-law", "own.h"), ("javascript-law", "own.cjs")]
+)
 def test_a_file_does_not_replace_one_beside_it(target, name, tmp_path):
     result = run(target, *LAW[:-2], "--theory", "calibrated", "--out", tmp_path / name)
     assert result.exit_code == 2
@@ -66,30 +111,62 @@ def test_code_is_written_and_replayed(tmp_path):
 
 
 def test_a_check_that_fails(tmp_path, monkeypatch):
-    monkeypatch.setattr(c_code, "check", lambda folder: c_code.Replay({"phi": 7}, {"phi": 0.5}, 2))
+    monkeypatch.setattr(
+        c_code, "check", lambda folder: c_code.Replay({"phi": 7}, {"phi": 0.5}, 2)
+    )
     result = run("c", "--out", tmp_path, "--check")
     assert result.exit_code == 2
-    assert "check failed: 2 answers are beyond their tolerance" in result.output.splitlines()[-1]
+    assert (
+        "check failed: 2 answers are beyond their tolerance"
+        in result.output.splitlines()[-1]
+    )
     assert run("c", "--out", tmp_path).exit_code == 0
 
 
-WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] != name] for name in LAW[::2]}
+WITHOUT = {
+    name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] != name]
+    for name in LAW[::2]
+}
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["calculix", "--out", "law", *NUMBERS, "--E-star", "13.3MPa"], "length_unit is missing"),
-        (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "stress_unit is missing"),
+        (
+            ["calculix", "--out", "law", *NUMBERS, "--E-star", "13.3MPa"],
+            "length_unit is missing",
+        ),
+        (
+            ["calculix", "--out", "law", *WITHOUT["--stress-unit"]],
+            "stress_unit is missing",
+        ),
         (["calculix", "--out", "law", *WITHOUT["--E-star"]], "is given and no modulus"),
         (["calculix", "--out", "law", *WITHOUT["--surface"]], "one surface is needed"),
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
         (["cobol", "--out", "law", *LAW], "cobol"),
-        (["c_law", "--out", "law", *LAW], "no target is named 'c_law'; did you mean 'c-law'?"),
-        (["c", "--out", "code", "--rows", "3", "--rtol", "0.1"], "leave --rows and --rtol out"),
-        (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
         (
-            ["calculix", "--out", "law", *LAW, "--pressures", "1:1e9", "--theory", "mbma"],
+            ["c_law", "--out", "law", *LAW],
+            "no target is named 'c_law'; did you mean 'c-law'?",
+        ),
+        (
+            ["c", "--out", "code", "--rows", "3", "--rtol", "0.1"],
+            "leave --rows and --rtol out",
+        ),
+        (
+            ["calculix", "--out", "law", *LAW, "--pressures", "1"],
+            "--pressures must be like 0.1:100",
+        ),
+        (
+            [
+                "calculix",
+                "--out",
+                "law",
+                *LAW,
+                "--pressures",
+                "1:1e9",
+                "--theory",
+                "mbma",
+            ],
             "pressure must be at most 2.02721 MPa, at d =",
         ),
         (
@@ -127,9 +204,19 @@ ANY = {
 def test_an_option_without_effect_is_refused(target, tmp_path):
     base = [] if target in CODE else BASE
     for option in {name.replace("_", "-") for name in ROWS} | {"check", "binaries"}:
-        if f"--{option}" not in ANY or option.replace("-", "_") in targets()[target].takes:
+        if (
+            f"--{option}" not in ANY
+            or option.replace("-", "_") in targets()[target].takes
+        ):
             continue
-        result = run(target, "--out", tmp_path / "law.mat", *base, f"--{option}", *ANY[f"--{option}"])
+        result = run(
+            target,
+            "--out",
+            tmp_path / "law.mat",
+            *base,
+            f"--{option}",
+            *ANY[f"--{option}"],
+        )
         assert result.exit_code == 2, option
         assert f"without effect on {target}: leave --{option}" in result.output
         assert len(result.output.strip().splitlines()) == 1
@@ -143,16 +230,27 @@ KINDS.remove(("abaqus", "--leakage"))  # refused by its interaction
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("target", "option"), [pair for pair in KINDS if pair[1].strip("-").replace("-", "_") in targets()[pair[0]].takes]
+    ("target", "option"),
+    [
+        pair
+        for pair in KINDS
+        if pair[1].strip("-").replace("-", "_") in targets()[pair[0]].takes
+    ],
 )
 def test_an_option_has_an_effect(target, option, tmp_path, monkeypatch):
-    monkeypatch.setattr(c_code, "check", lambda folder: c_code.Replay({"phi": 7}, {"phi": 0.0}, 0))
+    monkeypatch.setattr(
+        c_code, "check", lambda folder: c_code.Replay({"phi": 7}, {"phi": 0.0}, 0)
+    )
     base = [] if target in CODE else BASE
     plain = run(target, "--out", tmp_path / "plain", *base)
     given = run(target, "--out", tmp_path / "given", *base, option, *ANY[option])
     assert (plain.exit_code, given.exit_code) == (0, 0), given.output
     wrote, changed = (
-        [path.read_bytes() for path in sorted([*(tmp_path / name).rglob("*.*"), tmp_path / name]) if path.is_file()]
+        [
+            path.read_bytes()
+            for path in sorted([*(tmp_path / name).rglob("*.*"), tmp_path / name])
+            if path.is_file()
+        ]
         for name in ("plain", "given")
     )
     assert wrote != changed or "largest relative difference" in given.output
@@ -161,13 +259,28 @@ def test_an_option_has_an_effect(target, option, tmp_path, monkeypatch):
 @pytest.mark.parametrize("target", ["csv", "c-law", "fmu"])
 def test_a_header_has_the_command_and_hashes(target, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    np.save('a map of 100%; "x".npy', np.random.default_rng(3).normal(size=(32, 32)).cumsum(0))
+    np.save(
+        'a map of 100%; "x".npy', np.random.default_rng(3).normal(size=(32, 32)).cumsum(0)
+    )
     (path,) = tmp_path.iterdir()
-    given = ["--map", path.name, "--dx", "1um", "--E-star", "10 GPa", "--length-unit", "um", "--theory", "calibrated"]
+    given = [
+        "--map",
+        path.name,
+        "--dx",
+        "1um",
+        "--E-star",
+        "10 GPa",
+        "--length-unit",
+        "um",
+        "--theory",
+        "calibrated",
+    ]
     assert run(target, *given, "--out", "law.x").exit_code == 0
     content = (tmp_path / "law.x").read_bytes()
     if target == "fmu":
-        content = html.unescape(zipfile.ZipFile("law.x").read("modelDescription.xml").decode()).encode()
+        content = html.unescape(
+            zipfile.ZipFile("law.x").read("modelDescription.xml").decode()
+        ).encode()
     text = re.sub(r"\s+(?:[#*] )?", " ", content.decode())
     words = shlex.split(text.partition(": mbma export ")[2].partition("law.x")[0])
     assert [target, *given, "--out"] == words

@@ -19,9 +19,9 @@ MAP = "docs/data/maps/top-1.top"
 @pytest.fixture
 def map_file(tmp_path):
     path = tmp_path / "own.nc"
-    library.Topography(0.02 * random_map(POINTS, 0.03, 1, 1.7), (POINTS * STEP, POINTS * STEP), unit="um").to_netcdf(
-        str(path)
-    )
+    library.Topography(
+        0.02 * random_map(POINTS, 0.03, 1, 1.7), (POINTS * STEP, POINTS * STEP), unit="um"
+    ).to_netcdf(str(path))
     return path
 
 
@@ -37,9 +37,24 @@ def test_it_tells_what_was_found_and_done(map_file, tmp_path):
     pytest.importorskip("matplotlib")
     picture = tmp_path / "own.png"
     said = run(
-        "fit", map_file, "--short-cutoff", "2um", "--detrend", "quadratic", "--E-star", "100GPa", "--plot", picture
+        "fit",
+        map_file,
+        "--short-cutoff",
+        "2um",
+        "--detrend",
+        "quadratic",
+        "--E-star",
+        "100GPa",
+        "--plot",
+        picture,
     )
-    for text in ("h_rms", "heights: skewness", "slopes: anisotropy", "a short cut-off at 2 um removes", "GPa/um"):
+    for text in (
+        "h_rms",
+        "heights: skewness",
+        "slopes: anisotropy",
+        "a short cut-off at 2 um removes",
+        "GPa/um",
+    ):
         assert text in said
     assert "area depends on resolution" in said
     assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
@@ -47,13 +62,21 @@ def test_it_tells_what_was_found_and_done(map_file, tmp_path):
     assert found["theory"] == "corrected"
     assert found["columns"]["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1, 0.3, 0.6])
     assert found["columns"]["valid"] == ["no", *5 * ["yes"]]
-    assert any(note.startswith("not valid at contact of 0.002: A/A0 is below 0.003") for note in found["notes"])
+    assert any(
+        note.startswith("not valid at contact of 0.002: A/A0 is below 0.003")
+        for note in found["notes"]
+    )
 
 
 def test_what_the_calibrated_law_of_a_map_does_not_reach_is_left_out():
-    columns, notes = table_of_loads(Surface.from_map(MAP, short_cutoff="9.4nm"), theory="calibrated")
+    columns, notes = table_of_loads(
+        Surface.from_map(MAP, short_cutoff="9.4nm"), theory="calibrated"
+    )
     assert columns["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1])
-    assert any(note.startswith("contact of 0.3, 0.6 left out: area must be at most 0.1062") for note in notes)
+    assert any(
+        note.startswith("contact of 0.3, 0.6 left out: area must be at most 0.1062")
+        for note in notes
+    )
 
 
 def test_a_line_scan(line_file):
@@ -73,7 +96,9 @@ def test_every_command_takes_maps_and_says_so(map_file):
     text = run(*asked, "--model", "self-affine")
     fit = json.loads(run(*asked, "--model", "self-affine", "--json"))["surface"]["fit"]
     assert f"residual {fit['residual']:.6g}" in text
-    found = json.loads(run(*asked, "--short-cutoff", "2um", "--theory", "calibrated", "--json"))
+    found = json.loads(
+        run(*asked, "--short-cutoff", "2um", "--theory", "calibrated", "--json")
+    )
     steps = [entry["step"] for entry in found["surface"]["provenance"]]
     assert "short_cutoff" in steps
     assert "resolution" in steps
@@ -96,9 +121,15 @@ def test_the_same_in_toml(map_file, tmp_path):
     ("words", "message"),
     [
         (["fit", "absent.sur"], "there is no file"),
-        (["contact", "--surface", "concrete", "--outliers", "8", "-a", "0.1"], "for a measured map, which is missing"),
+        (
+            ["contact", "--surface", "concrete", "--outliers", "8", "-a", "0.1"],
+            "for a measured map, which is missing",
+        ),
         (["fit", "MAP", "--dx", "1um"], "leave dx and dy out (unit=... sets their unit)"),
-        (["fit", "MAP", "--extrapolate-to", "0.1um"], "extrapolate_to and extrapolate_hurst: give both"),
+        (
+            ["fit", "MAP", "--extrapolate-to", "0.1um"],
+            "extrapolate_to and extrapolate_hurst: give both",
+        ),
         (["fit", "MAP", "--channel", "7"], "has channels 0 to 0"),
     ],
 )
@@ -111,15 +142,51 @@ def test_an_array_in_a_file_needs_its_step(tmp_path):
     np.save(path, 0.02 * random_map(POINTS, 0.03, 1, 1.7))
     assert "give the sampling step dx" in refused("fit", path)
     assert json.loads(run("fit", path, "--dx", "500nm", "--json"))["length_unit"] == "nm"
-    found = json.loads(run("fit", path, "--dx", "500nm", "--length-unit", "um", "--short-cutoff", "2", "--json"))
+    found = json.loads(
+        run(
+            "fit",
+            path,
+            "--dx",
+            "500nm",
+            "--length-unit",
+            "um",
+            "--short-cutoff",
+            "2",
+            "--json",
+        )
+    )
     own = Surface.from_map(path, dx=0.5, unit="um", short_cutoff="2000 nm")
-    assert (found["length_unit"], found["rms_gradient"]) == ("um", pytest.approx(float(own.rms_gradient)))
-    known = json.loads(run("contact", "--map", path, "--dx", "0.5", "--length-unit", "um", "-a", "0.01", "--json"))
-    assert known["surface"]["h_rms"] == pytest.approx(float(Surface.from_map(path, dx=0.5).h_rms))
+    assert (found["length_unit"], found["rms_gradient"]) == (
+        "um",
+        pytest.approx(float(own.rms_gradient)),
+    )
+    known = json.loads(
+        run(
+            "contact",
+            "--map",
+            path,
+            "--dx",
+            "0.5",
+            "--length-unit",
+            "um",
+            "-a",
+            "0.01",
+            "--json",
+        )
+    )
+    assert known["surface"]["h_rms"] == pytest.approx(
+        float(Surface.from_map(path, dx=0.5).h_rms)
+    )
 
 
 def test_plain_lengths_of_a_map_are_in_the_unit_asked_for(map_file):
     words = ("--short-cutoff", "2000", "--length-unit", "nm", "--json")
-    found = json.loads(run("fit", map_file, *words)), json.loads(run("contact", "--map", map_file, "-a0.01", *words))
+    found = (
+        json.loads(run("fit", map_file, *words)),
+        json.loads(run("contact", "--map", map_file, "-a0.01", *words)),
+    )
     own = 1e3 * float(Surface.from_map(map_file, short_cutoff=2.0).h_rms)
-    assert (found[0]["h_rms"], found[1]["surface"]["h_rms"]) == (pytest.approx(own), pytest.approx(own))
+    assert (found[0]["h_rms"], found[1]["surface"]["h_rms"]) == (
+        pytest.approx(own),
+        pytest.approx(own),
+    )

@@ -53,7 +53,15 @@ def test_costs_and_distances_have_a_line_for_each_row():
     title, _, header, *lines = run("cost").splitlines()
     assert len(lines) == sum(row.island_model != UNIT for row in shipped_costs().rows)
     assert "fixed piece of work" in title
-    assert header.split() == ["island_model", "variant", "quantity", "error", "cost", "evaluations", "seconds"]
+    assert header.split() == [
+        "island_model",
+        "variant",
+        "quantity",
+        "error",
+        "cost",
+        "evaluations",
+        "seconds",
+    ]
     title, _, header, *lines = run("cost", "--distance").splitlines()
     assert title.endswith("s")
     assert header.split() == [*Distance._fields, "seconds"]
@@ -63,4 +71,6 @@ def test_costs_and_distances_have_a_line_for_each_row():
     found = json.loads(run("cost", "--distance", "--json"))
     for row, expected in zip(found["rows"], shipped_distances(), strict=True):
         assert (row["theory"], row["way"]) == (expected.theory, expected.way)
-        assert row["seconds"] == pytest.approx(expected.cost * found["unit_seconds"], rel=1e-12, abs=0)
+        assert row["seconds"] == pytest.approx(
+            expected.cost * found["unit_seconds"], rel=1e-12, abs=0
+        )

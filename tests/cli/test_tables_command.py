@@ -29,20 +29,27 @@ def test_info_by_kind_and_by_file(kind, folder):
     for axis in content.axes:
         # the universal table has cells
         nodes = "" if kind == UNIVERSAL else f", {axis.nodes} nodes, {axis.formula()}"
-        assert f"axis {axis.name}: {axis.long_name}, {axis.low:g} to {axis.high:g}{nodes}\n" in text
+        assert (
+            f"axis {axis.name}: {axis.long_name}, {axis.low:g} to {axis.high:g}{nodes}\n"
+            in text
+        )
     for name, value in content.attributes.items():
         assert f"{name}: {value}\n" in text
     shown = json.loads(run("tables", "info", kind, "--json"))
     assert shown["attributes"] == content.attributes
     assert shown["attributes"]["format_version"] == FORMAT_VERSIONS[kind]
-    assert shown["axes"] == {a.name: {**a.attributes(), "nodes": a.nodes} for a in content.axes}
+    assert shown["axes"] == {
+        a.name: {**a.attributes(), "nodes": a.nodes} for a in content.axes
+    }
 
 
 def test_verify_all_some_and_files(folder):
     lines = run("tables", "verify").splitlines()
     assert len(lines) == 2
     for line, kind in zip(lines, KINDS, strict=True):
-        assert line.startswith(f"{folder / kind}.nc: hashes match; 64 conformance points: table within ")
+        assert line.startswith(
+            f"{folder / kind}.nc: hashes match; 64 conformance points: table within "
+        )
         assert line.endswith(", exact solver identical to the last bit")
     assert run("tables", "verify", "island4d").splitlines() == lines[1:]
     assert run("tables", "verify", str(folder / "universal.nc")).splitlines() == lines[:1]
@@ -50,7 +57,11 @@ def test_verify_all_some_and_files(folder):
     tables = json.loads(run("tables", "verify", "--json"))["tables"]
     for row, kind in zip(tables, KINDS, strict=True):
         assert row.keys() == {"path", "kind", "points", "table_error", "solver_error"}
-        assert (row["path"], row["kind"], row["points"]) == (str(folder / f"{kind}.nc"), kind, 64)
+        assert (row["path"], row["kind"], row["points"]) == (
+            str(folder / f"{kind}.nc"),
+            kind,
+            64,
+        )
         assert 0 <= row["table_error"] < 1e-11
         assert row["solver_error"] == 0
 
@@ -61,19 +72,28 @@ def test_a_wrong_checksum_is_an_error(json_form, folder):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    for arguments in (["info", "universal"], ["verify"], ["verify", "island4d", str(path)]):
+    for arguments in (
+        ["info", "universal"],
+        ["verify"],
+        ["verify", "island4d", str(path)],
+    ):
         message = refused("tables", *arguments, *json_form)
         assert f"{path}: is damaged (its checksum does not match)" in message
         assert re.search("`python -m generate tables (all|universal)`", message)
 
 
 def test_a_missing_table_and_a_wrong_kind(folder):
-    assert "no file is called 'univrsal': the tables are universal and island4d" in refused(
-        "tables", "verify", "univrsal"
+    assert (
+        "no file is called 'univrsal': the tables are universal and island4d"
+        in refused("tables", "verify", "univrsal")
     )
     (folder / "universal.nc").replace(folder / "island4d.nc")
-    assert "holds a table of kind 'universal', not island4d" in refused("tables", "verify", "island4d")
-    assert "holds a table of kind 'universal', not island4d" in refused("tables", "info", "island4d")
+    assert "holds a table of kind 'universal', not island4d" in refused(
+        "tables", "verify", "island4d"
+    )
+    assert "holds a table of kind 'universal', not island4d" in refused(
+        "tables", "info", "island4d"
+    )
     assert "universal.nc: cannot be read" in refused("tables", "verify")
     assert "TABLE" in refused("tables", "info")
     assert "No such command" in refused("tables", "remake")

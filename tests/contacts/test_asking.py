@@ -17,7 +17,15 @@ from dask.callbacks import Callback
 from helpers import fresh, refusals
 
 import mbma_tables
-from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law, island
+from mbma_tables import (
+    ConvergenceError,
+    InputError,
+    OutOfRangeError,
+    Surface,
+    contact,
+    contact_law,
+    island,
+)
 from mbma_tables.common.files import shipped_file
 from mbma_tables.theories import THEORIES, Mbma, Theory, TheoryAnswer, get_theory
 
@@ -36,29 +44,52 @@ def test_the_four_ways_to_ask_give_one_contact(surface, theory):
     assert first.separation == pytest.approx(2 * u - surface.h_max)
     assert first.mean_pressure == pytest.approx(first.pressure / first.area, rel=1e-15)
     for known in ("separation", "pressure", "area"):
-        again = contact(surface, **{known: getattr(first, known)}, E_star=MODULUS, theory=theory)
-        for name in ("mean_separation", "separation", "pressure", "area", "stiffness", "mean_pressure", "energy"):
-            assert getattr(again, name) == pytest.approx(getattr(first, name), rel=1e-8), (known, name)
+        again = contact(
+            surface, **{known: getattr(first, known)}, E_star=MODULUS, theory=theory
+        )
+        for name in (
+            "mean_separation",
+            "separation",
+            "pressure",
+            "area",
+            "stiffness",
+            "mean_pressure",
+            "energy",
+        ):
+            assert getattr(again, name) == pytest.approx(
+                getattr(first, name), rel=1e-8
+            ), (known, name)
 
 
 @pytest.mark.parametrize("island_model", ["exact", "formula", "island4d"])
 def test_other_island_models_have_stiffness_and_validity_too(island_model):
     u = [0.0, 0.05, 0.3, 1.0, 2.0, 2.99, 3.0]
     models = ("universal", island_model)
-    table, other = (contact(SURFACE, mean_separation=u, island_model=t, theory="mbma") for t in models)
-    assert other.stiffness == pytest.approx(table.stiffness, rel={"exact": 1e-6}.get(island_model, 5e-3))
+    table, other = (
+        contact(SURFACE, mean_separation=u, island_model=t, theory="mbma") for t in models
+    )
+    assert other.stiffness == pytest.approx(
+        table.stiffness, rel={"exact": 1e-6}.get(island_model, 5e-3)
+    )
     assert other.valid.tolist() == table.valid.tolist()
     assert set(other.reasons) == set(table.reasons)
     rigid = contact(SURFACE, mean_separation=[1.0, 2.0], island_model="rigid")
-    assert rigid.stiffness == pytest.approx(contact_law(SURFACE, island_model="rigid").stiffness([1.0, 2.0]), rel=1e-6)
+    assert rigid.stiffness == pytest.approx(
+        contact_law(SURFACE, island_model="rigid").stiffness([1.0, 2.0]), rel=1e-6
+    )
 
 
 def test_scatter_of_stiffness_and_separation():
     known, small = {"E_star": MODULUS, "theory": "calibrated"}, 1e-4
     found = contact(SURFACE, pressure=[100.0, 400.0, 1500.0], **known)
     # a force that is off by its scatter moves the separation by this, to first order
-    moved = found.mean_separation - contact(SURFACE, pressure=found.pressure * (1 + small), **known).mean_separation
-    assert found.separation_scatter == pytest.approx(found.scatter * moved / small, rel=1e-3)
+    moved = (
+        found.mean_separation
+        - contact(SURFACE, pressure=found.pressure * (1 + small), **known).mean_separation
+    )
+    assert found.separation_scatter == pytest.approx(
+        found.scatter * moved / small, rel=1e-3
+    )
     # what was stated for stiffness at equal force, in the middle of a bin
     with netCDF4.Dataset(shipped_file("calibrated.nc")) as data:
         theories, middle = data.theories.split(), float(data["contact"][3])
@@ -71,14 +102,25 @@ def test_scatter_of_stiffness_and_separation():
 def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
     face, bodies = dataclasses.replace(SURFACE, unit="um"), ("45 W/(m K)", "167 W/m/K")
     asked = {"pressure": [10.0, 30.0], "theory": "calibrated"}
-    for modulus, given in ((100e3, {}), ("100 GPa", {"hardness": "1.5 GPa", "pressure": ["10 MPa", "30 MPa"]})):
+    for modulus, given in (
+        (100e3, {}),
+        ("100 GPa", {"hardness": "1.5 GPa", "pressure": ["10 MPa", "30 MPa"]}),
+    ):
         found = contact(face, E_star=modulus, **(asked | given))
         k_s = 2 / (1 / 45 + 1 / 167)
-        stiffness = np.asarray(found.unloading_stiffness) / (100e3 if modulus == 100e3 else 100)
+        stiffness = np.asarray(found.unloading_stiffness) / (
+            100e3 if modulus == 100e3 else 100
+        )
         assert found.conductance(45.0, 167.0) == pytest.approx(k_s * stiffness, rel=1e-14)
-        assert found.conductance(*bodies) == pytest.approx(1e6 * k_s * stiffness, rel=1e-14)
-        assert found.conductance("6e7 S/m") == pytest.approx(1e6 * found.conductance(6e7), rel=1e-14)
-    labelled = contact(face, pressure=xr.DataArray([10.0, 30.0], dims="load"), E_star=MODULUS).conductance(45.0)
+        assert found.conductance(*bodies) == pytest.approx(
+            1e6 * k_s * stiffness, rel=1e-14
+        )
+        assert found.conductance("6e7 S/m") == pytest.approx(
+            1e6 * found.conductance(6e7), rel=1e-14
+        )
+    labelled = contact(
+        face, pressure=xr.DataArray([10.0, 30.0], dims="load"), E_star=MODULUS
+    ).conductance(45.0)
     assert labelled.dims == ("load",)
     for bad, says in (
         ((45.0, "167 W/(m K)"), "got 45.0"),
@@ -98,16 +140,34 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
 def test_labelled_arrays_keep_their_names(theory):
     pressure = xr.DataArray([1.0, 10.0], dims="load", coords={"load": [1.0, 10.0]})
     hurst = xr.DataArray([0.7, 0.8], dims="hurst")
-    surface, lazy = (Surface(each, 0.01, 2.0, 1.0, 3.0) for each in (hurst, hurst.chunk(hurst=1)))
+    surface, lazy = (
+        Surface(each, 0.01, 2.0, 1.0, 3.0) for each in (hurst, hurst.chunk(hurst=1))
+    )
     asked = {"E_star": MODULUS, "theory": theory}
-    found, later = contact(surface, pressure=pressure, **asked), contact(lazy, pressure=pressure, **asked).area
+    found, later = (
+        contact(surface, pressure=pressure, **asked),
+        contact(lazy, pressure=pressure, **asked).area,
+    )
     assert later.chunks is not None
     np.testing.assert_array_equal(later.compute(), found.area)
-    plain = contact(Surface([[0.7], [0.8]], 0.01, 2.0, 1.0, 3.0), pressure=[1.0, 10.0], **asked)
-    names = ("separation", "mean_separation", "area", "stiffness", "mean_pressure", "valid")
-    for labelled, expected in [(getattr(found, name), getattr(plain, name)) for name in names]:
+    plain = contact(
+        Surface([[0.7], [0.8]], 0.01, 2.0, 1.0, 3.0), pressure=[1.0, 10.0], **asked
+    )
+    names = (
+        "separation",
+        "mean_separation",
+        "area",
+        "stiffness",
+        "mean_pressure",
+        "valid",
+    )
+    for labelled, expected in [
+        (getattr(found, name), getattr(plain, name)) for name in names
+    ]:
         assert set(labelled.dims) == {"load", "hurst"}
-        assert labelled.transpose("hurst", "load").values == pytest.approx(expected, rel=1e-13)
+        assert labelled.transpose("hurst", "load").values == pytest.approx(
+            expected, rel=1e-13
+        )
     assert found.area.attrs["units"] == "1"
 
 
@@ -116,8 +176,14 @@ test_what_cannot_be_asked = refusals(
     ({}, "exactly one of separation, mean_separation, pressure, area; got none"),
     ({"separation": 1.0, "pressure": 1.0}, "got separation and pressure"),
     ({"pressure": 1.0, "theory": "hertz"}, "theory must be one of"),
-    ({"pressure": 1.0, "theory": "persson", "island_model": "exact"}, "island_model: options of theory 'mbma'"),
-    ({"separation": 1.0, "theory": Mbma(), "variant": "printed"}, "variant: options of theory 'mbma' alone"),
+    (
+        {"pressure": 1.0, "theory": "persson", "island_model": "exact"},
+        "island_model: options of theory 'mbma'",
+    ),
+    (
+        {"separation": 1.0, "theory": Mbma(), "variant": "printed"},
+        "variant: options of theory 'mbma' alone",
+    ),
     ({"pressure": np.nan}, "pressure must be finite"),
     ({"pressure": -1.0}, "pressure must be at least 0"),
     ({"mean_separation": -1.0}, "mean_separation must be at least 0, got -1"),
@@ -141,9 +207,13 @@ def test_ends_validity_and_advice(theory):
         assert found.pressure[0] == found.area[0] == found.stiffness[0] == 0
         assert not np.signbit(contact(SURFACE, separation=3.0, theory=theory).energy)
     said = repr(contact(SURFACE, area=0.01, theory=theory))
-    assert ("advice theory='calibrated' for stiffness or separation" in said) == (theory == "mbma")
+    assert ("advice theory='calibrated' for stiffness or separation" in said) == (
+        theory == "mbma"
+    )
     # heights in um, wavenumbers in 1/mm
-    found = contact(Surface(0.8, 10.0, 2000.0, 1.0, 3.0), mean_separation=2.0, theory=theory)
+    found = contact(
+        Surface(0.8, 10.0, 2000.0, 1.0, 3.0), mean_separation=2.0, theory=theory
+    )
     assert not found.valid
     assert any("one unit?" in reason for reason in found.reasons)
     with pytest.raises(OutOfRangeError, match=r"^separation must be at least -h_max"):
@@ -159,7 +229,9 @@ def test_mbma_says_where_it_is_not_to_be_trusted():
     assert [mask.tolist() for mask in found.reasons.values()] == [[False, True]] * 2
     assert any("stiffness falls" in reason for reason in found.reasons)
     beyond = Surface([0.05, 0.8], 1.0, 1e8, 1.0, 4.5)
-    assert contact(beyond, mean_separation=[2.25, 0.5], outside="exact").valid.tolist() == [False, False]
+    assert contact(
+        beyond, mean_separation=[2.25, 0.5], outside="exact"
+    ).valid.tolist() == [False, False]
 
 
 def test_units_of_lists_and_of_named_arrays():
@@ -168,10 +240,25 @@ def test_units_of_lists_and_of_named_arrays():
     named = xr.DataArray([100.0, 200.0], dims="body", attrs={"units": "GPa"})
     assert contact(SURFACE, pressure="1 MPa", E_star=named).units["pressure"] == "GPa"
     with pytest.raises(InputError, match="hardness is in 'MPa'"):
-        contact(SURFACE, pressure=0.001, E_star=named, hardness=named.assign_attrs(units="MPa"))
+        contact(
+            SURFACE,
+            pressure=0.001,
+            E_star=named,
+            hardness=named.assign_attrs(units="MPa"),
+        )
     gaps = xr.DataArray([0.5, 1.0], dims="gap", name="mine")
-    found = contact(dataclasses.replace(SURFACE, unit="um"), separation=gaps, E_star="100 GPa", hardness="1.5 GPa")
-    expected = {"stiffness": "GPa/um", "mean_pressure": "GPa", "mean_separation": "um", "separation_scatter": "um"}
+    found = contact(
+        dataclasses.replace(SURFACE, unit="um"),
+        separation=gaps,
+        E_star="100 GPa",
+        hardness="1.5 GPa",
+    )
+    expected = {
+        "stiffness": "GPa/um",
+        "mean_pressure": "GPa",
+        "mean_separation": "um",
+        "separation_scatter": "um",
+    }
     for name, unit in expected.items():
         quantity = getattr(found, name)
         assert (quantity.name, quantity.attrs["units"]) == (name, unit)
@@ -180,9 +267,15 @@ def test_units_of_lists_and_of_named_arrays():
 
 @pytest.mark.parametrize("cap", [0.03, np.inf])
 def test_forces_that_no_gap_resolves_are_refused(cap):
-    surface, asked = Surface(0.8, 0.01, 2.0, 1.0, 3.0), {"pressure": [1e-150, 1e-3], "hardness": cap}
+    surface, asked = (
+        Surface(0.8, 0.01, 2.0, 1.0, 3.0),
+        {"pressure": [1e-150, 1e-3], "hardness": cap},
+    )
     # lighter than what is left where h_max - u is rounding
-    with pytest.raises(ConvergenceError, match="the separation at this pressure was not found for 1 entries") as caught:
+    with pytest.raises(
+        ConvergenceError,
+        match="the separation at this pressure was not found for 1 entries",
+    ) as caught:
         contact(surface, **asked, theory="mbma")
     assert caught.value.mask.tolist() == [True, False]
     found = contact(surface, **asked, theory="greenwood_williamson")
@@ -193,7 +286,9 @@ def test_forces_that_no_gap_resolves_are_refused(cap):
 def test_areas_that_no_gap_resolves_are_refused(height):
     """Beside h_max, where rounding of u is as large as the depth; 9 h_rms is outside of the table."""
     surface = Surface(0.8, 0.01, 0.64, 1.0, height)
-    with pytest.raises(ConvergenceError, match="the separation at this area was not found for 1 entries") as caught:
+    with pytest.raises(
+        ConvergenceError, match="the separation at this area was not found for 1 entries"
+    ) as caught:
         contact(surface, area=[1e-300, 1e-3], theory="calibrated")
     assert caught.value.mask.tolist() == [True, False]
     found = contact(surface, area=[0.0, 1e-12, 1e-3], theory="calibrated")
@@ -205,20 +300,33 @@ def test_areas_that_no_gap_resolves_are_refused(height):
 def test_the_bits_of_every_theory_do_not_depend_on_the_other_entries(theory, cap):
     surface = Surface(0.8, 0.01, 0.64, 1.0, 3.0)
     u = np.linspace(0.3, 2.9, 3001)
-    names = ["pressure", "area", "stiffness", "unloading_stiffness", "yielded", "plane_separation"]
+    names = [
+        "pressure",
+        "area",
+        "stiffness",
+        "unloading_stiffness",
+        "yielded",
+        "plane_separation",
+    ]
     names += ["energy"] if cap is None else []
     many = contact(surface, mean_separation=u, theory=theory, hardness=cap)
-    labelled = contact(surface, mean_separation=xr.DataArray(u, dims="gap"), theory=theory, hardness=cap)
+    labelled = contact(
+        surface, mean_separation=xr.DataArray(u, dims="gap"), theory=theory, hardness=cap
+    )
     for k in (0, 17, 1500, 3000):
         one = contact(surface, mean_separation=float(u[k]), theory=theory, hardness=cap)
         for name in names:
             value = float(getattr(one, name))
-            assert value == getattr(many, name)[k] == float(getattr(labelled, name)[k]), name
+            assert value == getattr(many, name)[k] == float(getattr(labelled, name)[k]), (
+                name
+            )
 
 
 def test_a_request_takes_few_calls_in_few_files():
     command = [sys.executable, "-m", "benchmarks.request"]
-    for row in subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout.splitlines():
+    for row in subprocess.run(
+        command, capture_output=True, text=True, check=True, cwd=ROOT
+    ).stdout.splitlines():
         calls, files = re.search(r"(\d+) calls .* (\d+) files", row).groups()
         assert int(calls) <= 90
         assert int(files) <= 9
@@ -243,14 +351,19 @@ def test_bodies_apart(theory):
     xr = pytest.importorskip("xarray")
     for name in ("separation", "mean_separation"):
         plain = contact(SURFACE, **{name: [1.0, 50.0]}, theory=theory)
-        labelled = contact(SURFACE, **{name: xr.DataArray([1.0, 50.0], dims="gap")}, theory=theory)
+        labelled = contact(
+            SURFACE, **{name: xr.DataArray([1.0, 50.0], dims="gap")}, theory=theory
+        )
         assert labelled.separation.values.tolist() == plain.separation.tolist()
         assert labelled.mean_separation.values.tolist() == plain.mean_separation.tolist()
     if ends:
         assert (found.pressure, found.area) == (0, 0)
         assert "the bodies are apart" in repr(found)
         assert contact(SURFACE, mean_separation=50.0, theory=theory).separation == 50.0
-    assert contact(SURFACE, separation=SURFACE.h_max, theory=theory).mean_separation == SURFACE.h_max
+    assert (
+        contact(SURFACE, separation=SURFACE.h_max, theory=theory).mean_separation
+        == SURFACE.h_max
+    )
 
 
 FIELDS = ("pressure", "area", "error")
@@ -258,11 +371,22 @@ SMOOTH = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
 
 
 def gaps_over(n, **kwargs):
-    return xr.DataArray(np.linspace(-2.9, 3.1, n), dims="gap", coords={"gap": np.arange(n)}, name="d", **kwargs)
+    return xr.DataArray(
+        np.linspace(-2.9, 3.1, n),
+        dims="gap",
+        coords={"gap": np.arange(n)},
+        name="d",
+        **kwargs,
+    )
 
 
 def surfaces_over():
-    hurst = xr.DataArray([0.4, 0.7, 1.0], dims="surface", coords={"surface": ["a", "b", "c"]}, attrs={"units": "1"})
+    hurst = xr.DataArray(
+        [0.4, 0.7, 1.0],
+        dims="surface",
+        coords={"surface": ["a", "b", "c"]},
+        attrs={"units": "1"},
+    )
     h_max = xr.DataArray([3.0, 3.2], dims="case")
     return Surface(hurst, 0.2, 40.0, 1.0, h_max)
 
@@ -278,14 +402,22 @@ class Tasks(Callback):
 
 def test_dimensions_by_name():
     gaps = gaps_over(7, attrs={"units": "mm", "long_name": "separation"})
-    found, h_max = contact(surfaces_over(), separation=gaps), np.array([3.0, 3.2])[:, None]
-    plain = contact(Surface(np.array([0.4, 0.7, 1.0])[:, None, None], 0.2, 40.0, 1.0, h_max), separation=gaps.values)
+    found, h_max = (
+        contact(surfaces_over(), separation=gaps),
+        np.array([3.0, 3.2])[:, None],
+    )
+    plain = contact(
+        Surface(np.array([0.4, 0.7, 1.0])[:, None, None], 0.2, 40.0, 1.0, h_max),
+        separation=gaps.values,
+    )
     assert found.islands is None
     for name in FIELDS:
         values = getattr(found, name)
         assert (values.name, values.attrs["units"]) == (name, "1")
         assert set(values.dims) == {"surface", "case", "gap"}
-        np.testing.assert_array_equal(values.transpose("surface", "case", "gap"), getattr(plain, name))
+        np.testing.assert_array_equal(
+            values.transpose("surface", "case", "gap"), getattr(plain, name)
+        )
         assert values.surface.values.tolist() == ["a", "b", "c"]
         assert values.gap.values.tolist() == list(range(7))
     assert found.pressure.attrs["long_name"] == "force over nominal area"
@@ -293,18 +425,29 @@ def test_dimensions_by_name():
     assert gaps.attrs == {"units": "mm", "long_name": "separation"}
     # above h_max the bodies are apart
     expected = np.maximum((h_max + gaps.values) / 2, gaps.values)
-    np.testing.assert_array_equal(found.mean_separation.isel(surface=0).transpose("case", "gap"), expected)
-    assert xr.Dataset({name: getattr(found, name) for name in FIELDS}).sizes == {"surface": 3, "case": 2, "gap": 7}
+    np.testing.assert_array_equal(
+        found.mean_separation.isel(surface=0).transpose("case", "gap"), expected
+    )
+    assert xr.Dataset({name: getattr(found, name) for name in FIELDS}).sizes == {
+        "surface": 3,
+        "case": 2,
+        "gap": 7,
+    }
 
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
 def test_dask_is_lazy_and_gives_the_same_answers(scheduler):
     gaps, surfaces = gaps_over(50), surfaces_over()
     eager = contact(surfaces, separation=gaps)
-    lazy_surfaces = Surface(surfaces.hurst.chunk(surface=2), 0.2, 40.0, 1.0, surfaces.h_max.chunk(case=1))
+    lazy_surfaces = Surface(
+        surfaces.hurst.chunk(surface=2), 0.2, 40.0, 1.0, surfaces.h_max.chunk(case=1)
+    )
 
     def outputs(found):
-        return {name: getattr(found, name) for name in (*FIELDS, "mean_separation", "separation")}
+        return {
+            name: getattr(found, name)
+            for name in (*FIELDS, "mean_separation", "separation")
+        }
 
     with Tasks() as tasks:
         lazy = outputs(contact(lazy_surfaces, separation=gaps.chunk(gap=11)))
@@ -315,31 +458,48 @@ def test_dask_is_lazy_and_gives_the_same_answers(scheduler):
     assert tasks.ran > 10
     for name, expected in outputs(eager).items():
         assert (computed[name].dims, lazy[name].attrs) == (expected.dims, expected.attrs)
-        # at few gaps of one surface islands are summed, at more there is a series: within their errors
+        # at few gaps of one surface islands are summed, at more there is a series: within
+        # their errors
         if name == "error":
             assert (computed[name] <= 1e-8).all()
         else:
-            np.testing.assert_allclose(computed[name], expected, rtol=float(2 * eager.error.max()))
+            np.testing.assert_allclose(
+                computed[name], expected, rtol=float(2 * eager.error.max())
+            )
 
 
 def test_the_bits_of_one_surface_depend_neither_on_the_kind_of_argument_nor_on_the_chunks():
     surface, gaps = SMOOTH, gaps_over(5000)
-    eager, plain = contact(surface, separation=gaps), contact(surface, separation=gaps.values)
+    eager, plain = (
+        contact(surface, separation=gaps),
+        contact(surface, separation=gaps.values),
+    )
     assert plain.islands < 5000  # one series for all gaps
     for k in (0, 17, 2500, 4999):
         one = contact(surface, separation=float(gaps[k]))
-        assert (one.pressure, one.area, one.error) == (plain.pressure[k], plain.area[k], plain.error[k])
+        assert (one.pressure, one.area, one.error) == (
+            plain.pressure[k],
+            plain.area[k],
+            plain.error[k],
+        )
     lazy = contact(surface, separation=gaps.chunk(gap=(7, 493, 4500)))
     with dask.config.set(scheduler="threads", num_workers=4):
         for name in FIELDS:
             np.testing.assert_array_equal(getattr(plain, name), getattr(eager, name))
-            np.testing.assert_array_equal(getattr(lazy, name).compute(), getattr(eager, name))
+            np.testing.assert_array_equal(
+                getattr(lazy, name).compute(), getattr(eager, name)
+            )
 
 
 def test_chunks_without_entries():
     gaps = gaps_over(12)
-    for ask in (lambda d: contact(SMOOTH, separation=d).pressure, lambda d: contact_law(SMOOTH).area(separation=d)):
-        np.testing.assert_array_equal(ask(gaps.chunk(gap=(5, 0, 7))).compute(), ask(gaps.values))
+    for ask in (
+        lambda d: contact(SMOOTH, separation=d).pressure,
+        lambda d: contact_law(SMOOTH).area(separation=d),
+    ):
+        np.testing.assert_array_equal(
+            ask(gaps.chunk(gap=(5, 0, 7))).compute(), ask(gaps.values)
+        )
     with pytest.raises(InputError, match="separation is empty"):
         contact(SMOOTH, separation=gaps[:0])
 
@@ -358,10 +518,17 @@ def labelled(values, **coords):
 
 
 test_labelled_arguments_that_are_refused = refusals(
-    lambda hurst, h_rms, gaps: contact(Surface(hurst, 0.2, 0.2e8, h_rms, 3.0), separation=gaps),
+    lambda hurst, h_rms, gaps: contact(
+        Surface(hurst, 0.2, 0.2e8, h_rms, 3.0), separation=gaps
+    ),
     (labelled([0.8, 1.2]), 1.0, 1.0, r"hurst must be in \(0, 1\]"),
     (labelled([0.05, 0.8]), 1.0, 1.0, "outside of island model .universal"),
-    (labelled([0.8, 0.9]), 1.0, [0.0, 1.0, 2.0], r"separation must be one or a scalar, got shape \(3,\)"),
+    (
+        labelled([0.8, 0.9]),
+        1.0,
+        [0.0, 1.0, 2.0],
+        r"separation must be one or a scalar, got shape \(3,\)",
+    ),
     (labelled([0.8, 0.9]), np.ones(2), 1.0, r"beside DataArrays, h_rms must be"),
     (labelled([0.8, 0.9], t=[0, 1]), 1.0, labelled([1.0, 2.0], t=[1, 2]), "join|align"),
     error=ValueError,
@@ -369,13 +536,21 @@ test_labelled_arguments_that_are_refused = refusals(
 
 
 def test_options_go_through():
-    gaps, surfaces = gaps_over(3), Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0)
+    gaps, surfaces = (
+        gaps_over(3),
+        Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0),
+    )
     found = contact(surfaces, separation=gaps, outside="nan").pressure
-    assert np.isnan(found.transpose("s", "gap")).values.tolist() == [[True, True, False], [False] * 3]
+    assert np.isnan(found.transpose("s", "gap")).values.tolist() == [
+        [True, True, False],
+        [False] * 3,
+    ]
     options = {"island_model": "rigid", "variant": "printed", "rtol": 1e-4}
     rigid = contact(SMOOTH, separation=gaps, **options)
     assert (rigid.island_model, rigid.variant) == ("rigid", "printed")
-    np.testing.assert_array_equal(rigid.pressure, contact(SMOOTH, separation=gaps.values, **options).pressure)
+    np.testing.assert_array_equal(
+        rigid.pressure, contact(SMOOTH, separation=gaps.values, **options).pressure
+    )
 
 
 COLD = """
@@ -409,7 +584,9 @@ class Careful(Theory):
 
     def answer(self, surface, mean_separation):
         force = np.exp(-3 * mean_separation / surface.h_rms)
-        return TheoryAnswer(force, 0.1 * force, 3 / surface.h_rms * force, np.zeros_like(force))
+        return TheoryAnswer(
+            force, 0.1 * force, 3 / surface.h_rms * force, np.zeros_like(force)
+        )
 
     def reasons(self, surface, answer, mean_separation):
         return {"u is below 1": mean_separation < 1}

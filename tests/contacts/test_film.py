@@ -9,7 +9,11 @@ from mbma_tables import InputError, Surface, contact, flow_factors
 from mbma_tables.quantities.effective_medium import FlowConstants
 from mbma_tables.quantities.lay import factors
 from mbma_tables.theories import BoundaryElements
-from mbma_tables.theories.simulated.reynolds import flow_and_couette, flow_conductance, open_ways
+from mbma_tables.theories.simulated.reynolds import (
+    flow_and_couette,
+    flow_conductance,
+    open_ways,
+)
 
 BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
@@ -21,7 +25,9 @@ def test_wide_gaps_have_the_known_expansion():
         plain, _ = factors(u, np.zeros(2), 1.0, FlowConstants())
         for k, c in enumerate((1 / (1 + gamma), gamma / (1 + gamma))):
             expanded = (1 - 1.5 / u**2) * ratio[k] / plain[k]
-            np.testing.assert_allclose(expanded, 1 + 3 * (1 - 3 * c) / u**2, atol=30 / 30**4)
+            np.testing.assert_allclose(
+                expanded, 1 + 3 * (1 - 3 * c) / u**2, atol=30 / 30**4
+            )
             np.testing.assert_allclose(shear[k] * u, 3 * c, rtol=0.01)
 
 
@@ -45,7 +51,9 @@ def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
     rng, n, lay = np.random.default_rng(5), 256, 3.0
     q = np.meshgrid(*2 * [np.fft.fftfreq(n)], indexing="ij")
     length = np.hypot(q[0] * lay, q[1])
-    amplitude = np.where((length > 1 / 32) & (np.hypot(*q) < 1 / 8), np.maximum(length, 1 / 32) ** -1.8, 0)
+    amplitude = np.where(
+        (length > 1 / 32) & (np.hypot(*q) < 1 / 8), np.maximum(length, 1 / 32) ** -1.8, 0
+    )
     z = np.fft.ifft2(np.fft.fft2(rng.standard_normal((n, n))) * amplitude).real
     z /= z.std()
     surface = Surface.from_map(z - z.mean(), dx=1.0, periodic=True, detrend="mean")
@@ -55,7 +63,12 @@ def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
     for k, gap in enumerate(u):
         K, couette = flow_and_couette(gap - z, (n, n))
         assert abs(np.log([found.phi_x[k], found.phi_y[k]] / (K / gap**3))).max() < 0.1
-        assert abs(np.log([found.shear_x[k], found.shear_y[k]] / ((gap - couette) / z.std()))).max() < 0.35
+        assert (
+            abs(
+                np.log([found.shear_x[k], found.shear_y[k]] / ((gap - couette) / z.std()))
+            ).max()
+            < 0.35
+        )
 
 
 def test_the_asperity_pressure_is_as_valid_as_that_of_the_contact():
@@ -120,7 +133,9 @@ def test_factors_of_a_simulated_map_are_those_of_its_gaps(own_map):
         deep = found.area > 0.05
         np.testing.assert_allclose(phi, K / gap.mean() ** 3, rtol=0.2 if deep else 0.02)
         np.testing.assert_allclose(shear, gap.mean() - couette, rtol=0.02)
-        assert np.all(np.abs(np.log(phi / (K / gap.mean() ** 3))) < 3 * film.scatter[k] + 0.01)
+        assert np.all(
+            np.abs(np.log(phi / (K / gap.mean() ** 3))) < 3 * film.scatter[k] + 0.01
+        )
 
 
 @pytest.mark.slow
@@ -132,10 +147,14 @@ def test_a_simulated_map_continued_by_its_images_and_what_is_refused(own_map):
     u = 4.0
     whole = Surface.from_map(face.map.heights, dx=1.0, periodic=False, detrend="mean")
     z = whole.map.heights - whole.map.heights.mean()
-    K, couette = flow_and_couette(u - np.block([[z, z[:, ::-1]], [z[::-1], z[::-1, ::-1]]]), (192, 192))
+    K, couette = flow_and_couette(
+        u - np.block([[z, z[:, ::-1]], [z[::-1], z[::-1, ::-1]]]), (192, 192)
+    )
     found = flow_factors(whole, [u], theory="simulated")
     np.testing.assert_allclose([found.phi_x[0], found.phi_y[0]], K / u**3, rtol=1e-4)
-    np.testing.assert_allclose([found.shear_x[0], found.shear_y[0]], (u - couette) / whole.h_rms, rtol=1e-4)
+    np.testing.assert_allclose(
+        [found.shear_x[0], found.shear_y[0]], (u - couette) / whole.h_rms, rtol=1e-4
+    )
     with pytest.raises(InputError, match="peklenik"):
         flow_factors(face, 1.0, theory=BoundaryElements.of(face), peklenik=2.0)
 
@@ -152,7 +171,10 @@ test_what_is_refused = refusals(
 def test_units_and_what_is_not_valid(tmp_path):
     film = flow_factors(BEARING, ["1 um", "2000 nm"], E_star="110 GPa", peklenik=2.0)
     data = film.to_dataset()
-    assert (data["K_x"].attrs["units"], data["pressure"].attrs["units"]) == ("um^3", "GPa")
+    assert (data["K_x"].attrs["units"], data["pressure"].attrs["units"]) == (
+        "um^3",
+        "GPa",
+    )
     film.plot(tmp_path / "film.svg")
     deep = flow_factors(BEARING, [0.2], peklenik=8.0)
     assert not deep.valid[0]
@@ -162,8 +184,12 @@ def test_units_and_what_is_not_valid(tmp_path):
 def test_scale_of_gaps_and_sides():
     gap = np.exp(0.3 * np.random.default_rng(1).standard_normal((20, 40)))
     first = flow_conductance(gap, (1.0, 2.0))
-    np.testing.assert_allclose(flow_conductance(1e-3 * gap, (3.0, 6.0)), 1e-9 * first, rtol=1e-10)
-    np.testing.assert_allclose(flow_conductance(gap.T, (2.0, 1.0)), first[::-1], rtol=1e-10)
+    np.testing.assert_allclose(
+        flow_conductance(1e-3 * gap, (3.0, 6.0)), 1e-9 * first, rtol=1e-10
+    )
+    np.testing.assert_allclose(
+        flow_conductance(gap.T, (2.0, 1.0)), first[::-1], rtol=1e-10
+    )
 
 
 def test_a_dam_blocks_one_way():
@@ -203,7 +229,9 @@ def test_another_solver():
         gap = np.maximum(field / field.std() + level, 0)
         assert np.mean(gap == 0) == pytest.approx(touching, abs=0.03)
         for axis, values in enumerate((gap, gap.T)):
-            kept, _, flux = transport.solve_fluid_problem(values, "scipy-spsolve", boundary_mode="periodic")
+            kept, _, flux = transport.solve_fluid_problem(
+                values, "scipy-spsolve", boundary_mode="periodic"
+            )
             theirs, _ = transport.compute_total_flux(kept, flux, 64, "periodic")
             assert flow_conductance(gap)[axis] == pytest.approx(theirs, rel=1e-6)
 

@@ -32,7 +32,9 @@ class Spheres:
 
 
 def sheared(u=2.5):
-    return contact(FACE, mean_separation=u, E_star=1e3, theory=Spheres()).tangential(FRICTION, NU)
+    return contact(FACE, mean_separation=u, E_star=1e3, theory=Spheres()).tangential(
+        FRICTION, NU
+    )
 
 
 def test_spheres_are_those_of_cattaneo_mindlin_and_deresiewicz():
@@ -50,22 +52,32 @@ def test_spheres_are_those_of_cattaneo_mindlin_and_deresiewicz():
     assert found.stiffness == pytest.approx(8 * a / compliance, rel=1e-5)
     assert found.gross_slip == pytest.approx(3 * FRICTION * load / (16 * a) * compliance)
     assert found.shear(2 * found.gross_slip) == pytest.approx(FRICTION * load)
-    assert found.displacement(FRICTION * load) == pytest.approx(found.gross_slip, rel=1e-6)
+    assert found.displacement(FRICTION * load) == pytest.approx(
+        found.gross_slip, rel=1e-6
+    )
     lost = 9 * (FRICTION * load) ** 2 / (10 * a) * compliance
-    lost = lost * (1 - (1 - share) ** (5 / 3) - 5 * share / 6 * (1 + (1 - share) ** (2 / 3)))
+    lost = lost * (
+        1 - (1 - share) ** (5 / 3) - 5 * share / 6 * (1 + (1 - share) ** (2 / 3))
+    )
     np.testing.assert_allclose(found.energy_loss(shear)[1:], lost[1:], rtol=1e-5)
 
 
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_laws_answer_as_contacts_do(theory):
-    one = contact(FACE, pressure="10 MPa", E_star="100 GPa", theory=theory).tangential(0.2, 0.3)
+    one = contact(FACE, pressure="10 MPa", E_star="100 GPa", theory=theory).tangential(
+        0.2, 0.3
+    )
     law = contact_law(FACE, E_star="100 GPa", theory=theory)
     two = law.tangential(pressure="10 MPa", friction=0.2, nu=0.3)
     assert two.stiffness == pytest.approx(one.stiffness, rel=1e-5)
-    assert law.tangential(one.mean_separation, nu=0.3).stiffness == pytest.approx(one.stiffness, rel=1e-5)
+    assert law.tangential(one.mean_separation, nu=0.3).stiffness == pytest.approx(
+        one.stiffness, rel=1e-5
+    )
     for slid in ("10 nm", ["0.05 um", "0.1 um"]):
         np.testing.assert_allclose(two.shear(slid), one.shear(slid), rtol=1e-4)
-    np.testing.assert_allclose(two.energy_loss("1 MPa"), one.energy_loss("1 MPa"), rtol=1e-4)
+    np.testing.assert_allclose(
+        two.energy_loss("1 MPa"), one.energy_loss("1 MPa"), rtol=1e-4
+    )
     assert one.shear(1e-5) / 1e-5 == pytest.approx(one.stiffness, rel=1e-3)
     # a cycle loses less than one that slips freely, and more than none
     assert 0 < one.energy_loss("1 MPa") < 4e-3 * one.displacement("1 MPa")
@@ -75,12 +87,18 @@ def test_laws_answer_as_contacts_do(theory):
 def test_a_sheared_contact_is_the_same_after_pickling(of_law):
     given = {"E_star": "100 GPa", "theory": "calibrated"}
     if of_law:
-        sheared = contact_law(FACE, **given).tangential(pressure="10 MPa", friction=0.2, nu=0.3)
+        sheared = contact_law(FACE, **given).tangential(
+            pressure="10 MPa", friction=0.2, nu=0.3
+        )
     else:
         sheared = contact(FACE, pressure="10 MPa", **given).tangential(0.2, 0.3)
     copy = pickle.loads(pickle.dumps(sheared))
     assert copy.gross_slip == sheared.gross_slip
-    for ask, value in (("shear", "50 nm"), ("displacement", "1 MPa"), ("energy_loss", "1 MPa")):
+    for ask, value in (
+        ("shear", "50 nm"),
+        ("displacement", "1 MPa"),
+        ("energy_loss", "1 MPa"),
+    ):
         assert getattr(copy, ask)(value) == getattr(sheared, ask)(value)
 
 
@@ -89,13 +107,24 @@ def test_with_a_hardness_full_stick_alone(theory):
     given = {"E_star": "100 GPa", "theory": theory, "hardness": "1.5 GPa"}
     joint = contact(FACE, pressure=["1 MPa", "10 MPa"], **given)
     law = pickle.loads(pickle.dumps(contact_law(FACE, **given)))
-    np.testing.assert_allclose(law.unloading_stiffness(joint.mean_separation), joint.unloading_stiffness, rtol=1e-5)
-    assert (joint.unloading_stiffness > 1.1 * joint.stiffness).all()
-    np.testing.assert_allclose(joint.tangential(nu=0.0).stiffness, joint.unloading_stiffness, rtol=1e-15)
     np.testing.assert_allclose(
-        law.tangential(joint.mean_separation, nu=0.3).stiffness, joint.tangential(nu=0.3).stiffness, rtol=1e-5
+        law.unloading_stiffness(joint.mean_separation),
+        joint.unloading_stiffness,
+        rtol=1e-5,
     )
-    for slips in (joint.tangential(0.2, 0.3), law.tangential(pressure="1 MPa", friction=0.2, nu=0.3)):
+    assert (joint.unloading_stiffness > 1.1 * joint.stiffness).all()
+    np.testing.assert_allclose(
+        joint.tangential(nu=0.0).stiffness, joint.unloading_stiffness, rtol=1e-15
+    )
+    np.testing.assert_allclose(
+        law.tangential(joint.mean_separation, nu=0.3).stiffness,
+        joint.tangential(nu=0.3).stiffness,
+        rtol=1e-5,
+    )
+    for slips in (
+        joint.tangential(0.2, 0.3),
+        law.tangential(pressure="1 MPa", friction=0.2, nu=0.3),
+    ):
         for ask in (slips.shear, slips.displacement, slips.energy_loss):
             with pytest.raises(InputError, match="contact that yields is not known"):
                 ask(0.0)
@@ -105,30 +134,59 @@ def test_with_a_hardness_full_stick_alone(theory):
 
 def test_two_bodies_add_their_compliances():
     # against a rigid one only the other counts
-    assert tangential_ratio((0.3, 0.1), (1.0, 1e12)) == pytest.approx(tangential_ratio(0.3))
-    assert tangential_ratio((0.3, 0.3), ("210 GPa", "7e4 MPa")) == pytest.approx(1.7 / 1.4)
+    assert tangential_ratio((0.3, 0.1), (1.0, 1e12)) == pytest.approx(
+        tangential_ratio(0.3)
+    )
+    assert tangential_ratio((0.3, 0.3), ("210 GPa", "7e4 MPa")) == pytest.approx(
+        1.7 / 1.4
+    )
     # Mindlin's 4 (1 - nu)/(2 - nu) of half-spaces over the 2 of normal contact
     assert tangential_ratio(0.5) == pytest.approx(1.5)
-    named = contact(FACE, pressure="10 MPa", theory="calibrated", materials=("steel 4140 hard", "aluminium 6061 hard"))
+    named = contact(
+        FACE,
+        pressure="10 MPa",
+        theory="calibrated",
+        materials=("steel 4140 hard", "aluminium 6061 hard"),
+    )
     known = named.tangential()
     assert known.ratio == pytest.approx(tangential_ratio((0.29, 0.33), (205.0, 69.0)))
     assert known.stiffness == pytest.approx(named.unloading_stiffness / known.ratio)
     share = lambda nu: 0.2 + 0.1 * nu  # noqa: E731
-    assert tangential_ratio((0.3, 0.3), (210.0, 70.0), share) == pytest.approx(tangential_ratio(0.3, share=share))
+    assert tangential_ratio((0.3, 0.3), (210.0, 70.0), share) == pytest.approx(
+        tangential_ratio(0.3, share=share)
+    )
     two = {"nu": (0.3, 0.3)}
-    for wrong in (two, two | {"E": (1.0, -1.0)}, {"nu": 0.6}, {"nu": 0.3, "E": (1.0, 1.0)}, {}):
+    for wrong in (
+        two,
+        two | {"E": (1.0, -1.0)},
+        {"nu": 0.6},
+        {"nu": 0.3, "E": (1.0, 1.0)},
+        {},
+    ):
         with pytest.raises(InputError):
             contact(FACE, pressure="10 MPa", E_star="100 GPa").tangential(**wrong)
 
 
 def test_what_is_refused():
-    found, apart, law = sheared(), contact(FACE, mean_separation=2.5, theory=Spheres()), contact_law(FACE, "calibrated")
-    cases = [(ask, (-0.1,), "at least 0") for ask in (found.shear, found.displacement, found.energy_loss)]
+    found, apart, law = (
+        sheared(),
+        contact(FACE, mean_separation=2.5, theory=Spheres()),
+        contact_law(FACE, "calibrated"),
+    )
+    cases = [
+        (ask, (-0.1,), "at least 0")
+        for ask in (found.shear, found.displacement, found.energy_loss)
+    ]
     cases += [(apart.tangential, (mu, NU), "friction") for mu in (0.0, -1.0, np.nan)]
     cases += [(found.displacement, (1e9,), "at most the friction times the pressure")]
-    cases += [(found.shear, ("1 MPa",), "pressure= takes"), (law.tangential, (), "one of them")]
+    cases += [
+        (found.shear, ("1 MPa",), "pressure= takes"),
+        (law.tangential, (), "one of them"),
+    ]
     for ask, given, match in cases:
-        with pytest.raises(OutOfRangeError if match.startswith("at ") else InputError, match=match):
+        with pytest.raises(
+            OutOfRangeError if match.startswith("at ") else InputError, match=match
+        ):
             ask(*given)
     with pytest.raises(InputError, match="slip needs friction"):
         _ = apart.tangential(nu=NU).gross_slip
@@ -144,12 +202,15 @@ def test_batches_and_data_arrays():
     many = contact(batch, mean_separation=u, theory="calibrated").tangential(0.3, 0.3)
     assert many.shear(0.1).shape == (3,)
     assert many.shear(0.1)[0] == pytest.approx(plain.shear(0.1)[0], rel=1e-9)
-    named = contact(FACE, mean_separation=xr.DataArray(u, dims="gap"), theory="calibrated").tangential(0.3, 0.3)
+    named = contact(
+        FACE, mean_separation=xr.DataArray(u, dims="gap"), theory="calibrated"
+    ).tangential(0.3, 0.3)
     np.testing.assert_allclose(named.shear(0.1).values, plain.shear(0.1), rtol=1e-12)
     assert named.stiffness.dims == ("gap",)
 
 
-# kappa k_t/k_n along and across a lay of 4:1 at nu = 0.3, by boundary elements of another code, at three contacts
+# kappa k_t/k_n along and across a lay of 4:1 at nu = 0.3, by boundary elements of another
+# code, at three contacts
 LAY_OF_FOUR = {0.03: (0.93, 1.09), 0.12: (0.914, 1.118), 0.4: (0.893, 1.157)}
 
 
@@ -161,7 +222,9 @@ def test_a_lay_is_stiffer_across():
         isotropic = contact(plain, area=area).tangential(nu=0.3).stiffness
         found = contact(stretched, area=area)
         for way, ratio in zip(("along", "across"), expected, strict=True):
-            assert found.tangential(nu=0.3, direction=way).stiffness / isotropic == pytest.approx(ratio, abs=0.02)
+            assert found.tangential(
+                nu=0.3, direction=way
+            ).stiffness / isotropic == pytest.approx(ratio, abs=0.02)
     with pytest.raises(InputError, match="direction"):
         found.tangential(nu=0.3)
     with pytest.raises(InputError, match="anisotropy"):
@@ -178,7 +241,10 @@ def test_gaps_of_boundary_elements(hurst, seed, eta):
     recipe = Recipe("self_affine", hurst, 6, 4, seed, 128)
     z = heights(recipe)
     slope = np.hypot(*np.gradient(z, 1 / 128)).std()
-    solved, jumps = Contact(z / slope, recipe.sizes, hardness=eta), np.array([0.3, 1.0, 3.0])
+    solved, jumps = (
+        Contact(z / slope, recipe.sizes, hardness=eta),
+        np.array([0.3, 1.0, 3.0]),
+    )
     for area in (0.01, 0.05, 0.2):
         solved.press(load_at(area, eta))
         gap, open_ = solved.gap * slope, solved.pressure <= 0
@@ -186,7 +252,10 @@ def test_gaps_of_boundary_elements(hurst, seed, eta):
         law = mean_inverse(gap.mean(), 1 - open_.mean(), jumps, 1.0, eta)
         assert (np.abs(law / measured - 1) < [0.08, 0.04, 0.02]).all()
         if area < 0.1:  # a gap like the mean one is further off
-            assert (np.abs(law / measured - 1)[:2] < np.abs(1 / (gap.mean() + jumps) / measured - 1)[:2]).all()
+            assert (
+                np.abs(law / measured - 1)[:2]
+                < np.abs(1 / (gap.mean() + jumps) / measured - 1)[:2]
+            ).all()
 
 
 def test_limits():
@@ -195,7 +264,9 @@ def test_limits():
     assert mean_inverse(1e3, 1e-300, 0.1, 1.0) == pytest.approx(1e-3, rel=5e-3)
     assert mean_inverse(1e-12, 1.0, 1.0, 1.0) == pytest.approx(0.0, abs=1e-9)
     # no jump at first contact
-    assert mean_inverse(3.0, 1e-12, 0.1, 1.0) == pytest.approx(mean_inverse(3.0, 0.0, 0.1, 1.0), rel=1e-6)
+    assert mean_inverse(3.0, 1e-12, 0.1, 1.0) == pytest.approx(
+        mean_inverse(3.0, 0.0, 0.1, 1.0), rel=1e-6
+    )
     # soft bodies: Gaussian heights cut off by a plane, by a sum over them
     z = np.random.default_rng(1).standard_normal(2_000_000)
     gap = np.maximum(1.5 - z, 0)
@@ -204,13 +275,21 @@ def test_limits():
 
 
 @pytest.mark.parametrize(
-    ("gas", "mass", "gamma", "share"), [("air", 28.97e-3, 1.4, 0.85), ("helium", 4.0026e-3, 5 / 3, 0.45)]
+    ("gas", "mass", "gamma", "share"),
+    [("air", 28.97e-3, 1.4, 0.85), ("helium", 4.0026e-3, 5 / 3, 0.45)],
 )
 def test_at_low_pressure_molecules_fly_from_face_to_face(gas, mass, gamma, share):
     """Free molecular conduction between parallel plates (Kennard 1938), without conductivity, viscosity and gap."""
     T, P = np.array([250.0, 300.0, 550.0]), 10.0
     k, jump = jump_of(gas, T, P)
-    free = share / (2 - share) * (gamma + 1) / (gamma - 1) * np.sqrt(R / (8 * np.pi * mass * T)) * P
+    free = (
+        share
+        / (2 - share)
+        * (gamma + 1)
+        / (gamma - 1)
+        * np.sqrt(R / (8 * np.pi * mass * T))
+        * P
+    )
     np.testing.assert_allclose(k / jump, free, rtol=1e-12)
 
 
@@ -219,29 +298,51 @@ def test_conductivities_of_other_tables():
     for T, k in ((225.0, 0.1282), (350.0, 0.1732), (450.0, 0.2060)):
         assert jump_of("helium", T, 1e5)[0] == pytest.approx(k, rel=0.01)
     for T in (220.0, 350.0, 450.0, 550.0):
-        assert jump_of("air", T, 1e5)[0] == pytest.approx(2.334e-3 * T**1.5 / (T + 164.54), rel=0.02)
+        assert jump_of("air", T, 1e5)[0] == pytest.approx(
+            2.334e-3 * T**1.5 / (T + 164.54), rel=0.02
+        )
     # mean free path of nitrogen at room temperature and 1 atm, 67 nm: CRC Handbook
-    assert jump_of("air", 298.15, 101325.0, 1.0)[1] == pytest.approx(67e-9 * 2 * 2.8 / (2.4 * 0.71), rel=0.03)
+    assert jump_of("air", 298.15, 101325.0, 1.0)[1] == pytest.approx(
+        67e-9 * 2 * 2.8 / (2.4 * 0.71), rel=0.03
+    )
 
 
 def test_contacts_have_it_in_watts():
-    joint = contact(FACE, pressure=["1 MPa", "10 MPa"], theory="calibrated", materials="steel 1020")
+    joint = contact(
+        FACE, pressure=["1 MPa", "10 MPa"], theory="calibrated", materials="steel 1020"
+    )
     k, jump = jump_of("air", 300.0, 101325.0)
     eta = 1 / joint.psi
-    plain = 1e6 * k * mean_inverse(joint.mean_separation, joint.area, 1e6 * jump, 1.0, eta)
+    plain = (
+        1e6 * k * mean_inverse(joint.mean_separation, joint.area, 1e6 * jump, 1.0, eta)
+    )
     np.testing.assert_allclose(joint.gap_conductance(), plain, rtol=1e-12)
-    np.testing.assert_allclose(joint.gap_conductance(gas_pressure=101325.0), plain, rtol=1e-12)
+    np.testing.assert_allclose(
+        joint.gap_conductance(gas_pressure=101325.0), plain, rtol=1e-12
+    )
     assert (joint.gap_conductance("helium") > 2 * plain).all()
     assert (joint.gap_conductance("vacuum") == 0).all()
-    in_mm = contact(FACE.to("mm"), pressure=["1 MPa", "10 MPa"], theory="calibrated", materials="steel 1020")
+    in_mm = contact(
+        FACE.to("mm"),
+        pressure=["1 MPa", "10 MPa"],
+        theory="calibrated",
+        materials="steel 1020",
+    )
     np.testing.assert_allclose(in_mm.gap_conductance(), plain, rtol=1e-9)
     xr = pytest.importorskip("xarray")
-    named = contact(FACE, pressure=xr.DataArray([1e-3, 1e-2], dims="load"), theory="calibrated", materials="steel 1020")
+    named = contact(
+        FACE,
+        pressure=xr.DataArray([1e-3, 1e-2], dims="load"),
+        theory="calibrated",
+        materials="steel 1020",
+    )
     np.testing.assert_allclose(named.gap_conductance().values, plain, rtol=1e-9)
 
 
 test_gases_that_are_refused = refusals(
-    lambda face, given: contact(face, area=0.01, theory="calibrated", E_star="10 GPa").gap_conductance(**given),
+    lambda face, given: contact(
+        face, area=0.01, theory="calibrated", E_star="10 GPa"
+    ).gap_conductance(**given),
     (FACE, {"gas": "xenon"}, "no gas is named 'xenon'"),
     (FACE, {"temperature": 100.0}, "from 200 to 600 K"),
     (FACE, {"temperature": np.nan}, "finite"),
@@ -254,7 +355,12 @@ test_gases_that_are_refused = refusals(
 
 def test_mean_conductivity_is_harmonic():
     # a body that conducts without limit leaves twice the other
-    for given, expected in (((50.0, 200.0), 80.0), ((3.0, 3.0), 3.0), ((7.0, 1e300), 14.0), ((1e300, 7.0), 14.0)):
+    for given, expected in (
+        ((50.0, 200.0), 80.0),
+        ((3.0, 3.0), 3.0),
+        ((7.0, 1e300), 14.0),
+        ((1e300, 7.0), 14.0),
+    ):
         found = mean_conductivity(*given)
         assert found == pytest.approx(expected, rel=1e-15, abs=0)
         assert np.shape(found) == ()
@@ -273,4 +379,6 @@ def test_the_correlation_follows_the_model_it_was_fitted_to():
     found = cooper_mikic_yovanovich(joint, area * 1e9, 1.0, 1e11, 1e9)
     np.testing.assert_allclose(found, plastic, rtol=0.016)
     # the older power law leaves the model at small pressures
-    assert (1.45 * area**0.985 * slope / joint.h_rms / plastic).min() == pytest.approx(0.72, abs=0.005)
+    assert (1.45 * area**0.985 * slope / joint.h_rms / plastic).min() == pytest.approx(
+        0.72, abs=0.005
+    )

@@ -54,10 +54,19 @@ class TestLimits:
     def test_validity_ends_at_three_tenths_and_mbmas_gap_is_not_valid(self):
         found = asked(area=[0.05, 0.29, 0.31])
         assert found.valid.tolist() == [True, True, False]
-        assert any("0.3" in reason and mask.tolist() == [False, False, True] for reason, mask in found.reasons.items())
-        assert any("separation" in reason for reason in asked(theory="mbma", area=0.05).reasons)
+        assert any(
+            "0.3" in reason and mask.tolist() == [False, False, True]
+            for reason, mask in found.reasons.items()
+        )
+        assert any(
+            "separation" in reason for reason in asked(theory="mbma", area=0.05).reasons
+        )
         # areas above all of the nominal one
-        above = contact(Surface(1.0, 3e-3, 300.0, 1.0, 3.0), mean_separation=1e-3, theory="greenwood_williamson")
+        above = contact(
+            Surface(1.0, 3e-3, 300.0, 1.0, 3.0),
+            mean_separation=1e-3,
+            theory="greenwood_williamson",
+        )
         assert above.area > 4
         assert above.leakage.K == 0
         one, two = shipped_part("leakage")[1]["coverage"]
@@ -66,11 +75,18 @@ class TestLimits:
 
 
 def test_falls_with_load_on_10000_random_cases():
-    ends = [0.1, np.log(3.01), -7, -9, 2.5, np.log(1e-6)], [1.0, np.log(9e4), 7, 0, 5.5, np.log(0.45)]
-    hurst, zeta, h_rms, q0, top, area = np.random.default_rng(3).uniform(*ends, (10_000, 6)).T
+    ends = (
+        [0.1, np.log(3.01), -7, -9, 2.5, np.log(1e-6)],
+        [1.0, np.log(9e4), 7, 0, 5.5, np.log(0.45)],
+    )
+    hurst, zeta, h_rms, q0, top, area = (
+        np.random.default_rng(3).uniform(*ends, (10_000, 6)).T
+    )
     zeta, h_rms, q0, area = np.exp([zeta, h_rms, q0, area])
     batch = Surface(hurst, q0, q0 * zeta, h_rms, h_rms * top)
-    light, heavy = (contact(batch, area=a, theory="calibrated").leakage for a in (area, area * 1.01))
+    light, heavy = (
+        contact(batch, area=a, theory="calibrated").leakage for a in (area, area * 1.01)
+    )
     assert np.all((k_of(heavy) < k_of(light)) | heavy.blocked)
     assert np.all(light.blocked <= heavy.blocked)
 
@@ -81,17 +97,26 @@ def test_table_is_the_medium(hurst, zeta_1, area):
     surface = Surface(hurst, 1.0, zeta_1, 1.0, 4.0)
     found = contact(surface, area=area, theory="calibrated")
     table = shipped_flow()
-    exact = leakage.contact_factor(Spectrum.self_affine(hurst, zeta_1), [area], table.constants)[0]
+    exact = leakage.contact_factor(
+        Spectrum.self_affine(hurst, zeta_1), [area], table.constants
+    )[0]
     plain = np.log(found.mean_separation**3 * leakage.wide_gap(found.mean_separation))
-    assert np.log(k_of(found.leakage)) == pytest.approx(plain + exact, abs=1.5 * table.error + 1e-3)
+    assert np.log(k_of(found.leakage)) == pytest.approx(
+        plain + exact, abs=1.5 * table.error + 1e-3
+    )
 
 
 def test_outside_the_table_and_of_a_spectrum():
     both = Surface(np.array([0.07, 0.5]), 1.0, 40.0, 1.0, 4.0)
     found = contact(both, area=0.1, theory="calibrated")
-    alone = [k_of(asked(Surface(hurst, 1.0, 40.0, 1.0, 4.0), area=0.1)) for hurst in (0.07, 0.5)]
+    alone = [
+        k_of(asked(Surface(hurst, 1.0, 40.0, 1.0, 4.0), area=0.1))
+        for hurst in (0.07, 0.5)
+    ]
     np.testing.assert_allclose(k_of(found.leakage), alone, rtol=1e-12)
-    own = flow_of_spectrum(Spectrum.self_affine(0.5, 40.0), found.mean_separation[1:], np.array([0.1]))
+    own = flow_of_spectrum(
+        Spectrum.self_affine(0.5, 40.0), found.mean_separation[1:], np.array([0.1])
+    )
     assert own[0] == pytest.approx(alone[1], rel=2 * shipped_flow().error + 2e-3)
     q = np.geomspace(1.0, 40.0, 60)
     measured = Surface.from_spectrum(q, q**-3.0, h_max=9.9)
@@ -105,7 +130,9 @@ class TestRates:
         # 1 mm wide open gap: h^3 dp/(12 eta L)
         plates = 1000.0**3 * 0.1 / (12 * 1e-9 * 1e4)  # um^3 MPa/(MPa s um)
         wide = asked(mean_separation="1 mm", E_star="10 MPa")
-        assert wide.liquid("1e-3 Pa s", "0.1 MPa", "10 mm") == pytest.approx(plates, rel=2e-6)
+        assert wide.liquid("1e-3 Pa s", "0.1 MPa", "10 mm") == pytest.approx(
+            plates, rel=2e-6
+        )
         found = asked(area=0.1, E_star="10 MPa")
         plain = found.K * 0.1 / (12 * 1e-9 * 2000)  # MPa, MPa s, um
         for known in (("1e-3 Pa s", "0.1 MPa", "2 mm"), (1e-9, 0.1, 2000.0)):
@@ -113,26 +140,38 @@ class TestRates:
         assert found.units == {"K": "um^3", "hydraulic_aperture": "um"}
         assert found.hydraulic_aperture**3 == pytest.approx(found.K)
 
-        wrong = (0, 1, 1, "viscosity"), (1, np.nan, 1, "pressure_drop"), (1, 1, -1, "width"), ("1 Pa", 1, 1, "Pa s")
+        wrong = (
+            (0, 1, 1, "viscosity"),
+            (1, np.nan, 1, "pressure_drop"),
+            (1, 1, -1, "width"),
+            ("1 Pa", 1, 1, "Pa s"),
+        )
         for *numbers, told in wrong:
             with pytest.raises((InputError, OutOfRangeError), match=told):
                 found.liquid(*numbers)
 
 
 def open_gaps(law, shares):
-    low, high = max(2 * law.leakage.blocked_at - law.h_max, law.lowest), min(law.h_max, law.highest)
+    low, high = (
+        max(2 * law.leakage.blocked_at - law.h_max, law.lowest),
+        min(law.h_max, law.highest),
+    )
     return low + (high - low) * shares
 
 
 def over_bound(law, shares):
     """Largest error of a law's leakage over that stated, at shares of the gaps that are not blocked."""
     d = open_gaps(law, shares)
-    expected = law.surface.h_rms**3 * flow(law.surface, (law.h_max + d) / 2, law.area(separation=d))
+    expected = law.surface.h_rms**3 * flow(
+        law.surface, (law.h_max + d) / 2, law.area(separation=d)
+    )
     return np.abs(law.leakage(separation=d) / expected - 1).max() / law.leakage.error
 
 
 class TestLaw:
-    @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson", "greenwood_williamson"])
+    @pytest.mark.parametrize(
+        "theory", ["mbma", "calibrated", "persson", "greenwood_williamson"]
+    )
     @pytest.mark.parametrize(
         "surface",
         [SEAL, Surface(0.3, 0.02, 160.0, 3.0, 9.0), Surface(0.23, 1.0, 1.5e4, 2.0, 3.0)],
@@ -141,9 +180,15 @@ class TestLaw:
     def test_is_the_contact_of_its_theory(self, theory, surface):
         law = contact_law(surface, theory=theory)
         rng = np.random.default_rng(6)
-        # from 1e-4 of the law above its blocked gap: nearer, the law's own error of the area is more than the rest
-        d = open_gaps(law, np.append(rng.uniform(1e-4, 1, 100), 10 ** rng.uniform(-4, 0, 100)))
-        found, expected = law.leakage(separation=d), contact(surface, separation=d, theory=theory).leakage.K
+        # from 1e-4 of the law above its blocked gap: nearer, the law's own error of the
+        # area is more than the rest
+        d = open_gaps(
+            law, np.append(rng.uniform(1e-4, 1, 100), 10 ** rng.uniform(-4, 0, 100))
+        )
+        found, expected = (
+            law.leakage(separation=d),
+            contact(surface, separation=d, theory=theory).leakage.K,
+        )
         np.testing.assert_allclose(found, expected, rtol=law.leakage.error + 2e-5)
         assert law.leakage.error < 2e-4
         np.testing.assert_allclose(law.leakage((d + law.h_max) / 2), found, rtol=1e-9)
@@ -151,8 +196,14 @@ class TestLaw:
     def test_blocked_below_its_gap_and_apart_above_h_max(self):
         law = contact_law(SEAL, E_star=10.0, theory="calibrated")
         at = 2 * law.leakage.blocked_at - law.h_max
-        assert law.area(separation=at) == pytest.approx(shipped_flow().constants.threshold, rel=1e-9)
-        assert law.leakage(separation=[law.lowest, at - 0.1, at]).tolist() == [0.0, 0.0, 0.0]
+        assert law.area(separation=at) == pytest.approx(
+            shipped_flow().constants.threshold, rel=1e-9
+        )
+        assert law.leakage(separation=[law.lowest, at - 0.1, at]).tolist() == [
+            0.0,
+            0.0,
+            0.0,
+        ]
         assert law.leakage(separation=at + 1e-6) > 0
 
     def test_falls_with_pressure_in_units_and_labels(self):
@@ -160,12 +211,18 @@ class TestLaw:
         pressure = np.geomspace(1e-6, law.pressure(law.leakage.blocked_at), 300)
         found = law.leakage(pressure=pressure)
         assert np.all(np.diff(found) < 0)
-        assert law.leakage(pressure="1 kPa") == pytest.approx(law.leakage(pressure=1e-3), rel=1e-14)
+        assert law.leakage(pressure="1 kPa") == pytest.approx(
+            law.leakage(pressure=1e-3), rel=1e-14
+        )
         labelled = law.leakage(pressure=xr.DataArray(pressure, dims="load"))
         np.testing.assert_array_equal(labelled.values, found)
-        assert pickle.loads(pickle.dumps(law)).leakage(pressure=0.01) == law.leakage(pressure=0.01)
+        assert pickle.loads(pickle.dumps(law)).leakage(pressure=0.01) == law.leakage(
+            pressure=0.01
+        )
         for gaps in ({}, {"separation": 1.0, "pressure": 1e-3}):
-            with pytest.raises(InputError, match="one of mean_separation, separation and pressure"):
+            with pytest.raises(
+                InputError, match="one of mean_separation, separation and pressure"
+            ):
                 law.leakage(**gaps)
 
     def test_gaps_that_never_block(self):
@@ -181,17 +238,38 @@ class TestLaw:
         assert over_bound(law, np.linspace(1e-4, 1, 500)) < 1
         assert law.leakage.error < 0.2 * law.error
         # whose flow has kinks: off by 1.04 of what the coefficients of the polynomials alone told
-        surface = Surface.from_map(random_map(64, 0.0189426, 0.21948, 1.32353543, 3), dx=1.0, periodic=True)
-        assert over_bound(contact_law(surface, rtol=7.898e-6, theory="persson"), np.linspace(0.7, 0.74, 2000)) < 1
+        surface = Surface.from_map(
+            random_map(64, 0.0189426, 0.21948, 1.32353543, 3), dx=1.0, periodic=True
+        )
+        assert (
+            over_bound(
+                contact_law(surface, rtol=7.898e-6, theory="persson"),
+                np.linspace(0.7, 0.74, 2000),
+            )
+            < 1
+        )
 
     @pytest.mark.slow
-    @pytest.mark.parametrize(("theory", "count"), [("mbma", 80), ("calibrated", 60), ("persson", 3)])
+    @pytest.mark.parametrize(
+        ("theory", "count"), [("mbma", 80), ("calibrated", 60), ("persson", 3)]
+    )
     def test_within_its_error_on_random_surfaces_and_maps(self, theory, count):
         rng = np.random.default_rng(len(theory))
         for batch in range(count):
             hurst, zeta_1, h_max, part = rng.uniform((0.1, 3.1, 2.6, -8), (1, 300, 5, -3))
-            rtol, d = 10**part, np.append(rng.uniform(0, 1, 1000), 10 ** rng.uniform(-6, 0, 1000))
-            assert over_bound(contact_law(Surface(hurst, 1, zeta_1, 1, h_max), rtol=rtol, theory=theory), d) < 1
+            rtol, d = (
+                10**part,
+                np.append(rng.uniform(0, 1, 1000), 10 ** rng.uniform(-6, 0, 1000)),
+            )
+            assert (
+                over_bound(
+                    contact_law(
+                        Surface(hurst, 1, zeta_1, 1, h_max), rtol=rtol, theory=theory
+                    ),
+                    d,
+                )
+                < 1
+            )
             if theory != "mbma":
                 low, high, power = rng.uniform((0.014, 0.15, 0), (0.025, 0.3, 2.2))
                 made = random_map(64, low, high, power, batch, batch % 2)
@@ -214,12 +292,21 @@ def test_leakage_is_not_computed_unless_read():
 
 def test_reference_data_of_another_campaign():
     """Surfaces that no constant saw; cells of four or more waves differ by 0.08, 0.09 and 0.25 there."""
-    lines = [line for line in REFERENCE.read_text().splitlines() if not line.startswith("#")]
+    lines = [
+        line for line in REFERENCE.read_text().splitlines() if not line.startswith("#")
+    ]
     data = np.genfromtxt(lines, delimiter=",", names=True)
-    kept = (data["L_over_lambda0"] >= 4) & (data["kx"] > 1e-10) & (data["ky"] > 1e-10) & (data["area"] < 0.3)
+    kept = (
+        (data["L_over_lambda0"] >= 4)
+        & (data["kx"] > 1e-10)
+        & (data["ky"] > 1e-10)
+        & (data["area"] < 0.3)
+    )
     data, one = data[kept], np.ones(kept.sum())
     surface = Surface(data["hurst"], one, data["zeta_1"], one, data["h_max_over_h_rms"])
-    found = contact(surface, pressure=data["force"] * surface.rms_gradient, theory="calibrated")
+    found = contact(
+        surface, pressure=data["force"] * surface.rms_gradient, theory="calibrated"
+    )
     miss = np.log(k_of(found.leakage) / np.sqrt(data["kx"] * data["ky"]))
     for low, high, bar in ((0, 0.05, 0.12), (0.05, 0.15, 0.2), (0.15, 0.3, 0.35)):
         own = miss[(data["area"] >= low) & (data["area"] < high)]
@@ -230,14 +317,22 @@ def test_reference_data_of_another_campaign():
 
 def test_rates_of_named_arrays_keep_their_dimensions_and_units():
     seal = Surface(hurst=0.8, q0=0.01, q1=0.5, h_rms=1.0, h_max=3.5, unit="um")
-    gaps, width = xr.DataArray([1.9, 2.0], dims="gap"), xr.DataArray([2.0, 3.0, 4.0], dims="width")
+    gaps, width = (
+        xr.DataArray([1.9, 2.0], dims="gap"),
+        xr.DataArray([2.0, 3.0, 4.0], dims="width"),
+    )
     known = {"theory": "calibrated", "E_star": "10 MPa"}
     named = contact(seal, mean_separation=gaps, **known).leakage
     plain = contact(seal, mean_separation=gaps.values[:, None], **known).leakage
-    found, expected = named.liquid("1e-3 Pa s", "0.1 MPa", width), plain.liquid("1e-3 Pa s", "0.1 MPa", width.values)
+    found, expected = (
+        named.liquid("1e-3 Pa s", "0.1 MPa", width),
+        plain.liquid("1e-3 Pa s", "0.1 MPa", width.values),
+    )
     assert found.dims == ("gap", "width")
     assert found.values == pytest.approx(expected)
-    assert plain.liquid("1e-3 Pa s", "0.1 MPa", ["2 um", "3e-3 mm", "4 um"]) == pytest.approx(expected)
+    assert plain.liquid(
+        "1e-3 Pa s", "0.1 MPa", ["2 um", "3e-3 mm", "4 um"]
+    ) == pytest.approx(expected)
     with pytest.raises(InputError, match="width is in 'mm'"):
         plain.liquid("1e-3 Pa s", "0.1 MPa", width.assign_attrs(units="mm"))
     with pytest.raises(InputError, match="beside DataArrays, width"):
@@ -246,7 +341,10 @@ def test_rates_of_named_arrays_keep_their_dimensions_and_units():
 
 def test_waves_of_a_map_that_are_rounding_alone_do_not_stop_it():
     rough = Spectrum.self_affine(0.8, 30.0)
-    x, variance = (np.append(a, b) for a, b in ((rough.x, [35.0, 40.0]), (rough.variance, [1e-23, 3e-24])))
+    x, variance = (
+        np.append(a, b)
+        for a, b in ((rough.x, [35.0, 40.0]), (rough.variance, [1e-23, 3e-24]))
+    )
     area = np.linspace(1e-3, 0.4, 20)
     factors = [
         leakage.contact_factor(one, area, shipped_flow().constants)
@@ -272,9 +370,13 @@ def test_a_yielded_contact_is_not_called_blocked(pressure):
 
 
 def test_the_separation_at_which_gaps_block_is_a_mean_separation():
-    law = contact_law(Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5), "calibrated")
+    law = contact_law(
+        Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5), "calibrated"
+    )
     u = law.leakage.blocked_at
-    assert law.area(u) == pytest.approx(contact(law.surface, mean_separation=u, theory="calibrated").area, rel=1e-4)
+    assert law.area(u) == pytest.approx(
+        contact(law.surface, mean_separation=u, theory="calibrated").area, rel=1e-4
+    )
     assert law.area(u) == pytest.approx(0.41, abs=0.02)
     assert law.leakage(u * (1 - 1e-9)) == 0
     assert law.leakage(u * (1 + 1e-3)) > 0

@@ -29,8 +29,14 @@ CASES = [
     (0.9, 1e3, 2.5, 1e-4),
     (0.7, 3.01, 3.0, 2.0),
 ]
-# next to a kink, where a derivative that forgot it would be wrong: the third number is reach over the kink
-AT_KINKS = [(0.9, 100.0, 0, 0.95), (0.9, 100.0, 0, 1.05), (0.9, 100.0, 1, 0.97), (0.9, 100.0, 1, 1.03)]
+# next to a kink, where a derivative that forgot it would be wrong: the third number is
+# reach over the kink
+AT_KINKS = [
+    (0.9, 100.0, 0, 0.95),
+    (0.9, 100.0, 0, 1.05),
+    (0.9, 100.0, 1, 0.97),
+    (0.9, 100.0, 1, 1.03),
+]
 
 
 def differences(numbers, variant, step, names):
@@ -41,14 +47,24 @@ def differences(numbers, variant, step, names):
         backward = name == "hurst" and numbers[place] == 1
         offsets = np.arange(-6.0, 1) if backward else np.arange(-3.0, 4)
         # the depth is what matters near first contact
-        span = step * (numbers[4] - numbers[5] if name in ("separation", "h_max") else numbers[place])
+        span = step * (
+            numbers[4] - numbers[5] if name in ("separation", "h_max") else numbers[place]
+        )
         points = np.repeat(np.asarray(numbers, dtype=float)[:, None], 7, axis=1)
         points[place] += span * offsets
         shifted.append(points)
         spans.append(difference_weights(offsets) / span)
     points = np.stack(shifted, axis=1)
-    found = contact(Surface(*points[:5]), separation=points[5], island_model="exact", variant=variant, rtol=1e-11)
-    return [np.einsum("nk,nk->n", spans, values) for values in (found.pressure, found.area)]
+    found = contact(
+        Surface(*points[:5]),
+        separation=points[5],
+        island_model="exact",
+        variant=variant,
+        rtol=1e-11,
+    )
+    return [
+        np.einsum("nk,nk->n", spans, values) for values in (found.pressure, found.area)
+    ]
 
 
 @functools.cache
@@ -59,7 +75,11 @@ def numbers_of(case):
 
 
 EVERY = [(case, variant, 4e-3) for case in CASES for variant in ("reported", "printed")]
-EVERY += [(CASES[k], variant, 4e-3) for k in (0, 2, 3) for variant in (OWN, LEVEL, NO_OFFSET, OF_HEIGHTS)]
+EVERY += [
+    (CASES[k], variant, 4e-3)
+    for k in (0, 2, 3)
+    for variant in (OWN, LEVEL, NO_OFFSET, OF_HEIGHTS)
+]
 for hurst, zeta_1, which, share in AT_KINKS:
     for variant in ("reported", OWN):
         reach = share * kinks(hurst, zeta_1, get_variant(variant))[which]
@@ -67,7 +87,9 @@ for hurst, zeta_1, which, share in AT_KINKS:
 
 
 def within(slope, true, value, parameter):
-    return (np.abs(slope - true) <= 1e-6 * np.maximum(np.abs(true), np.abs(value / parameter))).all()
+    return (
+        np.abs(slope - true) <= 1e-6 * np.maximum(np.abs(true), np.abs(value / parameter))
+    ).all()
 
 
 @pytest.mark.parametrize(("case", "variant", "step"), EVERY, ids=str)
@@ -86,16 +108,23 @@ def test_slopes_against_differences(case, variant, step):
 @pytest.mark.parametrize("variant", ["reported", "printed"])
 def test_sensitivity_against_differences(case, variant):
     *five, gap = numbers = numbers_of(case)
-    found = sensitivity(Surface(*five), separation=gap, theory=Mbma(variant=variant, rtol=1e-10))
+    found = sensitivity(
+        Surface(*five), separation=gap, theory=Mbma(variant=variant, rtol=1e-10)
+    )
     slopes = np.array(differences(numbers, variant, 4e-3, NAMES[:5]))
     for name, parameter, true in zip(NAMES, five, slopes.T, strict=False):
         for answer, slope in zip(("pressure", "area"), true, strict=True):
-            assert found.slopes[name][answer] == pytest.approx(slope * parameter / found.answers[answer], abs=1e-5)
+            assert found.slopes[name][answer] == pytest.approx(
+                slope * parameter / found.answers[answer], abs=1e-5
+            )
 
 
 def test_units_shapes_and_no_contact():
     surface, gap = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4), np.array([1.0, 2.4, 5.0])
-    found, stiff = (contact(surface, separation=gap, E_star=e).stiffness for e in (1.0, [2.0, 3.0, 4.0]))
+    found, stiff = (
+        contact(surface, separation=gap, E_star=e).stiffness
+        for e in (1.0, [2.0, 3.0, 4.0])
+    )
     assert found.shape == (2, 3)
     assert (found[:, 1:] == 0).all()
     np.testing.assert_allclose(stiff, np.array([2, 3, 4]) * found, rtol=1e-15)
@@ -106,19 +135,33 @@ def test_units_shapes_and_no_contact():
 
 SURFACE = Surface(0.8, 0.06, 12.0, 0.5, 1.7, unit="um")
 HELD = {"mean_separation": 1.1, "pressure": 0.03, "area": 0.02}
-SLOW = [pytest.param(name, marks=pytest.mark.slow if name == "persson" else ()) for name in THEORIES]
+SLOW = [
+    pytest.param(name, marks=pytest.mark.slow if name == "persson" else ())
+    for name in THEORIES
+]
 
 
 @pytest.mark.parametrize("theory", SLOW)
 @pytest.mark.parametrize("by", HELD)
 def test_answers_scale_as_they_must(theory, by):
     found = sensitivity(SURFACE, **{by: HELD[by]}, E_star="10 GPa", theory=theory)
-    powers = {"mean_separation": (1, 0), "pressure": (0, 1), "area": (0, 0), "stiffness": (-1, 1)}
+    powers = {
+        "mean_separation": (1, 0),
+        "pressure": (0, 1),
+        "area": (0, 0),
+        "stiffness": (-1, 1),
+    }
     powers |= {"conductance": (-1, 0)}
     assert set(found.answers) == set(powers) - {by}
     for answer in found.answers:
         slope = {name: row[answer] for name, row in found.slopes.items()}
-        length = slope["h_rms"] + slope["h_max"] + slope.get("mean_separation", 0) - slope["q0"] - slope["q1"]
+        length = (
+            slope["h_rms"]
+            + slope["h_max"]
+            + slope.get("mean_separation", 0)
+            - slope["q0"]
+            - slope["q1"]
+        )
         stress = slope["E_star"] + slope.get("pressure", 0)
         assert (length, stress) == pytest.approx(powers[answer], abs=2e-5)
         assert all(abs(row[answer]) < 1e-5 for row in found.errors.values())
@@ -128,13 +171,23 @@ def test_numbers_of_a_drawing_are_the_unknowns():
     drawing = {"hurst": 0.8, "Ra": 0.4, "Rdq": 0.1, "longest": 100.0, "h_max": 1.8}
     surface = Surface.from_roughness(**drawing, unit="um")
     found = sensitivity(surface, pressure=0.02, E_star=10.0, theory="persson")
-    assert list(found.parameters) == ["hurst", "Ra", "h_max", "Rdq", "longest", "E_star", "pressure"]
+    assert list(found.parameters) == [
+        "hurst",
+        "Ra",
+        "h_max",
+        "Rdq",
+        "longest",
+        "E_star",
+        "pressure",
+    ]
     # Persson's area is a function of p/(E* g) alone
     slopes = {name: row["area"] for name, row in found.slopes.items()}
     assert slopes["Rdq"] == pytest.approx(-slopes["pressure"], abs=1e-6)
     assert max(abs(slopes[name]) for name in ("hurst", "Ra", "h_max", "longest")) < 1e-6
     assert "q1" in sensitivity(surface.to("mm"), pressure=0.02, E_star=10.0).parameters
-    moved = sensitivity(dataclasses.replace(surface, h_max=2.5), mean_separation=1.0, theory="calibrated")
+    moved = sensitivity(
+        dataclasses.replace(surface, h_max=2.5), mean_separation=1.0, theory="calibrated"
+    )
     assert moved.parameters["h_max"] == 2.5
     assert "q1" in moved.parameters
 
@@ -145,7 +198,10 @@ test_what_is_refused = refusals(
     ({"pressure": 0.1, "area": 0.1}, "got pressure and area"),
     ({"separation": 2.0}, "there is no contact at this separation"),
     ({"pressure": [0.1, 0.2]}, "pressure must be one number"),
-    ({"pressure": 0.1, "surface": Surface([0.7, 0.8], 0.06, 12.0, 0.5, 1.7)}, "not of a batch"),
+    (
+        {"pressure": 0.1, "surface": Surface([0.7, 0.8], 0.06, 12.0, 0.5, 1.7)},
+        "not of a batch",
+    ),
 )
 
 
@@ -154,25 +210,50 @@ def test_the_command():
     answer = json.loads(run("sensitivity", *arguments, "--json"))
     found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa")
     assert answer["slopes"] == found.slopes
-    assert [answer["units"][name] for name in found.parameters] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
+    assert [answer["units"][name] for name in found.parameters] == [
+        "-",
+        "1/um",
+        "1/um",
+        "um",
+        "um",
+        "MPa",
+        "MPa",
+    ]
     assert "MPa/um" in run("sensitivity", *arguments)
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_a_spectrum_in_samples_has_the_slopes_of_its_five_numbers(theory):
     q = np.geomspace(SURFACE.q0, SURFACE.q1, 50)
-    sampled = Surface.from_spectrum(q, SURFACE.power_spectrum(q), h_max=SURFACE.h_max, unit="um")
-    found, five = (sensitivity(s, pressure=0.03, E_star="10 GPa", theory=theory).slopes for s in (sampled, SURFACE))
+    sampled = Surface.from_spectrum(
+        q, SURFACE.power_spectrum(q), h_max=SURFACE.h_max, unit="um"
+    )
+    found, five = (
+        sensitivity(s, pressure=0.03, E_star="10 GPa", theory=theory).slopes
+        for s in (sampled, SURFACE)
+    )
     for answer, slope in found["heights"].items():
-        assert slope == pytest.approx(five["h_rms"][answer] + five["h_max"][answer], abs=1e-4)
-        assert found["lengths"][answer] == pytest.approx(-five["q0"][answer] - five["q1"][answer], abs=1e-4)
+        assert slope == pytest.approx(
+            five["h_rms"][answer] + five["h_max"][answer], abs=1e-4
+        )
+        assert found["lengths"][answer] == pytest.approx(
+            -five["q0"][answer] - five["q1"][answer], abs=1e-4
+        )
         assert found["h_max"][answer] == pytest.approx(five["h_max"][answer], abs=1e-4)
     # a cut takes height away, five numbers keep it
     cut = 0.02
     short = dataclasses.replace(SURFACE, q1=SURFACE.q1 * np.exp(-cut))
-    short = dataclasses.replace(short, h_rms=SURFACE.h_rms * float(short.s / short.h_rms * SURFACE.h_rms / SURFACE.s))
-    areas = [float(contact(s, pressure=0.03, E_star="10 GPa", theory=theory).area) for s in (short, SURFACE)]
-    assert found["shortest"]["area"] == pytest.approx(np.log(areas[0] / areas[1]) / cut, abs=5e-3)
+    short = dataclasses.replace(
+        short,
+        h_rms=SURFACE.h_rms * float(short.s / short.h_rms * SURFACE.h_rms / SURFACE.s),
+    )
+    areas = [
+        float(contact(s, pressure=0.03, E_star="10 GPa", theory=theory).area)
+        for s in (short, SURFACE)
+    ]
+    assert found["shortest"]["area"] == pytest.approx(
+        np.log(areas[0] / areas[1]) / cut, abs=5e-3
+    )
 
 
 def test_unknowns_of_a_map_and_of_its_extrapolation():
@@ -181,16 +262,29 @@ def test_unknowns_of_a_map_and_of_its_extrapolation():
     found = sensitivity(Surface.from_map(heights, 1.0, periodic=True), **given)
     assert set(found.slopes) == {"heights", "lengths", "pressure"}
     # a force over E* and the gradient, whatever the size
-    assert found.slopes["heights"]["area"] == pytest.approx(-found.slopes["lengths"]["area"], abs=1e-3)
-    assert found.slopes["heights"]["area"] == pytest.approx(-found.slopes["pressure"]["area"], abs=1e-3)
-    longer = Surface.from_map(heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8)
+    assert found.slopes["heights"]["area"] == pytest.approx(
+        -found.slopes["lengths"]["area"], abs=1e-3
+    )
+    assert found.slopes["heights"]["area"] == pytest.approx(
+        -found.slopes["pressure"]["area"], abs=1e-3
+    )
+    longer = Surface.from_map(
+        heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8
+    )
     assert sensitivity(longer, **given).slopes["extrapolate_hurst"]["area"] > 0
 
 
 def simulated_anew(heights, spacing, **given):
     """Logarithms of the answers of a map, which is simulated for this call."""
-    pressed = contact(Surface.from_map(heights, spacing, periodic=True, unit="um"), **given)
-    known = (pressed.mean_separation, pressed.area, pressed.stiffness, pressed.unloading_stiffness)
+    pressed = contact(
+        Surface.from_map(heights, spacing, periodic=True, unit="um"), **given
+    )
+    known = (
+        pressed.mean_separation,
+        pressed.area,
+        pressed.stiffness,
+        pressed.unloading_stiffness,
+    )
     return np.log(np.array(known, dtype=float))
 
 
@@ -202,18 +296,27 @@ def test_a_map_answers_by_the_theory_that_contact_takes():
     surface = Surface.from_map(heights, 1.0, periodic=True, unit="um")
     slopes = sensitivity(surface, **given).slopes
     rows = {
-        "heights": [simulated_anew(heights * (1 + sign * step), 1.0, **given) for sign in (1, -1)],
-        "lengths": [simulated_anew(heights, 1 + sign * step, **given) for sign in (1, -1)],
+        "heights": [
+            simulated_anew(heights * (1 + sign * step), 1.0, **given) for sign in (1, -1)
+        ],
+        "lengths": [
+            simulated_anew(heights, 1 + sign * step, **given) for sign in (1, -1)
+        ],
     }
     for name, change in (("pressure", 0.1), ("E_star", 30.0)):
         texts = [f"{change * (1 + sign * step)!r} GPa" for sign in (1, -1)]
-        rows[name] = [simulated_anew(heights, 1.0, **given | {name: text}) for text in texts]
+        rows[name] = [
+            simulated_anew(heights, 1.0, **given | {name: text}) for text in texts
+        ]
     # conductance is the stiffness over the modulus
     for row, sign in zip(rows["E_star"], (1, -1), strict=True):
         row[3] -= np.log(1 + sign * step)
     assert set(slopes) == set(rows)
     for name, (up, down) in rows.items():
-        known = [slopes[name][answer] for answer in ("mean_separation", "area", "stiffness", "conductance")]
+        known = [
+            slopes[name][answer]
+            for answer in ("mean_separation", "area", "stiffness", "conductance")
+        ]
         differences_by_hand = (up - down) / np.log((1 + step) / (1 - step))
         np.testing.assert_allclose(known, differences_by_hand, atol=0.01, err_msg=name)
     with pytest.raises(InputError, match="theory='calibrated'"):
@@ -224,11 +327,25 @@ def test_a_map_answers_by_the_theory_that_contact_takes():
 def test_the_command_for_a_map_of_many_points(tmp_path):
     """By default with the theory, and so the numbers, of `mbma contact`."""
     np.save(tmp_path / "face.npy", 0.1 * random_map(64, 0.03, 0.2, power=0))
-    asked = ["--map", str(tmp_path / "face.npy"), "--dx", "1um", "--length-unit", "um", "-p", "0.005", "--json"]
+    asked = [
+        "--map",
+        str(tmp_path / "face.npy"),
+        "--dx",
+        "1um",
+        "--length-unit",
+        "um",
+        "-p",
+        "0.005",
+        "--json",
+    ]
     told = json.loads(run("sensitivity", *asked))
     pressed = json.loads(run("contact", *asked))
-    assert told["answers"]["area"] == pytest.approx(pressed["columns"]["area"][0], rel=1e-9)
+    assert told["answers"]["area"] == pytest.approx(
+        pressed["columns"]["area"][0], rel=1e-9
+    )
     assert set(told["slopes"]) == {"heights", "lengths", "pressure"}
-    lighter = json.loads(run("contact", *asked[:-2], "0.00499", "--json"))["columns"]["area"][0]
+    lighter = json.loads(run("contact", *asked[:-2], "0.00499", "--json"))["columns"][
+        "area"
+    ][0]
     by_hand = np.log(pressed["columns"]["area"][0] / lighter) / np.log(0.005 / 0.00499)
     assert told["slopes"]["pressure"]["area"] == pytest.approx(by_hand, abs=0.01)

@@ -1,7 +1,8 @@
 """Calls of record.py with arguments spoilt, for a core under sanitizers: ``python mutate.py FILE COUNT``.
 
-Every argument of every function is spoilt alone, in each way that `ways` lists, and COUNT times together with others.
-Prints as JSON how many calls each argument of each function was spoilt in.
+Every argument of every function is spoilt alone, in each way that `ways` lists, and COUNT
+times together with others. Prints as JSON how many calls each argument of each function was
+spoilt in.
 """
 
 import ctypes
@@ -16,7 +17,21 @@ from record import Call, functions
 
 from mbma_tables.core import core
 
-NUMBERS = [0.0, -0.0, 5e-324, -1e-310, 1e-300, 1.0, -1.0, 2.5, 1e19, -1e300, np.inf, -np.inf, np.nan]
+NUMBERS = [
+    0.0,
+    -0.0,
+    5e-324,
+    -1e-310,
+    1e-300,
+    1.0,
+    -1.0,
+    2.5,
+    1e19,
+    -1e300,
+    np.inf,
+    -np.inf,
+    np.nan,
+]
 WHOLE = [0, 1, -1, 2, 3, 17, 4096, 2**31 - 1, -(2**31), 2**32, 2**62, 2**63 - 1, -(2**63)]
 HEAD = 20  # leading items of an array, each of which may have a meaning of its own
 EACH = 32  # leading items that are spoilt one by one
@@ -39,7 +54,9 @@ def unaligned(array):
 def whole_numbers(kind):
     """`WHOLE`, as far as a type of whole numbers has them."""
     limits = np.iinfo(kind)
-    return np.array([number for number in WHOLE if limits.min <= number <= limits.max], kind)
+    return np.array(
+        [number for number in WHOLE if limits.min <= number <= limits.max], kind
+    )
 
 
 def odd_numbers(kind):
@@ -101,7 +118,10 @@ def ways(given):
 def fresh(given):
     """Arguments whose arrays are in memory of their own, large tables excepted, which calls only read."""
     return [
-        exact(one.tobytes(), one.dtype) if isinstance(one, np.ndarray) and one.nbytes < LARGE else one for one in given
+        exact(one.tobytes(), one.dtype)
+        if isinstance(one, np.ndarray) and one.nbytes < LARGE
+        else one
+        for one in given
     ]
 
 
@@ -113,11 +133,17 @@ def spoilt_calls(given, together, alone):
             arguments[place] = other
             yield [place], arguments
     # results that are written over what is read
-    arrays = [place for place, argument in enumerate(given) if isinstance(argument, np.ndarray)]
+    arrays = [
+        place for place, argument in enumerate(given) if isinstance(argument, np.ndarray)
+    ]
     for first, second in itertools.permutations(arrays, 2):
         if given[second].nbytes >= given[first].nbytes > 0:
             arguments = fresh(given)
-            arguments[first] = arguments[second].view(np.uint8)[: given[first].nbytes].view(given[first].dtype)
+            arguments[first] = (
+                arguments[second]
+                .view(np.uint8)[: given[first].nbytes]
+                .view(given[first].dtype)
+            )
             yield [first, second], arguments
     several = [list(itertools.islice(ways(argument), 60)) for argument in given]
     for _ in range(together if given else 0):
@@ -125,7 +151,11 @@ def spoilt_calls(given, together, alone):
         places = RANDOM.integers(len(given), size=3).tolist()
         for place in places:
             choice = several[place][RANDOM.integers(len(several[place]))]
-            arguments[place] = exact(choice.tobytes(), choice.dtype) if isinstance(choice, np.ndarray) else choice
+            arguments[place] = (
+                exact(choice.tobytes(), choice.dtype)
+                if isinstance(choice, np.ndarray)
+                else choice
+            )
         yield places, arguments
 
 
@@ -135,8 +165,15 @@ def chosen(calls):
     What is None in one call is an array in another.
     """
     covered = set()
-    for call in sorted(calls, key=lambda call: sum(one.nbytes for one in call.given if isinstance(one, np.ndarray))):
-        given = {place for place, argument in enumerate(call.given) if argument is not None}
+    for call in sorted(
+        calls,
+        key=lambda call: sum(
+            one.nbytes for one in call.given if isinstance(one, np.ndarray)
+        ),
+    ):
+        given = {
+            place for place, argument in enumerate(call.given) if argument is not None
+        }
         if given - covered:
             yield call, sorted(given - covered)
         covered |= given
@@ -166,18 +203,26 @@ def ask_law(block, gap, gaps):
         quantity(separation=gap)
         quantity(separation=gaps)
         if isinstance(gap, float):
-            ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_void_p)(address)(gap, data)
+            ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_void_p)(address)(
+                gap, data
+            )
 
 
 if __name__ == "__main__":
-    recorded, together = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()), int(sys.argv[2])
+    recorded, together = (
+        pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()),
+        int(sys.argv[2]),
+    )
     called = {**dict(functions()), "Law": ask_law}
     counts = {name: [] for name in called}
     for call in [call for call in recorded if call.name == "law_fill"]:
         recorded.append(Call("Law", [call.given[1], 0.5, call.given[0]], 0, []))
     for name, function in called.items():
         for call, alone in chosen([call for call in recorded if call.name == name]):
-            tables = [exact(one.tobytes(), one.dtype) if isinstance(one, np.ndarray) else one for one in call.given]
+            tables = [
+                exact(one.tobytes(), one.dtype) if isinstance(one, np.ndarray) else one
+                for one in call.given
+            ]
             call = call._replace(given=tables)
             counts[name] = spoilt = counts[name] or [0] * len(call.given)
             for places, arguments in spoilt_calls(call.given, together, alone):

@@ -17,7 +17,11 @@ MOST_BYTES = 5_000_000  # of an array
 
 def functions():
     found = vars(package.core).items()
-    return [(name, one) for name, one in found if type(one).__name__ == "builtin_function_or_method"]
+    return [
+        (name, one)
+        for name, one in found
+        if type(one).__name__ == "builtin_function_or_method"
+    ]
 
 
 def copied(given):
@@ -35,10 +39,17 @@ class Call(NamedTuple):
         parts = [struct.pack("<64sq", self.name.encode(), len(self.given))]
         for one in self.given:
             if isinstance(one, np.ndarray):
-                parts += [struct.pack("<qqqd", one.nbytes, one.itemsize, 0, 0.0), one.tobytes()]
+                parts += [
+                    struct.pack("<qqqd", one.nbytes, one.itemsize, 0, 0.0),
+                    one.tobytes(),
+                ]
             else:
-                whole = 0 if one is None or isinstance(one, float) else operator.index(one)
-                parts.append(struct.pack("<qqqd", -1, 1, whole, 0.0 if one is None else one))
+                whole = (
+                    0 if one is None or isinstance(one, float) else operator.index(one)
+                )
+                parts.append(
+                    struct.pack("<qqqd", -1, 1, whole, 0.0 if one is None else one)
+                )
         return b"".join(parts)
 
 
@@ -48,7 +59,9 @@ def recorded(using):
     def recording(name, function):
         def call(*given):
             found = calls.setdefault(name, [])
-            big = any(one.nbytes > MOST_BYTES for one in given if isinstance(one, np.ndarray))
+            big = any(
+                one.nbytes > MOST_BYTES for one in given if isinstance(one, np.ndarray)
+            )
             if len(found) == MOST_CALLS or big:
                 return function(*given)
             before = copied(given)
@@ -75,7 +88,9 @@ def use():
     for which, first in enumerate([-700.0, -2.0, 1e-300, -0.9, -6.0]):
         x = np.linspace(first, 10.0, 501)
         core.elementary(which, x, np.empty(501))
-    core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
+    core.island_geometry(
+        0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14)
+    )
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
     core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
@@ -98,7 +113,12 @@ def use():
     law.slope_error(separation=gaps)
     for theory in ("mbma", "calibrated", "persson"):
         for cap in (np.inf, 0.05):
-            found = contact(one, mean_separation=np.linspace(0.2, 2.5, 30), theory=theory, hardness=cap)
+            found = contact(
+                one,
+                mean_separation=np.linspace(0.2, 2.5, 30),
+                theory=theory,
+                hardness=cap,
+            )
             contact(one, pressure=found.pressure, theory=theory, hardness=cap)
     contact(many, mean_separation=1.0, theory="calibrated")
     # outside the calibrated table

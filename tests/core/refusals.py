@@ -14,7 +14,11 @@ def wrong(given, changed):
     for k, one in enumerate(given):
         others = ["text", [1.0], 1j]
         if isinstance(one, np.ndarray):
-            others += [1.0, *(np.zeros(one.shape, kind) for kind in (np.complex64, np.int16, ">f8")), b"1234567"]
+            others += [
+                1.0,
+                *(np.zeros(one.shape, kind) for kind in (np.complex64, np.int16, ">f8")),
+                b"1234567",
+            ]
             if one.size > 1:
                 others.append(np.repeat(one.ravel(), 2)[::2])
         elif one is not None:
@@ -34,7 +38,9 @@ if __name__ == "__main__":
     refused = 0
     for name, (before, after) in first.items():
         changed = [
-            k for k, one in enumerate(before) if isinstance(one, np.ndarray) and one.tobytes() != after[k].tobytes()
+            k
+            for k, one in enumerate(before)
+            if isinstance(one, np.ndarray) and one.tobytes() != after[k].tobytes()
         ]
         for case in wrong(before, changed):
             try:

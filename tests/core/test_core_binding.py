@@ -20,7 +20,9 @@ from mbma_tables.theories.mbma.profile import RULES
 
 
 def run(code, timeout=120):
-    ended = subprocess.run([sys.executable, *code], capture_output=True, text=True, timeout=timeout)
+    ended = subprocess.run(
+        [sys.executable, *code], capture_output=True, text=True, timeout=timeout
+    )
     assert ended.returncode == 0, ended.stderr
     return ended.stdout
 
@@ -32,7 +34,9 @@ def test_wrong_arguments_are_refused():
 def test_arrays_of_wrong_sizes_are_refused():
     x = np.linspace(0.1, 1.0, 10)
     for size in (0, 9, 11):
-        with pytest.raises(ValueError, match="sizes of the arrays of elementary do not match"):
+        with pytest.raises(
+            ValueError, match="sizes of the arrays of elementary do not match"
+        ):
             core.elementary(0, x, np.empty(size))
     locked = x.copy()
     locked.flags.writeable = False
@@ -97,7 +101,9 @@ def test_arrays_that_are_not_aligned_or_overlap_results_are_refused():
         core.elementary(0, shifted, np.empty(10))
     both = np.linspace(0.1, 1.0, 15)
     for read, written in ((both[:10], both[5:]), (both[5:], both[:10]), (x, x)):
-        with pytest.raises(ValueError, match="a result of elementary overlaps another of its arrays"):
+        with pytest.raises(
+            ValueError, match="a result of elementary overlaps another of its arrays"
+        ):
             core.elementary(0, read, written)
     assert core.elementary(0, both[:5], both[5:10]) == 0
 
@@ -157,7 +163,10 @@ def test_forks_after_use_go_on():
 # of each long request what it needs, and the request
 LONG = {
     "totals": ("", "contact(many, separation=1.0, theory='mbma')"),
-    "exact": ("", "contact(one, separation=np.linspace(0, 2, 2000), island_model='exact')"),
+    "exact": (
+        "",
+        "contact(one, separation=np.linspace(0, 2, 2000), island_model='exact')",
+    ),
     "islands": ("X = np.linspace(-5, 40, 1_000_000)", "greenwood_tripp.solve(X, 1.0)"),
     "four numbers": (
         "four, delta = open_table('island4d'), np.linspace(1, 2, 3_000_000)",
@@ -172,7 +181,10 @@ LONG = {
         "pressure = np.geomspace(1e-4, 1e-2, 1_000_000)",
         "contact(one, pressure=pressure, theory='calibrated', hardness=0.05)",
     ),
-    "leakage": ("found = contact(one, mean_separation=u, theory='calibrated')", "found.leakage.K"),
+    "leakage": (
+        "found = contact(one, mean_separation=u, theory='calibrated')",
+        "found.leakage.K",
+    ),
     "factors of the flow through a map": (
         "from mbma_tables.theories.simulated.reynolds import flow_conductance\n"
         "gap = np.random.default_rng(1).uniform(0.1, 1.0, (600, 600))",
@@ -210,18 +222,24 @@ except KeyboardInterrupt:
 
 def processor_time(process):
     """Seconds that a process has computed for, in all its threads."""
-    fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    fields = (
+        pathlib.Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    )
     return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the processor time of another process")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="reads the processor time of another process"
+)
 @pytest.mark.parametrize("name", LONG)
 def test_control_c_ends_long_requests_within_a_second(name):
     """A signal from outside; counted in time of the processor, whatever else the machine does."""
     needed, request = LONG[name]
     code = ASKED.format(needed=needed, request=request)
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True
+    ) as process:
         try:
             assert process.stdout.readline() == "begun\n"
             before = processor_time(process)

@@ -19,17 +19,35 @@ QUICK = [
     "core/test_calibrated_core.py",
     "theories/mbma/test_core_islands.py",
 ]
-QUICK += ["theories/mbma/test_kernel.py", "law/test_law.py", "theories/mbma/test_island_models.py"]
-MORE = ["theories/mbma/test_geometry.py", "theories/mbma/test_universal_model.py", "theories/mbma/test_contact.py"]
+QUICK += [
+    "theories/mbma/test_kernel.py",
+    "law/test_law.py",
+    "theories/mbma/test_island_models.py",
+]
+MORE = [
+    "theories/mbma/test_geometry.py",
+    "theories/mbma/test_universal_model.py",
+    "theories/mbma/test_contact.py",
+]
 MORE += ["theories/mbma/test_island4d_model.py", "theories/mbma/test_closed_forms.py"]
-MORE += ["theories/calibrated/test_calibrated_theory.py", "theories/yielding/test_yielding.py"]
+MORE += [
+    "theories/calibrated/test_calibrated_theory.py",
+    "theories/yielding/test_yielding.py",
+]
 pytestmark = pytest.mark.slow
 
 
 def passed(tests, **environment):
     options = ["-P", "-m", "pytest", "-n", "0", "-p", "no:cacheprovider"]
     command = [sys.executable, *options, *(f"tests/{name}" for name in tests)]
-    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -44,15 +62,36 @@ def test_with_each_generation(generation):
 @pytest.mark.skipif(sys.platform != "linux", reason="LD_PRELOAD")
 def test_under_sanitizers(tmp_path):
     package = tmp_path / "mbma_tables"
-    shutil.copytree(CORE.parent, package, ignore=shutil.ignore_patterns("__pycache__", "_plain.*"))
+    shutil.copytree(
+        CORE.parent, package, ignore=shutil.ignore_patterns("__pycache__", "_plain.*")
+    )
     for name in ("docs", "tables"):
         (tmp_path / name).symlink_to(ROOT / name)
     include, cc = f"-I{sysconfig.get_path('include')}", found("cc")
-    options = [*BUILD.FLAGS, *SANITIZERS, include, "-DMBMA_MODULE=_plain", "-shared", "-fPIC"]
-    run(cc, *options, *SOURCES, CORE / "binding.c", "-o", package / "core" / "_plain.abi3.so", "-lm")
+    options = [
+        *BUILD.FLAGS,
+        *SANITIZERS,
+        include,
+        "-DMBMA_MODULE=_plain",
+        "-shared",
+        "-fPIC",
+    ]
+    run(
+        cc,
+        *options,
+        *SOURCES,
+        CORE / "binding.c",
+        "-o",
+        package / "core" / "_plain.abi3.so",
+        "-lm",
+    )
     library = run(cc, "-print-file-name=libasan.so").strip()
     # Python itself keeps what it has allocated
-    sanitizer = {"LD_PRELOAD": library, "ASAN_OPTIONS": "detect_leaks=0", "MBMA_TABLES_CORE": "plain"}
+    sanitizer = {
+        "LD_PRELOAD": library,
+        "ASAN_OPTIONS": "detect_leaks=0",
+        "MBMA_TABLES_CORE": "plain",
+    }
     paths = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     said = run(
         *(sys.executable, "-P", "-c", "from mbma_tables.core import core; print(core.__file__)"),
@@ -62,7 +101,16 @@ def test_under_sanitizers(tmp_path):
     passed(QUICK, PYTHONPATH=paths, **sanitizer)
     calls, script = recording(tmp_path), ROOT / "tests" / "core" / "mutate.py"
     exact = {"PYTHONMALLOC": "malloc", "PYTHONPATH": paths}
-    tried = json.loads(run(sys.executable, script, calls, "100", env=os.environ | sanitizer | exact, cwd=tmp_path))
+    tried = json.loads(
+        run(
+            sys.executable,
+            script,
+            calls,
+            "100",
+            env=os.environ | sanitizer | exact,
+            cwd=tmp_path,
+        )
+    )
     assert set(tried) == {name for name, _ in functions()} | {"Law"}
     # of every function every argument, numbers in at least ten ways, arrays in hundreds
     assert all(min(counts, default=10) >= 10 for counts in tried.values())

@@ -11,7 +11,15 @@ import pytest
 from mbma_tables import ContactLaw, Surface, contact_law
 from mbma_tables.export.law_code import law_text
 
-PLAIN = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")  # of rows of pressure alone
+PLAIN = (
+    "calculix",
+    "abaqus",
+    "lsdyna",
+    "optistruct",
+    "comsol",
+    "moose",
+    "modelica",
+)  # of rows of pressure alone
 POINTS = 10_000
 VALUES, TANGENTS = 1e-13, 1e-11  # what agreement is asked of exported laws
 CONDUCTIVITY, KAPPA = 3.0, 1.25
@@ -43,11 +51,18 @@ class Points:
 
     def assert_equal(self, p, tangent, area, energy, leakage, close=VALUES):
         """Values as the law's, tangents as its slopes, of which those about a maximum are relative to p/c."""
-        pairs = (p, self.p), (area, self.area), (energy, self.energy), (leakage, self.leakage)
+        pairs = (
+            (p, self.p),
+            (area, self.area),
+            (energy, self.energy),
+            (leakage, self.leakage),
+        )
         for found, known in pairs:
             np.testing.assert_allclose(found, known, rtol=close, atol=0)
         slope = np.maximum(np.abs(self.tangent), 1e-2 * self.p / np.abs(self.c))
-        assert np.abs((np.asarray(tangent) - self.tangent) / slope).max() <= max(TANGENTS, close)
+        assert np.abs((np.asarray(tangent) - self.tangent) / slope).max() <= max(
+            TANGENTS, close
+        )
 
     def pressures(self):
         """Pressures on the branch of first contact, but where pieces meet: they do so within the law's error alone."""
@@ -65,10 +80,15 @@ class Points:
         """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""
         wanted = self.pressures()
         d, back = self.law.h_max - 2 * np.asarray(c), self.law.separation(pressure=wanted)
-        assert np.abs(np.asarray(self.law.pressure(separation=d)) / wanted - 1).max() <= 1e-12
+        assert (
+            np.abs(np.asarray(self.law.pressure(separation=d)) / wanted - 1).max()
+            <= 1e-12
+        )
         slope = np.asarray(self.law.stiffness(separation=back))
         known = (self.law.h_max - back) / 2
-        assert (np.abs(c - known) <= 1e-12 * (np.abs(known) + np.abs(wanted / slope))).all()
+        assert (
+            np.abs(c - known) <= 1e-12 * (np.abs(known) + np.abs(wanted / slope))
+        ).all()
 
 
 @functools.cache
@@ -79,8 +99,12 @@ def points(name):
     ends = math.isinf(law.highest)
     near = h - 2 * h * 10 ** rng.uniform(-12, -0.6, POINTS // 2)
     grid = 2.0**-30
-    joints = h * np.array([0.5, 0.25, 0.125, 0.75, 0.375, 0.5 + 2.0**-30, 0.5 - 2.0**-30, 1 - 2.0**-9])
-    rest = grid * np.floor(rng.uniform(law.lowest, h if ends else law.highest, POINTS // 2) / grid)
+    joints = h * np.array(
+        [0.5, 0.25, 0.125, 0.75, 0.375, 0.5 + 2.0**-30, 0.5 - 2.0**-30, 1 - 2.0**-9]
+    )
+    rest = grid * np.floor(
+        rng.uniform(law.lowest, h if ends else law.highest, POINTS // 2) / grid
+    )
     c = (h - np.concatenate([near, rest, h - 2 * joints])) / 2
     d = h - 2 * c
     assert ((h - d) / 2 == c).all()
@@ -88,7 +112,16 @@ def points(name):
     found = law.values(separation=d)
     # code has 0 where the flow of a yielded contact is not known, as its header states
     flow = np.nan_to_num(np.asarray(law.leakage(separation=d)), nan=0.0)
-    return Points(law, c, found.pressure, found.stiffness, found.area, found.energy, flow, (h - turn) / 2)
+    return Points(
+        law,
+        c,
+        found.pressure,
+        found.stiffness,
+        found.area,
+        found.energy,
+        flow,
+        (h - turn) / 2,
+    )
 
 
 def text(target, law, **options):
@@ -98,4 +131,6 @@ def text(target, law, **options):
 
 def needs(*programs):
     missing = [program for program in programs if shutil.which(program) is None]
-    return pytest.mark.skipif(bool(missing), reason=f"not installed: {', '.join(missing)}")
+    return pytest.mark.skipif(
+        bool(missing), reason=f"not installed: {', '.join(missing)}"
+    )

@@ -40,8 +40,15 @@ def random_islands():
     """X and mu over the table, then over the closed form's range, with the ends of both."""
     rng, found = np.random.default_rng(2008), []
     (X, mu), form = universal_model().content.axes, RANGES[conformance.FORM]
-    for low, high, least, most in ((X.low, X.high, 1e-10, mu.high), (*form["X"], 1e-6, form["mu"][1])):
-        found.append(rng.uniform([[low], [np.log(least)]], [[high], [np.log(most)]], (2, POINTS // 2)))
+    for low, high, least, most in (
+        (X.low, X.high, 1e-10, mu.high),
+        (*form["X"], 1e-6, form["mu"][1]),
+    ):
+        found.append(
+            rng.uniform(
+                [[low], [np.log(least)]], [[high], [np.log(most)]], (2, POINTS // 2)
+            )
+        )
         found[-1][1] = np.exp(found[-1][1])
         found[-1][:, :4] = (low, low, high, high), (least, most) * 2
     return np.concatenate(found, axis=1)
@@ -52,13 +59,25 @@ def many_points(variant="reported"):
     """A points' file; some surfaces have hurst = 1, where powers vanish, and some the calibrated table lacks."""
     model, rng = universal_model(), np.random.default_rng(48)
     islands = random_islands()
-    lines = [*conformance.rows("phi", islands, model.answer(*islands)), *conformance.formula_rows(*islands)]
+    lines = [
+        *conformance.rows("phi", islands, model.answer(*islands)),
+        *conformance.formula_rows(*islands),
+    ]
     for hurst in [*np.ones(3), *rng.uniform(0.1, 1.0, SURFACES - 3)]:
-        (q0, h_rms), zeta_1 = np.exp(rng.uniform(-8.0, 8.0, 2)), np.exp(rng.uniform(np.log(4.0), np.log(1e6)))
-        surface = tuple(map(float, (hurst, q0, q0 * zeta_1, h_rms, h_rms * rng.uniform(2.0, 6.0))))
-        approach = np.exp(rng.uniform(np.log(1e-9), np.log(12.0), POINTS // 10 // SURFACES))
+        (q0, h_rms), zeta_1 = (
+            np.exp(rng.uniform(-8.0, 8.0, 2)),
+            np.exp(rng.uniform(np.log(4.0), np.log(1e6))),
+        )
+        surface = tuple(
+            map(float, (hurst, q0, q0 * zeta_1, h_rms, h_rms * rng.uniform(2.0, 6.0)))
+        )
+        approach = np.exp(
+            rng.uniform(np.log(1e-9), np.log(12.0), POINTS // 10 // SURFACES)
+        )
         shares = SHARES if zeta_1 < 9.9e4 else ()
-        lines += conformance.surface_rows(surface, get_variant(variant), approach, DEPTHS, shares, 7.5)
+        lines += conformance.surface_rows(
+            surface, get_variant(variant), approach, DEPTHS, shares, 7.5
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -70,8 +89,13 @@ def replayed(folder, work, command=None, points=""):
     if command is None:
         return check(folder, path)
     sources = [f"{folder}/{name}" for name in SOURCES]
-    for words in ([*command, *WARNINGS, *sources, "-lm", "-o", "selftest"], ["./selftest", str(path)]):
-        done = subprocess.run(words, cwd=work, capture_output=True, text=True, timeout=300, check=False)
+    for words in (
+        [*command, *WARNINGS, *sources, "-lm", "-o", "selftest"],
+        ["./selftest", str(path)],
+    ):
+        done = subprocess.run(
+            words, cwd=work, capture_output=True, text=True, timeout=300, check=False
+        )
         assert done.stderr == ""
     return read_report(done.stdout)
 
@@ -79,7 +103,9 @@ def replayed(folder, work, command=None, points=""):
 def assert_equal_to_runtime(replay):
     assert replay.failed == 0
     lines = many_points().splitlines()
-    asked = {kind: sum(line.startswith(f"{kind},") for line in lines) for kind in TOLERANCES}
+    asked = {
+        kind: sum(line.startswith(f"{kind},") for line in lines) for kind in TOLERANCES
+    }
     assert {kind: n for kind, n in replay.points.items() if n} == asked
     assert asked["formula"] > POINTS // 2
     assert asked["total"] == 4 * SURFACES
@@ -99,12 +125,28 @@ def test_every_file_says_what_it_is(tmp_path):
     attributes = universal_model().content.attributes
     written = write_code(tmp_path / "code", variant="printed")
     assert sorted(written) == sorted((tmp_path / "code").iterdir())
-    included = {name for path in written for name in re.findall(r'#include "(.*)"', path.read_text())}
-    assert included | {*SOURCES, "mbma_conformance.csv"} == {path.name for path in written}
+    included = {
+        name
+        for path in written
+        for name in re.findall(r'#include "(.*)"', path.read_text())
+    }
+    assert included | {*SOURCES, "mbma_conformance.csv"} == {
+        path.name for path in written
+    }
     largest = max(attributes["largest_error_F"], attributes["largest_error_A"])
     core = pathlib.Path(mbma_tables.core.__file__).parent
-    facts = (f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause", "Variant: printed")
-    facts += ("-6.25 <= X <= 41.0", f"{largest:.2g} on", "zeta_1 in [3.0, 100000.0]", "of the table against the law")
+    facts = (
+        f"mbma_tables {__version__}",
+        "force is per nominal area",
+        "BSD-3-Clause",
+        "Variant: printed",
+    )
+    facts += (
+        "-6.25 <= X <= 41.0",
+        f"{largest:.2g} on",
+        "zeta_1 in [3.0, 100000.0]",
+        "of the table against the law",
+    )
     for path in written:
         text = path.read_text(encoding="utf-8")
         if (core / path.name).is_file():
@@ -142,20 +184,30 @@ def test_a_wrong_number_is_seen(tmp_path, monkeypatch):
 def test_bad_requests_leave_no_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a_file").write_text("kept", encoding="utf-8")
-    cases = ("code", "guessed", "must be one of"), ("code", "fitted", "takes their cover"), ("a_file", "a_file")
+    cases = (
+        ("code", "guessed", "must be one of"),
+        ("code", "fitted", "takes their cover"),
+        ("a_file", "a_file"),
+    )
     for *arguments, message in cases:
         with pytest.raises(InputError, match=message) as caught:
             write_code(*arguments)
         assert len(str(caught.value).splitlines()) == 1
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a_file", "kept")]
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [
+        ("a_file", "kept")
+    ]
 
 
 def test_points_of_a_variant_with_high_floors():
     ratios = [surface[2] / surface[1] for surface in conformance.SURFACES]
     for floor in (3.0, 150.0, 500.0):
-        text = conformance.points_text(universal_model(), Variant("high floors", floor_u=floor))
+        text = conformance.points_text(
+            universal_model(), Variant("high floors", floor_u=floor)
+        )
         count = sum(line.startswith("total,") for line in text.splitlines())
-        assert count == len(conformance.DEPTHS) * sum(ratio > floor for ratio in ratios), floor
+        assert count == len(conformance.DEPTHS) * sum(
+            ratio > floor for ratio in ratios
+        ), floor
 
 
 @needs("cc")
@@ -193,13 +245,37 @@ def test_the_printed_variant(tmp_path):
 @needs("gcc", "nm")
 def test_nothing_is_allocated_or_kept(c_folder, tmp_path):
     # without tables of addresses that a loader would move
-    command = ["gcc", "-std=c11", "-O0", "-fno-pie", "-c", *(str(c_folder / name) for name in MODEL)]
+    command = [
+        "gcc",
+        "-std=c11",
+        "-O0",
+        "-fno-pie",
+        "-c",
+        *(str(c_folder / name) for name in MODEL),
+    ]
     subprocess.run(command, cwd=tmp_path, check=True)
     objects = [path.name for path in tmp_path.glob("*.o")]
-    listed = subprocess.run(["nm", *objects], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    listed = subprocess.run(
+        ["nm", *objects], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout
     kinds = [line.split()[-2:] for line in listed.splitlines() if len(line.split()) > 1]
-    outside = {name for kind, name in kinds if kind == "U" and not name.startswith("mbma_")} - {"__stack_chk_fail"}
-    mathematics = {"asinh", "cbrt", "copysign", "cos", "exp", "expm1", "fmax", "fmin", "log", "log1p", "pow", "sqrt"}
+    outside = {
+        name for kind, name in kinds if kind == "U" and not name.startswith("mbma_")
+    } - {"__stack_chk_fail"}
+    mathematics = {
+        "asinh",
+        "cbrt",
+        "copysign",
+        "cos",
+        "exp",
+        "expm1",
+        "fmax",
+        "fmin",
+        "log",
+        "log1p",
+        "pow",
+        "sqrt",
+    }
     assert outside <= {*mathematics, "memcpy", "memset"}
     assert not [name for kind, name in kinds if kind in "BbDdC"]
 
@@ -207,22 +283,52 @@ def test_nothing_is_allocated_or_kept(c_folder, tmp_path):
 @needs("gcc")
 def test_no_answer_has_a_status_and_nan(c_folder, tmp_path):
     sources = [str(c_folder / name) for name in MODEL]
-    command = ["gcc", "-std=c11", "-O2", "-shared", "-fPIC", *sources, "-lm", "-o", str(tmp_path / "model.so")]
+    command = [
+        "gcc",
+        "-std=c11",
+        "-O2",
+        "-shared",
+        "-fPIC",
+        *sources,
+        "-lm",
+        "-o",
+        str(tmp_path / "model.so"),
+    ]
     subprocess.run(command, check=True)
     library = ctypes.CDLL(str(tmp_path / "model.so"))
     library.mbma_message.restype = ctypes.c_char_p
 
     def total(*numbers):
         """Answers and the meaning of the status, of a surface's numbers, gap, E* and rtol."""
-        surface, (gap, *more), answers = np.array(numbers[:5]), map(ctypes.c_double, numbers[5:]), np.empty(4)
+        surface, (gap, *more), answers = (
+            np.array(numbers[:5]),
+            map(ctypes.c_double, numbers[5:]),
+            np.empty(4),
+        )
         at, written = (ctypes.c_void_p(array.ctypes.data) for array in (surface, answers))
-        return answers, library.mbma_message(library.mbma_total_of(at, gap, *more, written))
+        return answers, library.mbma_message(
+            library.mbma_total_of(at, gap, *more, written)
+        )
 
     good = (0.8, 1.0, 100.0, 1.0, 3.0, 1.0, 1.0, 1e-8)
     nan, inf = math.nan, math.inf
-    wrong = [(0, nan), (0, 1.1), (1, 0.0), (2, 3.0), (2, 1e9), (4, inf), (5, nan), (5, inf), (5, -3.1), (6, -1.0)]
+    wrong = [
+        (0, nan),
+        (0, 1.1),
+        (1, 0.0),
+        (2, 3.0),
+        (2, 1e9),
+        (4, inf),
+        (5, nan),
+        (5, inf),
+        (5, -3.1),
+        (6, -1.0),
+    ]
     invalid = b"an argument is not finite, or is outside what the model allows"
-    cases = [((*good[:k], value, *good[k + 1 :]), invalid) for k, value in (*wrong, (7, 0.0), (7, nan))]
+    cases = [
+        ((*good[:k], value, *good[k + 1 :]), invalid)
+        for k, value in (*wrong, (7, 0.0), (7, nan))
+    ]
     cases.append(((0.5, 1.0, 1e6, 1.0, 30.0, -30.0, 1.0, 1e-8), b"X is above the range"))
     cases.append(((0.1, 1.0, 1e7, 1.0, 3.0, -3.0, 1.0, 1e-8), b"mu is above the range"))
     for numbers, message in cases:
@@ -242,13 +348,19 @@ HOSTILE = (
 
 @pytest.fixture(scope="module")
 def law():
-    return describe_law(Surface.named("concrete"), 13.3, length_unit="mm", stress_unit="MPa", rows=5)
+    return describe_law(
+        Surface.named("concrete"), 13.3, length_unit="mm", stress_unit="MPa", rows=5
+    )
 
 
 def test_source_code():
     content = copy.copy(universal_model().content)
     # a certificate's numbers are numbers in any case; the rest is text of the file
-    texts = {name: HOSTILE for name, value in content.attributes.items() if isinstance(value, str)}
+    texts = {
+        name: HOSTILE
+        for name, value in content.attributes.items()
+        if isinstance(value, str)
+    }
     attributes = content.attributes | texts | {"certificate_points": HOSTILE}
     model = UniversalModel(dataclasses.replace(content, attributes=attributes))
     hostile = model, dataclasses.replace(get_variant("reported"), name=HOSTILE)
@@ -259,7 +371,11 @@ def test_source_code():
         assert text.isascii()
         assert ("int evil" in text) == (of is hostile)
         code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).splitlines()
-        points = [line for line in conformance.points_text(*of).splitlines() if not line.startswith("#")]
+        points = [
+            line
+            for line in conformance.points_text(*of).splitlines()
+            if not line.startswith("#")
+        ]
         return [line for line in code if line.strip()] + points
 
     assert live(hostile) == live(plain)
@@ -269,7 +385,11 @@ def test_source_code():
 def test_decks_and_functions(target, law):
     write = getattr(solvers, target, lambda law: data.matlab_reader(law, "law").decode())
     mark = getattr(write, "mark", "%")
-    words = {"comments": (HOSTILE, HOSTILE, *law.comments[2:], HOSTILE), "x_unit": HOSTILE, "y_unit": HOSTILE}
+    words = {
+        "comments": (HOSTILE, HOSTILE, *law.comments[2:], HOSTILE),
+        "x_unit": HOSTILE,
+        "y_unit": HOSTILE,
+    }
     live = [
         [line for line in write(one).splitlines() if not line.startswith(mark)]
         for one in (law, dataclasses.replace(law, **words))
@@ -277,7 +397,10 @@ def test_decks_and_functions(target, law):
     assert live[0] == live[1]
 
 
-@pytest.mark.parametrize("name", ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81, 3])
+@pytest.mark.parametrize(
+    "name",
+    ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81, 3],
+)
 def test_names_of_cards_and_functions(name, law):
     for write in (solvers.calculix, solvers.abaqus, solvers.modelica, data.matlab_reader):
         with pytest.raises(InputError, match="a name must be a letter"):
@@ -285,23 +408,39 @@ def test_names_of_cards_and_functions(name, law):
     assert checked_name("Rough_2", 7) == "Rough_2"
 
 
-@pytest.mark.parametrize("unit", ["mW/(mm, K)", 'a "quoted" unit', "=HYPERLINK(evil)", "µm"])
+@pytest.mark.parametrize(
+    "unit", ["mW/(mm, K)", 'a "quoted" unit', "=HYPERLINK(evil)", "µm"]
+)
 @pytest.mark.parametrize("name", ["=1+1", "+1", "-1", "@SUM", "\tx"])
 def test_csv_cells(name, unit, law):
     changed = dataclasses.replace(
-        law, x_name=name, y_unit=unit, comments=(*law.comments, f"in {unit}\n=HYPERLINK(evil)")
+        law,
+        x_name=name,
+        y_unit=unit,
+        comments=(*law.comments, f"in {unit}\n=HYPERLINK(evil)"),
     )
     lines = data.to_csv(changed).decode().splitlines()
     head = len(changed.comments)
     assert all(line.startswith("# ") for line in lines[:head])
     cells = list(csv.reader(io.StringIO("\n".join(lines[head:]))))
     assert cells[0] == [f"'{name} [mm]", f"pressure [{unit}]"]
-    assert [[float(cell) for cell in row] for row in cells[1:]] == [list(row) for row in zip(law.x, law.y, strict=True)]
+    assert [[float(cell) for cell in row] for row in cells[1:]] == [
+        list(row) for row in zip(law.x, law.y, strict=True)
+    ]
 
 
 @pytest.mark.parametrize("unit", ["W\n*INCLUDE, INPUT=evil", "W\u2028"])
 @pytest.mark.parametrize("which", ["length_unit", "stress_unit", "conductivity_unit"])
 def test_units_are_printable(which, unit):
-    units = {"length_unit": "mm", "stress_unit": "MPa", "conductivity_unit": "mW/K"} | {which: unit}
+    units = {"length_unit": "mm", "stress_unit": "MPa", "conductivity_unit": "mW/K"} | {
+        which: unit
+    }
     with pytest.raises(InputError, match=r"is no known unit|is not printable"):
-        describe_law(Surface.named("concrete"), 13.3, quantity="conductance", conductivity=1.0, rows=5, **units)
+        describe_law(
+            Surface.named("concrete"),
+            13.3,
+            quantity="conductance",
+            conductivity=1.0,
+            rows=5,
+            **units,
+        )

@@ -36,11 +36,18 @@ def pressed(numbers, u, E_star):
     K = 16 * np.sqrt(2) / 15 * np.pi * (eta * beta * sigma) ** 2 * np.sqrt(sigma / beta)
     k, H, H0 = 4.4086e-5 * K * E_star, u / sigma - numbers["delta"] / sigma, numbers["H0"]
     a0, a1 = (4 - H0) ** 6.804, -6.804 * (4 - H0) ** 5.804
-    return np.where(H > 4, 0.0, k * np.where(H >= H0, np.maximum(4 - H, 0) ** 6.804, a0 + a1 * (H - H0)))
+    return np.where(
+        H > 4,
+        0.0,
+        k * np.where(H >= H0, np.maximum(4 - H, 0) ** 6.804, a0 + a1 * (H - H0)),
+    )
 
 
 def read(text):
-    return {key: float(value) for key, value in re.findall(r"^set: real joint_(\w+) = (\S+);$", text, re.M)}
+    return {
+        key: float(value)
+        for key, value in re.findall(r"^set: real joint_(\w+) = (\S+);$", text, re.M)
+    }
 
 
 def test_rows_of_a_film_are_the_flow_factors():
@@ -50,10 +57,16 @@ def test_rows_of_a_film_are_the_flow_factors():
     own = flow_factors(BEARING, film.x * 1e6, E_star="110 GPa", peklenik=3)
     for name, (values, unit) in list(film.columns.items())[1:-1]:
         scale = 1e9 if unit == "Pa" else 1
-        np.testing.assert_allclose(values, scale * np.asarray(getattr(own, name)), rtol=1e-6, err_msg=name)
+        np.testing.assert_allclose(
+            values, scale * np.asarray(getattr(own, name)), rtol=1e-6, err_msg=name
+        )
     law = contact_law(BEARING, "calibrated", E_star="110 GPa")
     inner = film.x < 1.5e-6
-    np.testing.assert_allclose(film.more["stiffness"][0][inner], 1e15 * law.stiffness(film.x[inner] * 1e6), rtol=2e-4)
+    np.testing.assert_allclose(
+        film.more["stiffness"][0][inner],
+        1e15 * law.stiffness(film.x[inner] * 1e6),
+        rtol=2e-4,
+    )
 
 
 @pytest.mark.parametrize("rows", [25, 200])
@@ -65,14 +78,26 @@ def test_the_stated_error_of_a_film_is_its_largest(rows):
     for name in ("phi_x", "phi_y", "shear_x", "shear_y", "pressure"):
         value = np.asarray(getattr(own, name)) * (1e9 if name == "pressure" else 1)
         kept = own.valid & (value > (film.floor if name == "pressure" else 0))
-        off.append(np.abs(np.interp(u, film.x, film.columns[name][0]) / np.where(kept, value, 1) - 1)[kept].max())
+        off.append(
+            np.abs(
+                np.interp(u, film.x, film.columns[name][0]) / np.where(kept, value, 1) - 1
+            )[kept].max()
+        )
     assert 0.5 * film.largest_error < max(off) < 2.5 * film.largest_error
 
 
 def test_mbdyn_finds_its_own_numbers_again():
     film = rows_of(**FILM)
-    made = {"sigma": 5e-7, "eta": 0.05 / (5e-7 * 2e-6), "beta": 2e-6, "delta": 4e-7, "H0": -100.0}
-    own = dataclasses.replace(film, more=dict(film.more) | {"pressure": (pressed(made, film.x, 1.1e11), "Pa")})
+    made = {
+        "sigma": 5e-7,
+        "eta": 0.05 / (5e-7 * 2e-6),
+        "beta": 2e-6,
+        "delta": 4e-7,
+        "H0": -100.0,
+    }
+    own = dataclasses.replace(
+        film, more=dict(film.more) | {"pressure": (pressed(made, film.x, 1.1e11), "Pa")}
+    )
     numbers = read(solvers.mbdyn(own, name="joint"))
     assert [numbers[key] for key in ("eta", "beta", "delta")] == pytest.approx(
         [made[key] for key in ("eta", "beta", "delta")], rel=1e-5
@@ -84,17 +109,26 @@ def test_mbdyn_reads_the_pressure_within_the_stated_misfit(pressures):
     film = rows_of(**FILM, pressures=pressures)
     text = solvers.mbdyn(film, name="joint")
     numbers = read(text)
-    low, high, unit = re.search(r"fitted from p = (\S+) to (\S+) (\w+),", text.replace("\n# ", " ")).groups()
-    root, most = map(float, re.search(r"is (\S+) root mean\s(?:# )?square,\s(?:# )?(\S+) at", text).groups())
+    low, high, unit = re.search(
+        r"fitted from p = (\S+) to (\S+) (\w+),", text.replace("\n# ", " ")
+    ).groups()
+    root, most = map(
+        float,
+        re.search(r"is (\S+) root mean\s(?:# )?square,\s(?:# )?(\S+) at", text).groups(),
+    )
     u, p = film.x, film.more["pressure"][0]
     kept = (p >= float(low) * 0.999) & (p <= float(high) * 1.001)
     off = np.log(pressed(numbers, u[kept], numbers["E"]) / p[kept])
     assert unit == "Pa"
-    assert [np.sqrt(np.mean(off**2)), np.abs(off).max()] == pytest.approx([root, most], rel=0.06)
+    assert [np.sqrt(np.mean(off**2)), np.abs(off).max()] == pytest.approx(
+        [root, most], rel=0.06
+    )
     assert most < 0.2
     # E1 = E2 = 2 E*, nu = 0 have the modulus E*; continuous slope below H0
     assert numbers["E"] == 1.1e11
-    below = pressed(numbers, u[kept][0] * np.array([0.97, 1 - 1e-9, 1 + 1e-9, 1.03]), numbers["E"])
+    below = pressed(
+        numbers, u[kept][0] * np.array([0.97, 1 - 1e-9, 1 + 1e-9, 1.03]), numbers["E"]
+    )
     assert (np.diff(below) < 0).all()
     # Mindlin's ratio of nu = 0.3 about the law's stiffness over pressure
     slip = film.more["stiffness"][0][kept] / p[kept] * 2 * (1 - 0.3) / (2 - 0.3)
@@ -102,8 +136,26 @@ def test_mbdyn_reads_the_pressure_within_the_stated_misfit(pressures):
     assert numbers["Rq"] * np.sqrt(2) == pytest.approx(5e-7)
     assert numbers["lambdax"] == 3
     # the order in which its parser asks for keywords
-    order = ("flow factors", "lambdax", "lambdaz", "contact model", "E1", "nu1", "E2", "nu2", "unit system", "standard")
-    order += ("asperity density", "asperity curvature", "asperity mean height", "linearize", "friction model", "micro")
+    order = (
+        "flow factors",
+        "lambdax",
+        "lambdaz",
+        "contact model",
+        "E1",
+        "nu1",
+        "E2",
+        "nu2",
+        "unit system",
+        "standard",
+    )
+    order += (
+        "asperity density",
+        "asperity curvature",
+        "asperity mean height",
+        "linearize",
+        "friction model",
+        "micro",
+    )
     deck = text[text.index("# in the element") :]
     places = [deck.index(word) for word in order]
     assert places == sorted(places)
@@ -135,16 +187,36 @@ def test_geos_takes_the_tables():
     p = np.geomspace(1e6, 0.499e9, 500)
     exact = np.asarray(own.at_pressure(p * 1e-9).mean_separation) * 1e-6
     assert np.abs(np.interp(p, stress, u) / exact - 1).max() < 2 * law.largest_error
-    assert np.abs(np.interp(p, *held["rough_hydraulicAperture"]) / aperture(exact) - 1).max() < 1.05 * law.largest_error
+    assert (
+        np.abs(np.interp(p, *held["rough_hydraulicAperture"]) / aperture(exact) - 1).max()
+        < 1.05 * law.largest_error
+    )
     x, slope = held["rough_derivative"]
-    inner = np.asarray(own.at_pressure(x[1:-1] * 1e-9 * np.array([[1.001], [0.999]])).mean_separation) * 1e-6
-    np.testing.assert_allclose(slope[1:-1], (aperture(inner[0]) - aperture(inner[1])) / (0.002 * x[1:-1]), rtol=1e-5)
+    inner = (
+        np.asarray(
+            own.at_pressure(x[1:-1] * 1e-9 * np.array([[1.001], [0.999]])).mean_separation
+        )
+        * 1e-6
+    )
+    np.testing.assert_allclose(
+        slope[1:-1],
+        (aperture(inner[0]) - aperture(inner[1])) / (0.002 * x[1:-1]),
+        rtol=1e-5,
+    )
     bandis = next(root.iter("BartonBandis"))
-    w0, reference = (float(bandis.get(key)) for key in ("referenceAperture", "referenceNormalStress"))
+    w0, reference = (
+        float(bandis.get(key)) for key in ("referenceAperture", "referenceNormalStress")
+    )
     kept = law.x >= law.x[1]
     misfit = np.log(w0 / (1 + 9 * law.x[kept] / reference) / law.y[kept])
-    assert f"is {misfit.std():.2g} root mean square, {np.abs(misfit).max():.2g} at most" in text
-    assert next(root.iter("HydraulicApertureTable")).get("apertureTableName") == "rough_byJump"
+    assert (
+        f"is {misfit.std():.2g} root mean square, {np.abs(misfit).max():.2g} at most"
+        in text
+    )
+    assert (
+        next(root.iter("HydraulicApertureTable")).get("apertureTableName")
+        == "rough_byJump"
+    )
 
 
 @pytest.mark.parametrize("options", [FILM, HEAT | RANGE, APERTURE | RANGE, {"rows": 30}])
@@ -152,19 +224,24 @@ def test_moose_takes_functions(options):
     law = rows_of(**options)
     text = solvers.moose_function(law, name="f")
     blocks = re.findall(
-        r"^  \[f_(\w+)\]\n    type = PiecewiseLinear\n    x = '(.*)'\n    y = '(.*)'\n  \[\]$", text, re.M
+        r"^  \[f_(\w+)\]\n    type = PiecewiseLinear\n    x = '(.*)'\n    y = '(.*)'\n  \[\]$",
+        text,
+        re.M,
     )
     assert [name for name, *_ in blocks] == list(law.columns)[1:]
     for name, x, y in blocks:
         np.testing.assert_allclose(np.array(x.split(), float), law.x, rtol=1e-9)
-        np.testing.assert_allclose(np.array(y.split(), float), law.columns[name][0], rtol=1e-9)
+        np.testing.assert_allclose(
+            np.array(y.split(), float), law.columns[name][0], rtol=1e-9
+        )
 
 
 def test_lethe_conducts_within_the_stated_misfit():
     law = rows_of(**HEAT, **RANGE)
     text = solvers.lethe(law)
     set_ = {key: float(value) for key, value in re.findall(r"set ([\w ]+) = (\S+)", text)}
-    # two faces: squares add up, the harmonic mean of the hardness; calculate_microcontact_resistance times its area
+    # two faces: squares add up, the harmonic mean of the hardness;
+    # calculate_microcontact_resistance times its area
     sigma, slope, H = (
         np.hypot(set_["surface roughness particles"], set_["surface roughness wall"]),
         np.hypot(set_["surface slope particles"], set_["surface slope wall"]),
@@ -174,9 +251,13 @@ def test_lethe_conducts_within_the_stated_misfit():
     # of Hertz's pressure up to the peak the mean of h is h(peak)/(1 + 0.96/2)
     conductance = (1 + 0.96 / 2) * 50.0 * slope / (1.184 * sigma) * (peak / H) ** 0.96
     stated = float(re.search(r"\^0.96 is within (\S+) of", text).group(1))
-    assert np.expm1(np.abs(np.log(conductance / law.y[1:])).max()) == pytest.approx(stated, rel=0.05)
+    assert np.expm1(np.abs(np.log(conductance / law.y[1:])).max()) == pytest.approx(
+        stated, rel=0.05
+    )
     assert sigma == pytest.approx(5e-7)
-    assert slope == pytest.approx(np.sqrt(2 / np.pi) * float(BEARING.rms_gradient) / np.sqrt(2), rel=1e-6)
+    assert slope == pytest.approx(
+        np.sqrt(2 / np.pi) * float(BEARING.rms_gradient) / np.sqrt(2), rel=1e-6
+    )
 
 
 GETDP = """
@@ -208,7 +289,11 @@ def test_getdp_interpolates(options, tmp_path):
     )
     (tmp_path / "a.pro").write_text(GETDP.replace("PRINTS", asked))
     ran = subprocess.run(
-        ["getdp", "a.pro", "-msh", "a.msh", "-solve", "R"], cwd=tmp_path, capture_output=True, text=True, timeout=60
+        ["getdp", "a.pro", "-msh", "a.msh", "-solve", "R"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     for name in names:
         found = re.search(rf"^{name} (.*)$", ran.stdout, re.M)
@@ -230,15 +315,26 @@ def test_data_of_a_film_come_back(name, tmp_path):
         assert again["facts"] == {key: list(fact) for key, fact in film.facts.items()}
         found = again["columns"]
     elif name == "csv":
-        lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+        lines = [
+            line for line in path.read_text().splitlines() if not line.startswith("#")
+        ]
         assert lines[0].startswith("mean_separation [m],phi_x [1],")
-        found = dict(zip(film.columns, np.array([line.split(",") for line in lines[1:]], float).T, strict=True))
+        found = dict(
+            zip(
+                film.columns,
+                np.array([line.split(",") for line in lines[1:]], float).T,
+                strict=True,
+            )
+        )
     elif name == "matlab":
         from scipy.io import loadmat
 
         held = loadmat(path, appendmat=False)
         assert held["largest_error"].item() == film.largest_error
-        found = {key: held[{"mean_separation": "x", "phi_x": "y"}.get(key, key)][:, 0] for key in film.columns}
+        found = {
+            key: held[{"mean_separation": "x", "phi_x": "y"}.get(key, key)][:, 0]
+            for key in film.columns
+        }
     elif name in ("netcdf", "hdf5"):
         with pytest.importorskip("h5py").File(path) as held:
             assert held["pressure"].attrs["units"] in ("Pa", b"Pa")
@@ -256,15 +352,28 @@ def test_data_of_a_film_come_back(name, tmp_path):
 @pytest.mark.parametrize("name", ["comsol", "moose", "modelica"])
 def test_columns_of_a_film(name):
     film = rows_of(**FILM)
-    lines = [line.split() for line in getattr(solvers, name)(film).splitlines() if line[0] in "0123456789"]
-    np.testing.assert_allclose(np.array(lines, float).T, [values for values, _ in film.columns.values()], rtol=1e-9)
+    lines = [
+        line.split()
+        for line in getattr(solvers, name)(film).splitlines()
+        if line[0] in "0123456789"
+    ]
+    np.testing.assert_allclose(
+        np.array(lines, float).T,
+        [values for values, _ in film.columns.values()],
+        rtol=1e-9,
+    )
 
 
 def written(*words):
-    ran = CliRunner().invoke(main, ["export", *words, "--surface", "concrete", "--E-star", "13.3MPa", "--out", "-"])
+    ran = CliRunner().invoke(
+        main,
+        ["export", *words, "--surface", "concrete", "--E-star", "13.3MPa", "--out", "-"],
+    )
     assert ran.exit_code == 0
     text = ran.stdout
-    assert ("lengths in m\n" in text.replace(" -->", "")) == (targets()[words[0]].units is not None)
+    assert ("lengths in m\n" in text.replace(" -->", "")) == (
+        targets()[words[0]].units is not None
+    )
     assert ("E* = 13300000.0 Pa" in text) == (targets()[words[0]].units is not None)
     return text
 
@@ -273,7 +382,14 @@ HEAT_WORDS = ("--conductivity", "2", "--conductivity-unit", "W/(m K)")
 test_the_command_writes_them = told(
     written,
     ("mbdyn", "--peklenik", "2", "set: real rough_lambdax = 2.0;"),
-    ("geos", "--theory", "calibrated", "--pressures", "1kPa:1MPa", '<BartonBandis name="rough_fitted"'),
+    (
+        "geos",
+        "--theory",
+        "calibrated",
+        "--pressures",
+        "1kPa:1MPa",
+        '<BartonBandis name="rough_fitted"',
+    ),
     ("moose-function", "--quantity", "film", "--rows", "9", "[rough_phi_x]"),
     ("csv", "--quantity", "film", "--peklenik", "2", "mean_separation [mm],phi_x [1]"),
     ("lethe", *HEAT_WORDS, "--pressures", "1kPa:1MPa", "microhardness"),
@@ -282,11 +398,26 @@ test_the_command_writes_them = told(
 
 test_refused = refusals(
     lambda target, asked, options: getattr(solvers, target)(rows_of(**asked), **options),
-    ("mbdyn", {}, {}, "MBDyn takes film against mean_separation here, got pressure against"),
+    (
+        "mbdyn",
+        {},
+        {},
+        "MBDyn takes film against mean_separation here, got pressure against",
+    ),
     ("geos", FILM, {}, "GEOS takes hydraulic_aperture against pressure here, got phi_x"),
-    ("mbdyn", FILM | {"length_unit": "um"}, {}, "MBDyn takes m and Pa here, got um and Pa"),
+    (
+        "mbdyn",
+        FILM | {"length_unit": "um"},
+        {},
+        "MBDyn takes m and Pa here, got um and Pa",
+    ),
     ("mbdyn", FILM, {"name": "a b"}, "a name must be a letter"),
-    ("mbdyn", FILM | {"pressures": ("3 GPa", "4 GPa")}, {}, r"needs 3 rows at pressures with A/A0 <="),
+    (
+        "mbdyn",
+        FILM | {"pressures": ("3 GPa", "4 GPa")},
+        {},
+        r"needs 3 rows at pressures with A/A0 <=",
+    ),
     ("mbdyn", FILM | {"rtol": 1e-3}, {}, "rtol does not belong to quantity='film'"),
     ("mbdyn", FILM | {"rows": 2}, {}, "rows must be a whole number in"),
     ("mbdyn", {"peklenik": 2.0}, {}, "peklenik does not belong to quantity='pressure'"),

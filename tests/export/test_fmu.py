@@ -14,7 +14,15 @@ from mbma_tables import InputError
 from mbma_tables.export.fmu import fmu
 
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
-QUANTITIES = ["pressure", "tangent", "area", "energy", "conductance", "tangential_stiffness", "leakage"]
+QUANTITIES = [
+    "pressure",
+    "tangent",
+    "area",
+    "energy",
+    "conductance",
+    "tangential_stiffness",
+    "leakage",
+]
 SLOPES = QUANTITIES[4:6]
 MORE = HEAT | {"kappa": KAPPA, "leakage": True}
 KINDS = ("ModelExchange", "CoSimulation")
@@ -24,26 +32,45 @@ DISCARDED = r"failed with status 2 \(discard\)"
 
 def made(law, **options):
     surface, asked = ASKED[law]
-    return fmu(surface, "13.3 MPa", **({"name": "road", "binaries": "none"} | asked | options))
+    return fmu(
+        surface, "13.3 MPa", **({"name": "road", "binaries": "none"} | asked | options)
+    )
 
 
 def built(name, folder):
-    validation, build = pytest.importorskip("fmpy.validation"), pytest.importorskip("fmpy.build")
+    validation, build = (
+        pytest.importorskip("fmpy.validation"),
+        pytest.importorskip("fmpy.build"),
+    )
     (folder / "build").mkdir()
     (folder / "road.fmu").write_bytes(made(name, **MORE))
     assert validation.validate_fmu(str(folder / "road.fmu")) == []
     with zipfile.ZipFile(folder / "road.fmu") as archive:
         archive.extractall(folder / "road")
     strict = {"CMAKE_C_FLAGS:STRING": "-Werror"}
-    build.build_platform_binary(folder / "road", folder / "build", all_warnings=True, cmake_options=strict)
+    build.build_platform_binary(
+        folder / "road", folder / "build", all_warnings=True, cmake_options=strict
+    )
     return str(folder / "road")
 
 
 def simulated(path, kind, c, logger=None):
     times = np.arange(c.size, dtype=float)
-    given = np.array(list(zip(times, c, strict=True)), [("time", float), ("overclosure", float)])
-    fixed = {"stop_time": times[-1], "solver": "Euler", "step_size": 1.0, "output_interval": 1.0}
-    asked = {"fmi_type": kind, "input": given, "output": ["overclosure", *QUANTITIES], "logger": logger}
+    given = np.array(
+        list(zip(times, c, strict=True)), [("time", float), ("overclosure", float)]
+    )
+    fixed = {
+        "stop_time": times[-1],
+        "solver": "Euler",
+        "step_size": 1.0,
+        "output_interval": 1.0,
+    }
+    asked = {
+        "fmi_type": kind,
+        "input": given,
+        "output": ["overclosure", *QUANTITIES],
+        "logger": logger,
+    }
     return pytest.importorskip("fmpy").simulate_fmu(path, **asked, **fixed)
 
 
@@ -57,11 +84,18 @@ def test_simulation_and_directional_derivatives(name, tmp_path):
         # co-simulation answers after a step, by the input before it
         answers = found[: known.c.size] if kind == "ModelExchange" else found[1:]
         assert (answers["overclosure"] == known.c).all()
-        known.assert_equal(*(answers[quantity] for quantity in QUANTITIES if quantity not in SLOPES))
+        known.assert_equal(
+            *(answers[quantity] for quantity in QUANTITIES if quantity not in SLOPES)
+        )
         known.assert_slopes(*(answers[quantity] for quantity in SLOPES))
         said = []
         with pytest.raises(Exception, match=DISCARDED):
-            simulated(path, kind, np.array([0.0, 1e9, 1e9]), lambda *words, said=said: said.append(words[-1]))
+            simulated(
+                path,
+                kind,
+                np.array([0.0, 1e9, 1e9]),
+                lambda *words, said=said: said.append(words[-1]),
+            )
         assert re.search(r"overclosure = .* must be from", str(said[-1]))
     if name in ("mbma", "calibrated", "persson"):
         assert_directional_derivatives(path, known)
@@ -71,7 +105,10 @@ def assert_directional_derivatives(path, known):
     fmpy = pytest.importorskip("fmpy")
     said = []
     # FMPy's own logger may call that of a model before, which is gone
-    description, logger = fmpy.read_model_description(path), lambda *words: said.append(words[-1])
+    description, logger = (
+        fmpy.read_model_description(path),
+        lambda *words: said.append(words[-1]),
+    )
     model = fmpy.instantiate_fmu(path, description, "CoSimulation", logger=logger)
     model.setupExperiment()
     model.enterInitializationMode()
@@ -82,20 +119,32 @@ def assert_directional_derivatives(path, known):
         return list(model.getDirectionalDerivative([2, 3, 4, 5, 6, 7, 8], [1], [2.0]))
 
     c = known.c[far := (known.c > 1e-3) & (known.c < 0.97 * known.law.h_max)]
-    by_p, by_tangent, by_area, by_energy, by_conductance, by_shear, by_leakage = np.array([slopes(x) for x in c]).T / 2
-    assert np.abs(by_p - known.tangent[far]).max() <= 1e-11 * np.abs(known.tangent[far]).max()
+    by_p, by_tangent, by_area, by_energy, by_conductance, by_shear, by_leakage = (
+        np.array([slopes(x) for x in c]).T / 2
+    )
+    assert (
+        np.abs(by_p - known.tangent[far]).max()
+        <= 1e-11 * np.abs(known.tangent[far]).max()
+    )
     np.testing.assert_allclose(by_energy, known.p[far], rtol=1e-13)
-    np.testing.assert_allclose(by_conductance, CONDUCTIVITY / 13.3 * by_tangent, rtol=1e-15)
+    np.testing.assert_allclose(
+        by_conductance, CONDUCTIVITY / 13.3 * by_tangent, rtol=1e-15
+    )
     np.testing.assert_allclose(by_shear, by_tangent / KAPPA, rtol=1e-15)
-    # those of area, tangent and leakage by differences of the library's law, but where a piece of it ends
+    # those of area, tangent and leakage by differences of the library's law, but where a
+    # piece of it ends
     ends = []
     for by in (1e-5, -1e-5):
         d = known.law.h_max - 2 * c * (1 + by)
         found = known.law.values(separation=d)
-        ends.append((found.area, found.stiffness, np.asarray(known.law.leakage(separation=d))))
+        ends.append(
+            (found.area, found.stiffness, np.asarray(known.law.leakage(separation=d)))
+        )
     # the slope of leakage is steep where contact percolates
     sizes = known.area, known.tangent, known.leakage + 1e-3
-    for slope, above, below, size in zip((by_area, by_tangent, by_leakage), *ends, sizes, strict=True):
+    for slope, above, below, size in zip(
+        (by_area, by_tangent, by_leakage), *ends, sizes, strict=True
+    ):
         error = np.abs(slope - (above - below) / (2e-5 * c)) * c / np.abs(size[far])
         assert np.quantile(error, 0.99) < 1e-5
     with pytest.raises(Exception, match=REFUSED):
@@ -110,21 +159,44 @@ def assert_directional_derivatives(path, known):
 
 def test_description():
     fmpy = pytest.importorskip("fmpy")
-    read = fmpy.read_model_description(io.BytesIO(made("calibrated", **MORE)), validate=True)
-    assert [variable.name for variable in read.modelVariables] == ["time", "overclosure", *QUANTITIES]
+    read = fmpy.read_model_description(
+        io.BytesIO(made("calibrated", **MORE)), validate=True
+    )
+    assert [variable.name for variable in read.modelVariables] == [
+        "time",
+        "overclosure",
+        *QUANTITIES,
+    ]
     units = {variable.name: variable.unit for variable in read.modelVariables}
     assert units["tangent"] == "MPa/mm"
     assert units["conductance"] == "mW/(mm K)/mm"
-    size = {unit.name: unit.baseUnit.factor for unit in read.unitDefinitions if unit.baseUnit is not None}
-    expected = {"mm": 1e-3, "MPa": 1e6, "MPa/mm": 1e9, "MPa mm": 1e3, "mm^3": 1e-9, "1": 1.0, "s": 1.0}
-    assert {unit: float(factor) for unit, factor in size.items()} == pytest.approx(expected)
+    size = {
+        unit.name: unit.baseUnit.factor
+        for unit in read.unitDefinitions
+        if unit.baseUnit is not None
+    }
+    expected = {
+        "mm": 1e-3,
+        "MPa": 1e6,
+        "MPa/mm": 1e9,
+        "MPa mm": 1e3,
+        "mm^3": 1e-9,
+        "1": 1.0,
+        "s": 1.0,
+    }
+    assert {unit: float(factor) for unit, factor in size.items()} == pytest.approx(
+        expected
+    )
     for words in ("theory 'calibrated'", "range:", "within", "scatter"):
         assert words in read.description
     assert read.modelExchange.providesDirectionalDerivative
     assert read.coSimulation.providesDirectionalDerivative
     # a law of its own has a token of its own
     files = (made("calibrated", **options) for options in ({}, {"theory": "mbma"}, HEAT))
-    sources = [zipfile.ZipFile(io.BytesIO(file)).read("sources/road.c").decode() for file in files]
+    sources = [
+        zipfile.ZipFile(io.BytesIO(file)).read("sources/road.c").decode()
+        for file in files
+    ]
     assert len({text.split('TOKEN[] = "')[1][:38] for text in sources}) == 3
 
 
@@ -134,13 +206,26 @@ def test_an_fmu_runs_as_it_is(tmp_path):
     file, law = made("mbma", binaries="here", leakage=True), points("mbma").law
     (tmp_path / "road.fmu").write_bytes(file)
     for c in (0.5, 2.0):
-        asked = {"start_values": {"overclosure": c}, "output": [*QUANTITIES[:4], "leakage"]}
+        asked = {
+            "start_values": {"overclosure": c},
+            "output": [*QUANTITIES[:4], "leakage"],
+        }
         found = fmpy.simulate_fmu(str(tmp_path / "road.fmu"), stop_time=1.0, **asked)[-1]
         known = law.values(3 - c)
-        expected = [known.pressure, known.stiffness, known.area, known.energy, law.leakage(3 - c)]
+        expected = [
+            known.pressure,
+            known.stiffness,
+            known.area,
+            known.energy,
+            law.leakage(3 - c),
+        ]
         np.testing.assert_allclose(list(found)[1:], expected, rtol=1e-12)
     said = fmpy.read_model_description(str(tmp_path / "road.fmu")).description
-    (folder,) = {name.split("/")[1] for name in zipfile.ZipFile(io.BytesIO(file)).namelist() if "binaries/" in name}
+    (folder,) = {
+        name.split("/")[1]
+        for name in zipfile.ZipFile(io.BytesIO(file)).namelist()
+        if "binaries/" in name
+    }
     assert f"binaries: {folder}" in said
     assert made("mbma", binaries="here", leakage=True) == file
 
@@ -150,9 +235,14 @@ def test_a_step_outside_the_range_is_discarded_and_can_be_repeated(tmp_path):
     """An implicit tool's trial step beyond the law asks for a smaller one; it does not end the simulation."""
     fmpy = pytest.importorskip("fmpy")
     (tmp_path / "road.fmu").write_bytes(made("calibrated", binaries="here"))
-    folder, said = fmpy.extract(str(tmp_path / "road.fmu"), unzipdir=tmp_path / "road"), []
+    folder, said = (
+        fmpy.extract(str(tmp_path / "road.fmu"), unzipdir=tmp_path / "road"),
+        [],
+    )
     description = fmpy.read_model_description(folder)
-    model = fmpy.instantiate_fmu(folder, description, "CoSimulation", logger=lambda *words: said.append(words[2:]))
+    model = fmpy.instantiate_fmu(
+        folder, description, "CoSimulation", logger=lambda *words: said.append(words[2:])
+    )
     model.setupExperiment(startTime=0.0)
     model.enterInitializationMode()
     model.exitInitializationMode()
@@ -171,7 +261,9 @@ def test_a_step_outside_the_range_is_discarded_and_can_be_repeated(tmp_path):
     # the same model goes on
     model.setReal([1], [0.75])
     model.doStep(1.0, 0.5)
-    assert model.getReal([2])[0] == pytest.approx(float(points("calibrated").law.pressure(3 - 0.75)), rel=1e-12)
+    assert model.getReal([2])[0] == pytest.approx(
+        float(points("calibrated").law.pressure(3 - 0.75)), rel=1e-12
+    )
     model.terminate()
     model.freeInstance()
 
@@ -192,13 +284,22 @@ def test_an_fmu_without_a_compiler(fails, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang")
+@pytest.mark.skipif(
+    importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang"
+)
 def test_an_fmu_for_all_platforms():
     archive = zipfile.ZipFile(io.BytesIO(made("mbma", binaries="all")))
-    begins = {name.split("/")[1]: archive.read(name)[:2] for name in archive.namelist() if "binaries/" in name}
+    begins = {
+        name.split("/")[1]: archive.read(name)[:2]
+        for name in archive.namelist()
+        if "binaries/" in name
+    }
     assert begins == {"linux64": b"\x7fE", "darwin64": b"\xcf\xfa", "win64": b"MZ"}
     said = archive.read("modelDescription.xml").decode()
-    assert "linux64 for glibc 2.17 and later); on ARM the importing tool compiles the sources" in said
+    assert (
+        "linux64 for glibc 2.17 and later); on ARM the importing tool compiles the sources"
+        in said
+    )
     # the newest version of the C library that a symbol needs, as ELF's version names have it
     needed = re.findall(rb"GLIBC_(\d+)\.(\d+)", archive.read("binaries/linux64/road.so"))
     assert needed

@@ -31,7 +31,9 @@ ROUTINES = ("abaqus-uinter", "abaqus-gapcon", "calculix-gapcon")
 @pytest.fixture(scope="module")
 def joint():
     parts = FACE, FACE | {"Rq": "0.7 um"}
-    return Joint(*parts, materials=METALS, nominal_area="4 cm^2", friction=0.2, theory="calibrated")
+    return Joint(
+        *parts, materials=METALS, nominal_area="4 cm^2", friction=0.2, theory="calibrated"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,9 @@ def total(joint):
     """W/(m^2 K) of solid and gas at pressures in MPa, by the joint's own table."""
 
     def at(pressures):
-        table = joint.table([f"{pressure!r} MPa" for pressure in np.asarray(pressures).tolist()])
+        table = joint.table(
+            [f"{pressure!r} MPa" for pressure in np.asarray(pressures).tolist()]
+        )
         return table["total_conductance"].to_numpy()
 
     return at
@@ -53,7 +57,9 @@ def test_every_target_takes_a_joint_with_a_name(joint, target, tmp_path):
     of_solids = dataclasses.replace(joint, gas="vacuum") if target in ROUTINES else joint
     path = tmp_path / f"bolt{kind.end or '.txt'}"
     options = {"binaries": "none"} if target == "fmu" else {}
-    written = of_solids.export(target, SPAN if kind.rows else None, name="bolt", path=path, **options)
+    written = of_solids.export(
+        target, SPAN if kind.rows else None, name="bolt", path=path, **options
+    )
     assert written[-1] == path
     assert sorted(written) == sorted(tmp_path.iterdir())
     assert all(each.stat().st_size > 0 for each in written)
@@ -73,18 +79,29 @@ def test_rows_have_the_conductance_of_the_gas_too(joint, total):
     assert content["y_unit"] == "mW/(mm K)/mm"
     read = 1000 * np.interp(pressures, columns["pressure"], columns["conductance"])
     np.testing.assert_allclose(read, total(pressures), rtol=1.1e-3)
-    assert "solid spots and of the gas in the gaps together, air at 300.0 K" in " ".join(content["comments"])
+    assert "solid spots and of the gas in the gaps together, air at 300.0 K" in " ".join(
+        content["comments"]
+    )
     for target in ("abaqus", "calculix"):
         card = joint.export(target, SPAN).split("*GAP CONDUCTANCE")[1].splitlines()[1:]
         k, p = np.array([line.split(",") for line in card], float).T
-        stated = float(re.search(r"conductance: \d+ rows; .*?interpolation (\S+),", joint.export(target, SPAN))[1])
-        np.testing.assert_allclose(1000 * np.interp(pressures, p, k), total(pressures), rtol=1.1 * stated)
+        stated = float(
+            re.search(
+                r"conductance: \d+ rows; .*?interpolation (\S+),",
+                joint.export(target, SPAN),
+            )[1]
+        )
+        np.testing.assert_allclose(
+            1000 * np.interp(pressures, p, k), total(pressures), rtol=1.1 * stated
+        )
 
 
 def test_without_gas_rows_are_of_the_solid(joint):
     vacuum = dataclasses.replace(joint, gas="vacuum")
     content = json.loads(vacuum.export("json", SPAN))
-    read = np.interp([1.0, 10.0], content["columns"]["pressure"], content["columns"]["conductance"])
+    read = np.interp(
+        [1.0, 10.0], content["columns"]["pressure"], content["columns"]["conductance"]
+    )
     solid = joint.table(["1 MPa", "10 MPa"])["conductance"].to_numpy()
     np.testing.assert_allclose(1000 * read, solid, rtol=1.1e-3)
     assert "solid spots alone, without gas" in " ".join(content["comments"])
@@ -109,14 +126,18 @@ def test_code_says_what_the_gas_adds(joint):
 @pytest.mark.parametrize("target", ["python-law", "jax-law", "matlab-law"])
 def test_laws_without_an_unloading_stiffness_are_written_and_say_so(joint, target):
     text = joint.export(target)
-    assert "without conductance and tangential stiffness" in " ".join(text.replace("#", "").replace("%", "").split())
+    assert "without conductance and tangential stiffness" in " ".join(
+        text.replace("#", "").replace("%", "").split()
+    )
 
 
 def test_files_that_need_others_are_written_to_a_path(joint):
     with pytest.raises(InputError, match=r"several files.*give path"):
         joint.export("fortran-law")
     assert joint.export("netcdf", SPAN)[:4] == b"\x89HDF"
-    archive = zipfile.ZipFile(io.BytesIO(joint.export("fmu", name="bolt", binaries="none")))
+    archive = zipfile.ZipFile(
+        io.BytesIO(joint.export("fmu", name="bolt", binaries="none"))
+    )
     assert "sources/bolt.c" in archive.namelist()
 
 
@@ -128,33 +149,49 @@ def test_fortran_of_a_joint_runs_with_its_own_files(joint, tmp_path):
     )
     build = "cc -O1 -c bolt_c.c && gfortran bolt.f90 main.f90 bolt_c.o -lm -o run"
     subprocess.run(build, shell=True, cwd=tmp_path, check=True, capture_output=True)
-    ran = subprocess.run(["./run"], cwd=tmp_path, check=True, capture_output=True, text=True)
+    ran = subprocess.run(
+        ["./run"], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
     solid = joint.table(["10 MPa"])["conductance"].to_numpy()[0]
     assert 1000 * float(ran.stdout) == pytest.approx(solid, rel=1e-4)
 
 
 @pytest.mark.parametrize(("length", "stress"), [("m", "Pa"), ("um", "GPa"), ("mm", "Pa")])
 def test_units_are_those_asked_for(joint, total, length, stress):
-    metre, pascal = {"m": 1, "mm": 1e-3, "um": 1e-6}[length], {"Pa": 1, "GPa": 1e9}[stress]
-    content = json.loads(joint.export("json", SPAN, length_unit=length, stress_unit=stress, rtol=1e-2))
+    metre, pascal = (
+        {"m": 1, "mm": 1e-3, "um": 1e-6}[length],
+        {"Pa": 1, "GPa": 1e9}[stress],
+    )
+    content = json.loads(
+        joint.export("json", SPAN, length_unit=length, stress_unit=stress, rtol=1e-2)
+    )
     assert content["x_unit"] == stress
     assert content["y_unit"] == f"W/({length} K)/{length}"
     x, y = (np.array(content["columns"][name]) for name in ("pressure", "conductance"))
-    np.testing.assert_allclose(np.interp(1e6 / pascal, x, y) / metre**2, total([1.0])[0], rtol=1.1e-2)
+    np.testing.assert_allclose(
+        np.interp(1e6 / pascal, x, y) / metre**2, total([1.0])[0], rtol=1.1e-2
+    )
 
 
 def test_each_quantity_has_its_own_number_of_rows_and_error(joint):
     """The header of a card stated the conductance's rows and error alone."""
     card = joint.export("abaqus", SPAN)
-    pressure = re.search(r"\*\* pressure: (\d+) rows; largest error of linear interpolation (\S+),", card)
-    heat = re.search(r"\*\* conductance: (\d+) rows; largest error of linear interpolation (\S+),", card)
+    pressure = re.search(
+        r"\*\* pressure: (\d+) rows; largest error of linear interpolation (\S+),", card
+    )
+    heat = re.search(
+        r"\*\* conductance: (\d+) rows; largest error of linear interpolation (\S+),",
+        card,
+    )
     closure = card.split("TABULAR\n")[1].split("*FRICTION")[0].splitlines()
     assert int(pressure[1]) == len(closure)
     assert int(heat[1]) == len(card.split("*GAP CONDUCTANCE, PRESSURE\n")[1].splitlines())
     p, c = np.array([line.split(",") for line in closure], float).T
     law = joint.law()
     at = np.geomspace(0.0101, 99, 300)
-    exact = 1e-3 * (joint.surface.h_max - np.asarray(law.at_pressure(at / 1000).mean_separation))
+    exact = 1e-3 * (
+        joint.surface.h_max - np.asarray(law.at_pressure(at / 1000).mean_separation)
+    )
     error = np.abs(np.interp(exact, c, p) / at - 1).max()
     assert 0.5 * float(pressure[2]) < error < 1.1 * float(pressure[2])
 
@@ -164,7 +201,9 @@ def test_rows_are_as_many_as_a_program_keeps(joint):
     assert len(card.split("*GAP CONDUCTANCE\n")[1].splitlines()) == 20
     twelve = joint.export("calculix", SPAN, rows=12)
     assert len(twelve.split("*GAP CONDUCTANCE\n")[1].splitlines()) == 12
-    with pytest.raises(InputError, match="needs 27 rows, and the program keeps 20: take a larger rtol"):
+    with pytest.raises(
+        InputError, match="needs 27 rows, and the program keeps 20: take a larger rtol"
+    ):
         joint.export("calculix", SPAN, rtol=1e-3)
     with pytest.raises(InputError, match="20 rows of conductance at most here, got 30"):
         joint.export("calculix", SPAN, rows=30)
@@ -193,13 +232,22 @@ def test_getdp_reads_several_quantities(joint, total, tmp_path):
     found = joint.at_pressure("10 MPa")
     c = 1e-3 * float(joint.surface.h_max - found.mean_separation)
     asked = {"pressure": c, "conductance": 10.0, "tangential_stiffness": 10.0}
-    prints = "".join(f'Print[{{bolt_{name}[{number(x)}]}}, Format "{name} %.17g"];\n' for name, x in asked.items())
+    prints = "".join(
+        f'Print[{{bolt_{name}[{number(x)}]}}, Format "{name} %.17g"];\n'
+        for name, x in asked.items()
+    )
     (tmp_path / "a.msh").write_text(f"{MESH}$EndElements\n")
     (tmp_path / "a.pro").write_text(GETDP.replace("PRINTS", prints))
     done = subprocess.run(
-        ["getdp", "a.pro", "-msh", "a.msh", "-solve", "R"], cwd=tmp_path, capture_output=True, text=True, timeout=60
+        ["getdp", "a.pro", "-msh", "a.msh", "-solve", "R"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
-    read = {name: float(re.search(rf"^{name} (\S+)", done.stdout, re.M)[1]) for name in asked}
+    read = {
+        name: float(re.search(rf"^{name} (\S+)", done.stdout, re.M)[1]) for name in asked
+    }
     expected = {
         "pressure": 10.0,
         "conductance": total([10.0])[0] / 1000,
@@ -232,14 +280,27 @@ def test_the_command_writes_a_joint(tmp_path):
     done = run("--export", "fortran-law", "--name", "bolt", "--out", str(out))
     assert done.exit_code == 0, done.output
     assert done.output.split() == [str(tmp_path / "joint_c.c"), str(out)]
-    done = run("--export", "abaqus", "--pressures", "10kPa:100MPa", "--name", "JOINT", "--out", "-")
+    done = run(
+        "--export",
+        "abaqus",
+        "--pressures",
+        "10kPa:100MPa",
+        "--name",
+        "JOINT",
+        "--out",
+        "-",
+    )
     assert done.exit_code == 0, done.output
     assert "*SURFACE INTERACTION, NAME=JOINT\n" in done.output
     assert "mbma joint " in done.output
     assert "sha256" in done.output
     known = Joint.from_toml(EXAMPLE)
     k, p = np.array(
-        [line.split(",") for line in done.output.split("*GAP CONDUCTANCE, PRESSURE\n")[1].splitlines()], float
+        [
+            line.split(",")
+            for line in done.output.split("*GAP CONDUCTANCE, PRESSURE\n")[1].splitlines()
+        ],
+        float,
     ).T
     own = known.table(["1 MPa"])["total_conductance"].to_numpy()[0]
     assert 1000 * np.interp(1.0, p, k) == pytest.approx(own, rel=1.2e-3)
@@ -250,12 +311,27 @@ def test_the_command_writes_a_joint(tmp_path):
     [
         (("--export", "abaqus", "--pressures", "1MPa:2MPa"), "--export needs --out"),
         (("--export", "abaqus", "--out", "-"), "abaqus needs pressures"),
-        (("--export", "abaqus", "--pressures", "1MPa", "--out", "-"), "--pressures must be like 1MPa:50MPa"),
+        (
+            ("--export", "abaqus", "--pressures", "1MPa", "--out", "-"),
+            "--pressures must be like 1MPa:50MPa",
+        ),
         (("--export", "abacus", "--out", "-"), "no target of laws is called 'abacus'"),
-        (("--export", "c-law", "--pressures", "1MPa:2MPa", "--out", "-"), "without effect on c-law"),
-        (("--export", "c-law", "--rows", "20", "--out", "-"), "without effect on c-law: leave rows out"),
-        (("--export", "mbdyn", "--length-unit", "mm", "--out", "-"), "mbdyn is written in m and Pa, got mm and Pa"),
-        (("--export", "csv", "--pressure", "1MPa", "--out", "-"), "--export writes the joint: leave --pressure"),
+        (
+            ("--export", "c-law", "--pressures", "1MPa:2MPa", "--out", "-"),
+            "without effect on c-law",
+        ),
+        (
+            ("--export", "c-law", "--rows", "20", "--out", "-"),
+            "without effect on c-law: leave rows out",
+        ),
+        (
+            ("--export", "mbdyn", "--length-unit", "mm", "--out", "-"),
+            "mbdyn is written in m and Pa, got mm and Pa",
+        ),
+        (
+            ("--export", "csv", "--pressure", "1MPa", "--out", "-"),
+            "--export writes the joint: leave --pressure",
+        ),
         (("--rows", "20", "--pressure", "1MPa"), "--rows belong to --export"),
         ((), "pressures or forces are needed"),
     ],
@@ -267,6 +343,8 @@ def test_what_the_command_refuses(words, message):
 
 
 def test_export_of_a_joints_file_names_the_command_that_writes_it():
-    done = CliRunner().invoke(main, ["export", "calculix", "--file", str(EXAMPLE), "--out", "-"])
+    done = CliRunner().invoke(
+        main, ["export", "calculix", "--file", str(EXAMPLE), "--out", "-"]
+    )
     assert done.exit_code != 0
     assert f"mbma joint {EXAMPLE} --export TARGET" in str(done.exception) + done.output

@@ -33,8 +33,12 @@ HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 
 
 def run(*command, folder, last_words=""):
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-    assert (done.returncode, done.stderr.strip()) in ((0, ""), (0, last_words)), done.stderr
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (done.returncode, done.stderr.strip()) in ((0, ""), (0, last_words)), (
+        done.stderr
+    )
     return done.stdout
 
 
@@ -45,7 +49,9 @@ def compiled(tmp_path_factory):
         path, asked = folder / f"{name}.c", HEAT | {"kappa": KAPPA, "leakage": True}
         path.write_text(law_points.text("c-law", name, name="road", **asked))
         for level in ("-O3", "-O2"):
-            found[name] = compiled_law(path, *STRICT, "-Wmissing-prototypes", "-Wstrict-prototypes", level)
+            found[name] = compiled_law(
+                path, *STRICT, "-Wmissing-prototypes", "-Wstrict-prototypes", level
+            )
     return found
 
 
@@ -57,10 +63,18 @@ def test_c(name, compiled):
     known.assert_equal(*found)
     known.assert_inverse(law("overclosure", known.pressures()))
     both = law.library.road_with_tangent
-    both.restype, both.argtypes = ctypes.c_double, [ctypes.c_double, ctypes.POINTER(ctypes.c_double)]
+    both.restype, both.argtypes = (
+        ctypes.c_double,
+        [ctypes.c_double, ctypes.POINTER(ctypes.c_double)],
+    )
     slope = ctypes.c_double()
-    assert (both(float(known.c[0]), ctypes.byref(slope)), slope.value) == (found[0][0], found[1][0])
-    known.assert_slopes(*(law(what, known.c) for what in ("conductance", "tangential_stiffness")))
+    assert (both(float(known.c[0]), ctypes.byref(slope)), slope.value) == (
+        found[0][0],
+        found[1][0],
+    )
+    known.assert_slopes(
+        *(law(what, known.c) for what in ("conductance", "tangential_stiffness"))
+    )
 
 
 @needs("gcc")
@@ -68,7 +82,11 @@ def test_c(name, compiled):
 def test_c_outside_its_range(name, compiled):
     answer, law = compiled[name], points(name).law
     beyond = [math.nan, math.inf, 0.5 * (law.h_max - law.lowest) * (1 + 1e-9)]
-    before = [] if math.isinf(law.highest) else [-math.inf, 0.5 * (law.h_max - law.highest) * (1 + 1e-9)]
+    before = (
+        []
+        if math.isinf(law.highest)
+        else [-math.inf, 0.5 * (law.h_max - law.highest) * (1 + 1e-9)]
+    )
     for quantity in (*QUANTITIES, "curvature"):
         found = answer(quantity, [5e-324, 1e-320, 1e-310, 2.3e-308])
         assert np.isfinite(found).all(), quantity
@@ -76,7 +94,11 @@ def test_c_outside_its_range(name, compiled):
         assert np.isnan(answer(quantity, beyond + before)).all()
         if not before and quantity not in ("leakage", "curvature"):
             assert (answer(quantity, [0.0, -0.0, -1.0, -math.inf]) == 0).all()
-    most = float(law.pressure(separation=law.lowest if law.turning_point is None else law.turning_point))
+    most = float(
+        law.pressure(
+            separation=law.lowest if law.turning_point is None else law.turning_point
+        )
+    )
     assert np.isnan(answer("overclosure", [-1.0, math.nan, math.inf, 1.01 * most])).all()
     assert before or answer("overclosure", [0.0]) == 0
 
@@ -86,40 +108,73 @@ def test_c_outside_its_range(name, compiled):
 def test_leakage_apart_and_where_gaps_close(name, compiled):
     law, leakage = points(name).law, functools.partial(compiled[name], "leakage")
     apart = np.geomspace(1e-9, 1e3 if math.isinf(law.highest) else 26, 200)
-    np.testing.assert_allclose(leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES)
+    np.testing.assert_allclose(
+        leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES
+    )
     if name != "mbma":
         blocked = law.h_max - law.leakage.blocked_at
-        assert ((leakage(blocked + np.array([-1e-12, 1e-12, 1e-3])) == 0) == [False, True, True]).all()
+        assert (
+            (leakage(blocked + np.array([-1e-12, 1e-12, 1e-3])) == 0)
+            == [False, True, True]
+        ).all()
 
 
 def test_headers_say_what_is_there():
     assert tuple(LANGUAGES) == LAWS
     for target in LAWS:
         # the core has leakage in its header
-        plain = law_points.text(target, "calibrated", **HEAT).replace(core_text("law"), "")
+        plain = law_points.text(target, "calibrated", **HEAT).replace(
+            core_text("law"), ""
+        )
         assert not any(word in plain.lower() for word in ("leakage", "@if", "@end"))
-    text = " ".join(law_points.text("python-law", "calibrated", leakage=True).replace("#", "").split())
+    text = " ".join(
+        law_points.text("python-law", "calibrated", leakage=True).replace("#", "").split()
+    )
     leakage = points("calibrated").law.leakage
-    facts = f"K is within {leakage.error:.1e} of that at the law's area", "one standard deviation of ln K: 0.1"
+    facts = (
+        f"K is within {leakage.error:.1e} of that at the law's area",
+        "one standard deviation of ln K: 0.1",
+    )
     facts += f"c = {float(3 - leakage.blocked_at)!r} on", "leakage: A/A0 is above 0.3"
     assert all(fact in text for fact in facts)
-    assert "import { pressure, with_tangent, curvature" in law_points.text("javascript-law", "mbma")
-    text = law_points.text("modelica-law", "calibrated", name="road", leakage=True, **HEAT)
+    assert "import { pressure, with_tangent, curvature" in law_points.text(
+        "javascript-law", "mbma"
+    )
+    text = law_points.text(
+        "modelica-law", "calibrated", name="road", leakage=True, **HEAT
+    )
     assert "overclosure(" not in text.partition("package")[0]
-    for kind, unit in {"Overclosure": "mm", "Pressure": "MPa", "Tangent": "MPa/mm", "Energy": "MPa.mm"}.items():
+    for kind, unit in {
+        "Overclosure": "mm",
+        "Pressure": "MPa",
+        "Tangent": "MPa/mm",
+        "Energy": "MPa.mm",
+    }.items():
         assert f'type {kind} = Real(unit = "{unit}");' in text
     assert 'output Real y(unit = "mm3");' in text
 
 
 test_requests_that_are_refused = refusals(
     lambda target, law, options: law_points.text(target, law, **options),
-    *((target, "calibrated", HEAT | {"leakage": True}, "has no place for leakage") for target in SUBROUTINES),
-    *((target, "mbma", {}, "conductance needs conductivity") for target in SUBROUTINES if "gapcon" in target),
+    *(
+        (target, "calibrated", HEAT | {"leakage": True}, "has no place for leakage")
+        for target in SUBROUTINES
+    ),
+    *(
+        (target, "mbma", {}, "conductance needs conductivity")
+        for target in SUBROUTINES
+        if "gapcon" in target
+    ),
     ("jax-law", "hardened", HEAT, "leave the hardness out"),
     ("c-law", "calibrated", {"kappa": 3.0}, "kappa must be"),
     ("cobol-law", "mbma", {}, "target must be one of"),
     ("c-law", "mbma", {"name": "1 x"}, "a name must be a letter"),
-    ("fortran-law", "mbma", {"name": "Energy"}, "which a function of the law needs for itself"),
+    (
+        "fortran-law",
+        "mbma",
+        {"name": "Energy"},
+        "which a function of the law needs for itself",
+    ),
 )
 
 
@@ -131,18 +186,33 @@ def test_c_is_the_library(name, tmp_path):
     for file in ("mbma.h", "elementary.h", "law.c"):
         assert re.sub(r'(?m)^#include ".*"\n', "", core_file(file)) in text
     (tmp_path / "road.c").write_text(text)
-    level = core.__name__.partition("._")[2].replace("x86_64_", "-march=x86-64-").replace("plain", "-O3")
-    flags = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", level)
+    level = (
+        core.__name__.partition("._")[2]
+        .replace("x86_64_", "-march=x86-64-")
+        .replace("plain", "-O3")
+    )
+    flags = (
+        "-std=c11",
+        "-O3",
+        "-ffp-contract=off",
+        "-fno-math-errno",
+        "-fno-trapping-math",
+        level,
+    )
     answer, known = compiled_law(tmp_path / "road.c", *flags), points(name)
     for quantity in QUANTITIES:
-        np.testing.assert_array_equal(answer(quantity, known.c), getattr(known, FIELDS.get(quantity, quantity)))
+        np.testing.assert_array_equal(
+            answer(quantity, known.c), getattr(known, FIELDS.get(quantity, quantity))
+        )
 
 
 @needs("gcc")
 def test_digits_next_to_first_contact(compiled):
     """An overclosure keeps its digits where a separation has none left: there pressure is a power of it."""
     functions = ("pressure", "tangent", "overclosure")
-    pressure, tangent, inverse = (functools.partial(compiled["mbma"], what) for what in functions)
+    pressure, tangent, inverse = (
+        functools.partial(compiled["mbma"], what) for what in functions
+    )
     c = np.geomspace(1e-70, 1e-14, 100)
     np.testing.assert_allclose(c * tangent(c) / pressure(c), 3.5, rtol=1e-6)
     np.testing.assert_allclose(inverse(pressure(c)), c, rtol=1e-14)
@@ -153,22 +223,39 @@ def test_digits_next_to_first_contact(compiled):
 def test_two_laws_with_headers_in_c_and_cpp(tmp_path):
     for name, law in {"road": "mbma", "seal": "persson"}.items():
         surface, asked = ASKED[law]
-        files = law_files("c-law", surface, "13.3 MPa", name=name, leakage=True, **HEAT, **asked)
+        files = law_files(
+            "c-law", surface, "13.3 MPa", name=name, leakage=True, **HEAT, **asked
+        )
         (tmp_path / f"{name}.c").write_text(files[""])
         (tmp_path / f"{name}.h").write_text(files[".h"])
     (tmp_path / "uinter.c").write_text(law_points.text("abaqus-uinter", "mbma", **HEAT))
-    asks = (
-        "road_with_tangent(1.0, &k), road_leakage(1.0), road_conductance(1.0), road_overclosure(0.01), seal_area(0.5)"
-    )
+    asks = "road_with_tangent(1.0, &k), road_leakage(1.0), road_conductance(1.0), road_overclosure(0.01), seal_area(0.5)"
     text = '#include "road.h"\n#include "seal.h"\n#include "road.h"\n#include <stdio.h>\nint main(void) { double k; '
-    (tmp_path / "ask.c").write_text(f'{text}printf("%.17g %.17g %.17g %.17g %.17g", {asks}); return 0; }}\n')
+    (tmp_path / "ask.c").write_text(
+        f'{text}printf("%.17g %.17g %.17g %.17g %.17g", {asks}); return 0; }}\n'
+    )
     law, seal = points("mbma").law, points("persson").law
-    known = [law.pressure(2.0), law.leakage(2.0), CONDUCTIVITY / 13.3 * law.stiffness(2.0)]
+    known = [
+        law.pressure(2.0),
+        law.leakage(2.0),
+        CONDUCTIVITY / 13.3 * law.stiffness(2.0),
+    ]
     known += [3 - law.at_pressure(0.01).mean_separation, seal.area(2.5)]
     for compiler in (("gcc", "-std=c99"), ("g++", "-x", "c++", "-std=c++11")):
-        run(*compiler, *WARNINGS, "-c", "road.c", "seal.c", "uinter.c", "ask.c", folder=tmp_path)
+        run(
+            *compiler,
+            *WARNINGS,
+            "-c",
+            "road.c",
+            "seal.c",
+            "uinter.c",
+            "ask.c",
+            folder=tmp_path,
+        )
         run(compiler[0], "road.o", "seal.o", "ask.o", "-lm", "-o", "ask", folder=tmp_path)
-        np.testing.assert_allclose(np.array(run("./ask", folder=tmp_path).split(), float), known, rtol=1e-11)
+        np.testing.assert_allclose(
+            np.array(run("./ask", folder=tmp_path).split(), float), known, rtol=1e-11
+        )
 
 
 FORTRAN = """program ask
@@ -217,17 +304,31 @@ console.log(both(1e-3), ...asks.map(fault));
 
 @pytest.mark.parametrize("name", ASKED)
 def test_python(name, tmp_path):
-    known, road, heat = points(name), types.ModuleType("road"), {} if name == "hardened" else HEAT
-    (tmp_path / "road.py").write_text(law_points.text("python-law", name, leakage=True, **heat))
+    known, road, heat = (
+        points(name),
+        types.ModuleType("road"),
+        {} if name == "hardened" else HEAT,
+    )
+    (tmp_path / "road.py").write_text(
+        law_points.text("python-law", name, leakage=True, **heat)
+    )
     exec(compile((tmp_path / "road.py").read_text(), "road.py", "exec"), road.__dict__)
     known.assert_equal(*(getattr(road, what)(known.c) for what in QUANTITIES))
     known.assert_inverse(road.overclosure(known.pressures()))
-    turns = known.law.turning_point is not None and known.law.turning_point > known.law.lowest + 1e-9 * known.law.h_max
+    turns = (
+        known.law.turning_point is not None
+        and known.law.turning_point > known.law.lowest + 1e-9 * known.law.h_max
+    )
     assert (
-        "where pressure turns down" in " ".join((tmp_path / "road.py").read_text().replace("#", "").split())
+        "where pressure turns down"
+        in " ".join((tmp_path / "road.py").read_text().replace("#", "").split())
     ) == turns
     if heat:
-        np.testing.assert_allclose(road.conductance(known.c), CONDUCTIVITY / 13.3 * road.tangent(known.c), rtol=1e-15)
+        np.testing.assert_allclose(
+            road.conductance(known.c),
+            CONDUCTIVITY / 13.3 * road.tangent(known.c),
+            rtol=1e-15,
+        )
     assert road.pressure(known.c[:6].reshape(2, 3)).shape == (2, 3)
     assert float(road.pressure(float(known.c[0]))) == road.pressure(known.c)[0]
     for bad in ([1.0, 1e9], math.nan, math.inf):
@@ -258,7 +359,9 @@ def test_laws_of_any_modulus_are_written():
     rng = np.random.default_rng(53)
     for surface in random_faces(5, 53):
         modulus = 10.0 ** rng.uniform(-300, 3)
-        made = asked_law(surface, modulus, theory="greenwood_williamson", stress_unit="GPa")
+        made = asked_law(
+            surface, modulus, theory="greenwood_williamson", stress_unit="GPa"
+        )
         texts = {target: text_of(target, made) for target in OF_POLYNOMIALS}
         road = types.ModuleType("road")
         exec(texts["python-law"], road.__dict__)
@@ -270,7 +373,9 @@ def test_laws_of_any_modulus_are_written():
             theory="greenwood_williamson",
         )
         # doubles near the smallest one have fewer digits, in the polynomials too
-        np.testing.assert_allclose(road.pressure(c), known.pressure, rtol=1e-7, atol=1e-290)
+        np.testing.assert_allclose(
+            road.pressure(c), known.pressure, rtol=1e-7, atol=1e-290
+        )
 
 
 JAX = """
@@ -321,22 +426,34 @@ SLOW = ("jax-law", "matlab-law")
 
 
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
-@pytest.mark.parametrize("target", [pytest.param(t, marks=pytest.mark.slow if t in SLOW else ()) for t in LANGUAGE])
+@pytest.mark.parametrize(
+    "target",
+    [pytest.param(t, marks=pytest.mark.slow if t in SLOW else ()) for t in LANGUAGE],
+)
 def test_a_program_in_the_laws_language(target, name, tmp_path):
     program, text, end, commands, said = LANGUAGE[target]
-    if shutil.which(program) is None or (target == "jax-law" and importlib.util.find_spec("jax") is None):
+    if shutil.which(program) is None or (
+        target == "jax-law" and importlib.util.find_spec("jax") is None
+    ):
         pytest.skip(f"not installed: {target}")
     heat = HEAT if (target, name) == ("fortran-law", "mbma") else {}
-    known, law = points(name), law_points.text(target, name, name="road", leakage=True, **heat)
+    known, law = (
+        points(name),
+        law_points.text(target, name, name="road", leakage=True, **heat),
+    )
     (tmp_path / f"road.{end}").write_text(law)
     (tmp_path / f"ask.{end}").write_text(text)
     if target == "fortran-law":
         assert max(map(len, law.splitlines())) <= 132
-        (tmp_path / "road_c.c").write_text(law_points.text("c-law", name, name="road", leakage=True, **heat))
+        (tmp_path / "road_c.c").write_text(
+            law_points.text("c-law", name, name="road", leakage=True, **heat)
+        )
     np.savetxt(tmp_path / "c.txt", known.c, "%.17g")
     np.savetxt(tmp_path / "p.txt", known.pressures(), "%.17g")
     words = OCTAVE_ENDS if target == "matlab-law" else ""
-    found = [run(*command.split(), folder=tmp_path, last_words=words) for command in commands][-1]
+    found = [
+        run(*command.split(), folder=tmp_path, last_words=words) for command in commands
+    ][-1]
     known.assert_equal(*np.loadtxt(tmp_path / "values.txt", ndmin=2).T)
     known.assert_inverse(np.loadtxt(tmp_path / "inverse.txt"))
     assert found.startswith(said)
@@ -397,7 +514,9 @@ def called(target, program, name, folder, asked):
     run("gcc", *WARNINGS, *STRICT, "-O1", "-c", "road.c", folder=folder)
     fortran = ("gfortran", *WARNINGS, "-std=f2008", "-fcheck=all", "-O1")
     run(*fortran, "ask.f90", "road.o", "-lm", "-o", "ask", folder=folder)
-    done = subprocess.run(("./ask", "ROAD"), cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        ("./ask", "ROAD"), cwd=folder, capture_output=True, text=True, check=True
+    )
     return *np.loadtxt(folder / "values.txt").T, done.stderr
 
 
@@ -412,26 +531,39 @@ def assert_slope(law, x, slope):
 def test_abaqus_uinter(name, tmp_path):
     known = points(name)
     c = np.concatenate([known.c, [0.0, -1e-3, -1e36, 5.0]])
-    p, slope, energy, flux_1, flux_2, *others, opened, _ = called("abaqus-uinter", UINTER, name, tmp_path, c)
+    p, slope, energy, flux_1, flux_2, *others, opened, _ = called(
+        "abaqus-uinter", UINTER, name, tmp_path, c
+    )
     inside, out = slice(known.c.size), slice(known.c.size, None)
-    known.assert_equal(p[inside], slope[inside], known.area, energy[inside], known.leakage)
+    known.assert_equal(
+        p[inside], slope[inside], known.area, energy[inside], known.leakage
+    )
     by_temperature, by_gap, rest = np.array(others[:4]), others[4:6], others[6]
     heat = CONDUCTIVITY / 13.3 * known.tangent
-    np.testing.assert_allclose(by_temperature[:, inside], np.outer([1, -1, -1, 1], heat), rtol=1e-11)
+    np.testing.assert_allclose(
+        by_temperature[:, inside], np.outer([1, -1, -1, 1], heat), rtol=1e-11
+    )
     np.testing.assert_allclose(flux_1[inside], 100 * heat, rtol=1e-11)
     assert (flux_1 == -flux_2).all()
     assert (by_gap[0] == -by_gap[1]).all()
     far = (known.c > 1e-3) & (known.c < 2.9)
-    flux = lambda c: 100 * CONDUCTIVITY / 13.3 * known.law.stiffness(separation=known.law.h_max - 2 * c)  # noqa: E731
+
+    def flux(c):
+        stiffness = known.law.stiffness(separation=known.law.h_max - 2 * c)
+        return 100 * CONDUCTIVITY / 13.3 * stiffness
+
     assert_slope(flux, known.c[far], by_gap[0][inside][far])
-    # no shear and no hint of a smaller step, but beyond the law, where the increment is to be tried again
+    # no shear and no hint of a smaller step, but beyond the law, where the increment is to
+    # be tried again
     assert (rest == [*np.ones(known.c.size + 3), 0.25]).all()
     assert (opened == [*np.ones(known.c.size), 0, 0, 0, 1]).all()
     assert (p[out][:3] == 0).all()
 
 
 @needs("gfortran")
-@pytest.mark.parametrize(("target", "more"), [("abaqus-gapcon", ""), ("calculix-gapcon", ", 1d0")])
+@pytest.mark.parametrize(
+    ("target", "more"), [("abaqus-gapcon", ""), ("calculix-gapcon", ", 1d0")]
+)
 @pytest.mark.parametrize("name", ["mbma", "calibrated"])
 def test_gapcon(target, more, name, tmp_path):
     law = points(name).law
@@ -440,8 +572,12 @@ def test_gapcon(target, more, name, tmp_path):
     *found, said = called(target, GAPCON.replace("AREA", more), name, tmp_path, asked)
     found, none, beyond = np.split(np.array(found), [-4, -2], axis=1)
     # as the library's law inverts and differentiates
-    np.testing.assert_allclose(found[0], CONDUCTIVITY / 13.3 * law.at_pressure(pressure).stiffness, rtol=1e-11)
-    assert_slope(lambda p: CONDUCTIVITY / 13.3 * law.at_pressure(p).stiffness, pressure, found[2])
+    np.testing.assert_allclose(
+        found[0], CONDUCTIVITY / 13.3 * law.at_pressure(pressure).stiffness, rtol=1e-11
+    )
+    assert_slope(
+        lambda p: CONDUCTIVITY / 13.3 * law.at_pressure(p).stiffness, pressure, found[2]
+    )
     assert (found[[1, 3, 4]] == 0).all()
     assert (none == 0).all()
     # beyond the law it keeps its last value, and tells once
@@ -449,7 +585,11 @@ def test_gapcon(target, more, name, tmp_path):
     np.testing.assert_allclose(beyond, np.outer([1, 0, 0, 0, 0], [last, last]), rtol=1e-6)
     assert said.count("beyond the law's range") == 1
     text = " ".join((tmp_path / "road.c").read_text().replace("\n *", " ").split())
-    for words in ("TYPE=SURFACE TO SURFACE", "PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR", "-o gapcon.o, ar r ccx_"):
+    for words in (
+        "TYPE=SURFACE TO SURFACE",
+        "PRESSURE-OVERCLOSURE=EXPONENTIAL or LINEAR",
+        "-o gapcon.o, ar r ccx_",
+    ):
         assert (words in text) == bool(more)
 
 
@@ -469,7 +609,15 @@ def joined(how, routine, folder):
     if how == "separate":
         (folder / "one.c").write_text(line + road)
         run("gcc", *WARNINGS, *STRICT, "-c", "one.c", folder=folder)
-        run("gcc", *WARNINGS, *STRICT, f"-D{routine}_ELSEWHERE", "-c", "seal.c", folder=folder)
+        run(
+            "gcc",
+            *WARNINGS,
+            *STRICT,
+            f"-D{routine}_ELSEWHERE",
+            "-c",
+            "seal.c",
+            folder=folder,
+        )
         return "one.o", "seal.o"
     both = road + seal if how == "copied" else '#include "road.c"\n#include "seal.c"\n'
     (folder / "job.c").write_text(line + both)
@@ -486,15 +634,23 @@ def test_two_exported_laws_in_one_job_by_surface_interaction(target, how, tmp_pa
     program, stopped = INTERACTIONS[target]
     laws = {"road": "mbma", "seal": "calibrated"}
     for name, law in laws.items():
-        (tmp_path / f"{name}.c").write_text(law_points.text(target, law, name=name, **HEAT))
-    objects = joined(how, LANGUAGES[target].subroutine.removesuffix(".c").upper(), tmp_path)
+        (tmp_path / f"{name}.c").write_text(
+            law_points.text(target, law, name=name, **HEAT)
+        )
+    objects = joined(
+        how, LANGUAGES[target].subroutine.removesuffix(".c").upper(), tmp_path
+    )
     (tmp_path / "ask.f90").write_text(program)
     # overclosures, or pressures for conductance
     x = np.array([0.05, 0.4, 1.5]) if "uinter" in target else np.array([1e-5, 1e-3, 1e-2])
     np.savetxt(tmp_path / "c.txt", x, "%.17g")
     fortran = ("gfortran", *WARNINGS, "-std=f2008", "-fcheck=all")
     run(*fortran, "ask.f90", *objects, "-lm", "-o", "ask", folder=tmp_path)
-    for interaction, name in {"ROAD": "road", "INTPROP-2": "seal", "IntProp-2": "seal"}.items():
+    for interaction, name in {
+        "ROAD": "road",
+        "INTPROP-2": "seal",
+        "IntProp-2": "seal",
+    }.items():
         run("./ask", interaction, folder=tmp_path)
         values = np.loadtxt(tmp_path / "values.txt")[:, 0]
         law = points(laws[name]).law
@@ -504,16 +660,23 @@ def test_two_exported_laws_in_one_job_by_surface_interaction(target, how, tmp_pa
             expected = CONDUCTIVITY / 13.3 * law.at_pressure(x).stiffness
         np.testing.assert_allclose(values, expected, rtol=1e-11)
     for unknown in ("SEAL", "ROAD2", "ROA", "INTPROP-2" + 72 * "X", ""):
-        done = subprocess.run(("./ask", unknown), cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            ("./ask", unknown), cwd=tmp_path, capture_output=True, text=True, check=False
+        )
         assert done.returncode == stopped
-        assert f"no law for the surface interaction '{unknown[:80]}', only for 'ROAD' 'INTPROP-2'" in done.stderr
+        assert (
+            f"no law for the surface interaction '{unknown[:80]}', only for 'ROAD' 'INTPROP-2'"
+            in done.stderr
+        )
 
 
 @needs("gcc")
 @pytest.mark.parametrize("target", INTERACTIONS)
 def test_several_laws_in_one_file_without_a_list_do_not_compile(target, tmp_path):
     """A law that no surface interaction could reach is an error of the compiler; so are laws of different versions."""
-    texts = [law_points.text(target, law, name=law, **HEAT) for law in ("mbma", "persson")]
+    texts = [
+        law_points.text(target, law, name=law, **HEAT) for law in ("mbma", "persson")
+    ]
     of_another_version = re.sub(r"(MBMA_LAW_CODE (?:!= )?)0x\w+", r"\g<1>0x1", texts[1])
     routine = LANGUAGES[target].subroutine.removesuffix(".c").upper()
     listed = f'#define {routine}_INTERFACES INTERFACE("MBMA", mbma) INTERFACE("PERSSON", persson)\n'
@@ -522,7 +685,9 @@ def test_several_laws_in_one_file_without_a_list_do_not_compile(target, tmp_path
     for message, text in refused.items():
         (tmp_path / "job.c").write_text(text)
         command = ("gcc", "-fsyntax-only", "job.c")
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=False
+        )
         assert done.returncode != 0
         assert message in done.stderr
 
@@ -553,7 +718,12 @@ end Ask;
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "hardened"])
 def test_modelica(name, tmp_path):
     rumoca, known = pytest.importorskip("rumoca"), points(name)
-    text, answers = law_points.text("modelica-law", name, name="road", leakage=True, kappa=KAPPA, **HEAT), []
+    text, answers = (
+        law_points.text(
+            "modelica-law", name, name="road", leakage=True, kappa=KAPPA, **HEAT
+        ),
+        [],
+    )
     for k, c in enumerate(np.array_split(known.c, 25)):
         asks = MODELICA.format(size=c.size, gaps=", ".join(map(repr, c.tolist())))
         (tmp_path / f"{k}").mkdir()
@@ -569,11 +739,18 @@ def test_modelica(name, tmp_path):
 
 @needs("gcc")
 def test_c_of_a_polynomial_over_many_decades(tmp_path):
-    surface, asked = Surface(0.3, 1.0, 3.5, 0.125, 0.125, unit="mm"), {"theory": "mbma", "hardness": "0.06 MPa"}
-    (tmp_path / "law.c").write_text(law_text("c-law", surface, "1 MPa", name="road", **asked))
+    surface, asked = (
+        Surface(0.3, 1.0, 3.5, 0.125, 0.125, unit="mm"),
+        {"theory": "mbma", "hardness": "0.06 MPa"},
+    )
+    (tmp_path / "law.c").write_text(
+        law_text("c-law", surface, "1 MPa", name="road", **asked)
+    )
     u = 0.125 * (1 - np.geomspace(1e-12, 1, 500)[:-1])
     found = compiled_law(tmp_path / "law.c", *STRICT)("pressure", 0.125 - u)
-    np.testing.assert_allclose(found, contact_law(surface, E_star="1 MPa", **asked).pressure(u), rtol=1e-10)
+    np.testing.assert_allclose(
+        found, contact_law(surface, E_star="1 MPa", **asked).pressure(u), rtol=1e-10
+    )
 
 
 @pytest.mark.parametrize("target", LAWS)
@@ -581,9 +758,16 @@ def test_a_unit_never_becomes_code(target):
     hostile = 'W */ int evil(void); /* @NAME@ {name} """ system(\'evil\') <!-- %'
     mark = LANGUAGES[target].mark
     live = [
-        [line for line in text.splitlines() if not line.startswith((mark, " *") if mark == "/*" else mark)]
+        [
+            line
+            for line in text.splitlines()
+            if not line.startswith((mark, " *") if mark == "/*" else mark)
+        ]
         for text in (
-            law_points.text(target, "calibrated", conductivity=1.0, conductivity_unit=unit) for unit in (hostile, "W")
+            law_points.text(
+                target, "calibrated", conductivity=1.0, conductivity_unit=unit
+            )
+            for unit in (hostile, "W")
         )
     ]
     assert live[0] == live[1]
@@ -599,7 +783,9 @@ def test_types_of_a_law_in_javascript(more):
         (".cjs", ".d.cts", "module.exports ="),
     ):
         exported = files[module].partition(f"\n{begin} {{")[2].rpartition("}")[0]
-        typed = re.findall(r"^export function (\w+)\(\w: number\): ", files[types_], flags=re.M)
+        typed = re.findall(
+            r"^export function (\w+)\(\w: number\): ", files[types_], flags=re.M
+        )
         assert sorted(typed) == sorted(re.findall(r"\w+", exported))
 
 
@@ -641,7 +827,14 @@ def test_node_opens_a_law_by_import_and_by_require(program, opens, tmp_path):
     gaps = law.h_max - np.array(c)
     pressure, tangent = law.pressure_and_stiffness(gaps)
     curvature = (law.stiffness(gaps - 1e-5) - law.stiffness(gaps + 1e-5)) / 2e-5
-    known = [pressure, pressure, tangent, tangent, curvature, CONDUCTIVITY / 13.3 * tangent]
+    known = [
+        pressure,
+        pressure,
+        tangent,
+        tangent,
+        curvature,
+        CONDUCTIVITY / 13.3 * tangent,
+    ]
     np.testing.assert_allclose(answers.T, known, rtol=1e-6)
     assert "await" not in (tmp_path / "road.mjs").read_text()
 
@@ -660,22 +853,43 @@ def test_typescript_compiles_both_modules(tmp_path):
     javascript_files(tmp_path)
     (tmp_path / "ask.mts").write_text('import * as road from "./road.mjs";' + TYPED)
     (tmp_path / "ask.cts").write_text('import * as road from "./road.cjs";' + TYPED)
-    options = "--strict --noEmit --module node16 --moduleResolution node16 --target es2020"
+    options = (
+        "--strict --noEmit --module node16 --moduleResolution node16 --target es2020"
+    )
     run("tsc", *options.split(), "ask.mts", "ask.cts", folder=tmp_path)
     # types are checked: an answer is no text
-    (tmp_path / "wrong.mts").write_text('import { tangent } from "./road.mjs";\nconst text: string = tangent(0.2);\n')
-    wrong = subprocess.run(["tsc", *options.split(), "wrong.mts"], cwd=tmp_path, capture_output=True, text=True)
+    (tmp_path / "wrong.mts").write_text(
+        'import { tangent } from "./road.mjs";\nconst text: string = tangent(0.2);\n'
+    )
+    wrong = subprocess.run(
+        ["tsc", *options.split(), "wrong.mts"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
     assert "'number' is not assignable to type 'string'" in wrong.stdout
 
 
 @pytest.mark.parametrize(
-    "target", ["c-law", "javascript-law", "python-law", "matlab-law", "modelica-law", "fortran-law"]
+    "target",
+    [
+        "c-law",
+        "javascript-law",
+        "python-law",
+        "matlab-law",
+        "modelica-law",
+        "fortran-law",
+    ],
 )
 def test_headers_name_functions_that_are_there(target):
-    head, _, text = law_points.text(target, "calibrated", name="road", **HEAT).partition("Example: ")
+    head, _, text = law_points.text(target, "calibrated", name="road", **HEAT).partition(
+        "Example: "
+    )
     lines = " ".join(line.strip("*/!#%; ") for line in text.splitlines()[:4])
     called = re.findall(r"(?:road[._]|law\.)?(\w+)\([\d.]", lines)
     assert len(called) >= 2
     for name in called:
-        assert re.search(rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text)
+        assert re.search(
+            rf"(?:function|def|const|double|kept\.|export) ?(?:road_)?{name}\b", text
+        )
     assert "{{" not in head

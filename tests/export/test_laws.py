@@ -24,19 +24,32 @@ CONCRETE = Surface.named("concrete")
 
 
 def law_of(surface=CONCRETE, **changed):
-    return describe_law(surface, 13.3, **(UNITS | {"rows": 40, "theory": "mbma"} | changed))
+    return describe_law(
+        surface, 13.3, **(UNITS | {"rows": 40, "theory": "mbma"} | changed)
+    )
 
 
 @pytest.mark.parametrize(
-    "theory", [pytest.param(name, marks=pytest.mark.slow if name == "persson" else ()) for name in THEORIES]
+    "theory",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name == "persson" else ())
+        for name in THEORIES
+    ],
 )
 def test_rows_of_any_theory(theory):
     law = law_of(theory=theory, rows=50)
-    near = CONCRETE.h_max - np.geomspace(max(CONCRETE.h_max - law.x[-1], 1e-9), 0.5, 500)[1:]
+    near = (
+        CONCRETE.h_max - np.geomspace(max(CONCRETE.h_max - law.x[-1], 1e-9), 0.5, 500)[1:]
+    )
     x = np.append(np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500), near)
-    model = contact(CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory).pressure
+    model = contact(
+        CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory
+    ).pressure
     kept = model > FLOOR * law.y[-1]
-    assert np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max() <= 1.02 * law.largest_error
+    assert (
+        np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max()
+        <= 1.02 * law.largest_error
+    )
     assert law.x[0] == law.y[0] == 0
     assert (np.diff(law.x) > 0).all()
     assert (np.diff(law.y) >= 0).all()
@@ -51,10 +64,21 @@ def test_rows_of_any_theory(theory):
 
 @pytest.mark.parametrize("pressures", [(1, 500), (1, 550), None])
 def test_the_header_says_from_where_a_law_is_valid(pressures):
-    surface = Surface.from_roughness(hurst=0.8, h_max=3.5e-3, Rq=1e-3, longest=0.1, shortest=2e-3, unit="mm")
-    law = describe_law(surface, 115e3, stress_unit="MPa", theory="calibrated", rows=40, pressures=pressures)
+    surface = Surface.from_roughness(
+        hurst=0.8, h_max=3.5e-3, Rq=1e-3, longest=0.1, shortest=2e-3, unit="mm"
+    )
+    law = describe_law(
+        surface,
+        115e3,
+        stress_unit="MPa",
+        theory="calibrated",
+        rows=40,
+        pressures=pressures,
+    )
     root = contact(surface, area=1e-3, E_star=115e3, theory="calibrated").pressure
-    (light,) = (line for line in law.comments if line.startswith("not valid") and "0.001" in line)
+    (light,) = (
+        line for line in law.comments if line.startswith("not valid") and "0.001" in line
+    )
     said = float(light.split("below p = ")[1].split()[0])
     assert root <= said <= root * 1.001
     found = contact(surface, pressure=[0.01, said], E_star=115e3, theory="calibrated")
@@ -64,16 +88,24 @@ def test_the_header_says_from_where_a_law_is_valid(pressures):
 def test_the_header_says_up_to_where_a_law_is_valid():
     turning = "\n".join(law_of(Surface(0.35, 1.0, 1e4, 0.1, 0.3)).comments)
     assert "has its maximum" in turning
-    (areas,) = (line for line in law_of().comments if line.startswith("not valid") and "areas" in line)
+    (areas,) = (
+        line
+        for line in law_of().comments
+        if line.startswith("not valid") and "areas" in line
+    )
     root, said = (
         contact(CONCRETE, area=0.1, E_star=13.3, theory="mbma").pressure,
         float(areas.split("above p = ")[1].split()[0]),
     )
     assert root * 0.999 <= said <= root
-    assert any("scatter" in line and "ln p at a given c" in line for line in law_of().comments)
+    assert any(
+        "scatter" in line and "ln p at a given c" in line for line in law_of().comments
+    )
     assert not any("has its maximum" in line for line in law_of().comments)
     own = dataclasses.replace(PRINTED, name="own", beta=0.3)
-    assert any("scatter" in line and "not known" in line for line in law_of(variant=own).comments)
+    assert any(
+        "scatter" in line and "not known" in line for line in law_of(variant=own).comments
+    )
 
 
 @pytest.mark.parametrize("name", ["concrete", "asphalt", "challenge"])
@@ -95,7 +127,9 @@ def test_fewest_rows(monkeypatch):
     assert law.largest_error <= 1e-2
     assert law_of(rows=law.x.size - 1).largest_error > 1e-2
     monkeypatch.setattr(law_table, "MAX_ROWS", 30)
-    with pytest.raises(InputError, match="needs more than 30 rows under linear interpolation"):
+    with pytest.raises(
+        InputError, match="needs more than 30 rows under linear interpolation"
+    ):
         law_of(rows=None, rtol=1e-6)
     assert law_of(rows=None, rtol=0.2).x.size <= 30
 
@@ -105,12 +139,26 @@ def test_force_and_conductance_in_one_interaction():
     assert law.largest_error < 2e-2
     assert (law.x_name, law.y_name, law.y_unit) == ("pressure", "conductance", "mW/K/mm")
     text, abaqus = calculix(law, "JOINT"), solvers.abaqus(law, "JOINT")
-    assert "*SURFACE INTERACTION, NAME=JOINT\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n" in text
+    assert (
+        "*SURFACE INTERACTION, NAME=JOINT\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n"
+        in text
+    )
     assert "TYPE=SURFACE TO SURFACE" in text
-    assert abaqus.count("*SURFACE INTERACTION, NAME=JOINT\n") == abaqus.count("*SURFACE INTERACTION") == 1
+    assert (
+        abaqus.count("*SURFACE INTERACTION, NAME=JOINT\n")
+        == abaqus.count("*SURFACE INTERACTION")
+        == 1
+    )
     force, heat = abaqus.split("=TABULAR\n")[1].split("*GAP CONDUCTANCE, PRESSURE\n")
-    for rows, known in ((force, plain), (heat, law), (text.split("*GAP CONDUCTANCE\n")[1], law)):
-        np.testing.assert_allclose([numbers(line)[::-1] for line in rows.splitlines()], np.stack([known.x, known.y], 1))
+    for rows, known in (
+        (force, plain),
+        (heat, law),
+        (text.split("*GAP CONDUCTANCE\n")[1], law),
+    ):
+        np.testing.assert_allclose(
+            [numbers(line)[::-1] for line in rows.splitlines()],
+            np.stack([known.x, known.y], 1),
+        )
 
 
 def numbers(line):
@@ -126,8 +174,12 @@ def parse(target, text):
     if target == "optistruct":
         # on the first line that field would be the friction coefficient
         assert "\nPCONT,1\n+,STFTAB,2\nTABLES1*2 " in text
-        cards = [line for line in lines if line.startswith("*       ") and line.strip() != "*"]
-        fields = [line[8 + 16 * k : 24 + 16 * k].strip() for line in cards for k in range(4)]
+        cards = [
+            line for line in lines if line.startswith("*       ") and line.strip() != "*"
+        ]
+        fields = [
+            line[8 + 16 * k : 24 + 16 * k].strip() for line in cards for k in range(4)
+        ]
         values = [float(f) for f in fields[: fields.index("ENDT")]]
         return list(zip(values[::2], values[1::2], strict=True))
     if target == "modelica":
@@ -138,7 +190,11 @@ def parse(target, text):
         assert lines[head].split("(")[1].split(")")[0] == f"{len(lines) - head - 1},2"
         return [tuple(numbers(line)) for line in lines[head + 1 :]]
     marks = {"comsol": "%", "moose": "#", "csv": ("#", "overclosure")}
-    rows = [tuple(numbers(line)) for line in lines if not line.startswith(marks.get(target, "*"))]
+    rows = [
+        tuple(numbers(line))
+        for line in lines
+        if not line.startswith(marks.get(target, "*"))
+    ]
     return rows if target in marks else [(c, p) for p, c in rows]
 
 
@@ -147,8 +203,18 @@ def parse(target, text):
 def test_text_holds_the_rows(target, rows):
     law = law_of(rows=rows)
     text = getattr(solvers, target)(law)
-    np.testing.assert_allclose(parse(target, text), np.stack([law.x, law.y], 1), rtol=1e-9)
-    for word in ("variant 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "table: data"):
+    np.testing.assert_allclose(
+        parse(target, text), np.stack([law.x, law.y], 1), rtol=1e-9
+    )
+    for word in (
+        "variant 'reported'",
+        "E* = 13.3",
+        "[MPa]",
+        "[mm]",
+        "h_max - u",
+        "largest error",
+        "table: data",
+    ):
         assert word in text
 
 
@@ -172,7 +238,11 @@ test_refused = refusals(
     ({"quantity": "conductance"}, "conductance needs"),
     ({"surface": Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)}, "not of a batch"),
     (
-        {"surface": Surface(0.8, 1.0, 100.0, 1.0, 1.5), "theory": "persson", "pressures": (1e-12, 1e-9)},
+        {
+            "surface": Surface(0.8, 1.0, 100.0, 1.0, 1.5),
+            "theory": "persson",
+            "pressures": (1e-12, 1e-9),
+        },
         r"pressures must reach above \S+ MPa, that at c = 0, where rows begin",
     ),
 )
@@ -182,9 +252,20 @@ test_what_a_solver_does_not_take = refusals(
     lambda target, changed: getattr(solvers, target)(law_of(**changed)),
     ("calculix", {"rows": 201}, "takes 200 rows of pressure at most here, got 201"),
     ("calculix", HEAT | {"rows": 21}, "takes 20 rows of conductance at most"),
-    ("calculix", {"surface": Surface.named("yang-persson"), "length_unit": "m"}, "closer than 1e-10 m"),
-    ("optistruct", HEAT, "takes pressure against overclosure here, got conductance against pressure"),
-    *((name, LEAKAGE | {"rows": 50}, "takes pressure against overclosure") for name in PLAIN[:2]),
+    (
+        "calculix",
+        {"surface": Surface.named("yang-persson"), "length_unit": "m"},
+        "closer than 1e-10 m",
+    ),
+    (
+        "optistruct",
+        HEAT,
+        "takes pressure against overclosure here, got conductance against pressure",
+    ),
+    *(
+        (name, LEAKAGE | {"rows": 50}, "takes pressure against overclosure")
+        for name in PLAIN[:2]
+    ),
 )
 
 
@@ -211,7 +292,9 @@ def test_rows_of_leakage_without_a_block():
     d = np.linspace(known.lowest, known.h_max, 5000)
     kept = known.leakage(separation=d) > FLOOR * law.y[0]
     np.testing.assert_allclose(
-        np.interp(known.pressure(separation=d), law.x, law.y)[kept], known.leakage(separation=d)[kept], rtol=1.01e-2
+        np.interp(known.pressure(separation=d), law.x, law.y)[kept],
+        known.leakage(separation=d)[kept],
+        rtol=1.01e-2,
     )
 
 
@@ -223,7 +306,10 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
     pressure = np.geomspace(1.001e-5, 0.0999, 400)
     found = contact(CONCRETE, pressure=pressure, E_star=13.3, theory=theory)
     if quantity == "pressure":
-        model, read = pressure, np.interp(CONCRETE.h_max - found.mean_separation, law.x, law.y)
+        model, read = (
+            pressure,
+            np.interp(CONCRETE.h_max - found.mean_separation, law.x, law.y),
+        )
     else:
         model, read = found.stiffness * 50.0 / 13.3, np.interp(pressure, law.x, law.y)
     assert np.abs(read / model - 1).max() <= 1.05e-2
@@ -233,12 +319,26 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
 
 @pytest.mark.parametrize("target", [*PLAIN, "csv"])
 @pytest.mark.parametrize("largest", [0.1, 0.1234567890123])
-@pytest.mark.parametrize("choice", [{"rows": 20}, {"rows": 33, "evenly": True}, {"rows": None, "rtol": 3e-3}])
+@pytest.mark.parametrize(
+    "choice", [{"rows": 20}, {"rows": 33, "evenly": True}, {"rows": None, "rtol": 3e-3}]
+)
 def test_rows_reach_the_largest_pressure(target, largest, choice):
     law = law_of(theory="calibrated", pressures=(1e-4, largest), **choice)
-    c, p = np.array(parse(target, data.to_csv(law).decode() if target == "csv" else getattr(solvers, target)(law))).T
+    c, p = np.array(
+        parse(
+            target,
+            data.to_csv(law).decode()
+            if target == "csv"
+            else getattr(solvers, target)(law),
+        )
+    ).T
     assert p[-1] >= largest
-    at = CONCRETE.h_max - contact(CONCRETE, pressure=largest, E_star=13.3, theory="calibrated").mean_separation
+    at = (
+        CONCRETE.h_max
+        - contact(
+            CONCRETE, pressure=largest, E_star=13.3, theory="calibrated"
+        ).mean_separation
+    )
     # the law itself is within 6e-6 of the theory
     assert np.interp(at * (1 + 1e-4), c, p) >= largest
     assert np.interp(at, c, p) == pytest.approx(largest, rel=law.largest_error + 1e-4)
@@ -247,7 +347,13 @@ def test_rows_reach_the_largest_pressure(target, largest, choice):
 @pytest.mark.parametrize("quantity", ["conductance", "leakage"])
 def test_rows_against_pressure_reach_the_largest(quantity):
     heat = quantity == "conductance"
-    law = law_of(**(LEAKAGE | (HEAT if heat else {}) | {"pressures": (1e-4, 0.1234567890123), "rows": 20}))
+    law = law_of(
+        **(
+            LEAKAGE
+            | (HEAT if heat else {})
+            | {"pressures": (1e-4, 0.1234567890123), "rows": 20}
+        )
+    )
     assert law.x[-1] >= 0.1234567890123
     found = contact(CONCRETE, pressure=0.1234567890123, E_star=13.3, theory="calibrated")
     model = found.stiffness * 50.0 / 13.3 if heat else found.leakage.K
@@ -263,7 +369,11 @@ def test_rows_of_leakage_are_the_contacts_flow_to_the_blocked_pressure():
     assert (np.diff(law.y) < 0).all()
     pressure = np.geomspace(law.x[1], law.x[-2], 400)
     model = contact(CONCRETE, pressure=pressure, E_star=13.3, theory="calibrated")
-    error = np.interp(pressure, law.x, law.y) / np.where(model.area < 0.3, model.leakage.K, np.nan) - 1
+    error = (
+        np.interp(pressure, law.x, law.y)
+        / np.where(model.area < 0.3, model.leakage.K, np.nan)
+        - 1
+    )
     assert np.nanmax(np.abs(error)) < 1.05e-3 + 1e-4
     text = "\n".join(law.comments)
     for fact in (
@@ -280,7 +390,9 @@ def test_rows_of_leakage_are_the_contacts_flow_to_the_blocked_pressure():
     assert some.x[-1] == pytest.approx(0.1, rel=1e-6)
     assert some.y[-1] > 0
     steep = Surface(0.8, 1.0, 1e3, 1.0, 1.5, unit="mm")
-    falling = describe_law(steep, "900 MPa", quantity="leakage", theory="persson", rows=50)
+    falling = describe_law(
+        steep, "900 MPa", quantity="leakage", theory="persson", rows=50
+    )
     assert (np.diff(falling.y) <= 0).all()
 
 
@@ -288,17 +400,29 @@ HARD = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
 
 
 def test_rows_of_a_law_with_a_hardness():
-    joint = functools.partial(describe_law, HARD, "100 GPa", stress_unit="MPa", theory="calibrated", rtol=1e-2)
+    joint = functools.partial(
+        describe_law, HARD, "100 GPa", stress_unit="MPa", theory="calibrated", rtol=1e-2
+    )
     asked = {"hardness": "1500 MPa", "pressures": ("1 MPa", "500 MPa")}
-    known = functools.partial(contact, HARD, E_star=100e3, theory="calibrated", hardness=1500.0)
+    known = functools.partial(
+        contact, HARD, E_star=100e3, theory="calibrated", hardness=1500.0
+    )
     law, elastic = joint(**asked), joint()
     # chords lie about the law by as much as they may miss it
     kept = law.y > 1.0
-    assert law.y[kept] == pytest.approx(known(mean_separation=3.0 - law.x[kept]).pressure, rel=1e-2)
+    assert law.y[kept] == pytest.approx(
+        known(mean_separation=3.0 - law.x[kept]).pressure, rel=1e-2
+    )
     assert "hardness = 1500.0 MPa, plasticity index 3.61" in " ".join(law.comments)
-    assert "elastic: within 5% in area for hardnesses from 4922.0 MPa on" in " ".join(elastic.comments)
+    assert "elastic: within 5% in area for hardnesses from 4922.0 MPa on" in " ".join(
+        elastic.comments
+    )
     # conductance is not the slope of loading
-    heat = joint(**asked, quantity="conductance", conductivity=20.0, conductivity_unit="mW/(mm K)")
+    heat = joint(
+        **asked, quantity="conductance", conductivity=20.0, conductivity_unit="mW/(mm K)"
+    )
     found = known(pressure=heat.x[heat.x > 2.0])
-    assert heat.y[heat.x > 2.0] == pytest.approx(20.0 / 100e3 * found.unloading_stiffness, rel=1e-2)
+    assert heat.y[heat.x > 2.0] == pytest.approx(
+        20.0 / 100e3 * found.unloading_stiffness, rel=1e-2
+    )
     assert (np.asarray(found.unloading_stiffness) > 1.1 * found.stiffness).all()

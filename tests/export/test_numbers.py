@@ -30,7 +30,14 @@ POSITIVE = st.one_of(
     st.sampled_from([2.0**31, 3.24e9, 9999999999.0, 1e16, 1e22]),
 )
 NUMBER = re.compile(r"(?<![\w.#])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?(?![\w.])")
-UNITS = [("m", "Pa"), ("mm", "MPa"), ("um", "GPa"), ("um", "Pa"), ("m", "GPa"), ("nm", "Pa")]
+UNITS = [
+    ("m", "Pa"),
+    ("mm", "MPa"),
+    ("um", "GPa"),
+    ("um", "Pa"),
+    ("m", "GPa"),
+    ("nm", "Pa"),
+]
 # comments of each program, and what of its text is no number of a law: identifiers, counts, options
 COMMENTS = {
     "calculix": "**", "abaqus": "**", "lsdyna": "$", "optistruct": "$", "comsol": "%", "moose": "#", "modelica": "#",
@@ -68,13 +75,17 @@ def test_a_number_reads_back_as_the_same_double(value):
 
 
 @given(FINITE, st.sampled_from([16, 20]))
-def test_a_number_in_a_field_is_within_its_columns_and_the_error_that_they_allow(value, width):
+def test_a_number_in_a_field_is_within_its_columns_and_the_error_that_they_allow(
+    value, width
+):
     written = number(value, width=width)
     assert len(written) <= width
     assert has_point(written)
     # numbers below the normal ones have fewer digits themselves
     allowed = {16: 5e-9, 20: 5e-13}[width] * abs(value)
-    assert abs(float(written) - value) <= max(allowed, 5e-324) or len(number(value)) <= width
+    assert (
+        abs(float(written) - value) <= max(allowed, 5e-324) or len(number(value)) <= width
+    )
 
 
 def test_what_is_no_number_is_refused():
@@ -93,12 +104,16 @@ def test_every_number_of_rows_has_a_point_and_reads_back(values, target):
     if target == "calculix" and (np.diff(law.x) <= 1e-10).any():
         return
     written = getattr(solvers, target)(law)
-    body = [line for line in written.splitlines() if not line.startswith(COMMENTS[target])]
+    body = [
+        line for line in written.splitlines() if not line.startswith(COMMENTS[target])
+    ]
     rows = [line for line in body if not re.search(STRUCTURE.get(target, "(?!)"), line)]
     if target == "lsdyna":
         tokens = [line[at : at + 20].strip() for line in rows[1:] for at in (0, 20)]
     elif target == "optistruct":
-        fields = [line[at : at + 16].strip() for line in rows for at in range(8, len(line), 16)]
+        fields = [
+            line[at : at + 16].strip() for line in rows for at in range(8, len(line), 16)
+        ]
         tokens = [field for field in fields if field not in ("", "ENDT", "*")]
     else:
         tokens = [token for line in rows for token in NUMBER.findall(line)]
@@ -113,12 +128,18 @@ def test_every_number_of_rows_has_a_point_and_reads_back(values, target):
 @given(st.lists(POSITIVE, min_size=3, max_size=8))
 def test_data_keep_the_type_and_the_bits_of_a_number(values):
     law = table_of(values)
-    lines = [line for line in data.to_csv(law).decode().splitlines() if not line.startswith("#")]
+    lines = [
+        line
+        for line in data.to_csv(law).decode().splitlines()
+        if not line.startswith("#")
+    ]
     for line, row in zip(lines[1:], zip(law.x, law.y, strict=True), strict=True):
         assert all(has_point(cell) for cell in line.split(","))
         assert tuple(map(float, line.split(","))) == row
     columns = json.loads(data.to_json(law))["columns"]
-    assert all(isinstance(value, float) for value in columns["overclosure"] + columns["pressure"])
+    assert all(
+        isinstance(value, float) for value in columns["overclosure"] + columns["pressure"]
+    )
     assert columns["overclosure"] == law.x.tolist()
 
 
@@ -142,13 +163,27 @@ def test_numbers_of_films_and_fits_have_a_point(length, stress):
     assert has_point(header)
 
 
-WHOLE = Surface(hurst=0.5, q0=1.0, q1=100.0, h_rms=1.0, h_max=4.0, unit="m")  # whole numbers wherever they may be
+WHOLE = Surface(
+    hurst=0.5, q0=1.0, q1=100.0, h_rms=1.0, h_max=4.0, unit="m"
+)  # whole numbers wherever they may be
 
 
 def test_numbers_of_code_have_a_point():
     heat = {"conductivity": 6e9, "conductivity_unit": "W/(m K)"}
-    targets = ("fortran-law", "matlab-law", "modelica-law", "python-law", "javascript-law", "c-law")
-    code = {target: law_text(target, WHOLE, 3e9, stress_unit="Pa", theory="calibrated", **heat) for target in targets}
+    targets = (
+        "fortran-law",
+        "matlab-law",
+        "modelica-law",
+        "python-law",
+        "javascript-law",
+        "c-law",
+    )
+    code = {
+        target: law_text(
+            target, WHOLE, 3e9, stress_unit="Pa", theory="calibrated", **heat
+        )
+        for target in targets
+    }
     fortran = re.search(r"h_max = (\S+), least", code["fortran-law"])[1]
     assert fortran == "4.0d0"
     assert re.search(r"constant Real h_max = (\S+),", code["modelica-law"])[1] == "4.0"
@@ -177,11 +212,18 @@ def test_getdp_reads_stiffnesses_of_billions(tmp_path):
     pressures = np.geomspace(1.1e4, 0.99e6, 40)
     expected = np.interp(pressures, law.x, law.y)
     assert (expected > 2**31).sum() > 5
-    prints = "".join(f'Print[{{road_tangential_stiffness[{number(p)}]}}, Format "k %.17g"];\n' for p in pressures)
+    prints = "".join(
+        f'Print[{{road_tangential_stiffness[{number(p)}]}}, Format "k %.17g"];\n'
+        for p in pressures
+    )
     (tmp_path / "a.msh").write_text(f"{MESH}$EndElements\n")
     (tmp_path / "a.pro").write_text(GETDP.replace("PRINTS", prints))
     done = subprocess.run(
-        ["getdp", "a.pro", "-msh", "a.msh", "-solve", "R"], cwd=tmp_path, capture_output=True, text=True, timeout=60
+        ["getdp", "a.pro", "-msh", "a.msh", "-solve", "R"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     values = [float(word) for word in re.findall(r"^k (\S+)", done.stdout, re.M)]
     np.testing.assert_allclose(values, expected, rtol=1e-9)
@@ -190,7 +232,11 @@ def test_getdp_reads_stiffnesses_of_billions(tmp_path):
 @needs("ccx")
 def test_calculix_takes_no_more_columns_than_a_field_has():
     """CalculiX reads 20 columns: a longer number loses its exponent."""
-    law = dataclasses.replace(table_of([1e-9, 2e-9, 3e-9]), y=np.array([1.2345678901234567e-05] * 3))
+    law = dataclasses.replace(
+        table_of([1e-9, 2e-9, 3e-9]), y=np.array([1.2345678901234567e-05] * 3)
+    )
     rows = solvers.calculix(law).split("TABULAR\n")[1].splitlines()
     assert max(len(cell.strip()) for row in rows for cell in row.split(",")) <= 20
-    assert float(rows[0].split(",")[0]) == pytest.approx(1.2345678901234567e-05, rel=5e-13)
+    assert float(rows[0].split(",")[0]) == pytest.approx(
+        1.2345678901234567e-05, rel=5e-13
+    )

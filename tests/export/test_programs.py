@@ -28,8 +28,14 @@ def each(nodes, words):
 
 def blocks(card, steps, side, stiff, more="", kind="NODE TO SURFACE"):
     """Two blocks of one element each, so stiff that they do not count; `more` of their material."""
-    corners = [(x, y, z) for z in (0.0, side, side, 2 * side) for x, y in ((0, 0), (side, 0), (side, side), (0, side))]
-    nodes = "".join(f"{k + 1}, {x!r}, {y!r}, {z!r}\n" for k, (x, y, z) in enumerate(corners))
+    corners = [
+        (x, y, z)
+        for z in (0.0, side, side, 2 * side)
+        for x, y in ((0, 0), (side, 0), (side, side), (0, side))
+    ]
+    nodes = "".join(
+        f"{k + 1}, {x!r}, {y!r}, {z!r}\n" for k, (x, y, z) in enumerate(corners)
+    )
     return (
         f"*NODE, NSET=ALL\n{nodes}*NSET, NSET=TOP\n13, 14, 15, 16\n*NSET, NSET=SLAVE\n9, 10, 11, 12\n"
         "*ELEMENT, TYPE=C3D8, ELSET=LOW\n1, 1, 2, 3, 4, 5, 6, 7, 8\n"
@@ -52,27 +58,53 @@ def pressed(card, compressions, side, stiff):
 
 def heated(card, loads, side, stiff):
     """A step for each load, a line on the top's nodes, 100 degrees above and 0 below, in steady state."""
-    ends = each(LOW, "1, 3") + each(LOW, "11, 11, 0.") + each([*BETWEEN, *TOP], "1, 2") + each(TOP, "11, 11, 100.")
-    output = "".join(f"*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000\n{what}\n" for what in ("RF", "RFL"))
+    ends = (
+        each(LOW, "1, 3")
+        + each(LOW, "11, 11, 0.")
+        + each([*BETWEEN, *TOP], "1, 2")
+        + each(TOP, "11, 11, 100.")
+    )
+    output = "".join(
+        f"*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000\n{what}\n"
+        for what in ("RF", "RFL")
+    )
     steps = "".join(
         f"*STEP, INC=1000\n*COUPLED TEMPERATURE-DISPLACEMENT, STEADY STATE\n1., 1.\n*BOUNDARY\n{ends}{load}"
         f"{output}*END STEP\n"
         for load in loads
     )
     steps = f"*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 50.\n{steps}"
-    return blocks(card, steps, side, stiff, f"*CONDUCTIVITY\n{CONDUCTIVITY!r}\n*EXPANSION\n0.\n", "SURFACE TO SURFACE")
+    return blocks(
+        card,
+        steps,
+        side,
+        stiff,
+        f"*CONDUCTIVITY\n{CONDUCTIVITY!r}\n*EXPANSION\n0.\n",
+        "SURFACE TO SURFACE",
+    )
 
 
 def calculix(deck, folder, side=10.0):
     """What CalculiX says of a deck, and the pressures and heat fluxes at the ends of its steps."""
     (folder / "joint.inp").write_text(deck)
-    said = subprocess.run(["ccx", "joint"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    said = subprocess.run(
+        ["ccx", "joint"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
     rows = [
         [abs(float(word)) / side**2 for word in line.split()]
         for line in (folder / "joint.dat").read_text().splitlines()
         if re.fullmatch(r"(\s+-?\d\.\d+E[+-]\d+)+", line)
     ]
-    return said, np.array([row[2] for row in rows if len(row) == 3]), np.array([r[0] for r in rows if len(r) == 1])
+    return (
+        said,
+        np.array([row[2] for row in rows if len(row) == 3]),
+        np.array([r[0] for r in rows if len(r) == 1]),
+    )
 
 
 def conductance(flux, side=10.0):
@@ -84,17 +116,25 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     law = contact_law(ROUGH, "mbma", E_star="25 MPa")
     asked = HEAT | {"pressures": ("10 kPa", "2 MPa"), "rows": 20, "theory": "mbma"}
     rows = describe_law(ROUGH, "25 MPa", quantity="conductance", **asked)
-    card, c = solvers.calculix(rows), law.h_max - law.at_pressure(PRESSURES).mean_separation
+    card, c = (
+        solvers.calculix(rows),
+        law.h_max - law.at_pressure(PRESSURES).mean_separation,
+    )
     moved = (each(TOP, f"3, 3, {-down:.9e}") for down in c + 20 * PRESSURES / 1e6)
     said, p, flux = calculix(heated(card, moved, 10.0, 1e6), tmp_path)
     assert len(p) == len(flux) == PRESSURES.size, said.stdout[-1000:]
-    # the pressure is the law's to what the card says of its closure, and the conductance is of that pressure
-    stated = float(re.search(r"within (\d+)% of the law", card.replace("\n**", ""))[1]) / 100
+    # the pressure is the law's to what the card says of its closure, and the conductance is
+    # of that pressure
+    stated = (
+        float(re.search(r"within (\d+)% of the law", card.replace("\n**", ""))[1]) / 100
+    )
     assert 0.1 < np.abs(np.log(p / PRESSURES)).max() < np.log1p(stated) + 0.06
     # the formula of the comments, with its numbers, is what CalculiX calculates
     words = " ".join(card.replace("\n**", "").split())
     assert "p = p0 exp(ln(100) c/c0)" in words
-    c0, p0 = (float(re.search(rf"{name} = (\S+) ", words)[1]) for name in ("with c0", "and p0"))
+    c0, p0 = (
+        float(re.search(rf"{name} = (\S+) ", words)[1]) for name in ("with c0", "and p0")
+    )
     overlap = c + 20 * PRESSURES / 1e6 - 20 * p / 1e6
     np.testing.assert_allclose(p0 * np.exp(np.log(100) * overlap / c0), p, rtol=1e-3)
     expected = CONDUCTIVITY / 25 * law.at_pressure(p).stiffness
@@ -104,14 +144,31 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
 
 
 @needs("ccx")
-@pytest.mark.parametrize(("length", "stress", "theory"), [("mm", "MPa", "mbma"), ("m", "Pa", "calibrated")])
+@pytest.mark.parametrize(
+    ("length", "stress", "theory"), [("mm", "MPa", "mbma"), ("m", "Pa", "calibrated")]
+)
 def test_calculix_feels_the_law(tmp_path, length, stress, theory):
-    surface, E_star = Surface.named("concrete").to(length), {"MPa": 13.3, "Pa": 13.3e6}[stress]
+    surface, E_star = (
+        Surface.named("concrete").to(length),
+        {"MPa": 13.3, "Pa": 13.3e6}[stress],
+    )
     top = 0.04 * E_star
-    law = describe_law(surface, E_star, stress_unit=stress, pressures=(1e-5 * top, top), rtol=5e-4, theory=theory)
+    law = describe_law(
+        surface,
+        E_star,
+        stress_unit=stress,
+        pressures=(1e-5 * top, top),
+        rtol=5e-4,
+        theory=theory,
+    )
     pressures = np.geomspace(1.01e-5, 0.99, 30) * top
     found = contact(surface, pressure=pressures, E_star=E_star, theory=theory)
-    deck = pressed(solvers.calculix(law), float(surface.h_max) - found.mean_separation, SIDES[length], 1e9 * E_star)
+    deck = pressed(
+        solvers.calculix(law),
+        float(surface.h_max) - found.mean_separation,
+        SIDES[length],
+        1e9 * E_star,
+    )
     said, reached, _ = calculix(deck, tmp_path, SIDES[length])
     assert len(reached) == 30, said.stdout[-2000:]
     np.testing.assert_allclose(reached, pressures, rtol=2e-3)
@@ -123,14 +180,27 @@ def test_calculix_feels_the_law(tmp_path, length, stress, theory):
 def test_calculix_feels_rows_of_nanometres_in_any_unit(tmp_path, length, side):
     """Rows 1e-7 mm apart are followed from first touch, over seven decades, as well as the same ones in um.
 
-    The blocks are 1e9 times as stiff as the joint: of stiffer ones CalculiX loses the digits of small overlaps.
+    The blocks are 1e9 times as stiff as the joint: of stiffer ones CalculiX loses the
+    digits of small overlaps.
     """
     surface = Surface.from_map(MAPS / "top-1.top", short_cutoff="9.4 nm").to(length)
     low, high, E_star = 1e-4, 1000.0, 1e5
-    law = describe_law(surface, E_star, stress_unit="MPa", theory="calibrated", pressures=(low, high), rtol=1e-3)
+    law = describe_law(
+        surface,
+        E_star,
+        stress_unit="MPa",
+        theory="calibrated",
+        pressures=(low, high),
+        rtol=1e-3,
+    )
     pressures = np.geomspace(1.01 * low, 0.99 * high, 15)
     found = contact(surface, pressure=pressures, E_star=E_star, theory="calibrated")
-    deck = pressed(solvers.calculix(law), float(surface.h_max) - found.mean_separation, side, 1e9 * E_star)
+    deck = pressed(
+        solvers.calculix(law),
+        float(surface.h_max) - found.mean_separation,
+        side,
+        1e9 * E_star,
+    )
     said, reached, _ = calculix(deck, tmp_path, side)
     assert len(reached) == 15, said.stdout[-2000:]
     # compliance of the blocks: p 2 side/(1e9 E*) over p/slope
@@ -140,16 +210,19 @@ def test_calculix_feels_rows_of_nanometres_in_any_unit(tmp_path, length, side):
 
 @needs("octave-cli")
 def test_octave_looks_up(tmp_path):
-    law = describe_law(Surface.named("asphalt"), 20.0, length_unit="mm", stress_unit="MPa", rows=60)
+    law = describe_law(
+        Surface.named("asphalt"), 20.0, length_unit="mm", stress_unit="MPa", rows=60
+    )
     (tmp_path / "law.mat").write_bytes(to_matlab(law))
     (tmp_path / "law.m").write_bytes(matlab_reader(law, "law"))
     x = np.random.default_rng(1).uniform(0, law.x[-1], 200)
     np.savetxt(tmp_path / "x.txt", x, fmt="%.17g")
-    script = (
-        "x = load('x.txt'); printf('%.17g\\n', law(x)); s = load('law.mat'); printf('%.17g\\n', s.x, s.y); law(1e3)"
-    )
+    script = "x = load('x.txt'); printf('%.17g\\n', law(x)); s = load('law.mat'); printf('%.17g\\n', s.x, s.y); law(1e3)"
     said = subprocess.run(
-        ["octave-cli", "--no-init-file", "--eval", script], cwd=tmp_path, capture_output=True, text=True
+        ["octave-cli", "--no-init-file", "--eval", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
     )
     assert said.returncode != 0
     assert "x must be in" in said.stderr
@@ -159,10 +232,24 @@ def test_octave_looks_up(tmp_path):
 
 
 @needs("ccx")
-@pytest.mark.parametrize(("length", "stress"), [("mm", "MPa"), ("m", "Pa")], ids=["mm", "SI"])
+@pytest.mark.parametrize(
+    ("length", "stress"), [("mm", "MPa"), ("m", "Pa")], ids=["mm", "SI"]
+)
 def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
-    asked = HEAT | {"conductivity_unit": "W/(m K)", "pressures": ("1 kPa", "2 MPa"), "rows": 20, "theory": "mbma"}
-    law = describe_law(ROUGH, "25 MPa", length_unit=length, stress_unit=stress, quantity="conductance", **asked)
+    asked = HEAT | {
+        "conductivity_unit": "W/(m K)",
+        "pressures": ("1 kPa", "2 MPa"),
+        "rows": 20,
+        "theory": "mbma",
+    }
+    law = describe_law(
+        ROUGH,
+        "25 MPa",
+        length_unit=length,
+        stress_unit=stress,
+        quantity="conductance",
+        **asked,
+    )
     side, unit = SIDES[length], {"MPa": 1.0, "Pa": 1e6}[stress]
     pressures, card = unit * np.geomspace(1.1e-3, 1.9, 8), solvers.calculix(law)
     slope = re.search(r"with the line (\S+) below", card.replace("\n** ", " "))[1]
@@ -171,7 +258,9 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
     said, _, flux = calculix(heated(card, forces, side, 1e6 * unit), tmp_path, side)
     assert len(flux) == 8, said.stdout[-2000:]
     found = contact(ROUGH.to(length), pressure=pressures, E_star=25 * unit, theory="mbma")
-    np.testing.assert_allclose(conductance(flux, side), found.stiffness * CONDUCTIVITY / (25 * unit), rtol=1e-2)
+    np.testing.assert_allclose(
+        conductance(flux, side), found.stiffness * CONDUCTIVITY / (25 * unit), rtol=1e-2
+    )
 
 
 @needs("Rscript")
@@ -187,8 +276,16 @@ def test_r_reads(tmp_path):
       cat(sprintf("%.17g", c(ncdf4::ncvar_get(file, "overclosure"), ncdf4::ncvar_get(file, "pressure"))))
     }
     """
-    said = subprocess.run(["Rscript", "-e", script], cwd=tmp_path, capture_output=True, text=True, check=True)
+    said = subprocess.run(
+        ["Rscript", "-e", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     names, *tables = said.stdout.strip().splitlines()
     assert names == "overclosure [mm]|pressure [MPa]"
     for table in tables:
-        np.testing.assert_array_equal(np.array(table.split(), dtype=float), np.concatenate([law.x, law.y]))
+        np.testing.assert_array_equal(
+            np.array(table.split(), dtype=float), np.concatenate([law.x, law.y])
+        )

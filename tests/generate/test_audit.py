@@ -21,7 +21,11 @@ def test_bounds_hold_in_a_short_search(what):
 
 
 def test_a_bound_that_is_exceeded_is_counted_and_quoted(monkeypatch):
-    monkeypatch.setitem(audit.BOUNDS, "too tight", (lambda surface, u, rtol: np.array([0.5, np.nan, 2.0]), 10, {}))
+    monkeypatch.setitem(
+        audit.BOUNDS,
+        "too tight",
+        (lambda surface, u, rtol: np.array([0.5, np.nan, 2.0]), 10, {}),
+    )
     (found,) = audit.bound("too tight", 1, 1.0)
     assert found.beyond == 2 * found.answers / 3
     assert "Surface(" in found.where
@@ -31,9 +35,13 @@ def test_untested_answers_and_bad_failures_are_found(monkeypatch):
     monkeypatch.setattr(audit, "LONGEST", 1.0)
     monkeypatch.setitem(audit.CALLS, "island", lambda *given, **options: time.sleep(1.1))
     monkeypatch.setitem(audit.CALLS, "surface", lambda *given: 1 / 0)
-    monkeypatch.setitem(audit.CALLS, "sensitivity", lambda *given, **options: np.float64(1) / 0)
+    monkeypatch.setitem(
+        audit.CALLS, "sensitivity", lambda *given, **options: np.float64(1) / 0
+    )
     warning, error, hang = audit.failures(1, 1e-3)
-    assert all("1 / 0" not in each.where and each.beyond == 2 for each in (warning, error, hang))
+    assert all(
+        "1 / 0" not in each.where and each.beyond == 2 for each in (warning, error, hang)
+    )
     assert audit.validity(3, 0.02)[0].beyond == 0
 
 
@@ -71,7 +79,9 @@ def test_workers_end_with_a_killed_parent():
         "        time.sleep(60)\n"
     )
     command = [sys.executable, "-W", "ignore", "-c", code]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as parent:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as parent:
         worker = int(parent.stdout.readline())
         parent.send_signal(signal.SIGKILL)
     end = time.monotonic() + 20

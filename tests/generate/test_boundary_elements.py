@@ -9,7 +9,15 @@ import xarray as xr
 from generate import files
 from generate.boundary_elements.run import SOLVERS, TEXTS, dataset, group, run
 from generate.boundary_elements.solve import Contact, simulate
-from generate.boundary_elements.surfaces import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Recipe, Task, campaign, heights
+from generate.boundary_elements.surfaces import (
+    HELD_OUT_SPECTRUM,
+    SPLITS,
+    TRAINING,
+    Recipe,
+    Task,
+    campaign,
+    heights,
+)
 from generate.calibrated_file import write_part
 from mbma_tables import InputError
 from mbma_tables.surfaces.bearing_curve import FRACTIONS, bearing
@@ -21,27 +29,35 @@ RECIPE = Recipe("self_affine", 0.8, 8, 2, 5, 64)
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
 def test_wavy_surface_against_westergaard(share):
-    # mean pressure p over p* = pi E* amplitude/wavelength: A/A0 = (2/pi) asin(sqrt(p/p*)) (Westergaard 1939)
+    # mean pressure p over p* = pi E* amplitude/wavelength: A/A0 = (2/pi) asin(sqrt(p/p*))
+    # (Westergaard 1939)
     amplitude, points = 0.01, 512
     wave = amplitude * np.cos(2 * np.pi * np.arange(points) / points)
     full = np.pi * amplitude
     contact = Contact(np.tile(wave[:, None], (1, 8)), (1.0, 8 / points), 1e-9)
     result = contact.press(share * full)
-    assert result["area_raw"] == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(share)), abs=2 / points)
+    assert result["area_raw"] == pytest.approx(
+        2 / np.pi * np.arcsin(np.sqrt(share)), abs=2 / points
+    )
     # a row of flat strips of half width a gives by -(2 L/(pi E*)) ln sin(pi a/L) a mean pressure (Sadowsky 1928), here
     # -(L/(pi E*)) ln s as sin(pi a/L)^2 = s = p/p*; the mean gap is its integral over p from there to p*
     s = share
-    assert result["mean_separation"] == pytest.approx(amplitude * (1 - s + s * np.log(s)), rel=2e-3)
+    assert result["mean_separation"] == pytest.approx(
+        amplitude * (1 - s + s * np.log(s)), rel=2e-3
+    )
 
 
 def test_sphere_against_hertz():
-    # Hertz (1882), E* = R = 1: F = 4 a^3/3, pressure (2 a/pi) sqrt(1 - r^2/a^2), whose mean of -r^2/2 is -a^2/5
+    # Hertz (1882), E* = R = 1: F = 4 a^3/3, pressure (2 a/pi) sqrt(1 - r^2/a^2), whose mean
+    # of -r^2/2 is -a^2/5
     points, radius = 192, 0.12
     x = (np.arange(points) + 0.5) / points - 0.5
     contact = Contact(-(x[:, None] ** 2 + x[None, :] ** 2) / 2, SQUARE, 1e-9)
     result = contact.press(4 * radius**3 / 3)
     assert result["area"] == pytest.approx(np.pi * radius**2, rel=0.01)
-    assert np.asarray(contact.model.traction).max() == pytest.approx(2 * radius / np.pi, rel=0.01)
+    assert np.asarray(contact.model.traction).max() == pytest.approx(
+        2 * radius / np.pi, rel=0.01
+    )
     assert result["pressure_weighted_height"] == pytest.approx(-(radius**2) / 5, rel=0.01)
 
 
@@ -52,7 +68,8 @@ def test_force_is_the_derivative_of_energy():
     forces = np.geomspace(0.08, 0.12, 9)
     results = [contact.press(force) for force in forces]
     energy, gap, height = (
-        np.array([r[k] for r in results]) for k in ("energy", "mean_separation", "pressure_weighted_height")
+        np.array([r[k] for r in results])
+        for k in ("energy", "mean_separation", "pressure_weighted_height")
     )
     np.testing.assert_allclose(height, gap + 2 * energy / forces, rtol=1e-7)
     work = -np.sum((forces[1:] + forces[:-1]) / 2 * np.diff(gap))
@@ -67,7 +84,9 @@ def test_spectrum_and_anisotropy_are_those_asked_for():
     known = bearing(heights(RECIPE), SQUARE)
     assert (known.gradient, known.h_rms) == pytest.approx((gradient, 1), rel=1e-12)
     stretched = Recipe("stretched", 0.8, 8, 4, 1, 128, 4.0)
-    assert bearing(heights(stretched), stretched.sizes).anisotropy == pytest.approx(4, rel=1e-6)
+    assert bearing(heights(stretched), stretched.sizes).anisotropy == pytest.approx(
+        4, rel=1e-6
+    )
 
 
 def test_seed_gives_the_same_surface_on_every_grid():
@@ -75,13 +94,19 @@ def test_seed_gives_the_same_surface_on_every_grid():
     np.testing.assert_allclose(fine[::4, ::4], heights(RECIPE), atol=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "shape"), [("peaks", 0.5), ("valleys", 0.5), ("worn", 1.0), ("patchy", 0.6)])
+@pytest.mark.parametrize(
+    ("kind", "shape"), [("peaks", 0.5), ("valleys", 0.5), ("worn", 1.0), ("patchy", 0.6)]
+)
 def test_transforms_skew_and_normalise(kind, shape):
     z = heights(Recipe(kind, 0.8, 4, 4, 3, 128, shape))
     assert abs(z.mean()) < 1e-12
     assert z.std() == pytest.approx(1)
     skewness, kurtosis = np.mean(z**3), np.mean(z**4)
-    assert {"peaks": skewness > 0.5, "valleys": skewness < -0.5, "worn": skewness < -0.3}.get(kind, kurtosis > 3.5)
+    assert {
+        "peaks": skewness > 0.5,
+        "valleys": skewness < -0.5,
+        "worn": skewness < -0.3,
+    }.get(kind, kurtosis > 3.5)
 
 
 def test_bearing_of_a_paraboloid():
@@ -101,15 +126,24 @@ def test_design_holds_out_whole_spectra_and_whole_surfaces():
     assert len({task.recipe.name for task in tasks}) == len(tasks)
 
     def spectra(split):
-        return {dataclasses.replace(task.recipe, seed=0) for task in tasks if task.split == split}
+        return {
+            dataclasses.replace(task.recipe, seed=0)
+            for task in tasks
+            if task.split == split
+        }
 
     assert not spectra(TRAINING) & spectra(HELD_OUT_SPECTRUM)
-    assert {r.kind for r in spectra(TRAINING)} == {r.kind for r in spectra(HELD_OUT_SPECTRUM)}
+    assert {r.kind for r in spectra(TRAINING)} == {
+        r.kind for r in spectra(HELD_OUT_SPECTRUM)
+    }
     assert len({task.recipe.seed for task in tasks}) > 150
 
 
 def test_runs_resumes_and_collects(tmp_path):
-    tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "held_out_surface")]
+    tasks = [
+        Task(RECIPE, "training"),
+        Task(dataclasses.replace(RECIPE, seed=6), "held_out_surface"),
+    ]
     run(tasks[:1], tmp_path)
     before = (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns
     target = tmp_path / "evidence.nc"
@@ -119,11 +153,20 @@ def test_runs_resumes_and_collects(tmp_path):
     write_part(target, dataset(tasks, tmp_path), "elastic")
     with xr.open_dataset(target, group="elastic") as data:
         assert data.split.values.tolist() == [SPLITS.index(task.split) for task in tasks]
-        assert all("units" in v.attrs or "flag_meanings" in v.attrs for v in data.data_vars.values())
+        assert all(
+            "units" in v.attrs or "flag_meanings" in v.attrs
+            for v in data.data_vars.values()
+        )
         own = simulate(RECIPE)
-        np.testing.assert_array_equal(data.area[0, : len(own["force"])], own["area"].astype("f4"))
-        np.testing.assert_allclose(data.band_energy[0, : len(own["force"])], own["band_energy"], rtol=2.0**-10)
-        np.testing.assert_allclose(own["band_energy"][:15].sum(axis=1), own["energy"][:15], rtol=1e-6)
+        np.testing.assert_array_equal(
+            data.area[0, : len(own["force"])], own["area"].astype("f4")
+        )
+        np.testing.assert_allclose(
+            data.band_energy[0, : len(own["force"])], own["band_energy"], rtol=2.0**-10
+        )
+        np.testing.assert_allclose(
+            own["band_energy"][:15].sum(axis=1), own["energy"][:15], rtol=1e-6
+        )
         identity = data.mean_separation + 2 * data.energy / data.force
         np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
 
@@ -146,7 +189,10 @@ def test_other_campaigns_keep_what_their_files_hold(kind, tmp_path):
 
 def test_failures_come_last_and_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr("generate.boundary_elements.solve.MAX_ITERATIONS", 2)
-    tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
+    tasks = [
+        Task(RECIPE, "training"),
+        Task(dataclasses.replace(RECIPE, seed=6), "training"),
+    ]
     with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
         run(tasks, tmp_path)
     assert not list(tmp_path.iterdir())

@@ -28,7 +28,8 @@ from mbma_tables.theories.mbma.universal import UniversalModel
 
 # fresh points find other worst places than the few hundred of a small certificate
 STATED_FACTOR = 1.5
-# of numpy and its BLAS, on any processor with AVX2, the code of the one that made the shipped tables
+# of numpy and its BLAS, on any processor with AVX2, the code of the one that made the
+# shipped tables
 HASWELL = {
     "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
     "OPENBLAS_CORETYPE": "Haswell",
@@ -39,7 +40,8 @@ WITHOUT_FMA = {
     "OPENBLAS_CORETYPE": "Nehalem",
 }
 PROCESSORS = {"this one": {}, "with FMA": HASWELL, "without FMA": WITHOUT_FMA}
-# largest difference of rebuilt lookups and of the spline: a unit of the 40 digits is 9e-13 of a cell's mean
+# largest difference of rebuilt lookups and of the spline: a unit of the 40 digits is 9e-13
+# of a cell's mean
 REBUILT = 1e-11
 
 
@@ -56,15 +58,26 @@ def fresh(kind, content, count=4000, seed=5):
         X, mu = kind.held_out(content, count, seed)
         found = UniversalModel(content).answer(X, mu)
         solved = greenwood_tripp.solve(X, mu, rtol=1e-10)
-        ratio = np.stack([found.phi_F / solved.phi_F, found.phi_A / solved.phi_A], axis=-1)
+        ratio = np.stack(
+            [found.phi_F / solved.phi_F, found.phi_A / solved.phi_A], axis=-1
+        )
         return np.abs(ratio - 1), found.error[:, None]
     positions = [rng.uniform(0, axis.nodes - 1, count) for axis in content.axes]
-    X, mu = kind.arguments(*(axis.coordinate(p) for axis, p in zip(content.axes, positions, strict=True)))
+    X, mu = kind.arguments(
+        *(axis.coordinate(p) for axis, p in zip(content.axes, positions, strict=True))
+    )
     solved = greenwood_tripp.solve(X, mu, rtol=1e-10)
-    table = np.exp(evaluate(content.coefficients, positions)).T * greenwood_tripp.rigid_sphere(X, mu)
+    table = np.exp(
+        evaluate(content.coefficients, positions)
+    ).T * greenwood_tripp.rigid_sphere(X, mu)
     cells = content.local_error.shape[:-1]
-    where = tuple(error_cell(a, c, p) for a, c, p in zip(content.axes, cells, positions, strict=True))
-    return np.abs(table / np.stack([solved.phi_F, solved.phi_A]) - 1).T, content.local_error[where]
+    where = tuple(
+        error_cell(a, c, p)
+        for a, c, p in zip(content.axes, cells, positions, strict=True)
+    )
+    return np.abs(
+        table / np.stack([solved.phi_F, solved.phi_A]) - 1
+    ).T, content.local_error[where]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -73,7 +86,10 @@ def test_fresh_points_confirm_the_certificate_and_the_local_bound(kind, tmp_path
     errors, bound = fresh(kind, content)
     target = content.attributes["target"]
     for number, function in enumerate("FA"):
-        stated = [content.attributes[f"{what}_error_{function}"] for what in ("median", "p99", "largest")]
+        stated = [
+            content.attributes[f"{what}_error_{function}"]
+            for what in ("median", "p99", "largest")
+        ]
         assert 0 < stated[0] < stated[1] <= stated[2] <= target
         assert errors[:, number].max() <= min(STATED_FACTOR * target, 2 * stated[2])
         # half of the certificate's points lie where surfaces go, so only the order is the same
@@ -93,7 +109,9 @@ def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
         kind.certify(content.axes, content.coefficients)
 
 
-@pytest.mark.parametrize(("kind", "targets"), [("universal", (1e-4, 1e-6, 1e-8)), ("island4d", (1e-1, 2e-2))])
+@pytest.mark.parametrize(
+    ("kind", "targets"), [("universal", (1e-4, 1e-6, 1e-8)), ("island4d", (1e-1, 2e-2))]
+)
 def test_a_tighter_target_takes_more_coefficients_and_is_met(kind, targets, tmp_path):
     sizes, largest = [], []
     for target in targets:
@@ -102,7 +120,8 @@ def test_a_tighter_target_takes_more_coefficients_and_is_met(kind, targets, tmp_
         assert largest[-1] <= target
         sizes.append(content.coefficients.size)
     assert (np.diff(sizes) > 0).all()
-    # of high order: a hundredth of the error, or a fifth in four dimensions, for a few times the coefficients
+    # of high order: a hundredth of the error, or a fifth in four dimensions, for a few
+    # times the coefficients
     assert sizes[-1] < 6 * sizes[-2]
     assert largest[-1] < largest[-2] / 3
 
@@ -110,7 +129,9 @@ def test_a_tighter_target_takes_more_coefficients_and_is_met(kind, targets, tmp_
 def test_a_target_that_is_missed_is_refused(nodes):
     kind, content = nodes
     tight = dataclasses.replace(kind.configuration, target=1e-6)
-    with pytest.raises(UncertifiedError, match=r"the largest held-out error is .*, the target 1\.00e-06"):
+    with pytest.raises(
+        UncertifiedError, match=r"the largest held-out error is .*, the target 1\.00e-06"
+    ):
         type(kind)(tight).certify(content.axes, content.coefficients)
 
 
@@ -162,15 +183,29 @@ def test_any_workers_give_the_same_bits(monkeypatch):
     X, mu = np.linspace(0.0, 5.0, 40), np.geomspace(1e-3, 10.0, 40)
     expected = phi(X, mu, 1e-6)
     for workers in (1, 2):
-        found = Kind(load("universal"), workers).phi("test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6)
+        found = Kind(load("universal"), workers).phi(
+            "test", X.reshape(8, 5), mu.reshape(8, 5), 1e-6
+        )
         np.testing.assert_array_equal(found, expected.reshape(8, 5, 2))
 
 
 def rebuilt(kind, folder, **environment):
     """A shipped table made again by its command, in an environment of its own."""
     out = folder / f"{kind}.nc"
-    name = [sys.executable, "-m", "generate", "tables", kind, "--out", str(out), "--workers", "2"]
-    subprocess.run(name, cwd=ROOT, env=os.environ | environment, check=True, capture_output=True)
+    name = [
+        sys.executable,
+        "-m",
+        "generate",
+        "tables",
+        kind,
+        "--out",
+        str(out),
+        "--workers",
+        "2",
+    ]
+    subprocess.run(
+        name, cwd=ROOT, env=os.environ | environment, check=True, capture_output=True
+    )
     return read_table(out)
 
 
@@ -180,7 +215,9 @@ def test_the_shipped_tables_rebuild_to_the_last_bit(kind, tmp_path):
     """With the code of their processor type and their versions, as docs/tables.md says."""
     old = read_table(shipped(kind)).attributes
     if json.loads(old["versions"]) != versions():
-        pytest.skip("other versions or another arithmetic than those of the shipped tables")
+        pytest.skip(
+            "other versions or another arithmetic than those of the shipped tables"
+        )
     new = rebuilt(kind, tmp_path, **HASWELL).attributes
     differing = {key for key in old if old[key] != new[key]}
     # the record of the source follows every edit of it
@@ -201,22 +238,30 @@ def lookups(content):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("processor", PROCESSORS)
-def test_tables_rebuilt_on_another_processor_have_the_same_values(kind, processor, tmp_path):
+def test_tables_rebuilt_on_another_processor_have_the_same_values(
+    kind, processor, tmp_path
+):
     """numpy's functions and BLAS round otherwise there, and coefficients are rounded to 40 binary digits after that."""
     if processor != "this one" and platform.machine() not in ("x86_64", "AMD64"):
         pytest.skip("kernels of x86-64")
     old, new = read_table(shipped(kind)), rebuilt(kind, tmp_path, **PROCESSORS[processor])
-    assert {n: a.shape for n, a in old.arrays().items()} == {n: a.shape for n, a in new.arrays().items()}
+    assert {n: a.shape for n, a in old.arrays().items()} == {
+        n: a.shape for n, a in new.arrays().items()
+    }
     (before, scale), (after, _) = lookups(old), lookups(new)
     assert (np.abs(after - before) / scale).max() < REBUILT
     # arguments follow from the geometry of islands, which cancels digits where a band is narrow
     for name, stored in old.conformance.items():
-        np.testing.assert_allclose(new.conformance[name], stored, rtol=REBUILT, err_msg=name)
+        np.testing.assert_allclose(
+            new.conformance[name], stored, rtol=REBUILT, err_msg=name
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_shipped_table_names_the_sources_that_it_is_made_of(kind):
-    assert read_table(shipped(kind)).attributes["source_modules"].split() == list(MODULES[kind])
+    assert read_table(shipped(kind)).attributes["source_modules"].split() == list(
+        MODULES[kind]
+    )
     assert len(source_digest(MODULES[kind])) == 64
 
 
@@ -229,7 +274,9 @@ def refused(kind, folder, *arguments):
     assert result.stdout == ""
     assert result.stderr.startswith("generate: ")
     assert len(result.stderr.splitlines()) == 1
-    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    assert {
+        path: path.read_bytes() for path in folder.rglob("*") if path.is_file()
+    } == before
     return result.stderr
 
 
@@ -244,16 +291,31 @@ WRONG = [
     ("target = nan", "not JSON compliant"),
     ("max_nodes = 1.5", "max_nodes: 1.5 is not of type 'integer'"),
     ("variant = 'rubbed'", "variant: 'rubbed' is not one of"),
-    ("[axes.mu]\nhigh = 1e11", "axes.mu.high: 100000000000.0 is greater than the maximum of 10000000000.0"),
-    ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X: its nodes must increase from low to high"),
+    (
+        "[axes.mu]\nhigh = 1e11",
+        "axes.mu.high: 100000000000.0 is greater than the maximum of 10000000000.0",
+    ),
+    (
+        "[axes.X]\nlow = 5.0\nhigh = 2.0",
+        "axes.X: its nodes must increase from low to high",
+    ),
     ("variant = [", "is not a TOML file"),
-    (SMALL["universal"].replace("max_nodes = 5000", "max_nodes = 100"), "more than the 100 allowed; raise max_nodes"),
-    (SMALL["universal"].replace(LOW, "low = 90.0\nhigh = 100.0"), "hardly a surface visits these axes"),
+    (
+        SMALL["universal"].replace("max_nodes = 5000", "max_nodes = 100"),
+        "more than the 100 allowed; raise max_nodes",
+    ),
+    (
+        SMALL["universal"].replace(LOW, "low = 90.0\nhigh = 100.0"),
+        "hardly a surface visits these axes",
+    ),
 ]
 WRONG_4D = [
     ("[axes.hurst]\nhigh = 1.1", "axes.hurst.high: 1.1 is greater than the maximum of 1"),
     ("[axes.hurst]\noffset = 1.0", "[axes.hurst]: unknown key 'offset'"),
-    ("[axes.X]\noffset = -0.5", "axes.X: its nodes must increase from low to high, and low + offset be above 0"),
+    (
+        "[axes.X]\noffset = -0.5",
+        "axes.X: its nodes must increase from low to high, and low + offset be above 0",
+    ),
     ("[axes.X]\nnodes = 50000", "nodes, max_nodes allows"),
 ]
 
@@ -265,13 +327,17 @@ WRONG_4D = [
 def test_a_bad_configuration_is_refused(kind, text, message, tmp_path):
     path = tmp_path / "own.toml"
     path.write_text(text)
-    said = refused(kind, tmp_path, "--config", str(path), "--out", str(tmp_path / "sub" / "table.nc"))
+    said = refused(
+        kind, tmp_path, "--config", str(path), "--out", str(tmp_path / "sub" / "table.nc")
+    )
     assert message in said
     assert not (tmp_path / "sub").exists()
 
 
 def test_misuse_of_the_command_line_is_refused(tmp_path):
-    assert "--config and --target belong to one table" in refused("all", tmp_path, "--target", "1e-6")
+    assert "--config and --target belong to one table" in refused(
+        "all", tmp_path, "--target", "1e-6"
+    )
     assert "'--workers'" in refused("universal", tmp_path, "--workers", "0")
     assert "'univresal'" in refused("univresal", tmp_path)
     message = refused("universal", tmp_path, "--target", "1e-4", "--out", str(tmp_path))
@@ -283,7 +349,10 @@ def test_few_certificate_points_are_for_tables_that_are_not_shipped(tmp_path):
     path.write_text(f"certificate_points = {MIN_SHIPPED_POINTS - 1}")
     for out in ((), ("--out", str(TABLES / "other.nc"))):
         message = refused("universal", tmp_path, "--config", str(path), *out)
-        assert f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in" in message
+        assert (
+            f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in"
+            in message
+        )
     assert not (TABLES / "other.nc").exists()
     for kind in KINDS:
         assert load(kind).certificate_points >= MIN_SHIPPED_POINTS
@@ -292,17 +361,30 @@ def test_few_certificate_points_are_for_tables_that_are_not_shipped(tmp_path):
 def test_a_target_alone_is_a_configuration():
     shipped, same = load("island4d"), load("island4d", target=4e-4)
     assert same == shipped
-    loose, tight = load("island4d", target=0.1), load("island4d", target=shipped.target / 2)
+    loose, tight = (
+        load("island4d", target=0.1),
+        load("island4d", target=shipped.target / 2),
+    )
     # errors are of fourth order
     assert [axis.nodes for axis in tight.axes.values()] == [27, 55, 10, 16]
     assert {axis.nodes for axis in loose.axes.values()} < set(range(8, 20))
     assert load("universal", target=1e-6).target == 1e-6
-    assert len({made.attributes()["configuration_sha256"] for made in (shipped, loose, tight, load("universal"))}) == 4
+    assert (
+        len(
+            {
+                made.attributes()["configuration_sha256"]
+                for made in (shipped, loose, tight, load("universal"))
+            }
+        )
+        == 4
+    )
 
 
 def test_a_file_changes_what_it_names(tmp_path):
     path = tmp_path / "own.toml"
     path.write_text("[axes.spread]\nhigh = 10.0\nnodes = 17")
     found, shipped = load("island4d", path), load("island4d")
-    assert found.axes["spread"] == dataclasses.replace(shipped.axes["spread"], high=10.0, nodes=17)
+    assert found.axes["spread"] == dataclasses.replace(
+        shipped.axes["spread"], high=10.0, nodes=17
+    )
     assert found.axes["X"] == shipped.axes["X"]

@@ -27,7 +27,12 @@ def by_variant(rows):
 
 def test_references_agree_with_the_solver():
     surface, truth = cost.SURFACES[3], cost.reference()[3]
-    answer = contact(surface, separation=cost.gaps_of(surface)[:: cost.EVERY], island_model="exact", rtol=1e-10)
+    answer = contact(
+        surface,
+        separation=cost.gaps_of(surface)[:: cost.EVERY],
+        island_model="exact",
+        rtol=1e-10,
+    )
     for name in ("pressure", "area"):
         assert getattr(answer, name) == pytest.approx(truth[name], rel=1e-10, abs=0)
     answers = list(cost.reference())
@@ -37,11 +42,17 @@ def test_references_agree_with_the_solver():
     islands, phi = cost.held_out(40)
     solved = greenwood_tripp.solve(islands["X"], islands["mu"], rtol=1e-11)
     assert cost.island_error(solved.phi_F, solved.phi_A, phi) < 1e-11
-    assert cost.island_error(1.01 * solved.phi_F, solved.phi_A, phi) == pytest.approx(0.01, rel=1e-6, abs=0)
+    assert cost.island_error(1.01 * solved.phi_F, solved.phi_A, phi) == pytest.approx(
+        0.01, rel=1e-6, abs=0
+    )
 
 
 def test_totals_laws_and_theories(monkeypatch):
-    few = {"ISLAND_MODELS": ("universal", "rigid"), "RTOLS": (1e-1, 1e-2, 1e-4), "LAW_RTOLS": (1e-2,)}
+    few = {
+        "ISLAND_MODELS": ("universal", "rigid"),
+        "RTOLS": (1e-1, 1e-2, 1e-4),
+        "LAW_RTOLS": (1e-2,),
+    }
     few |= {"SLOW_LAW_RTOLS": (1e-1,), "MANY": 5, "measure": once}
     for name, value in few.items():
         monkeypatch.setattr(cost, name, value)
@@ -54,14 +65,26 @@ def test_totals_laws_and_theories(monkeypatch):
     # a call's cost is taken off, and the rest, here nothing, is shared by the gaps
     assert row.cost == pytest.approx(0, abs=1e-15)
     assert 1 < row.evaluations < 10  # gaps share islands
-    assert rows["universal", "call", "both"].cost == pytest.approx(COST / 6, rel=1e-12, abs=0)
+    assert rows["universal", "call", "both"].cost == pytest.approx(
+        COST / 6, rel=1e-12, abs=0
+    )
     # spheres that do not deform are not the model
     assert rows["rigid", "gap rtol=1e-02", "both"].error > 1
     assert rows["universal", "law rtol=1e-02", "both"].error < 1e-2
     assert rows["law", "lookup", "both"].cost == COST / 10_000
     rows = by_variant(cost.theory_rows())
-    assert {model for model, _, _ in rows} == {"calibrated", "persson", "greenwood_williamson"}
-    assert {row.what for row in rows.values()} == {"call", "gap", "invert", "energy", "law"}
+    assert {model for model, _, _ in rows} == {
+        "calibrated",
+        "persson",
+        "greenwood_williamson",
+    }
+    assert {row.what for row in rows.values()} == {
+        "call",
+        "gap",
+        "invert",
+        "energy",
+        "law",
+    }
     assert rows["persson", "law rtol=1e-05", "both"].cost == COST
 
 
@@ -69,7 +92,9 @@ def test_a_study_becomes_data(tmp_path, monkeypatch):
     shipped, seconds = shipped_costs(), iter([3.0, shipped_costs().seconds, *[2.0] * 5])
     own = [row for row in shipped.rows if row.island_model != "unit"]
     for name in ("island", "scene", "gap", "law", "theory", "first_use"):
-        monkeypatch.setattr(cost, f"{name}_rows", lambda name=name: own if name == "island" else [])
+        monkeypatch.setattr(
+            cost, f"{name}_rows", lambda name=name: own if name == "island" else []
+        )
     monkeypatch.setattr(cost, "measure", lambda run: (1.0, next(seconds)))
     monkeypatch.setattr(cost_distances, "study", lambda: b"")
     monkeypatch.setattr(cost, "ROOT", tmp_path)
@@ -83,22 +108,34 @@ def test_the_gauge_names_every_theory_and_way_at_its_measured_place():
     rows = pages_cost.gauge_rows(known)
     assert set(rows["theory"]) == set(pages_cost.COLOURS)
     law = rows[(rows["theory"] == "calibrated") & (rows["way"] == "law")].iloc[0]
-    shipped = next(row for row in shipped_distances() if (row.theory, row.way) == ("calibrated", "law"))
+    shipped = next(
+        row
+        for row in shipped_distances()
+        if (row.theory, row.way) == ("calibrated", "law")
+    )
     assert law["us"] == pytest.approx(1e6 * shipped.cost * shipped_costs().seconds)
     assert law["area_light"] == pytest.approx(100 * np.expm1(shipped.area_light))
     simulated = rows[rows["theory"] == "simulated"].iloc[0]
     assert 1e5 < simulated["us"] < 1e7
     assert simulated["force_light"] < 1 < simulated["area_light"] < 3
-    for panel, name in zip(pages_cost.draw_gauge(rows).axes, pages_cost.GAUGES, strict=True):
+    for panel, name in zip(
+        pages_cost.draw_gauge(rows).axes, pages_cost.GAUGES, strict=True
+    ):
         drawn = {line.get_label(): len(line.get_xydata()) for line in panel.lines}
-        assert drawn == dict.fromkeys(drawn, 0) | rows[rows[name].notna()].groupby("theory").size().to_dict()
+        assert (
+            drawn
+            == dict.fromkeys(drawn, 0)
+            | rows[rows[name].notna()].groupby("theory").size().to_dict()
+        )
 
 
 @pytest.mark.slow
 def test_points_of_theories_are_priced(monkeypatch):
     monkeypatch.setattr(cost_distances, "measure", once)
     monkeypatch.setattr(cost_distances, "SLOW_POINTS", 2)
-    prices = {(label, way): (cost, made) for label, way, _, cost, made in cost_distances.ways()}
+    prices = {
+        (label, way): (cost, made) for label, way, _, cost, made in cost_distances.ways()
+    }
     assert {label for label, _ in prices} == set(distances.THEORIES)
     assert prices["calibrated", "law"] == (COST / (3 * cost_distances.POINTS), COST / 3)
     assert prices["MBMA reported", "exact"] == (COST / 6, 0)
@@ -129,5 +166,7 @@ def test_the_shipped_distances_are_those_of_the_theories():
             expected = distances.summed_up(seen, found[quantity], *ends)[0]
             assert getattr(row, f"{quantity}_{kind}") == pytest.approx(expected, rel=1e-3)
     # island models solve one theory
-    island_models = [shipped["MBMA reported", way] for way in ("universal", "exact", "law")]
+    island_models = [
+        shipped["MBMA reported", way] for way in ("universal", "exact", "law")
+    ]
     assert len({(row.area_light, row.force_deep) for row in island_models}) == 1

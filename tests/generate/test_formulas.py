@@ -8,16 +8,33 @@ from generate import formulas as fit
 from generate.formulas import FORMS, MODULE, forms_text, module_text
 from generate.pages.library import expressions
 from mbma_tables import Surface, contact, greenwood_tripp
-from mbma_tables.theories.mbma.closed_forms import CERTIFICATES, FUNCTIONS, RANGES, evaluate
+from mbma_tables.theories.mbma.closed_forms import (
+    CERTIFICATES,
+    FUNCTIONS,
+    RANGES,
+    evaluate,
+)
 
-PRINTED = {"rel": 0.011, "abs": 0}  # three digits are stated, the largest error rounded up
-SHIPPED = {f"{form}_{result}": one for form, results in FUNCTIONS.items() for result, one in results.items()}
+PRINTED = {
+    "rel": 0.011,
+    "abs": 0,
+}  # three digits are stated, the largest error rounded up
+SHIPPED = {
+    f"{form}_{result}": one
+    for form, results in FUNCTIONS.items()
+    for result, one in results.items()
+}
 
 
 @pytest.fixture
 def few(monkeypatch):
     """Fits to few samples, kept apart from those of other tests."""
-    for name, value in (("POINTS", 300), ("HELD_OUT", 400), ("GRID", 60), ("TOTAL_POINTS", 800)):
+    for name, value in (
+        ("POINTS", 300),
+        ("HELD_OUT", 400),
+        ("GRID", 60),
+        ("TOTAL_POINTS", 800),
+    ):
         monkeypatch.setattr(fit, name, value)
     monkeypatch.setattr(fit, "TOTAL_HELD_OUT", 600)
     caches = fit.islands, fit.totals
@@ -44,28 +61,43 @@ def test_the_largest_error_is_least():
     assert error < 1.02 * exact.fun
 
 
-@pytest.mark.parametrize("name", ["pocket_phi_F", "pocket_phi_A", "totals_pressure", "totals_area"])
+@pytest.mark.parametrize(
+    "name", ["pocket_phi_F", "pocket_phi_A", "totals_pressure", "totals_area"]
+)
 def test_certificates_are_the_errors_at_held_out_points(name, few):
     function, stated = fit.certified(SHIPPED[name])
     if function.form == "totals":
         given, _ = fit.totals(600, fit.TOTAL_HELD_OUT_SEED)
-        surface = Surface(given["hurst"], 1.0, given["zeta_1"], 1.0, given["h_max_over_h_rms"])
-        found = contact(surface, separation=given["d_over_h_rms"], island_model="exact", rtol=1e-6)
+        surface = Surface(
+            given["hurst"], 1.0, given["zeta_1"], 1.0, given["h_max_over_h_rms"]
+        )
+        found = contact(
+            surface, separation=given["d_over_h_rms"], island_model="exact", rtol=1e-6
+        )
         exact = getattr(found, function.result)
     else:
         given, _ = fit.islands(function.form, 400, fit.HELD_OUT_SEED)
-        exact = getattr(greenwood_tripp.solve(given["X"], given["mu"], rtol=1e-11), function.result)
+        exact = getattr(
+            greenwood_tripp.solve(given["X"], given["mu"], rtol=1e-11), function.result
+        )
     error = np.abs(evaluate(function.steps, given)[function.result] / exact - 1)
     assert stated.points == error.size
     assert error.max() <= stated.largest
-    assert (np.median(error), error.max()) == pytest.approx((stated.median, stated.largest), **PRINTED)
+    assert (np.median(error), error.max()) == pytest.approx(
+        (stated.median, stated.largest), **PRINTED
+    )
     worst = {key: values[error.argmax()] for key, values in given.items()}
     assert stated.worst_at == pytest.approx(worst, **PRINTED)
     assert function.title.endswith(f"within {stated.largest:g}.")
-    assert stated.coefficients == CERTIFICATES[function.form][function.result].coefficients
+    assert (
+        stated.coefficients == CERTIFICATES[function.form][function.result].coefficients
+    )
 
 
-@pytest.mark.parametrize(("text", "good"), [("mu*(X + 1)", True), ("1/(X + 1)", False), ("X - 3 + 0*mu", False)])
+@pytest.mark.parametrize(
+    ("text", "good"),
+    [("mu*(X + 1)", True), ("1/(X + 1)", False), ("X - 3 + 0*mu", False)],
+)
 def test_falling_and_negative_forms_are_seen(text, good):
     ranges = {"X": (0.0, 25.0), "mu": (0.0, 2e3)}
     assert fit.rises({"phi_A": text}, "phi_A", ranges) == good
@@ -73,18 +105,28 @@ def test_falling_and_negative_forms_are_seen(text, good):
 
 def test_a_form_that_falls_is_refused(few, monkeypatch):
     monkeypatch.setattr(fit, "rises", lambda *_: False)
-    with pytest.raises(RuntimeError, match="phi_F of the pocket form does not rise with X everywhere"):
+    with pytest.raises(
+        RuntimeError, match="phi_F of the pocket form does not rise with X everywhere"
+    ):
         fit.certified(SHIPPED["pocket_phi_F"])
 
 
-@pytest.mark.parametrize(("form", "accuracy"), [("pocket", 3e-3), ("standard", 1e-3), ("long", 1e-4)])
+@pytest.mark.parametrize(
+    ("form", "accuracy"), [("pocket", 3e-3), ("standard", 1e-3), ("long", 1e-4)]
+)
 @pytest.mark.parametrize("result", ["phi_F", "phi_A"])
 def test_the_rigid_sphere_of_a_form(form, accuracy, result):
-    steps = {name: SHIPPED[f"{form}_{result}"].steps[name] for name in ("w", "p", "rigid")}
+    steps = {
+        name: SHIPPED[f"{form}_{result}"].steps[name] for name in ("w", "p", "rigid")
+    }
     X = np.array([-0.5, -0.37, 0.0, 0.61, 1.3, 2.9, 6.7, 15.3, 33.1, 60.0])
     exact = greenwood_tripp.rigid_sphere(X, np.ones(X.size))[int(result == "phi_A")]
-    assert np.abs(evaluate(steps, {"X": X})["rigid"] / exact - 1).max() <= np.expm1(accuracy)
-    assert (np.diff(evaluate(steps, {"X": np.linspace(-0.5, 60, 2001)})["rigid"]) > 0).all()
+    assert np.abs(evaluate(steps, {"X": X})["rigid"] / exact - 1).max() <= np.expm1(
+        accuracy
+    )
+    assert (
+        np.diff(evaluate(steps, {"X": np.linspace(-0.5, 60, 2001)})["rigid"]) > 0
+    ).all()
 
 
 def test_the_shipped_text_is_what_the_generator_prints():
@@ -95,9 +137,17 @@ def test_the_shipped_text_is_what_the_generator_prints():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_core_agrees_with_sympy_in_30_digits(name):
-    function, steps, rng = SHIPPED[name], expressions(SHIPPED[name]), np.random.default_rng(5)
+    function, steps, rng = (
+        SHIPPED[name],
+        expressions(SHIPPED[name]),
+        np.random.default_rng(5),
+    )
     ranges = RANGES[function.form]
-    given = {argument: rng.uniform(*ranges[argument], 2) for argument in ranges if argument != "area"}
+    given = {
+        argument: rng.uniform(*ranges[argument], 2)
+        for argument in ranges
+        if argument != "area"
+    }
     if function.form == "totals":
         given["d_over_h_rms"] = given["h_max_over_h_rms"] - rng.uniform(0.1, 6, 2)
     else:
@@ -108,4 +158,6 @@ def test_the_core_agrees_with_sympy_in_30_digits(name):
         values = {argument: float(both[number]) for argument, both in given.items()}
         for step, expression in steps.items():
             values[step] = expression.evalf(30, subs=values)
-        assert found[number] == pytest.approx(float(values[function.result]), rel=1e-12, abs=0)
+        assert found[number] == pytest.approx(
+            float(values[function.result]), rel=1e-12, abs=0
+        )

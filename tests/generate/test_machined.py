@@ -37,7 +37,8 @@ def test_truth_of_a_part():
     pytest.importorskip("tamaas")
     found = solved(Part("gaussian", 2, 64))
     assert (np.diff(found["area"]) > 0).all()
-    # the stiffness is the slope of u, though with steps at light contact of a map of few waves, and flow falls
+    # the stiffness is the slope of u, though with steps at light contact of a map of few
+    # waves, and flow falls
     slope = np.diff(np.log(found["pressure"])) / -np.diff(found["mean_separation"])
     middle = found["stiffness"] / found["pressure"]
     assert ((slope > 0.6 * middle[:-1]) & (slope < 1.2 * middle[1:])).all()
@@ -49,10 +50,15 @@ def test_what_is_solved_and_answered_becomes_the_group(data, tmp_path, monkeypat
     monkeypatch.setattr(campaign, "parts", lambda: [part])
     for form in ("", *campaign.FORMS, "hardness"):
         (tmp_path / form).mkdir(exist_ok=True)
-        names = [n for n in campaign.TEXTS["columns"] if (f"{form}_{n}" if form else n) in data]
+        names = [
+            n for n in campaign.TEXTS["columns"] if (f"{form}_{n}" if form else n) in data
+        ]
         columns = {name: rng.random(7) for name in names}
         if form == "hardness":
-            columns = {f"hard_{name}": rng.random(data[f"hard_{name}"].shape[1:]) for name in campaign.TEXTS["hard"]}
+            columns = {
+                f"hard_{name}": rng.random(data[f"hard_{name}"].shape[1:])
+                for name in campaign.TEXTS["hard"]
+            }
         np.savez(tmp_path / form / part.name, engine="Tamaas", **columns)
     made = campaign.gathered(tmp_path)
     assert {n: (v.attrs, v.dims) for n, v in made.variables.items()} == {
@@ -66,11 +72,16 @@ def test_the_file_is_of_these_makers(data):
     assert data.sizes["surface"] == len(campaign.parts()) == 142
     for part in (Part("honed", 1), Part("eroded", 9), Part("worn", 2, 512)):
         values, name = heights(part), part.name
-        assert float(data.h_rms.sel(surface=name)) == pytest.approx(values.std(), rel=1e-6)
+        assert float(data.h_rms.sel(surface=name)) == pytest.approx(
+            values.std(), rel=1e-6
+        )
     assert {part.name for part in campaign.parts()} == set(data.surface.values)
 
 
-@pytest.mark.parametrize(("quantity", "bar"), [("area", 0.03), ("pressure", 0.02), ("stiffness", 0.05), ("flow", 0.15)])
+@pytest.mark.parametrize(
+    ("quantity", "bar"),
+    [("area", 0.03), ("pressure", 0.02), ("stiffness", 0.05), ("flow", 0.15)],
+)
 def test_a_pressed_map_is_as_near_to_the_full_grid_as_asked(data, quantity, bar):
     found = evaluation.errors(data, "simulated", quantity)
     kept = evaluation.seen(data, "simulated", quantity)
@@ -86,7 +97,9 @@ def test_a_pressed_map_is_as_near_to_the_full_grid_as_asked(data, quantity, bar)
 def test_where_valid_the_scatter_covers_the_errors(data, form, quantity):
     once, twice, number = evaluation.coverage(data, form, quantity, True)
     if (form, quantity) == ("calibrated", "flow"):
-        assert number == 0  # channels and walls of maps are not in their isotropic spectrum
+        assert (
+            number == 0
+        )  # channels and walls of maps are not in their isotropic spectrum
         return
     assert number > 30
     assert 0.6 < once < 0.95
@@ -106,7 +119,9 @@ def test_constants_of_the_other_families_cover_the_errors_of_one(data, form, qua
 
 
 @pytest.mark.parametrize("quantity", ["area", "pressure", "stiffness"])
-def test_constants_of_the_other_maps_cover_the_errors_of_the_calibrated_law(data, quantity):
+def test_constants_of_the_other_maps_cover_the_errors_of_the_calibrated_law(
+    data, quantity
+):
     ratio = evaluation.left_out(data, "calibrated", quantity)
     assert [family for family, own in ratio.items() if own.size] == ["gaussian"]
     assert 0.6 < np.mean(ratio["gaussian"] < 1) < 0.85
@@ -116,14 +131,18 @@ def test_constants_of_the_other_maps_cover_the_errors_of_the_calibrated_law(data
 @pytest.mark.parametrize("theory", [BoundaryElements, Corrected])
 @pytest.mark.parametrize("quantity", evaluation.QUANTITIES)
 def test_the_librarys_constants_are_not_below_those_of_the_fit(data, theory, quantity):
-    found = evaluation.by_area(data, theory.name, quantity, np.arange(data.sizes["surface"]))
+    found = evaluation.by_area(
+        data, theory.name, quantity, np.arange(data.sizes["surface"])
+    )
     known = np.isfinite(found)
     assert (np.array(theory.scatters[quantity])[known] > 0.97 * found[known]).all()
 
 
 def test_a_fit_finds_constants_that_are_known():
     ratio = np.random.default_rng(3).standard_normal(20_000)
-    expected = max(norm.ppf((1 + evaluation.ONCE) / 2), norm.ppf((1 + evaluation.TWICE) / 2) / 2)
+    expected = max(
+        norm.ppf((1 + evaluation.ONCE) / 2), norm.ppf((1 + evaluation.TWICE) / 2) / 2
+    )
     assert evaluation.reached(np.abs(ratio)) == pytest.approx(expected, rel=0.03)
 
 
@@ -148,15 +167,27 @@ def test_the_quick_law_is_wrong_where_it_is_not_valid(data):
         assert twice > 0.88
 
 
-@pytest.mark.parametrize(("family", "low", "high"), [("honed", 0, 0.8), ("worn", 0, 0.8), ("gaussian", 0.98, 1.02)])
-def test_plateaus_are_nearer_by_the_constants_that_were_fitted_to_them(data, family, low, high):
+@pytest.mark.parametrize(
+    ("family", "low", "high"),
+    [("honed", 0, 0.8), ("worn", 0, 0.8), ("gaussian", 0.98, 1.02)],
+)
+def test_plateaus_are_nearer_by_the_constants_that_were_fitted_to_them(
+    data, family, low, high
+):
     missed = []
     for part in (Part(family, number) for number in range(campaign.NUMBERS)):
         one, own = data.sel(surface=part.name), surface_of(part)[1]
         law = MapLaw.from_curves(own.bearing, own.bands)
         for shift in (0.0, PLATEAU_SHIFT):
             other = dataclasses.replace(law, plateau_shift=shift)
-            u = other.separation(one.pressure.values / own.bearing.gradient) * own.bearing.h_rms
-            missed.append((u - one.mean_separation.values) * one.stiffness.values / one.pressure.values)
+            u = (
+                other.separation(one.pressure.values / own.bearing.gradient)
+                * own.bearing.h_rms
+            )
+            missed.append(
+                (u - one.mean_separation.values)
+                * one.stiffness.values
+                / one.pressure.values
+            )
     before, after = np.sqrt(np.mean(np.square([missed[::2], missed[1::2]]), axis=(1, 2)))
     assert low < after / before < high

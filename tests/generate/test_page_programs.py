@@ -39,8 +39,13 @@ def test_every_command_has_help(what):
 
 
 def test_every_command_of_the_docs_is_there():
-    texts = [path.read_text("utf-8") for path in (ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md"))]
-    named = {name for text in texts for name in re.findall(r"python -m generate (\w+)", text)}
+    texts = [
+        path.read_text("utf-8")
+        for path in (ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md"))
+    ]
+    named = {
+        name for text in texts for name in re.findall(r"python -m generate (\w+)", text)
+    }
     assert {"score", "tables"} < named <= {"pages", *COMMANDS}
 
 
@@ -48,15 +53,23 @@ def test_ratios_of_a_theory_to_itself_are_one():
     surface = Surface(hurst=0.8, q0=0.01, q1=0.5, h_rms=1.0, h_max=3.0)
     u = np.array([1.2, 2.0, 2.5])
     found = contact(surface, mean_separation=u, theory="persson")
-    area, force = maps.ratios(theories.Persson(), surface, found.pressure, 2 * found.area, u)
+    area, force = maps.ratios(
+        theories.Persson(), surface, found.pressure, 2 * found.area, u
+    )
     np.testing.assert_allclose(area, 0.5, rtol=1e-3)
     np.testing.assert_allclose(force, 1.0, rtol=1e-9)
-    assert np.isnan(maps.ratios(theories.Persson(), surface, np.array([1e3]), np.array([1.0]), u[:1])[0])
+    assert np.isnan(
+        maps.ratios(theories.Persson(), surface, np.array([1e3]), np.array([1.0]), u[:1])[
+            0
+        ]
+    )
 
 
 def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):
     parts = {"corners": "of corners"}
-    monkeypatch.setattr("generate.pages.stability.measure", lambda: (parts, {"docs/a/b.svg": SVG}))
+    monkeypatch.setattr(
+        "generate.pages.stability.measure", lambda: (parts, {"docs/a/b.svg": SVG})
+    )
     place = tmp_path / "docs"
     assert run(main, "pages", "stability", "--out", tmp_path).split() == [
         str(place / "stability.md"),
@@ -64,15 +77,24 @@ def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):
     ]
     text = (place / "stability.md").read_text(encoding="utf-8")
     assert [match[0] for match in MARKED.finditer(text)] == [
-        f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->" for name, part in parts.items()
+        f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->"
+        for name, part in parts.items()
     ]
-    assert MARKED.sub("", text) == MARKED.sub("", (ROOT / "docs" / "stability.md").read_text(encoding="utf-8"))
+    assert MARKED.sub("", text) == MARKED.sub(
+        "", (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    )
     assert (place / "a" / "b.svg").read_bytes() == SVG
 
 
 def test_figures_are_small_drawings_each_shown_by_a_page():
     pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]
-    shown = {name for page in pages for name in re.findall(r"\]\((?:docs/)?figures/([^)]+)\)", page.read_text("utf-8"))}
+    shown = {
+        name
+        for page in pages
+        for name in re.findall(
+            r"\]\((?:docs/)?figures/([^)]+)\)", page.read_text("utf-8")
+        )
+    }
     assert shown == {path.name for path in (ROOT / "docs" / "figures").iterdir()}
     # a photograph of the screen
     for name in shown - {"explorer.png"}:
@@ -85,7 +107,10 @@ def test_figures_are_small_drawings_each_shown_by_a_page():
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        (ModuleNotFoundError("No module named 'mpmath'"), "No module named 'mpmath'; install the extra: pip install"),
+        (
+            ModuleNotFoundError("No module named 'mpmath'"),
+            "No module named 'mpmath'; install the extra: pip install",
+        ),
         (InputError("no such\nthing"), "no such thing"),
     ],
 )
@@ -133,7 +158,15 @@ def test_what_goes_wrong_is_counted():
     def refuse():
         raise InputError("no")
 
-    answers = [lambda: ([1.0], 0.1), lambda: ([1.5], 0.1), lambda: ([math.nan], 0.1), lambda: ([1 / 0], 0.1), refuse]
+    answers = [
+        lambda: ([1.0], 0.1),
+        lambda: ([1.5], 0.1),
+        lambda: ([math.nan], 0.1),
+        lambda: ([1 / 0], 0.1),
+        refuse,
+    ]
     found = [stability.outcome(answer, [1.0]) for answer in answers]
-    assert [one.error for one in found] == pytest.approx([0.0, 0.5, math.nan, math.nan, math.nan], nan_ok=True)
+    assert [one.error for one in found] == pytest.approx(
+        [0.0, 0.5, math.nan, math.nan, math.nan], nan_ok=True
+    )
     assert stability.row("some", found) == ["some", 5, 1, 2, 0, 0.5, 1]

@@ -9,7 +9,15 @@ import pytest
 from helpers import Springs, random_map, refusals, with_slopes
 from scipy.integrate import quad
 
-from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law, theories
+from mbma_tables import (
+    ConvergenceError,
+    InputError,
+    OutOfRangeError,
+    Surface,
+    contact,
+    contact_law,
+    theories,
+)
 from mbma_tables.theories import THEORIES, GreenwoodWilliamson, Mbma, Persson, get_theory
 
 SURFACE = Surface(hurst=0.8, q0=0.2, q1=20.0, h_rms=1.5, h_max=4.8)
@@ -40,7 +48,9 @@ class Peak:
 
 OBJECTS = [Persson("simplified"), Cones()]
 each = pytest.mark.parametrize(
-    "theory", [name for name in THEORIES if name != "mbma"] + OBJECTS, ids=lambda t: getattr(t, "name", t)
+    "theory",
+    [name for name in THEORIES if name != "mbma"] + OBJECTS,
+    ids=lambda t: getattr(t, "name", t),
 )
 
 
@@ -52,13 +62,21 @@ def law_of(theory, surface=SURFACE, rtol=1e-8):
 def places(law, seed, count=400):
     """Mean separations of the law, most of them between 1% and 99% of h_max, some near its ends."""
     low = (law.h_max + law.lowest) / 2
-    high = law.h_max if law.highest == math.inf else min(2 * law.h_max, (law.h_max + law.highest) / 2)
+    high = (
+        law.h_max
+        if law.highest == math.inf
+        else min(2 * law.h_max, (law.h_max + law.highest) / 2)
+    )
     u = np.random.default_rng(seed).uniform(max(low, 0.01 * law.h_max), high, count)
-    return np.sort(np.append(u, [low * 1.001 + 1e-4 * law.h_max, high - 1e-5 * law.h_max]))
+    return np.sort(
+        np.append(u, [low * 1.001 + 1e-4 * law.h_max, high - 1e-5 * law.h_max])
+    )
 
 
 @each
-@pytest.mark.parametrize("surface", [SURFACE, STEEP, FINE], ids=["usual", "steep", "fine"])
+@pytest.mark.parametrize(
+    "surface", [SURFACE, STEEP, FINE], ids=["usual", "steep", "fine"]
+)
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 def test_within_its_bound_of_the_theory(theory, surface, rtol):
     law, chosen = law_of(theory, surface, rtol), get_theory(theory)
@@ -66,7 +84,10 @@ def test_within_its_bound_of_the_theory(theory, surface, rtol):
     true = chosen.answer(surface, u)
     own = np.nan_to_num(true.error).max()
     assert law.error <= max(rtol, 0.1 * own) + own + 1e-15
-    for found, wanted in ((law.pressure(u) / MODULUS, true.pressure), (law.area(u), true.area)):
+    for found, wanted in (
+        (law.pressure(u) / MODULUS, true.pressure),
+        (law.area(u), true.area),
+    ):
         assert np.abs(found / wanted - 1).max() <= law.error
     if isinstance(chosen, Persson | GreenwoodWilliamson) and rtol == 1e-8:
         assert law.stiffness(u) / MODULUS == pytest.approx(true.stiffness, rel=2e-6)
@@ -92,11 +113,20 @@ def test_slopes_and_energy_are_those_of_the_force(theory):
         assert slope(separation=d) == pytest.approx(steep, rel=1e-6)
     end = law.h_max if law.highest == math.inf else law.highest
     for gap, energy in zip(d, law.energy(separation=d), strict=True):
-        work = quad(lambda d: law.pressure(separation=d), gap, min(end, gap + 60), epsabs=0, epsrel=1e-9, limit=400)[0]
+        work = quad(
+            lambda d: law.pressure(separation=d),
+            gap,
+            min(end, gap + 60),
+            epsabs=0,
+            epsrel=1e-9,
+            limit=400,
+        )[0]
         assert energy == pytest.approx(work / 2, rel=1e-6)
     # over the mean separation, which moves half as far
     u = (law.h_max + d) / 2
-    assert law.energy(separation=d) == pytest.approx(MODULUS * get_theory(theory).energy(SURFACE, u), rel=1e-6)
+    assert law.energy(separation=d) == pytest.approx(
+        MODULUS * get_theory(theory).energy(SURFACE, u), rel=1e-6
+    )
 
 
 @each
@@ -117,7 +147,9 @@ def test_inverses(theory):
 
 def test_no_load_and_no_contact():
     law = contact_law(SURFACE, theory=Cones())
-    assert contact_law(SURFACE, rtol=1e-3, theory=Noisy()).error < 2e-3  # a tolerance above the noise
+    assert (
+        contact_law(SURFACE, rtol=1e-3, theory=Noisy()).error < 2e-3
+    )  # a tolerance above the noise
     assert law.separation(pressure=0.0) == law.h_max
     assert law.pressure(separation=[law.h_max, 2 * law.h_max]).tolist() == [0, 0]
     assert law.energy(separation=law.h_max) == law.stiffness(separation=law.h_max) == 0
@@ -125,10 +157,18 @@ def test_no_load_and_no_contact():
     assert law.pressure(separation=tiny) == pytest.approx(1e-12, rel=1e-5)
     endless = contact_law(SURFACE, theory="persson")
     assert endless.pressure(2 * endless.h_max) > 0
-    for asked in ({"pressure": 0.0}, {"pressure": 1e-60}, {"area": 1.0}, {"pressure": -1.0}):
+    for asked in (
+        {"pressure": 0.0},
+        {"pressure": 1e-60},
+        {"area": 1.0},
+        {"pressure": -1.0},
+    ):
         with pytest.raises(OutOfRangeError):
             endless.separation(**asked)
-    for u, told in ((0.0, "where the theory ends"), (100 * endless.h_max, "where the law ends")):
+    for u, told in (
+        (0.0, "where the theory ends"),
+        (100 * endless.h_max, "where the law ends"),
+    ):
         with pytest.raises(OutOfRangeError, match=told):
             endless.pressure(u)
 
@@ -168,9 +208,15 @@ class Negative:
 
 test_what_is_no_law = refusals(
     lambda asked: contact_law(**({"surface": SURFACE} | asked)),
-    ({"theory": "persson", "island_model": "exact"}, "island_model: options of theory 'mbma'"),
+    (
+        {"theory": "persson", "island_model": "exact"},
+        "island_model: options of theory 'mbma'",
+    ),
     ({"theory": "persson", "rtol": 1e-10}, "rtol"),
-    ({"theory": "persson", "surface": Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0)}, "one surface, got a batch"),
+    (
+        {"theory": "persson", "surface": Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0)},
+        "one surface, got a batch",
+    ),
     ({"theory": Negative()}, "no positive force and area"),
     ({"theory": Noisy()}, "theory 'cones': the law needs more than .* use a larger rtol"),
     error=(InputError, ConvergenceError),
@@ -178,9 +224,17 @@ test_what_is_no_law = refusals(
 
 
 def test_mbma_ends_where_its_force_turns():
-    batch = Surface(hurst=[0.3, 0.7, 0.9], q0=1.0, q1=[1000.0, 60.0, 216.0], h_rms=1.0, h_max=[3.0, 3.0, 3.5])
+    batch = Surface(
+        hurst=[0.3, 0.7, 0.9],
+        q0=1.0,
+        q1=[1000.0, 60.0, 216.0],
+        h_rms=1.0,
+        h_max=[3.0, 3.0, 3.5],
+    )
     turn = contact_law(Surface(0.3, 1.0, 1000.0, 1.0, 3.0), "mbma").turning_point
-    assert Mbma().interval(batch)[0] == pytest.approx(np.array([(3.0 + turn) / 2, 0, 0]), abs=1e-5)
+    assert Mbma().interval(batch)[0] == pytest.approx(
+        np.array([(3.0 + turn) / 2, 0, 0]), abs=1e-5
+    )
 
 
 def test_a_users_own_object_is_a_theory():
@@ -188,8 +242,12 @@ def test_a_users_own_object_is_a_theory():
     u = np.array([0.5, 2.0])
     found = theory.answer(SURFACE, u)
     assert found.stiffness == pytest.approx(3 / SURFACE.h_rms * found.pressure, rel=1e-8)
-    assert theory.mean_separation_at(SURFACE, "pressure", found.pressure) == pytest.approx(u, rel=1e-10)
-    work = (found.pressure - np.exp(-3 * SURFACE.h_max / SURFACE.h_rms)) * SURFACE.h_rms / 3
+    assert theory.mean_separation_at(
+        SURFACE, "pressure", found.pressure
+    ) == pytest.approx(u, rel=1e-10)
+    work = (
+        (found.pressure - np.exp(-3 * SURFACE.h_max / SURFACE.h_rms)) * SURFACE.h_rms / 3
+    )
     assert theory.energy(SURFACE, u) == pytest.approx(work, rel=1e-8)
 
 
@@ -200,7 +258,11 @@ def test_what_is_no_theory_is_refused(wrong):
 
 
 YANG_PERSSON = Surface.named("yang-persson")
-SPHERES, FULL, LIGHT = theories.GreenwoodWilliamson(), theories.Persson(), theories.Persson("simplified")
+SPHERES, FULL, LIGHT = (
+    theories.GreenwoodWilliamson(),
+    theories.Persson(),
+    theories.Persson("simplified"),
+)
 
 
 def separation(surface, load, theory=FULL):
@@ -233,7 +295,9 @@ def printed_separation(hurst, zeta_1, slope, load, digits):
 
             def integrand(t):  # p' = p0 exp(t)
                 x = w_q * p0 * mpmath.exp(t)
-                return (gamma + 3 * (1 - gamma) * mpmath.erf(x) ** 2) * mpmath.exp(base - x * x)
+                return (gamma + 3 * (1 - gamma) * mpmath.erf(x) ** 2) * mpmath.exp(
+                    base - x * x
+                )
 
             return mpmath.quad(integrand, mpmath.linspace(0, span, int(span / 3) + 2))
 
@@ -245,7 +309,9 @@ def printed_separation(hurst, zeta_1, slope, load, digits):
         top = mpmath.log(mpmath.log(z))
         low = max(top + mpmath.log(base / (base + 80)) - 2, -mpmath.mpf(90))
         pieces = mpmath.linspace(low, top, int((top - low) / 3) + 2)
-        return float(mpmath.sqrt(mpmath.pi) * mpmath.exp(-base) * mpmath.quad(outer, pieces) / h)
+        return float(
+            mpmath.sqrt(mpmath.pi) * mpmath.exp(-base) * mpmath.quad(outer, pieces) / h
+        )
 
 
 # printed_separation(..., digits=25), up to two minutes each; the last two are computed here
@@ -266,7 +332,10 @@ PRINTED = [
 @pytest.mark.parametrize(("hurst", "zeta_1", "slope", "load", "expected"), PRINTED)
 def test_full_double_integral_equals_mpmath(hurst, zeta_1, slope, load, expected):
     known = expected or printed_separation(hurst, zeta_1, slope, load, digits=16)
-    assert relative(separation(Surface(hurst, slope, slope * zeta_1, 1.0, 3.0), load), known) < 1e-11
+    assert (
+        relative(separation(Surface(hurst, slope, slope * zeta_1, 1.0, 3.0), load), known)
+        < 1e-11
+    )
 
 
 def test_simplified_force_of_the_yang_persson_case():
@@ -279,7 +348,9 @@ def test_simplified_force_of_the_yang_persson_case():
 def test_simplified_is_the_light_load_limit_of_full(hurst):
     """Up to the four digits of 4.047 they are one: at light load the constant of (21b) follows from (19)."""
     surface = Surface(hurst, 0.1, 20.0, 1.0, 3.0)
-    expected = quad(lambda x: math.erf(x) ** 2 * math.exp(-x * x) / x, 0, 7, epsabs=0, epsrel=1e-12)[0]
+    expected = quad(
+        lambda x: math.erf(x) ** 2 * math.exp(-x * x) / x, 0, 7, epsabs=0, epsrel=1e-12
+    )[0]
     constant = math.exp(3 * 0.58 / 0.42 * expected - np.euler_gamma / 2)
     assert constant == pytest.approx(4.047, rel=1e-3)
     # the next term is of first order in the load
@@ -329,7 +400,12 @@ def test_greenwood_williamson_deep_and_far():
     x = 36.0
     far = SPHERES.answer(s, (s.h_max + x * s.summit_sigma) / 2)
     # F_1/F_{3/2} -> sqrt(x)/Gamma(5/2), the next term below 3/x^2
-    ratio = (far.area / far.pressure) * 4 / (3 * math.pi) / np.sqrt(s.summit_radius / s.summit_sigma)
+    ratio = (
+        (far.area / far.pressure)
+        * 4
+        / (3 * math.pi)
+        / np.sqrt(s.summit_radius / s.summit_sigma)
+    )
     assert relative(ratio, math.sqrt(x) / math.gamma(2.5)) < 3 / x**2
     assert SPHERES.answer(s, 31.5).pressure == 0
 
@@ -355,11 +431,18 @@ def test_extreme_loads_stay_numbers():
     assert relative(separation(YANG_PERSSON, [1e-300, 1e-150], LIGHT), light) < 1e-4
     assert separation(YANG_PERSSON, 1e300) == 0
     # p0/Y about which exp(-(p0/Y)^2) is no normal number any more
-    vanishing = separation(YANG_PERSSON, math.sqrt(YANG_PERSSON.m2) * np.linspace(25.0, 28.0, 31))
+    vanishing = separation(
+        YANG_PERSSON, math.sqrt(YANG_PERSSON.m2) * np.linspace(25.0, 28.0, 31)
+    )
     assert (np.diff(vanishing) <= 0).all()
     assert vanishing[0] > 0 == vanishing[-1]
     loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
-    assert relative(FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).pressure, loads) < 1e-9
+    assert (
+        relative(
+            FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).pressure, loads
+        )
+        < 1e-9
+    )
 
 
 @pytest.mark.parametrize("hardness", [0.0264, 0.043, 0.1135])

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from generate.pages.simulations import spheres
-from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, rough_contact
+from mbma_tables import (
+    InputError,
+    OutOfRangeError,
+    Surface,
+    greenwood_tripp,
+    rough_contact,
+)
 from mbma_tables.export.law_code import law_files, law_text
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import targets
@@ -27,14 +33,26 @@ def test_smooth_bodies_are_hertz(shape):
     R, E, before = 1000.0, 110.0, np.inf
     for h_rms in (0.05, 0.005, 0.0005):
         face = Surface(0.8, 0.05, 1.5, h_rms, 3.5 * h_rms)
-        found = rough_contact(face, R, shape=shape, approach=1.0, E_star=E, theory="calibrated")
+        found = rough_contact(
+            face, R, shape=shape, approach=1.0, E_star=E, theory="calibrated"
+        )
         if shape == "sphere":
             a, force = math.sqrt(R), 4 / 3 * E * math.sqrt(R)
         else:  # Johnson (4.43), (5.57) of a cylinder on a rigid flat
             a = math.sqrt(4 * R * found.force / (math.pi * E))
             force = math.pi * E / (2 * math.log(4 * R / a) - 1)
         p0 = 2 * E * a / math.pi / R if shape == "sphere" else E * a / (2 * R)
-        off = max(abs(np.log([found.force / force, found.contact_radius / a, found.pressure[0] / p0])))
+        off = max(
+            abs(
+                np.log(
+                    [
+                        found.force / force,
+                        found.contact_radius / a,
+                        found.pressure[0] / p0,
+                    ]
+                )
+            )
+        )
         assert off < max(before / 3, 3e-4)
         before = off
     assert off < 3e-4
@@ -59,7 +77,12 @@ class Asperities(Theory):
     def answer(self, surface, mean_separation):
         d = np.asarray(mean_separation) - self.ABOVE
         force, area, slope = (height_integral(n, d) for n in (1.5, 1.0, 0.5))
-        return TheoryAnswer(self.strength * force, 1e-3 * area, 1.5 * self.strength * slope, np.full(d.shape, 1e-13))
+        return TheoryAnswer(
+            self.strength * force,
+            1e-3 * area,
+            1.5 * self.strength * slope,
+            np.full(d.shape, 1e-13),
+        )
 
     def interval(self, surface, quantity="pressure"):
         return np.asarray(0.0), np.asarray(self.ABOVE + 30)
@@ -74,7 +97,9 @@ def test_the_island_problem_by_another_solver(mu):
     R, X = 300.0, np.array([-1.0, 3.0, 8.0])
     L = math.sqrt(2 * R)
     found = Asperities(mu, L).pressed(R, X)
-    np.testing.assert_allclose(found.force / L, greenwood_tripp.solve(X, mu).phi_F, rtol=1e-6)
+    np.testing.assert_allclose(
+        found.force / L, greenwood_tripp.solve(X, mu).phi_F, rtol=1e-6
+    )
 
 
 @pytest.mark.parametrize("mu", [4.0, 17.0])
@@ -86,18 +111,31 @@ def test_the_published_limit_of_roughness(mu):
     alpha, p0 = R / a0**2, 2 * a0 / math.pi / R
     assert alpha.min() < 0.05 < alpha.max()
     wider, lower = (
-        np.interp(0.05, alpha[::-1], ratio[::-1]) for ratio in (found.contact_radius / a0, found.pressure[:, 0] / p0)
+        np.interp(0.05, alpha[::-1], ratio[::-1])
+        for ratio in (found.contact_radius / a0, found.pressure[:, 0] / p0)
     )
     assert 1.01 < wider < 1.07
     assert 0.93 < lower < 0.99
 
 
 def test_force_laws_and_their_code(tmp_path):
-    found = rough_contact(FACE, "5 mm", approach=["-1 um", "0.5 um", "2 um"], E_star="110 GPa", theory="calibrated")
+    found = rough_contact(
+        FACE,
+        "5 mm",
+        approach=["-1 um", "0.5 um", "2 um"],
+        E_star="110 GPa",
+        theory="calibrated",
+    )
     law = found.law(1e-4)
     for name in ("force", "stiffness", "area"):
-        np.testing.assert_allclose(getattr(law, name)(found.approach), getattr(found, name), rtol=1e-3)
-    np.testing.assert_allclose(law.approach([f"{value:.17g} N" for value in found.force]), found.approach, rtol=1e-5)
+        np.testing.assert_allclose(
+            getattr(law, name)(found.approach), getattr(found, name), rtol=1e-3
+        )
+    np.testing.assert_allclose(
+        law.approach([f"{value:.17g} N" for value in found.force]),
+        found.approach,
+        rtol=1e-5,
+    )
     # the work is the integral of the force
     x = np.linspace(law.first, 1.0, 2001)
     assert law.energy(1.0) == pytest.approx(np.trapezoid(law.force(x), x), rel=1e-5)
@@ -107,16 +145,29 @@ def test_force_laws_and_their_code(tmp_path):
     assert "not valid below p = " in text
     if shutil.which("gcc"):
         (tmp_path / "ball.c").write_text(text)
-        subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "ball.c", "-lm", "-o", "ball.so"], cwd=tmp_path, check=True)
+        subprocess.run(
+            ["gcc", "-O1", "-shared", "-fPIC", "ball.c", "-lm", "-o", "ball.so"],
+            cwd=tmp_path,
+            check=True,
+        )
         code = ctypes.CDLL(str(tmp_path / "ball.so"))
-        code.ball_pressure.restype, code.ball_pressure.argtypes = ctypes.c_double, [ctypes.c_double]
-        assert code.ball_pressure(0.5 - law.first) == pytest.approx(float(law.force(0.5)), rel=1e-12)
+        code.ball_pressure.restype, code.ball_pressure.argtypes = (
+            ctypes.c_double,
+            [ctypes.c_double],
+        )
+        assert code.ball_pressure(0.5 - law.first) == pytest.approx(
+            float(law.force(0.5)), rel=1e-12
+        )
     rows = describe_law(law, rows=20)
     assert (rows.y_name, rows.y_unit) == ("force", "N")
     assert targets()["csv"].files(rows)[""]
     with pytest.raises(InputError, match="CalculiX takes pressure"):
         targets()["calculix"].files(rows)
-    for target, more in (("abaqus-uinter", {}), ("c-law", {"leakage": True}), ("c-law", {"theory": "mbma"})):
+    for target, more in (
+        ("abaqus-uinter", {}),
+        ("c-law", {"leakage": True}),
+        ("c-law", {"theory": "mbma"}),
+    ):
         with pytest.raises(InputError):
             law_files(target, law, name="ball", **more)
     with pytest.raises(InputError, match="stress_unit"):
@@ -125,22 +176,42 @@ def test_force_laws_and_their_code(tmp_path):
 
 @pytest.mark.parametrize("theory", ["persson", "mbma"])
 def test_force_and_approach_are_inverse(theory):
-    for shape, force in (("sphere", ["10 mN", "0.05 kN"]), ("cylinder", ["10 N/m", "0.05 kN/mm"])):
-        found = rough_contact(FACE, "5 mm", shape=shape, force=force, E_star="110 GPa", theory=theory)
+    for shape, force in (
+        ("sphere", ["10 mN", "0.05 kN"]),
+        ("cylinder", ["10 N/m", "0.05 kN/mm"]),
+    ):
+        found = rough_contact(
+            FACE, "5 mm", shape=shape, force=force, E_star="110 GPa", theory=theory
+        )
         np.testing.assert_allclose(found.force, [0.01, 50], rtol=1e-6)
-        again = rough_contact(FACE, 5e3, shape=shape, approach=found.approach, E_star=110.0, theory=theory)
-        np.testing.assert_allclose(again.force * (1e-3 if shape == "sphere" else 1.0), found.force, rtol=1e-6)
+        again = rough_contact(
+            FACE, 5e3, shape=shape, approach=found.approach, E_star=110.0, theory=theory
+        )
+        np.testing.assert_allclose(
+            again.force * (1e-3 if shape == "sphere" else 1.0), found.force, rtol=1e-6
+        )
         # the slope is that of the curve, and the profile adds up to the force
         step = 1e-4
-        beside = rough_contact(FACE, 5e3, shape=shape, approach=found.approach + step, E_star=110.0, theory=theory)
-        np.testing.assert_allclose((beside.force - again.force) / step, again.stiffness, rtol=1e-3)
+        beside = rough_contact(
+            FACE,
+            5e3,
+            shape=shape,
+            approach=found.approach + step,
+            E_star=110.0,
+            theory=theory,
+        )
+        np.testing.assert_allclose(
+            (beside.force - again.force) / step, again.stiffness, rtol=1e-3
+        )
         r, p = again.position, again.pressure
         whole = np.trapezoid(2 * np.pi * r * p if shape == "sphere" else 2 * p, r)
         np.testing.assert_allclose(whole, again.force, rtol=2e-3)
 
 
 def test_units_validity_and_what_is_refused(tmp_path):
-    found = rough_contact(FACE, "5 mm", force=["1 N", "100 N"], E_star="110 GPa", theory="calibrated")
+    found = rough_contact(
+        FACE, "5 mm", force=["1 N", "100 N"], E_star="110 GPa", theory="calibrated"
+    )
     data = found.to_dataset()
     assert data["force"].attrs["units"] == "N"
     assert data["pressure"].dims == ("load", "place")
@@ -182,7 +253,10 @@ def test_boundary_elements_of_rough_spheres():
     assert valid.sum() > 50
     for sd, least in ((1, 0.6), (2, 0.9)):
         assert np.mean(np.abs(seen["force"] / seen["scatter"])[valid] < sd) > least
-        assert np.mean(np.abs(seen["off"] / (CELLS[0] / seen["width"] ** CELLS[1])) < sd) > least
+        assert (
+            np.mean(np.abs(seen["off"] / (CELLS[0] / seen["width"] ** CELLS[1])) < sd)
+            > least
+        )
     wide = seen["width"] > 4.5
     assert np.abs(seen["off"][wide].mean()) < 0.1
     assert seen["off"][wide].std() < 0.2

@@ -29,7 +29,9 @@ def with_spikes(share, seed=0):
     rng = np.random.default_rng(seed)
     chosen = rng.random(MAP.shape) < share
     chosen[30, 30] = True
-    return MAP + np.where(chosen, rng.choice([-3.0, 3.0], MAP.shape) * MAP.std(), 0.0), chosen
+    return MAP + np.where(
+        chosen, rng.choice([-3.0, 3.0], MAP.shape) * MAP.std(), 0.0
+    ), chosen
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -51,7 +53,9 @@ class TestSpikes:
     def test_the_remedy_removes_them_and_little_else(self, share):
         spoilt, chosen = with_spikes(share)
         mended = of(spoilt, outliers=10)
-        removed = next(entry["points"] for entry in mended.provenance if entry["step"] == "outliers")
+        removed = next(
+            entry["points"] for entry in mended.provenance if entry["step"] == "outliers"
+        )
         assert removed == pytest.approx(chosen.sum(), abs=2)
         assert not any("spikes" in text for text in mended.doubts)
         assert asked(mended).pressure == pytest.approx(asked(of(MAP)).pressure, rel=0.02)
@@ -66,14 +70,18 @@ class TestHoles:
     @pytest.mark.parametrize(("count", "valid"), [(4, True), (40, False)])
     def test_more_than_a_thousandth_filled_is_not_valid(self, count, valid):
         holed = MAP.copy()
-        holed.ravel()[np.random.default_rng(1).choice(MAP.size, count, replace=False)] = np.nan
+        holed.ravel()[np.random.default_rng(1).choice(MAP.size, count, replace=False)] = (
+            np.nan
+        )
         # filled points leave waves of two sampling steps
         found = asked(of(holed, short_cutoff=4.0))
         assert bool(found.valid) == valid
         assert valid or "of the points are filled" in next(iter(found.reasons))
 
     def test_the_shipped_map_with_holes_is_not_valid(self):
-        surface = Surface.from_map("docs/data/maps/frt-2.frt", fill="harmonic", short_cutoff=0.0008, outliers=10)
+        surface = Surface.from_map(
+            "docs/data/maps/frt-2.frt", fill="harmonic", short_cutoff=0.0008, outliers=10
+        )
         found = asked(surface, area=0.005)
         assert not found.valid
         assert "0.28 of the points are filled" in next(iter(found.reasons))
@@ -132,18 +140,30 @@ class TestSampling:
     @pytest.mark.parametrize("step", [1.0, 0.123456])
     @pytest.mark.parametrize("theory", ["simulated", "corrected"])
     def test_the_stated_cutoff_makes_it_valid(self, unit, step, theory):
-        noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(MAP.shape)
+        noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(
+            MAP.shape
+        )
         given = {"heights": step * noise, "dx": step, "periodic": True, "unit": unit}
         found = asked(Surface.from_map(**given), theory)
         assert not found.valid
-        remedy = re.search(r"Surface\.from_map\(\.\.\., (.*)\)$", next(iter(found.reasons)))
-        mended = eval(f"Surface.from_map(**given, {remedy[1]})", {"Surface": Surface, "given": given})
+        remedy = re.search(
+            r"Surface\.from_map\(\.\.\., (.*)\)$", next(iter(found.reasons))
+        )
+        mended = eval(
+            f"Surface.from_map(**given, {remedy[1]})",
+            {"Surface": Surface, "given": given},
+        )
         assert asked(mended, theory).valid
 
     def test_the_calibrated_law_names_the_same(self):
-        noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(MAP.shape)
+        noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(
+            MAP.shape
+        )
         found = asked(of(noise), "calibrated")
-        assert "theory='simulated' simulates the map of Surface.from_map(..., short_cutoff=4.004)" in str(found.reasons)
+        assert (
+            "theory='simulated' simulates the map of Surface.from_map(..., short_cutoff=4.004)"
+            in str(found.reasons)
+        )
 
     @pytest.mark.parametrize("bits", [16, 24])
     def test_rounding_of_heights_is_no_wavelength(self, bits):
@@ -155,13 +175,18 @@ class TestSampling:
 
     def test_light_contacts_name_the_theory_that_reaches_them(self):
         found = contact(of(MAP), area=0.002, theory="corrected")
-        assert list(found.reasons) == ["A/A0 is below 0.003: theory='simulated' was tested from 0.001 on"]
+        assert list(found.reasons) == [
+            "A/A0 is below 0.003: theory='simulated' was tested from 0.001 on"
+        ]
         assert contact(of(MAP), area=0.002, theory="simulated").valid
 
     def test_an_average_names_a_scan(self):
         both = average([of(MAP), of(MAP[::-1])])
         found = contact(both, area=0.1, theory="calibrated")
-        remedy = re.search(r"contact\(surface\.scans\[0\], \.\.\., theory='simulated'\)", str(found.reasons))
+        remedy = re.search(
+            r"contact\(surface\.scans\[0\], \.\.\., theory='simulated'\)",
+            str(found.reasons),
+        )
         assert remedy
         call = remedy[0].replace("...", "area=0.1")
         assert eval(call, {"contact": contact, "surface": both}).valid
@@ -173,5 +198,7 @@ def test_a_regular_pattern_is_refused_with_its_wavelength(pattern):
     along = np.sin(2 * np.pi * x / 16)
     values = np.outer(along, along if pattern == "egg-box" else np.ones(64))
     length = "16" if pattern == "sine" else "11.31"
-    with pytest.raises(OutOfRangeError, match=f"the map holds wavelengths of {length} um only"):
+    with pytest.raises(
+        OutOfRangeError, match=f"the map holds wavelengths of {length} um only"
+    ):
         Surface.from_map(values, 1.0, periodic=True, unit="um")

@@ -24,7 +24,17 @@ FIVE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0)
 # a plateau, a rise, a jump and a gap
 Q = np.array([0.5, 1.0, 2.0, 2.0, 3.0, 5.0, 8.0, 20.0, 40.0])
 C = np.array([3.0, 3.0, 4.0, 2.0, 0.5, 0.0, 1e-2, 1e-3, 5e-5])
-MOMENTS = ("h_rms", "m0", "m2", "m4", "alpha", "rms_gradient", "summit_density", "summit_radius", "summit_sigma")
+MOMENTS = (
+    "h_rms",
+    "m0",
+    "m2",
+    "m4",
+    "alpha",
+    "rms_gradient",
+    "summit_density",
+    "summit_radius",
+    "summit_sigma",
+)
 
 
 def integral(order: int, low: float, high: float) -> float:
@@ -36,7 +46,10 @@ def integral(order: int, low: float, high: float) -> float:
         if b > a and first > 0 and last > 0 and end > start:
             power = math.log(last / first) / math.log(b / a)
             total += mpmath.quad(
-                lambda q, a=a, first=first, power=power: first * (q / a) ** power * q ** (order + 1), [start, end]
+                lambda q, a=a, first=first, power=power: (
+                    first * (q / a) ** power * q ** (order + 1)
+                ),
+                [start, end],
             )
     return float(2 * mpmath.pi * share * total)
 
@@ -46,11 +59,23 @@ class TestPowerLaws:
         laws = PowerLaws(Q, C)
         for order in (0, 2, 4):
             assert laws.moment(order) == pytest.approx(integral(order, 0, 99), rel=1e-13)
-            for low, high in [(0.6, 0.9), (0.7, 2.5), (1.5, 30.0), (9.0, 40.0), (30.0, 30.001)]:
+            for low, high in [
+                (0.6, 0.9),
+                (0.7, 2.5),
+                (1.5, 30.0),
+                (9.0, 40.0),
+                (30.0, 30.001),
+            ]:
                 a, b = laws.place(low), laws.place(high)
-                assert laws.between(order, a, b) == pytest.approx(integral(order, low, high), rel=1e-10)
-                assert laws.below(order, b) == pytest.approx(integral(order, 0, high), rel=1e-12)
-        assert laws.above(laws.place(10.0)) == pytest.approx(integral(0, 10, 99), rel=1e-12)
+                assert laws.between(order, a, b) == pytest.approx(
+                    integral(order, low, high), rel=1e-10
+                )
+                assert laws.below(order, b) == pytest.approx(
+                    integral(order, 0, high), rel=1e-12
+                )
+        assert laws.above(laws.place(10.0)) == pytest.approx(
+            integral(0, 10, 99), rel=1e-12
+        )
 
     @given(st.floats(-300, 0))
     def test_variance_above_is_inverted_down_to_nothing(self, log_share: float):
@@ -67,22 +92,41 @@ class TestMeasuredSurface:
         q = np.geomspace(FIVE.q0, FIVE.q1, count)
         found = Surface.from_spectrum(q[::-1], FIVE.power_spectrum(q)[::-1], h_max=4.0)
         for name in MOMENTS:
-            assert getattr(found, name) == pytest.approx(getattr(FIVE, name), rel=1e-12), name
+            assert getattr(found, name) == pytest.approx(
+                getattr(FIVE, name), rel=1e-12
+            ), name
         assert found.hurst == pytest.approx(0.8, rel=1e-12)
-        other = Surface.from_spectrum(q, 4 * np.pi**2 * FIVE.power_spectrum(q), h_max=4.0, convention="isotropic")
+        other = Surface.from_spectrum(
+            q, 4 * np.pi**2 * FIVE.power_spectrum(q), h_max=4.0, convention="isotropic"
+        )
         assert other.h_rms == pytest.approx(found.h_rms, rel=1e-14)
         assert found.fit().hurst == pytest.approx(0.8, rel=1e-6) if count > 10 else True
-        assert (found.shape, found.labelled, found.skewness, found.kurtosis) == ((), False, 0, 3)
+        assert (found.shape, found.labelled, found.skewness, found.kurtosis) == (
+            (),
+            False,
+            0,
+            3,
+        )
 
     test_what_is_no_spectrum_is_refused = staticmethod(
         refusals(
             lambda q, c, options: Surface.from_spectrum(q, c, **options),
             (Q, C, {}, "h_max is missing"),
             (Q, -C, {"h_max": 1.0}, "C must be zero or positive"),
-            (Q, np.where(Q == 1, np.nan, C), {"h_max": 1.0}, r"C must be finite, got nan at \(1,\)"),
+            (
+                Q,
+                np.where(Q == 1, np.nan, C),
+                {"h_max": 1.0},
+                r"C must be finite, got nan at \(1,\)",
+            ),
             (Q - 0.5, C, {"h_max": 1.0}, "leave q = 0 out"),
             (Q[:3], C[:2], {"h_max": 1.0}, "two columns of one length"),
-            (Q.reshape(3, 3), C.reshape(3, 3), {"h_max": 1.0}, "two columns of one length"),
+            (
+                Q.reshape(3, 3),
+                C.reshape(3, 3),
+                {"h_max": 1.0},
+                "two columns of one length",
+            ),
             (Q[:1], C[:1], {"h_max": 1.0}, "the spectrum has one wavenumber"),
             ([1.0, 2.0], [1.0, 1.0], {"h_max": 1.0}, "greater than 3"),
             ([1.0, 9.0], [0.0, 0.0], {"h_max": 1.0}, "holds no height"),
@@ -99,9 +143,13 @@ class TestCombined:
         other = Surface(hurst=0.6, q0=0.05, q1=7.0, h_rms=0.5, h_max=2.0)
         both = FIVE.combined(other)
         for name in ("m0", "m2", "m4"):
-            assert getattr(both, name) == pytest.approx(getattr(FIVE, name) + getattr(other, name), rel=1e-6)
+            assert getattr(both, name) == pytest.approx(
+                getattr(FIVE, name) + getattr(other, name), rel=1e-6
+            )
         q = np.array([0.02, 0.05001, 1.0, 1.9999, 2.001, 6.0])
-        assert both.power_spectrum(q) == pytest.approx(FIVE.power_spectrum(q) + other.power_spectrum(q), rel=1e-5)
+        assert both.power_spectrum(q) == pytest.approx(
+            FIVE.power_spectrum(q) + other.power_spectrum(q), rel=1e-5
+        )
         assert both.h_max == pytest.approx(math.hypot(4.0, 2.0))
         back = other.combined(FIVE)
         assert back.m4 == pytest.approx(both.m4, rel=1e-12)
@@ -118,26 +166,42 @@ class TestCombined:
         x, y = rng.normal(size=200_000), getattr(rng, law)(size=200_000)
         found, truth = Heights.of(x).convolved(Heights.of(y)), Heights.of(x + y)
         middle = (SHARES > 0.001) & (SHARES < 0.999)
-        assert np.abs(found.quantiles - truth.quantiles)[middle].max() < 0.03 * truth.h_rms
-        assert found.h_max == pytest.approx(truth.h_max, rel=0.15)  # the highest of many: chance
+        assert (
+            np.abs(found.quantiles - truth.quantiles)[middle].max() < 0.03 * truth.h_rms
+        )
+        assert found.h_max == pytest.approx(
+            truth.h_max, rel=0.15
+        )  # the highest of many: chance
         assert found.skewness == pytest.approx(truth.skewness, abs=0.02)
         assert found.kurtosis == pytest.approx(truth.kurtosis, abs=0.1)
 
     def test_what_two_maps_do_not_keep_is_told(self):
         rng = np.random.default_rng(2)
-        one, other = (Surface.from_map(rng.normal(size=(40, 40)), 1.0, step, periodic=True) for step in (2.0, 3.0))
+        one, other = (
+            Surface.from_map(rng.normal(size=(40, 40)), 1.0, step, periodic=True)
+            for step in (2.0, 3.0)
+        )
         both = one.combined(other)
         assert both.bearing is None
-        assert "the relative position of the maps is not known" in both.provenance[0]["told"]
+        assert (
+            "the relative position of the maps is not known" in both.provenance[0]["told"]
+        )
         # parallel lays: gradients' mean squares add along both axes
-        square, m2 = np.array([one.anisotropy, other.anisotropy]) ** 2, np.array([one.m2, other.m2])
-        assert both.anisotropy == pytest.approx(np.sqrt(m2 @ (square / (1 + square)) / (m2 @ (1 / (1 + square)))))
+        square, m2 = (
+            np.array([one.anisotropy, other.anisotropy]) ** 2,
+            np.array([one.m2, other.m2]),
+        )
+        assert both.anisotropy == pytest.approx(
+            np.sqrt(m2 @ (square / (1 + square)) / (m2 @ (1 / (1 + square))))
+        )
         assert one.combined(FIVE).anisotropy < one.anisotropy
         assert FIVE.combined(FIVE).anisotropy is None
 
     def test_a_batch_is_refused(self):
         with pytest.raises(InputError, match="one surface at a time"):
-            Surface(hurst=[0.5, 0.8], q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0).combined(FIVE)
+            Surface(hurst=[0.5, 0.8], q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0).combined(
+                FIVE
+            )
 
 
 def test_a_map_is_its_own_spectrum():
@@ -148,7 +212,12 @@ def test_a_map_is_its_own_spectrum():
     assert found.h_max == pytest.approx(heights.max() - heights.mean(), rel=1e-9)
     # the spectrum ends at the Nyquist circle, the map's corners hold waves beyond
     assert found.rms_gradient == pytest.approx(found.bearing.gradient, rel=0.05)
-    assert [step["step"] for step in found.provenance] == ["read", "detrend", "edges", "resolution"]
+    assert [step["step"] for step in found.provenance] == [
+        "read",
+        "detrend",
+        "edges",
+        "resolution",
+    ]
     assert found.fit().hurst == pytest.approx(0.8, abs=0.05)
 
 
@@ -157,7 +226,9 @@ WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)
 
 def measured(end):
     q = np.geomspace(1.0, end, 120)
-    return Surface.from_spectrum(q, WHOLE.power_spectrum(q * (1 - 1e-12)), h_max=1.0, unit="um")
+    return Surface.from_spectrum(
+        q, WHOLE.power_spectrum(q * (1 - 1e-12)), h_max=1.0, unit="um"
+    )
 
 
 def test_the_last_octave():
@@ -172,9 +243,13 @@ def test_waves_that_hold_no_power_are_not_known():
     q = np.geomspace(1.0, 400.0, 200)
     C = WHOLE.power_spectrum(q * (1 - 1e-12)) * np.where(q > 100, 1e-6, 1.0)
     sampled = Surface.from_spectrum(q, C, h_max=1.0, unit="um")
-    found, known = (surface.resolved().provenance[-1] for surface in (sampled, measured(100.0)))
+    found, known = (
+        surface.resolved().provenance[-1] for surface in (sampled, measured(100.0))
+    )
     assert found["shortest"] == pytest.approx(2 * np.pi / 100, rel=0.04)
-    assert found["gradient_without_last_octave"] == pytest.approx(known["gradient_without_last_octave"], rel=0.02)
+    assert found["gradient_without_last_octave"] == pytest.approx(
+        known["gradient_without_last_octave"], rel=0.02
+    )
     assert "(sampled to 0.01571 um, without power there)" in found["told"]
 
 
@@ -184,7 +259,9 @@ def test_the_true_power_law_gives_the_whole_surface_back():
     assert longer.m4 == pytest.approx(WHOLE.m4, rel=4e-3)
     assert longer.q1 == pytest.approx(400.0)
     record = longer.provenance[-1]
-    assert record["area"] == pytest.approx(float(measured(50.0).rms_gradient / WHOLE.rms_gradient), rel=2e-3)
+    assert record["area"] == pytest.approx(
+        float(measured(50.0).rms_gradient / WHOLE.rms_gradient), rel=2e-3
+    )
     assert "which was not measured" in record["told"]
 
 
@@ -195,12 +272,17 @@ def test_every_answer_of_a_map_says_so():
         surface = Surface.from_map(heights, 1.0, periodic=True, unit="um", model=model)
         rows = describe_law(surface, "1 GPa", rows=10, theory="calibrated")
         assert any(told in line for line in rows.comments)
-        answers = [contact(surface, pressure=0.01), contact_law(surface, theory="persson")]
+        answers = [
+            contact(surface, pressure=0.01),
+            contact_law(surface, theory="persson"),
+        ]
         answers.append(contact(surface.combined(WHOLE.scaled(1.0, "um")), pressure=0.01))
         for found in answers:
             assert told in repr(found)
             assert told in found.to_dataset().attrs["resolution"]
-    longer = Surface.from_map(heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8)
+    longer = Surface.from_map(
+        heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8
+    )
     assert "which was not measured" in repr(contact(longer, pressure=0.01))
     assert "resolution" not in repr(contact(WHOLE, pressure=0.01))
 
@@ -228,29 +310,53 @@ class TestScans:
         mean = average(parts)
         known = contact(whole, area=[0.03, 0.2], theory="calibrated")
         found = contact(mean, pressure=known.pressure)
-        each = np.array([contact(one, pressure=known.pressure, theory="calibrated").area for one in parts])
+        each = np.array(
+            [
+                contact(one, pressure=known.pressure, theory="calibrated").area
+                for one in parts
+            ]
+        )
         assert found.theory == "calibrated"
         assert (
-            np.abs(np.log(found.area / known.area)) < np.sqrt(np.mean(np.log(each / known.area) ** 2, axis=0))
+            np.abs(np.log(found.area / known.area))
+            < np.sqrt(np.mean(np.log(each / known.area) ** 2, axis=0))
         ).all()
         assert "average of 16 scans: h_rms" in mean.provenance[0]["told"]
         assert mean.h_rms == pytest.approx(float(whole.h_rms), rel=0.1)
 
     def test_their_spread_adds_to_the_scatter(self, scans):
-        parts, areas, names = scans[1][:4], [0.03, 0.2], ("scatter", "area_scatter", "stiffness_scatter")
+        parts, areas, names = (
+            scans[1][:4],
+            [0.03, 0.2],
+            ("scatter", "area_scatter", "stiffness_scatter"),
+        )
         mean = average(parts)
-        found, alone = (contact(one, area=areas) for one in (mean, dataclasses.replace(mean, scans=())))
-        each = [contact(one, pressure=found.pressure, theory="calibrated") for one in parts]
+        found, alone = (
+            contact(one, area=areas)
+            for one in (mean, dataclasses.replace(mean, scans=()))
+        )
+        each = [
+            contact(one, pressure=found.pressure, theory="calibrated") for one in parts
+        ]
         # of ln F at equal u, and of the others at equal F
-        pressure = [one.mean_separation * found.stiffness / found.pressure for one in each]
+        pressure = [
+            one.mean_separation * found.stiffness / found.pressure for one in each
+        ]
         logs = np.log([[one.area for one in each], [one.stiffness for one in each]])
         expected = np.std([pressure, *logs], axis=1, ddof=1)
-        added = [np.sqrt(getattr(found, name) ** 2 - getattr(alone, name) ** 2) for name in names]
+        added = [
+            np.sqrt(getattr(found, name) ** 2 - getattr(alone, name) ** 2)
+            for name in names
+        ]
         np.testing.assert_allclose(added, expected, rtol=1e-3)
         assert (expected > 0.01).all()
-        twice, once = (contact(one, area=areas) for one in (average(2 * parts[:1]), parts[0]))
+        twice, once = (
+            contact(one, area=areas) for one in (average(2 * parts[:1]), parts[0])
+        )
         for name in names:
-            np.testing.assert_allclose(getattr(twice, name), getattr(once, name), rtol=1e-6)
+            np.testing.assert_allclose(
+                getattr(twice, name), getattr(once, name), rtol=1e-6
+            )
 
     def test_the_average_of_one_scan_twice_is_that_scan(self, scans):
         one = scans[1][0]
@@ -260,11 +366,18 @@ class TestScans:
             found = contact(both, pressure=0.01, theory=theory)
             assert found.area == pytest.approx(known.area, rel=1e-3)
             assert found.mean_separation == pytest.approx(known.mean_separation, rel=1e-3)
-        assert (both.skewness, both.kurtosis) == (pytest.approx(one.skewness), pytest.approx(one.kurtosis))
+        assert (both.skewness, both.kurtosis) == (
+            pytest.approx(one.skewness),
+            pytest.approx(one.kurtosis),
+        )
 
     def test_refusals(self, scans):
         whole, parts = scans
-        for wrong in ([whole], [whole, Surface(0.8, 0.1, 2.0, 1.0, 3.0)], [average(parts), whole]):
+        for wrong in (
+            [whole],
+            [whole, Surface(0.8, 0.1, 2.0, 1.0, 3.0)],
+            [average(parts), whole],
+        ):
             with pytest.raises(InputError, match="two or more"):
                 average(wrong)
         with pytest.raises(InputError, match="some do not"):
@@ -272,11 +385,15 @@ class TestScans:
 
     def test_on_the_command_line(self, tmp_path):
         for seed in (1, 2):
-            np.save(tmp_path / f"{seed}.npy", 0.02 * random_map(64, 0.05, 0.25, seed=seed))
+            np.save(
+                tmp_path / f"{seed}.npy", 0.02 * random_map(64, 0.05, 0.25, seed=seed)
+            )
         words = ("--dx", "1um", "--periodic", "--json")
         found = json.loads(run("fit", tmp_path / "1.npy", tmp_path / "2.npy", *words))
         assert found["provenance"][0]["told"].startswith("average of 2 scans")
         one = json.loads(run("fit", tmp_path / "1.npy", *words))
         values = np.load(tmp_path / "1.npy")
         assert one["areal"]["Sq"] == pytest.approx(values.std(), rel=1e-6)
-        assert "core [um]: Sk" in run("fit", tmp_path / "1.npy", "--dx", "1um", "--periodic")
+        assert "core [um]: Sk" in run(
+            "fit", tmp_path / "1.npy", "--dx", "1um", "--periodic"
+        )

@@ -14,7 +14,9 @@ SHORTEST = 2 * np.pi / 6  # six sampling steps a wave
 
 def plateau(hurst, roll_off, longest):
     """C(q) of a surface with a roll-off, zero outside [longest, SHORTEST]."""
-    return lambda q: np.where((q >= longest) & (q <= SHORTEST), np.maximum(q, roll_off) ** (-2 - 2 * hurst), 0.0)
+    return lambda q: np.where(
+        (q >= longest) & (q <= SHORTEST), np.maximum(q, roll_off) ** (-2 - 2 * hurst), 0.0
+    )
 
 
 def trace(C, longest, seed, points=POINTS, waves=3000):
@@ -24,7 +26,9 @@ def trace(C, longest, seed, points=POINTS, waves=3000):
     q = edges[:-1] * (edges[1:] / edges[:-1]) ** rng.random(waves)
     variance = 2 * np.pi * C(q) * q * np.diff(edges)
     along = q * np.cos(2 * np.pi * rng.random(waves))
-    amplitude = np.sqrt(2 * variance * rng.exponential(size=waves)) * np.exp(2j * np.pi * rng.random(waves))
+    amplitude = np.sqrt(2 * variance * rng.exponential(size=waves)) * np.exp(
+        2j * np.pi * rng.random(waves)
+    )
     block = 100
     coarse = np.exp(1j * block * np.outer(np.arange(points // block), along)) * amplitude
     return (coarse @ np.exp(1j * np.outer(np.arange(block), along)).T).real.ravel()
@@ -41,7 +45,10 @@ def moments(C, longest, *orders):
     """2 pi integral C q^(1 + order) dq."""
     edges = np.geomspace(longest, SHORTEST, 4001)
     q = np.sqrt(edges[1:] * edges[:-1])
-    return [float(np.sum(2 * np.pi * C(q) * q ** (1 + order) * np.diff(edges))) for order in orders]
+    return [
+        float(np.sum(2 * np.pi * C(q) * q ** (1 + order) * np.diff(edges)))
+        for order in orders
+    ]
 
 
 @pytest.mark.slow
@@ -51,10 +58,19 @@ def test_fifty_traces(hurst, waves):
     roll_off = 2 * np.pi * waves / POINTS
     C = plateau(hurst, roll_off, roll_off / 8)
     m0, m2 = moments(C, roll_off / 8, 0, 2)
-    found = [Surface.from_profile(trace(C, roll_off / 8, seed), 1.0) for seed in range(50)]
+    found = [
+        Surface.from_profile(trace(C, roll_off / 8, seed), 1.0) for seed in range(50)
+    ]
     for name, truth, bar in (("h_rms", m0**0.5, 0.05), ("rms_gradient", m2**0.5, 0.10)):
         ratio = np.array([float(getattr(surface, name)) for surface in found]) / truth
-        stated = np.array([s[name] for surface in found for s in surface.provenance if s["step"] == "errors"])
+        stated = np.array(
+            [
+                s[name]
+                for surface in found
+                for s in surface.provenance
+                if s["step"] == "errors"
+            ]
+        )
         assert ratio.mean() == pytest.approx(1, abs=bar)
         # as wide as they scatter; 50 of them know their own scatter to 10%
         assert stated.mean() == pytest.approx(ratio.std(), rel=0.35)
@@ -121,7 +137,9 @@ def test_a_cut_line_is_that_of_the_cut_surface(cut):
     C, ratios = plateau(0.6, ROLL_OFF, ROLL_OFF / 4), []
     for seed in range(4):
         found = Surface.from_profile(rough_line(seed), 1.0, short_cutoff=cut)
-        m2, m4 = moments(lambda q: np.where(q <= 2 * np.pi / cut, C(q), 0.0), ROLL_OFF / 4, 2, 4)
+        m2, m4 = moments(
+            lambda q: np.where(q <= 2 * np.pi / cut, C(q), 0.0), ROLL_OFF / 4, 2, 4
+        )
         assert found.q1 == pytest.approx(2 * np.pi / cut)
         ratios.append((found.rms_gradient / np.sqrt(m2), found.m4 / (0.375 * m4)))
     gradient, curvature = np.mean(ratios, axis=0)
@@ -131,7 +149,10 @@ def test_a_cut_line_is_that_of_the_cut_surface(cut):
 
 def test_points_of_a_line_go_forward(tmp_path):
     pytest.importorskip("SurfaceTopography")
-    x, z = np.random.default_rng(1).random(100), np.random.default_rng(2).normal(size=100).cumsum()
+    x, z = (
+        np.random.default_rng(1).random(100),
+        np.random.default_rng(2).normal(size=100).cumsum(),
+    )
     for places, message in (
         (x, "must be in the order of rising x"),
         (np.arange(100)[::-1], "x and y rising, got -100"),
@@ -159,4 +180,6 @@ def test_sums_over_panels_do_not_depend_on_blocks(monkeypatch):
     expected = np.add.reduceat(np.diff(sides, axis=1), starts, axis=0)
     for block in (7, 10_000):
         monkeypatch.setattr(profiles, "BLOCK", block)
-        np.testing.assert_allclose(profiles._panel_sums(fine, q, starts), expected, rtol=1e-12)
+        np.testing.assert_allclose(
+            profiles._panel_sums(fine, q, starts), expected, rtol=1e-12
+        )

@@ -26,15 +26,29 @@ def drawn_from(surface):
     """What an ideal instrument says of a Gaussian isotropic surface."""
     slope, mean = float(np.sqrt(surface.m2)), math.sqrt(2 / math.pi) * surface.h_rms
     heights = {"Rq": surface.h_rms, "Ra": mean, "Sq": surface.h_rms, "Sa": mean}
-    slopes = {"Rdq": slope, "Sdq": math.sqrt(2) * slope, "Rsm": 2 * math.pi * surface.h_rms / slope}
+    slopes = {
+        "Rdq": slope,
+        "Sdq": math.sqrt(2) * slope,
+        "Rsm": 2 * math.pi * surface.h_rms / slope,
+    }
     waves = {"longest": 2 * math.pi / surface.q0, "shortest": 2 * math.pi / surface.q1}
-    return heights | slopes | waves | {"Sp": surface.h_max, "h_max": surface.h_max, "hurst": surface.hurst}
+    return (
+        heights
+        | slopes
+        | waves
+        | {"Sp": surface.h_max, "h_max": surface.h_max, "hurst": surface.hurst}
+    )
 
 
 COMBINATIONS = [
     (height, slope, third, top)
     for height in ("Rq", "Ra", "Sq", "Sa")
-    for slope, third in [("Rdq", "longest"), ("Sdq", "shortest"), ("Rsm", "shortest"), ("Rsm", "longest")]
+    for slope, third in [
+        ("Rdq", "longest"),
+        ("Sdq", "shortest"),
+        ("Rsm", "shortest"),
+        ("Rsm", "longest"),
+    ]
     for top in ("h_max", "Sp")
 ] + [("Ra", "longest", "shortest", "Sp"), ("Rq", "Sdq", "longest", "h_max")]
 
@@ -49,13 +63,23 @@ def test_numbers_lead_back_to_their_surface(names):
     (record,) = found.provenance
     assert set(record["given"]) == set(numbers)
     # each number has its assumption, in words
-    assert record["assumed"][0].startswith("heights are Gaussian and the surface is isotropic")
+    assert record["assumed"][0].startswith(
+        "heights are Gaussian and the surface is isotropic"
+    )
     assert len(record["assumed"]) == len(numbers) + 1
-    assert all(":" in line or "h_max" in line or "Hurst" in line for line in record["assumed"])
+    assert all(
+        ":" in line or "h_max" in line or "Hurst" in line for line in record["assumed"]
+    )
 
 
 def test_arrays_and_units():
-    given = {"Ra": "400 nm", "Rdq": [0.05, 0.1], "longest": "0.25 mm", "hurst": 0.8, "h_max": "1.8 um"}
+    given = {
+        "Ra": "400 nm",
+        "Rdq": [0.05, 0.1],
+        "longest": "0.25 mm",
+        "hurst": 0.8,
+        "h_max": "1.8 um",
+    }
     found = Surface.from_roughness(**given, unit="um")
     assert found.shape == (2,)
     assert found.h_rms == pytest.approx([0.4 * math.sqrt(math.pi / 2)] * 2)
@@ -71,7 +95,11 @@ def test_a_simulated_profile_has_these_numbers():
     lines = heights[:: points // 400] / heights.std()
     slopes = np.fft.irfft(1j * 2 * math.pi * np.fft.rfftfreq(points) * np.fft.rfft(lines))
     upward = ((lines[:, 1:] >= 0) & (lines[:, :-1] < 0)).sum() / lines.size
-    for name, number in {"Ra": np.abs(lines).mean(), "Rdq": slopes.std(), "Rsm": 1 / upward}.items():
+    for name, number in {
+        "Ra": np.abs(lines).mean(),
+        "Rdq": slopes.std(),
+        "Rsm": 1 / upward,
+    }.items():
         assert number == pytest.approx(drawn_from(surface)[name], rel=0.01), name
 
 
@@ -82,10 +110,19 @@ test_numbers_that_are_refused = refusals(
     lambda changed: Surface.from_roughness(**(GOOD | changed)),
     ({"Ra": 0.5}, "the height of roughness: give one of Rq, Ra, Sq, Sa; got Rq and Ra"),
     ({"hurst": None}, "missing: hurst, which a drawing does not tell"),
-    ({"h_max": None}, r"the highest point, one of h_max, Sp, .* 3 to 4.5 times the rms height"),
+    (
+        {"h_max": None},
+        r"the highest point, one of h_max, Sp, .* 3 to 4.5 times the rms height",
+    ),
     ({"h_max": 0.5}, "h_max must be above the rms height"),
     (
-        {"Rdq": None, "longest": "2 um", "shortest": "0.1 mm", "Rq": "1 um", "h_max": "3 um"},
+        {
+            "Rdq": None,
+            "longest": "2 um",
+            "shortest": "0.1 mm",
+            "Rq": "1 um",
+            "h_max": "3 um",
+        },
         r"longest \[um\] .* 100, got 2",
     ),
     ({"Sdq": 0.3}, "the slope of roughness: give one of"),
@@ -101,27 +138,42 @@ test_numbers_that_are_refused = refusals(
 def test_the_range_named_is_the_range():
     with pytest.raises(OutOfRangeError) as caught:
         Surface.from_roughness(**(GOOD | {"Rdq": 1e-3}))
-    low, high = (float(word) for word in str(caught.value).split("between ")[1].split(",")[0].split(" and "))
+    low, high = (
+        float(word)
+        for word in str(caught.value).split("between ")[1].split(",")[0].split(" and ")
+    )
     for end, inward in ((low, 1.01), (high, 0.99)):
         assert Surface.from_roughness(**(GOOD | {"Rdq": end * inward})).zeta_1 > 3
         with pytest.raises(OutOfRangeError):
             Surface.from_roughness(**(GOOD | {"Rdq": end / inward}))
 
 
-DRAWING = {"Ra": "0.4 um", "Rdq": 0.1, "longest": "0.1 mm", "hurst": 0.8, "h_max": "1.8 um"}
+DRAWING = {
+    "Ra": "0.4 um",
+    "Rdq": 0.1,
+    "longest": "0.1 mm",
+    "hurst": 0.8,
+    "h_max": "1.8 um",
+}
 
 
 def test_on_the_command_line_and_in_toml(tmp_path):
     options = [f"--{name.replace('_', '-')}={value}" for name, value in DRAWING.items()]
-    (tmp_path / "s.toml").write_text("[surface]\n" + "".join(f"{k} = {v!r}\n" for k, v in DRAWING.items()))
+    (tmp_path / "s.toml").write_text(
+        "[surface]\n" + "".join(f"{k} = {v!r}\n" for k, v in DRAWING.items())
+    )
     surface = Surface.from_roughness(**DRAWING)
     for source in (options, ["--file", str(tmp_path / "s.toml")]):
-        answer = json.loads(run("contact", *source, "--E-star=100GPa", "-p", "10MPa", "--json"))
+        answer = json.loads(
+            run("contact", *source, "--E-star=100GPa", "-p", "10MPa", "--json")
+        )
         assert answer["surface"]["q1"] == surface.q1
         assert answer["surface"]["assumed"] == surface.provenance[0]["assumed"]
         assert answer["units"]["separation"] == "um"
     assert run("contact", *options, "-d", "1").count("\nassumed: ") == 6
-    assert "q0 beside numbers of a drawing" in refused("contact", *options, "--q0", "1/mm", "-d", "1")
+    assert "q0 beside numbers of a drawing" in refused(
+        "contact", *options, "--q0", "1/mm", "-d", "1"
+    )
 
 
 NUMBERS = {"hurst": 0.8, "q0": 0.025, "q1": 3.0, "h_rms": 1.0, "unit": "um"}
@@ -129,7 +181,12 @@ NUMBERS = {"hurst": 0.8, "q0": 0.025, "q1": 3.0, "h_rms": 1.0, "unit": "um"}
 
 @pytest.mark.parametrize(
     ("kind", "hurst", "zeta_1", "waves"),
-    [("self_affine", 0.8, 4, 8), ("self_affine", 0.8, 32, 1), ("self_affine", 0.5, 8, 4), ("plateau", 0.8, 4, 8)],
+    [
+        ("self_affine", 0.8, 4, 8),
+        ("self_affine", 0.8, 32, 1),
+        ("self_affine", 0.5, 8, 4),
+        ("plateau", 0.8, 4, 8),
+    ],
 )
 def test_medians_and_spread_are_those_of_simulated_surfaces(kind, hurst, zeta_1, waves):
     tops, slopes = [], []
@@ -137,7 +194,12 @@ def test_medians_and_spread_are_those_of_simulated_surfaces(kind, hurst, zeta_1,
         z = heights(Recipe(kind, hurst, zeta_1, waves, 500 + seed, 256))
         tops.append(z.max())
         wavenumber = 2 * np.pi * np.fft.fftfreq(256, 1 / 256)
-        slopes.append(np.mean(np.fft.ifft(1j * wavenumber[:, None] * np.fft.fft(z, axis=0), axis=0).real ** 2))
+        slopes.append(
+            np.mean(
+                np.fft.ifft(1j * wavenumber[:, None] * np.fft.fft(z, axis=0), axis=0).real
+                ** 2
+            )
+        )
     known = highest_point(1.0, np.mean(slopes), 1.0, [0.16, 0.5, 0.84])
     assert np.median(tops) == pytest.approx(known[1], rel=0.04)
     assert np.quantile(tops, [0.16, 0.84]) == pytest.approx(known[[0, 2]], abs=0.3)
@@ -166,8 +228,14 @@ def test_every_constructor_takes_the_area():
     fitted = Surface.from_spectrum(**spectrum, model="self-affine", band=(0.025, 3.0))
     assert float(fitted.h_max) == pytest.approx(made.h_max, rel=1e-3)
     line = np.random.default_rng(3).standard_normal(400).cumsum()[:400]
-    short, long = (Surface.from_profile(line, dx=1.0, nominal_area=area) for area in (1e5, 1e8))
-    assert short.h_max < long.h_max == pytest.approx(float(highest_point(long.h_rms, long.m2, 1e8)))
+    short, long = (
+        Surface.from_profile(line, dx=1.0, nominal_area=area) for area in (1e5, 1e8)
+    )
+    assert (
+        short.h_max
+        < long.h_max
+        == pytest.approx(float(highest_point(long.h_rms, long.m2, 1e8)))
+    )
     # two faces alike: sqrt(2) times as high
     both = made.combined(made, "4 cm^2")
     assert both.h_max == pytest.approx(2**0.5 * made.h_max, rel=1e-3)
@@ -175,11 +243,30 @@ def test_every_constructor_takes_the_area():
 
 def test_files_and_options_take_the_area():
     made = Surface(**NUMBERS, nominal_area="4 cm^2")
-    five = {"hurst": 0.8, "q0": "0.025/um", "q1": "3/um", "h_rms": "1 um", "nominal_area": "400 mm^2"}
-    moments = {"hurst": 0.8, "m0": "1 um^2", "m2": float(made.m2), "m4": f"{made.m4} 1/um^2", "nominal_area": "4 cm^2"}
-    drawn = {"hurst": 0.8, "Rq": "1 um", "longest": f"{2 * np.pi / 0.025} um", "shortest": f"{2 * np.pi / 3} um"}
+    five = {
+        "hurst": 0.8,
+        "q0": "0.025/um",
+        "q1": "3/um",
+        "h_rms": "1 um",
+        "nominal_area": "400 mm^2",
+    }
+    moments = {
+        "hurst": 0.8,
+        "m0": "1 um^2",
+        "m2": float(made.m2),
+        "m4": f"{made.m4} 1/um^2",
+        "nominal_area": "4 cm^2",
+    }
+    drawn = {
+        "hurst": 0.8,
+        "Rq": "1 um",
+        "longest": f"{2 * np.pi / 0.025} um",
+        "shortest": f"{2 * np.pi / 3} um",
+    }
     for given in (five, moments, drawn | {"nominal_area": "4e8 um^2"}):
-        assert float(from_numbers(given).surface.h_max) == pytest.approx(made.h_max, rel=1e-6)
+        assert float(from_numbers(given).surface.h_max) == pytest.approx(
+            made.h_max, rel=1e-6
+        )
     with pytest.raises(InputError, match="h_max or nominal_area"):
         from_numbers({"hurst": 0.8, "nominal_area": "4 cm^2"})
 
@@ -189,7 +276,10 @@ test_areas_that_are_refused = refusals(
     ({"h_max": 3.0, "nominal_area": 1e6}, "both given"),
     ({}, "h_max is missing"),
     ({"nominal_area": "4 cm"}, "must be like"),
-    *(({"nominal_area": area}, OutOfRangeError, "nominal_area") for area in (0.0, -1.0, np.nan, np.inf, 100.0)),
+    *(
+        ({"nominal_area": area}, OutOfRangeError, "nominal_area")
+        for area in (0.0, -1.0, np.nan, np.inf, 100.0)
+    ),
     ({"h_rms": xr.DataArray([1.0, 2.0], dims="case"), "nominal_area": 1e6}, "DataArrays"),
 )
 
@@ -198,27 +288,48 @@ def test_beyond_the_heights_simulated_little_changes():
     """Why h_max up to 8 h_rms counts as tested: from 0.1% contact on, that above 5.5 hardly matters."""
     for hurst, zeta_1 in ((0.2, 8.0), (0.8, 16.0), (1.0, 128.0)):
         near, far = (
-            contact(Surface(hurst, 0.001, 0.001 * zeta_1, 1.0, h_max), area=[1e-3, 1e-2, 0.1], theory="calibrated")
+            contact(
+                Surface(hurst, 0.001, 0.001 * zeta_1, 1.0, h_max),
+                area=[1e-3, 1e-2, 0.1],
+                theory="calibrated",
+            )
             for h_max in (5.5, 8.0)
         )
-        for name, rtol in {"pressure": 1e-6, "mean_separation": 5e-4, "stiffness": 4e-3}.items():
+        for name, rtol in {
+            "pressure": 1e-6,
+            "mean_separation": 5e-4,
+            "stiffness": 4e-3,
+        }.items():
             np.testing.assert_allclose(getattr(far, name), getattr(near, name), rtol=rtol)
         assert far.valid.all()
 
 
 def test_a_roll_off_by_name():
-    given = {"Rq": "0.5 um", "hurst": 0.7, "longest": "5 mm", "shortest": "4 um", "nominal_area": "4 cm^2"}
-    face, plain = Surface.from_roughness(**given, rolloff="250 um"), Surface.from_roughness(**given)
+    given = {
+        "Rq": "0.5 um",
+        "hurst": 0.7,
+        "longest": "5 mm",
+        "shortest": "4 um",
+        "nominal_area": "4 cm^2",
+    }
+    face, plain = (
+        Surface.from_roughness(**given, rolloff="250 um"),
+        Surface.from_roughness(**given),
+    )
     assert face.h_rms == pytest.approx(0.5, rel=1e-12)
     q = 2 * np.pi / np.array([5000.0, 250.0, 4.0])
     np.testing.assert_allclose(face.q, q)
     assert face.C[0] == face.C[1]
     assert face.C[1] / face.C[2] == pytest.approx((q[2] / q[1]) ** 3.4)
-    # the same variance over shorter wavelengths is rougher, and has a higher highest point in one area
+    # the same variance over shorter wavelengths is rougher, and has a higher highest point
+    # in one area
     assert face.rms_gradient > 3 * plain.rms_gradient
     assert face.h_max > plain.h_max
     assert any("flat" in text for text in face.provenance[0]["assumed"])
-    for bad, match in (({"rolloff": "5 um"}, "3 times shortest"), ({"rolloff": "6 mm"}, "longest")):
+    for bad, match in (
+        ({"rolloff": "5 um"}, "3 times shortest"),
+        ({"rolloff": "6 mm"}, "longest"),
+    ):
         with pytest.raises(OutOfRangeError, match=match):
             Surface.from_roughness(**given, **bad)
 
@@ -240,7 +351,10 @@ def test_gaussian_heights():
     assert found["Sk"] == pytest.approx(Sk, rel=1e-3)
     assert found["Spk"] == pytest.approx(Spk, rel=2e-3)
     assert found["Svk"] == pytest.approx(Spk, rel=2e-3)
-    assert (found["Smr1"], found["Smr2"]) == (pytest.approx(Smr1, abs=1e-3), pytest.approx(1 - Smr1, abs=1e-3))
+    assert (found["Smr1"], found["Smr2"]) == (
+        pytest.approx(Smr1, abs=1e-3),
+        pytest.approx(1 - Smr1, abs=1e-3),
+    )
 
 
 def test_a_plateau_with_straight_valleys():
@@ -251,7 +365,9 @@ def test_a_plateau_with_straight_valleys():
     assert found["Smr2"] == pytest.approx(0.8, abs=2e-3)
     # the triangle between both lines is one already
     lower = 0.875
-    assert found["Svk"] == pytest.approx(2 * np.maximum(lower - curve, 0).mean() / 0.2, rel=0.01)
+    assert found["Svk"] == pytest.approx(
+        2 * np.maximum(lower - curve, 0).mean() / 0.2, rel=0.01
+    )
     assert found["Spk"] < 1e-3
 
 
@@ -283,7 +399,9 @@ def test_a_slope_beside_a_roll_off(hurst, wave):
     """The spectrum is flat down to the roll-off, and has the slope and the height that were given."""
     both = {"longest": 3000.0, "shortest": 4.0} | wave
     given = {"Rq": 0.5, "hurst": hurst, "rolloff": 250.0, "h_max": 2.0, "unit": "um"}
-    known = Surface.from_roughness(**given, longest=both["longest"], shortest=both["shortest"])
+    known = Surface.from_roughness(
+        **given, longest=both["longest"], shortest=both["shortest"]
+    )
     slopes = {
         "Rdq": np.sqrt(known.m2),
         "Sdq": known.rms_gradient,
@@ -298,6 +416,8 @@ def test_a_slope_beside_a_roll_off(hurst, wave):
 
 
 def test_all_that_is_missing_is_named_at_once():
-    missing = r"Ra; missing: hurst.*two of longest, shortest.*one of h_max, Sp, nominal_area"
+    missing = (
+        r"Ra; missing: hurst.*two of longest, shortest.*one of h_max, Sp, nominal_area"
+    )
     with pytest.raises(InputError, match=missing):
         Surface.from_roughness(Ra="1.6 um")

@@ -34,20 +34,41 @@ def integral(surface, order):
     return 2 * math.pi * angular * found
 
 
-@pytest.mark.parametrize(("hurst", "zeta_1"), [(0.1, 1e5), (0.5, 3.01), (0.8, 216.0), (1.0, 1e3)])
+@pytest.mark.parametrize(
+    ("hurst", "zeta_1"), [(0.1, 1e5), (0.5, 3.01), (0.8, 216.0), (1.0, 1e3)]
+)
 def test_moments_are_those_of_the_power_spectrum(hurst, zeta_1):
     surface = Surface(hurst, 0.37, 0.37 * zeta_1, 0.21, 0.7)
     m0, m2, m4 = (integral(surface, order) for order in (0, 2, 4))
     # the gradient has two components
-    found = (surface.h_rms**2, surface.m0, surface.m2, surface.m4, surface.rms_gradient**2)
+    found = (
+        surface.h_rms**2,
+        surface.m0,
+        surface.m2,
+        surface.m4,
+        surface.rms_gradient**2,
+    )
     assert found == pytest.approx((m0, m0, m2, m4, 2 * m2), rel=1e-10, abs=0)
-    assert surface.s == pytest.approx(0.21 / math.sqrt(1 - zeta_1 ** (-2 * hurst)), rel=1e-15, abs=0)
+    assert surface.s == pytest.approx(
+        0.21 / math.sqrt(1 - zeta_1 ** (-2 * hurst)), rel=1e-15, abs=0
+    )
     assert surface.shape == ()
-    assert all(isinstance(getattr(surface, name), float) for name in ("hurst", "q0", "h_max", "m2", "summit_density"))
+    assert all(
+        isinstance(getattr(surface, name), float)
+        for name in ("hurst", "q0", "h_max", "m2", "summit_density")
+    )
     # Nayak's summits
     alpha = m0 * m4 / m2**2
-    density, radius = m4 / m2 / (6 * math.pi * math.sqrt(3)), 3 * math.sqrt(math.pi) / (8 * math.sqrt(m4))
-    found = (surface.alpha, surface.summit_density, surface.summit_radius, surface.summit_sigma)
+    density, radius = (
+        m4 / m2 / (6 * math.pi * math.sqrt(3)),
+        3 * math.sqrt(math.pi) / (8 * math.sqrt(m4)),
+    )
+    found = (
+        surface.alpha,
+        surface.summit_density,
+        surface.summit_radius,
+        surface.summit_sigma,
+    )
     known = (alpha, density, radius, math.sqrt((1 - 0.8968 / alpha) * m0))
     assert found == pytest.approx(known, rel=1e-9, abs=0)
 
@@ -74,7 +95,9 @@ def test_a_surface_does_not_change():
 
 
 def test_prints_plain_numbers():
-    assert repr(Surface(**{**GOOD, "hurst": [0.5, 0.8]})).startswith("Surface(hurst=array([0.5, 0.8]), q0=array(")
+    assert repr(Surface(**{**GOOD, "hurst": [0.5, 0.8]})).startswith(
+        "Surface(hurst=array([0.5, 0.8]), q0=array("
+    )
     labelled = Surface(**{**GOOD, "hurst": xr.DataArray([0.5, 0.8], dims="site")})
     assert repr(labelled).startswith("Surface(hurst=<DataArray {'site': 2}>, q0=0.5,")
 
@@ -82,7 +105,11 @@ def test_prints_plain_numbers():
 @pytest.mark.parametrize(
     ("said", "name", "value"),
     [("hurst", "hurst", value) for value in (0.0, -0.1, 1.01)]
-    + [(name, name, value) for name in ("q0", "q1", "h_rms", "h_max") for value in (0.0, -1.0)]
+    + [
+        (name, name, value)
+        for name in ("q0", "q1", "h_rms", "h_max")
+        for value in (0.0, -1.0)
+    ]
     + [("q1/q0", "q1", zeta_1) for zeta_1 in (0.5, 1.0, 3.0, 1.0001e8)],
 )
 def test_out_of_range(said, name, value):
@@ -110,27 +137,51 @@ ROADS = {
 def test_cases_of_the_paper(name):
     surface = Surface.named(name)
     if name not in ROADS:
-        found = (surface.hurst, surface.zeta_1, surface.q0 * surface.h_rms, surface.h_max / surface.h_rms)
+        found = (
+            surface.hurst,
+            surface.zeta_1,
+            surface.q0 * surface.h_rms,
+            surface.h_max / surface.h_rms,
+        )
         assert found == pytest.approx(KNOWN[name], rel=1e-13, abs=0)
         return
     hurst, zeta_1, q0, m0, m2, m4, h_max = ROADS[name]
     assert (surface.hurst, surface.h_max) == (hurst, h_max)
     assert surface.zeta_1 == pytest.approx(zeta_1, abs=5e-5)
     assert surface.q0 == pytest.approx(q0, abs=5e-7)
-    assert (surface.m0, surface.m2, surface.m4) == pytest.approx((m0, m2, m4), rel=1e-12, abs=0)
+    assert (surface.m0, surface.m2, surface.m4) == pytest.approx(
+        (m0, m2, m4), rel=1e-12, abs=0
+    )
 
 
-test_unknown_case = refusals(Surface.named, ("moon", "no surface is named 'moon'; there are yang-persson"))
+test_unknown_case = refusals(
+    Surface.named, ("moon", "no surface is named 'moon'; there are yang-persson")
+)
 
 
 def test_the_two_variants_differ_by_pi_alone():
-    assert math.pi * REPORTED.density_divisor == pytest.approx(PRINTED.density_divisor, rel=1e-15, abs=0)
-    assert PRINTED.density_divisor == pytest.approx(6 * math.pi * math.sqrt(3), rel=1e-15, abs=0)
-    same = dataclasses.replace(REPORTED, name="printed", density_divisor=PRINTED.density_divisor)
+    assert math.pi * REPORTED.density_divisor == pytest.approx(
+        PRINTED.density_divisor, rel=1e-15, abs=0
+    )
+    assert PRINTED.density_divisor == pytest.approx(
+        6 * math.pi * math.sqrt(3), rel=1e-15, abs=0
+    )
+    same = dataclasses.replace(
+        REPORTED, name="printed", density_divisor=PRINTED.density_divisor
+    )
     assert same == PRINTED
     assert set(VARIANTS) == {"reported", "printed"}
-    assert (PRINTED.beta, PRINTED.phi, PRINTED.floor_d, PRINTED.floor_u) == (1 / 3, 0.05, 1.5, 3.0)
-    assert (PRINTED.jacobian, PRINTED.offset, PRINTED.summit_sigma) == ("printed", True, True)
+    assert (PRINTED.beta, PRINTED.phi, PRINTED.floor_d, PRINTED.floor_u) == (
+        1 / 3,
+        0.05,
+        1.5,
+        3.0,
+    )
+    assert (PRINTED.jacobian, PRINTED.offset, PRINTED.summit_sigma) == (
+        "printed",
+        True,
+        True,
+    )
 
 
 def test_by_name_or_own():
@@ -141,14 +192,27 @@ def test_by_name_or_own():
     assert own.numbers.tolist() == [*own.recorded, True]
 
 
-NONSENSE = {"density_divisor": (0.0, -1.0, math.nan, math.inf), "jacobian": ("guessed",), "beta": (0.0, 0.75, math.nan)}
-NONSENSE |= {"phi": (0.0, 2.0, math.nan), "floor_d": (1.0, 3.0), "floor_u": (1.2, math.nan)}
+NONSENSE = {
+    "density_divisor": (0.0, -1.0, math.nan, math.inf),
+    "jacobian": ("guessed",),
+    "beta": (0.0, 0.75, math.nan),
+}
+NONSENSE |= {
+    "phi": (0.0, 2.0, math.nan),
+    "floor_d": (1.0, 3.0),
+    "floor_u": (1.2, math.nan),
+}
 test_unknown_variants = refusals(
-    get_variant, *((name, "variant must be one of") for name in ("guessed", "", None, 3, ["printed"]))
+    get_variant,
+    *((name, "variant must be one of") for name in ("guessed", "", None, 3, ["printed"])),
 )
 test_variants_without_meaning = refusals(
     lambda field, value: dataclasses.replace(PRINTED, name="own", **{field: value}),
-    *((field, value, f"variant 'own': .*{field}") for field in NONSENSE for value in NONSENSE[field]),
+    *(
+        (field, value, f"variant 'own': .*{field}")
+        for field in NONSENSE
+        for value in NONSENSE[field]
+    ),
 )
 
 
@@ -174,7 +238,9 @@ def relative(found, exact):
 def test_band_moments(order):
     rng = np.random.default_rng(order)
     start = 10 ** rng.uniform(0, 7, 300)
-    zeta_1 = np.tile([math.nextafter(3, 4), 3.01, 10.0, 216.0, 1e4, 1e6, 1e8], len(HURSTS))
+    zeta_1 = np.tile(
+        [math.nextafter(3, 4), 3.01, 10.0, 216.0, 1e4, 1e6, 1e8], len(HURSTS)
+    )
     hurst, start, end, allowed = (
         np.append(*parts)
         for parts in (
@@ -188,7 +254,10 @@ def test_band_moments(order):
     for k in range(found.size):
         with mp.workdps(50):
             width = mp.log(mp.mpf(float(end[k])) / mp.mpf(float(start[k])))
-        assert relative(found[k], exact_moment(order, hurst[k], start[k], width)) <= allowed[k]
+        assert (
+            relative(found[k], exact_moment(order, hurst[k], start[k], width))
+            <= allowed[k]
+        )
 
 
 @pytest.mark.parametrize("hurst", HURSTS)
@@ -212,13 +281,24 @@ def test_alpha(hurst):
 )
 def test_moments_give_the_surface_back(hurst, log_zeta, q0, h_rms):
     first = Surface(hurst, q0, q0 * math.exp(log_zeta), h_rms, 3 * h_rms)
-    again = Surface.from_moments(hurst=hurst, m0=first.m0, m2=first.m2, m4=first.m4, h_max=first.h_max)
+    again = Surface.from_moments(
+        hurst=hurst, m0=first.m0, m2=first.m2, m4=first.m4, h_max=first.h_max
+    )
     # the moments come back to rounding; zeta_1 as well as alpha fixes it
-    for name, rel in {"m0": 1e-12, "m2": 1e-12, "m4": 1e-12, "zeta_1": 1e-11, "q0": 1e-11, "h_rms": 1e-14}.items():
+    for name, rel in {
+        "m0": 1e-12,
+        "m2": 1e-12,
+        "m4": 1e-12,
+        "zeta_1": 1e-11,
+        "q0": 1e-11,
+        "h_rms": 1e-14,
+    }.items():
         assert getattr(again, name) == pytest.approx(getattr(first, name), rel=rel, abs=0)
 
 
 def test_no_band_has_this_alpha():
     with pytest.raises(OutOfRangeError, match="alpha") as caught:
-        Surface.from_moments(hurst=0.7, m0=1.0, m2=1.0, m4=[10.0, 1.0, 1.5, 1e12], h_max=1.0)
+        Surface.from_moments(
+            hurst=0.7, m0=1.0, m2=1.0, m4=[10.0, 1.0, 1.5, 1e12], h_max=1.0
+        )
     assert caught.value.mask.tolist() == [False, True, True, True]

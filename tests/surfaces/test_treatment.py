@@ -46,7 +46,13 @@ def told(result, step):
 
 @pytest.mark.parametrize(
     ("mode", "theirs"),
-    [("plane", "height"), ("quadratic", "curvature"), ("median", "median"), ("slope", "slope"), ("mean", "center")],
+    [
+        ("plane", "height"),
+        ("quadratic", "curvature"),
+        ("median", "median"),
+        ("slope", "slope"),
+        ("mean", "center"),
+    ],
 )
 def test_trends_are_the_librarys(mode, theirs):
     x = np.linspace(0, 1, POINTS)
@@ -58,7 +64,9 @@ def test_trends_are_the_librarys(mode, theirs):
         np.testing.assert_allclose(found.heights + found.form, bent, atol=1e-12)
     if mode not in ("median", "slope"):
         other = library.UniformLineScan(bent[5], SIDE).detrend(theirs).heights()
-        np.testing.assert_allclose(treated(bent[5], steps=(STEP,), detrend=mode).heights, other, atol=1e-12)
+        np.testing.assert_allclose(
+            treated(bent[5], steps=(STEP,), detrend=mode).heights, other, atol=1e-12
+        )
 
 
 class TestHoles:
@@ -69,7 +77,9 @@ class TestHoles:
         assert "16 of 9216 points" in told(found, "fill")
         # harmonic: the mean of the four neighbours, before the plane is taken off
         inside = found.heights[21, 31]
-        near = [found.heights[21 + i, 31 + j] for i, j in ((0, 1), (1, 0), (0, -1), (-1, 0))]
+        near = [
+            found.heights[21 + i, 31 + j] for i, j in ((0, 1), (1, 0), (0, -1), (-1, 0))
+        ]
         assert inside == pytest.approx(np.mean(near), abs=1e-9)
         assert np.isfinite(found.heights).all()
 
@@ -98,21 +108,31 @@ def test_a_bad_pixel_goes_and_little_else():
 class TestCutoff:
     @pytest.mark.parametrize("periodic", [True, False])
     def test_gradient_and_variance_that_go(self, periodic):
-        whole, cut = treated(periodic=periodic), treated(periodic=periodic, short_cutoff=SIDE / 6.5)
+        whole, cut = (
+            treated(periodic=periodic),
+            treated(periodic=periodic, short_cutoff=SIDE / 6.5),
+        )
         entry = next(e for e in cut.provenance if e["step"] == "short_cutoff")
 
         def squares(heights):
             if not periodic:
-                heights = np.block([[heights, heights[:, ::-1]], [heights[::-1], heights[::-1, ::-1]]])
+                heights = np.block(
+                    [[heights, heights[:, ::-1]], [heights[::-1], heights[::-1, ::-1]]]
+                )
             size = heights.shape[0] * STEP
             scan = library.Topography(heights, (size, size), periodic=True)
-            return heights.var(), np.mean(sum(np.square(part) for part in scan.fourier_derivative()))
+            return heights.var(), np.mean(
+                sum(np.square(part) for part in scan.fourier_derivative())
+            )
 
         before, after = squares(whole.heights), squares(cut.heights)
         assert entry["of_variance"] == pytest.approx(1 - after[0] / before[0], rel=1e-9)
         assert entry["of_gradient"] == pytest.approx(1 - after[1] / before[1], rel=1e-9)
         assert 0.1 < entry["of_gradient"] < 0.9
-        assert f"the rms gradient is {math.sqrt(after[1] / before[1]):.2f} times" in entry["told"]
+        assert (
+            f"the rms gradient is {math.sqrt(after[1] / before[1]):.2f} times"
+            in entry["told"]
+        )
         assert cut.waves == (0.0, pytest.approx(2 * np.pi * 6.5 / SIDE))
 
     def test_periodic_waves_are_those_of_the_library(self):
@@ -121,7 +141,9 @@ class TestCutoff:
         other = other.longcut(cutoff_wavelength=12.0).shortcut(cutoff_wavelength=3.0)
         np.testing.assert_allclose(cut.heights, other.heights(), atol=1e-12)
         cut = treated(MAP[3], periodic=True, steps=(STEP,), short_cutoff=3.0)
-        other = library.UniformLineScan(MAP[3] - MAP[3].mean(), SIDE, periodic=True).shortcut(cutoff_wavelength=3.0)
+        other = library.UniformLineScan(
+            MAP[3] - MAP[3].mean(), SIDE, periodic=True
+        ).shortcut(cutoff_wavelength=3.0)
         np.testing.assert_allclose(cut.heights, other.heights(), atol=1e-12)
 
     test_refused = staticmethod(
@@ -143,7 +165,9 @@ class TestFilters:
         x = np.arange(128.0)
         q = 2 * np.pi * np.array([2, 8, 22]) / 128
         values = sum(np.sin(one * x)[:, None] + 0 * x for one in q)
-        own = Surface.from_map(values, 0.5, periodic=True, unit="um", **{name: 0.5 * 16.0})
+        own = Surface.from_map(
+            values, 0.5, periodic=True, unit="um", **{name: 0.5 * 16.0}
+        )
         left = 2 * np.abs(np.fft.fft(own.map.heights[:, 5]))[[2, 8, 22]] / 128
         # ISO 16610-61, alpha = sqrt(ln 2/pi)
         passed = np.exp(-np.pi * (np.sqrt(np.log(2) / np.pi) * 16 / (2 * np.pi / q)) ** 2)
@@ -161,7 +185,11 @@ class TestFilters:
         assert 2 * np.pi / float(own.q1) == pytest.approx(0.388 * 10, rel=0.1)
 
 
-BOW, TILT, SPIKE = (np.arange(64.0)[:, None] - 32) ** 2 / 100, np.arange(64.0) / 10, np.zeros((64, 64))
+BOW, TILT, SPIKE = (
+    (np.arange(64.0)[:, None] - 32) ** 2 / 100,
+    np.arange(64.0) / 10,
+    np.zeros((64, 64)),
+)
 SPIKE[10, 20] = 50.0
 
 
@@ -196,7 +224,9 @@ class TestReading:
             assert found.map.steps == pytest.approx((0.5, 0.8))
             assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
             assert found.unit == "um"
-            with pytest.raises(InputError, match="has no lengths: give the sampling step dx"):
+            with pytest.raises(
+                InputError, match="has no lengths: give the sampling step dx"
+            ):
                 Surface.from_map(tmp_path / name)
 
     def test_a_list_of_points_with_gaps_is_no_matrix(self, tmp_path):
@@ -210,12 +240,18 @@ class TestReading:
         library.Topography(MAP, (SIDE, SIDE), unit="nm").to_netcdf(str(path))
         found = Surface.from_map(path, model="measured")
         assert found.unit == "nm"
-        assert found.h_rms == pytest.approx(Surface.from_map(MAP, STEP, model="measured").h_rms, rel=1e-6)
+        assert found.h_rms == pytest.approx(
+            Surface.from_map(MAP, STEP, model="measured").h_rms, rel=1e-6
+        )
         with pytest.raises(InputError, match="has its own lengths"):
             read_measurement(path, dx=1.0)
         other = Surface.from_map(path, unit="um", short_cutoff=2e-3)
         expected = Surface.from_map(path, short_cutoff=2.0).to("um")
-        assert (other.unit, other.q1, other.h_rms) == ("um", pytest.approx(expected.q1), pytest.approx(expected.h_rms))
+        assert (other.unit, other.q1, other.h_rms) == (
+            "um",
+            pytest.approx(expected.q1),
+            pytest.approx(expected.h_rms),
+        )
         with pytest.raises(InputError, match="has channels 0 to 0, not 3"):
             read_measurement(path, channel=3)
 
@@ -229,8 +265,13 @@ class TestReading:
         ],
     )
     def test_units_in_the_header_of_points(self, tmp_path, header, unit, scale):
-        (tmp_path / "a.xyz").write_text("\n".join([header, *(" ".join(map(str, p)) for p in LIST)]), "latin-1")
-        found, plain = Surface.from_map(tmp_path / "a.xyz"), Surface.from_map(MAP[:40, :40], STEP)
+        (tmp_path / "a.xyz").write_text(
+            "\n".join([header, *(" ".join(map(str, p)) for p in LIST)]), "latin-1"
+        )
+        found, plain = (
+            Surface.from_map(tmp_path / "a.xyz"),
+            Surface.from_map(MAP[:40, :40], STEP),
+        )
         assert found.unit == unit
         assert found.h_rms == pytest.approx(scale * plain.h_rms, rel=1e-9)
         assert found.q1 == pytest.approx(plain.q1, rel=1e-9)
@@ -246,19 +287,30 @@ class TestReading:
         xr = pytest.importorskip("xarray")
         plain = Surface.from_map(MAP, STEP)
         own = xr.DataArray(MAP, dims=("x", "y"), attrs={"units": "um"})
-        for dx, unit, scale in ((STEP, None, 1.0), (STEP * 1e-3, "mm", 1e-3), (f"{1e3 * STEP} nm", None, 1e3)):
+        for dx, unit, scale in (
+            (STEP, None, 1.0),
+            (STEP * 1e-3, "mm", 1e-3),
+            (f"{1e3 * STEP} nm", None, 1e3),
+        ):
             found = Surface.from_map(own, dx, unit=unit)
             assert found.h_rms == pytest.approx(scale * plain.h_rms, rel=1e-9)
             assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
             assert found.unit == {1.0: "um", 1e-3: "mm", 1e3: "nm"}[scale]
         with pytest.raises(InputError, match="'V' is no known unit of length"):
             Surface.from_map(own.assign_attrs(units="V"), STEP)
-        with pytest.raises(InputError, match="h_rms is in 'um' by its attribute units, and asked for in 'mm'"):
-            Surface(0.8, 1.0, 100.0, xr.DataArray(1.0, attrs={"units": "um"}), 3.0, unit="mm")
+        with pytest.raises(
+            InputError,
+            match="h_rms is in 'um' by its attribute units, and asked for in 'mm'",
+        ):
+            Surface(
+                0.8, 1.0, 100.0, xr.DataArray(1.0, attrs={"units": "um"}), 3.0, unit="mm"
+            )
 
     def test_units_of_points_that_differ_along_the_axes(self, tmp_path):
         np.savetxt(tmp_path / "a.xyz", LIST, header="x [um] y [mm] z [nm]")
-        with pytest.raises(InputError, match="names the units um, mm, nm: write x and y in one unit"):
+        with pytest.raises(
+            InputError, match="names the units um, mm, nm: write x and y in one unit"
+        ):
             Surface.from_map(tmp_path / "a.xyz")
 
     def test_numbers_are_no_units(self, tmp_path):
@@ -271,30 +323,46 @@ class TestReading:
     @pytest.mark.parametrize("suffix", [".csv", ".txt", ".asc"])
     @pytest.mark.parametrize("separator", [";", "; ", "\t", " ", ", "])
     @pytest.mark.parametrize("mark", [".", ","])
-    def test_every_separator_with_both_decimal_marks(self, tmp_path, suffix, separator, mark):
+    def test_every_separator_with_both_decimal_marks(
+        self, tmp_path, suffix, separator, mark
+    ):
         values = np.round(10 * waves(shape=(40, 36)), 3)
         path = tmp_path / f"a{suffix}"
-        rows = [separator.join(f"{value:.3f}".replace(".", mark) for value in row) for row in values]
+        rows = [
+            separator.join(f"{value:.3f}".replace(".", mark) for value in row)
+            for row in values
+        ]
         path.write_text("\n".join(rows))
-        np.testing.assert_array_equal(read_measurement(path, dx=1.0, unit="um").heights(), values)
+        np.testing.assert_array_equal(
+            read_measurement(path, dx=1.0, unit="um").heights(), values
+        )
 
     @pytest.mark.parametrize("digits", [1, 2, 3])
     def test_commas_that_may_be_decimal_are_refused(self, tmp_path, digits):
         values = 7 + waves(shape=(40, 36))
-        rows = [",".join(f"{value:.{digits}f}".replace(".", ",") for value in row) for row in values]
+        rows = [
+            ",".join(f"{value:.{digits}f}".replace(".", ",") for value in row)
+            for row in values
+        ]
         (tmp_path / "a.csv").write_text("\n".join(rows))
-        with pytest.raises(InputError, match=r"are decimal commas\. Write decimal points"):
+        with pytest.raises(
+            InputError, match=r"are decimal commas\. Write decimal points"
+        ):
             read_measurement(tmp_path / "a.csv", dx=1.0)
 
     def test_whole_numbers_between_commas(self, tmp_path):
         values = np.rint(20000 + 3000 * waves(shape=(40, 36)))
         for offset in (0, 20000):
             np.savetxt(tmp_path / "a.csv", values - offset, delimiter=",", fmt="%d")
-            np.testing.assert_array_equal(read_measurement(tmp_path / "a.csv", dx=1.0).heights(), values - offset)
+            np.testing.assert_array_equal(
+                read_measurement(tmp_path / "a.csv", dx=1.0).heights(), values - offset
+            )
 
     def test_two_decimal_marks_are_refused(self, tmp_path):
         (tmp_path / "a.csv").write_text("1,5;2.5\n" * 40)
-        with pytest.raises(InputError, match="commas inside numbers that also hold points"):
+        with pytest.raises(
+            InputError, match="commas inside numbers that also hold points"
+        ):
             read_measurement(tmp_path / "a.csv", dx=1.0)
 
     @pytest.mark.parametrize("suffix", [".npy", ".txt", ".csv"])
@@ -325,7 +393,9 @@ class TestReading:
 
 def test_the_window_is_hanns():
     found = treated(MAP[3], steps=(STEP,))
-    weights = scipy.signal.windows.hann(2 * POINTS + 1)[1::2]  # at the middle of each step
+    weights = scipy.signal.windows.hann(2 * POINTS + 1)[
+        1::2
+    ]  # at the middle of each step
     weights = weights / np.sqrt(np.mean(weights**2))
     expected = weights * (found.heights - np.average(found.heights, weights=weights))
     np.testing.assert_allclose(found.windowed(), expected, atol=1e-12)
@@ -333,7 +403,9 @@ def test_the_window_is_hanns():
 
 def test_lengths_with_their_unit():
     plain = Surface.from_map(MAP, STEP, unit="um", short_cutoff=3.0, model="measured")
-    named = Surface.from_map(MAP, "250 nm", unit="um", short_cutoff="3e-6 m", model="measured")
+    named = Surface.from_map(
+        MAP, "250 nm", unit="um", short_cutoff="3e-6 m", model="measured"
+    )
     assert named.q1 == pytest.approx(plain.q1, rel=1e-12)
     assert plain.q1 <= 2 * np.pi / 3 * (1 + 1e-9)
     assert named.unit == "um"

@@ -24,7 +24,15 @@ def pairs(theory):
                     except MbmaError:
                         continue  # MBMA does not reach every area
                     caps = float(surface.rms_gradient) / PSI
-                    yield elastic, contact(surface, pressure=elastic.pressure, theory=theory, hardness=caps)
+                    yield (
+                        elastic,
+                        contact(
+                            surface,
+                            pressure=elastic.pressure,
+                            theory=theory,
+                            hardness=caps,
+                        ),
+                    )
 
 
 @pytest.mark.slow
@@ -52,7 +60,9 @@ def test_persson_at_light_loads_where_nothing_yields():
         elastic = contact(surface, area=area, theory="persson")
         hard = contact(surface, pressure=elastic.pressure, theory="persson", hardness=cap)
         for name in QUANTITIES:
-            assert getattr(hard, name) == pytest.approx(getattr(elastic, name), rel=2e-5), name
+            assert getattr(hard, name) == pytest.approx(
+                getattr(elastic, name), rel=2e-5
+            ), name
 
 
 @pytest.mark.parametrize("theory", THEORIES)
@@ -63,7 +73,8 @@ def test_force_rises_with_the_hardness_without_a_jump(theory):
         pressed = contact(surface, mean_separation=u, theory=theory, hardness=caps)
         steps = np.diff(np.log(pressed.pressure)) / np.diff(np.log(caps))
         assert steps.min() >= -1e-6
-        # of next to no hardness pressure is in proportion to it; what an elastic contact adds rises as its cube
+        # of next to no hardness pressure is in proportion to it; what an elastic contact
+        # adds rises as its cube
         assert steps.max() <= 3
 
 

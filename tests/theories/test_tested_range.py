@@ -25,9 +25,15 @@ def test_valid_implies_within_the_range_of_the_simulations(theory):
     areas = np.concatenate([one.area for one in alike])
     rng = np.random.default_rng(46)
     surface = random_surfaces(rng, 2000)
-    depth = np.where(rng.random(2000) < 0.5, 10 ** rng.uniform(-6, 0, 2000), rng.uniform(0.2, 0.99, 2000))
+    depth = np.where(
+        rng.random(2000) < 0.5,
+        10 ** rng.uniform(-6, 0, 2000),
+        rng.uniform(0.2, 0.99, 2000),
+    )
     options = {"outside": "nan"} if theory == "mbma" else {}
-    pressed = contact(surface, mean_separation=surface.h_max * (1 - depth), theory=theory, **options)
+    pressed = contact(
+        surface, mean_separation=surface.h_max * (1 - depth), theory=theory, **options
+    )
     valid = pressed.valid
     assert valid.sum() > (5 if theory == "greenwood_williamson" else 30)
     assert (surface.hurst[valid] >= least_hurst * (1 - 1e-9)).all()
@@ -49,22 +55,34 @@ def test_extreme_surfaces_are_not_valid(theory):
         pressed = contact(surface, area=1e-12, theory=theory, **options)
         assert not pressed.valid
         assert np.isnan(pressed.scatter)
-        assert any("the Hurst exponent is below 0.2" in reason for reason in pressed.reasons)
+        assert any(
+            "the Hurst exponent is below 0.2" in reason for reason in pressed.reasons
+        )
 
 
 @each
 def test_a_small_nominal_area_is_not_valid(theory):
     rough = {"Rq": 1.0, "longest": 100.0, "shortest": 2.0, "hurst": 0.8, "unit": "um"}
-    for waves, tested in ((1.0, False), (2.0, False), (3.9, False), (4.0, True), (50.0, True)):
+    for waves, tested in (
+        (1.0, False),
+        (2.0, False),
+        (3.9, False),
+        (4.0, True),
+        (50.0, True),
+    ):
         face = Surface.from_roughness(**rough, nominal_area=(100.0 * waves) ** 2)
         for surface in (face, face.to("mm"), face.sampled()):
             pressed = contact(surface, area=0.05, theory=theory)
-            reasons = [reason for reason in pressed.reasons if "wavelengths a side" in reason]
+            reasons = [
+                reason for reason in pressed.reasons if "wavelengths a side" in reason
+            ]
             assert len(reasons) == (not tested)
             assert not (pressed.valid and not tested)
     batch = Surface.from_roughness(**rough, nominal_area=np.array([1e4, 1e6]))
     masks = contact(batch, area=0.05, theory=theory).reasons
-    assert [mask.tolist() for text, mask in masks.items() if "a side" in text] == [[True, False]]
+    assert [mask.tolist() for text, mask in masks.items() if "a side" in text] == [
+        [True, False]
+    ]
     small = Surface.from_roughness(**rough, nominal_area=1e4)
     labelled = contact(small, area=xr.DataArray([0.05, 0.1], dims="load"), theory=theory)
     assert not labelled.valid.any()
@@ -76,7 +94,11 @@ def test_the_bulk_yields_from_a_third_of_the_hardness_on(theory):
     surface = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=0.2, h_max=0.66)
     share = np.array([0.02, 0.33, 0.34, 0.7])
     pressed = contact(surface, pressure=1e-3 * share, theory=theory, hardness=1e-3)
-    masks = [mask.tolist() for text, mask in pressed.reasons.items() if "a third of the hardness" in text]
+    masks = [
+        mask.tolist()
+        for text, mask in pressed.reasons.items()
+        if "a third of the hardness" in text
+    ]
     assert masks == [[False, False, True, True]]
     assert not pressed.valid[2:].any()
     elastic = contact(surface, pressure=1e-3 * share, theory=theory, hardness=np.inf)

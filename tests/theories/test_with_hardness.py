@@ -40,14 +40,20 @@ def pairs(tmp_path_factory):
     BoundaryElements.of(measured).to_netcdf(path)
     opened = BoundaryElements.from_netcdf(path)
     pairs = {name: (get_theory(name), rough) for name in THEORIES}
-    pairs |= {name: (get_theory(name, measured), measured) for name in ("simulated", "corrected")}
+    pairs |= {
+        name: (get_theory(name, measured), measured)
+        for name in ("simulated", "corrected")
+    }
     return pairs | {"table": (opened, opened.surface)}
 
 
 # the theory of a map alone, since importing others may import what it needs
 @pytest.mark.parametrize(
     "names",
-    [("simulated",), pytest.param((*THEORIES, "corrected", "table"), marks=pytest.mark.slow)],
+    [
+        ("simulated",),
+        pytest.param((*THEORIES, "corrected", "table"), marks=pytest.mark.slow),
+    ],
 )
 def test_every_theory_has_the_same_bits_in_a_new_process(pairs, tmp_path, names):
     bits = {}
@@ -59,7 +65,9 @@ def test_every_theory_has_the_same_bits_in_a_new_process(pairs, tmp_path, names)
             rows = [value.hex() for field in fields for value in field.tolist()]
             bits[f"{name}, hardness {cap}"] = rows
     path = tmp_path / "pairs.pickle"
-    path.write_bytes(pickle.dumps(({name: pairs[name] for name in names}, PRESSURES, HARDNESS)))
+    path.write_bytes(
+        pickle.dumps(({name: pairs[name] for name in names}, PRESSURES, HARDNESS))
+    )
     assert fresh(OTHER_PROCESS, str(path)) == bits
 
 
@@ -68,7 +76,9 @@ def test_workers_of_dask_have_the_same_bits(pairs):
     theory, surface = pairs["simulated"]
     pressures = xr.DataArray(PRESSURES, dims="load")
     here = contact(surface, pressure=pressures, theory=theory, hardness=HARDNESS).area
-    chunks = contact(surface, pressure=pressures.chunk(load=1), theory=theory, hardness=HARDNESS).area
+    chunks = contact(
+        surface, pressure=pressures.chunk(load=1), theory=theory, hardness=HARDNESS
+    ).area
     there = chunks.compute(scheduler="processes", num_workers=1)
     np.testing.assert_array_equal(there, here)
 

@@ -1,7 +1,8 @@
 """Persson's energy integral with cover and weight calibrated on boundary elements; equations in docs/calibrated.md.
 
-Force is over A0 E* g with g the rms gradient in two dimensions, lengths in h_rms, wavenumbers x = q/q0, energy over
-A0 E* g h_rms. The compiled core, spectrum_laws.c, keeps u_P(F) as polynomials of ln F.
+Force is over A0 E* g with g the rms gradient in two dimensions, lengths in h_rms,
+wavenumbers x = q/q0, energy over A0 E* g h_rms. The compiled core, spectrum_laws.c, keeps
+u_P(F) as polynomials of ln F.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ UNRESOLVED = 4  # the core's status where a quadrature did not reach its toleran
 class Constants:
     """The law's constants."""
 
-    area_s0: float = 0.5131  # S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1
+    # S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1
+    area_s0: float = 0.5131
     area_slope: float = 0.02973
     area_t0: float = 0.3428
     weight: float = 0.438  # W's coefficient a,
@@ -40,11 +42,15 @@ class Constants:
 
 
 CONSTANTS = Constants()
-PERSSON = Constants(area_s0=1.0, area_slope=0.0, weight=1.0, weight_slope=0.0, cubic=0.0, tail=0.0)
+PERSSON = Constants(
+    area_s0=1.0, area_slope=0.0, weight=1.0, weight_slope=0.0, cubic=0.0, tail=0.0
+)
 YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 
-def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+def area(
+    force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS
+) -> FloatArray:
     """A/A0 at F/(A0 E* g) >= 0 on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
     return area_of(force, light_factor(alpha, constants), constants.area_t0)
 
@@ -58,7 +64,9 @@ def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
     return np.asarray(erf(F * np.sqrt(2 * (1 + F / t0) / (np.asarray(s0) + F / t0))))
 
 
-def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+def force_of(
+    e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS
+) -> FloatArray:
     """F/(A0 E* g) at A/A0 = erf(e) by the light-load factor s0; inverts `area`: 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
     wanted, s0, t0 = np.asarray(e, float), np.asarray(light), constants.area_t0
     # at y = e/sqrt(2) the left side is the larger, and the cubic is convex from there to its root
@@ -75,7 +83,9 @@ def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -
 
 def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """s0, the value of S at light loads."""
-    return np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0)
+    return np.minimum(
+        constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -91,12 +101,16 @@ class Spectrum:
     @shared_property
     def narrowness(self) -> float:
         """Harmonic over arithmetic mean wavenumber, weighted by variance: 1 for one wavelength, 0 for a broad band."""
-        return float(1 / (np.sum(self.variance * self.x) * np.sum(self.variance / self.x)))
+        return float(
+            1 / (np.sum(self.variance * self.x) * np.sum(self.variance / self.x))
+        )
 
     @classmethod
     def self_affine(cls, hurst: float, zeta_1: float) -> Spectrum:
         """Power law x^(-2H) between 1 and zeta_1."""
-        return cls.from_samples(np.array([1.0, zeta_1]), np.array([1.0, zeta_1 ** (-2 - 2 * hurst)]))
+        return cls.from_samples(
+            np.array([1.0, zeta_1]), np.array([1.0, zeta_1 ** (-2 - 2 * hurst)])
+        )
 
     @classmethod
     def from_samples(cls, q: FloatArray, C: FloatArray) -> Spectrum:
@@ -104,7 +118,9 @@ class Spectrum:
         facts, none = np.empty(4), np.empty(0)
         count = core.spectrum_waves(q, C, none, none, none, facts)
         if not count:
-            raise InputError("there is no spectrum between these samples, or its moments are not finite")
+            raise InputError(
+                "there is no spectrum between these samples, or its moments are not finite"
+            )
         x, variance, below = np.empty((3, count))
         core.spectrum_waves(q, C, x, variance, below, facts)
         return cls(x, variance, below, *facts[:2].tolist())
@@ -147,13 +163,19 @@ class Law:
     def _prepared(self) -> FloatArray:
         """The law in the core's format."""
         s, highest = self.spectrum, np.inf if self.h_max is None else self.h_max
-        numbers = np.array([s.gradient, s.alpha, *dataclasses.astuple(self.constants), highest])
+        numbers = np.array(
+            [s.gradient, s.alpha, *dataclasses.astuple(self.constants), highest]
+        )
         law, work = np.empty(core.words_of_spectrum_law()), np.empty(3 * s.x.size)
         status = core.spectrum_law_of(s.x, s.variance, s.below, numbers, work, law)
         if status == UNRESOLVED:
-            raise ConvergenceError("the law of this spectrum has no curve that polynomials follow")
+            raise ConvergenceError(
+                "the law of this spectrum has no curve that polynomials follow"
+            )
         if status:
-            raise InputError("a spectrum has rising positive wavenumbers and shares of variance that are not negative")
+            raise InputError(
+                "a spectrum has rising positive wavenumbers and shares of variance that are not negative"
+            )
         return law
 
     def energy(self, force: ArrayLike) -> FloatArray:
@@ -168,7 +190,9 @@ class Law:
         def of_block(part: FloatArray) -> FloatArray:
             cover = erf(part[:, None] * reach)
             weights = np.zeros_like(cover)
-            for power, coefficient in zip(POWERS, self.coefficients.tolist(), strict=True):
+            for power, coefficient in zip(
+                POWERS, self.coefficients.tolist(), strict=True
+            ):
                 weights += coefficient * cover**power
             # a sum for each load, whose order does not depend on how many there are
             return np.asarray((weights * shares).sum(axis=-1))
@@ -177,12 +201,19 @@ class Law:
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor; 0 at loads that close the gap."""
-        u, slope = answered(functools.partial(core.spectrum_law_separation, self._prepared), (force,), 2, 0)
+        u, slope = answered(
+            functools.partial(core.spectrum_law_separation, self._prepared),
+            (force,),
+            2,
+            0,
+        )
         return u, slope
 
     def contact(self, u: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Force, area and -dF/du at mean separations u [h_rms]: 0 from h_max on, without bound at u = 0."""
-        force, share, stiffness = answered(functools.partial(core.spectrum_law_contact, self._prepared), (u,), 3)
+        force, share, stiffness = answered(
+            functools.partial(core.spectrum_law_contact, self._prepared), (u,), 3
+        )
         return force, share, stiffness
 
     def force(self, u: ArrayLike) -> FloatArray:
@@ -191,7 +222,12 @@ class Law:
 
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
-        return answered(functools.partial(core.spectrum_law_separation, self._prepared), (force,), 2, 1)[0]
+        return answered(
+            functools.partial(core.spectrum_law_separation, self._prepared),
+            (force,),
+            2,
+            1,
+        )[0]
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
@@ -199,7 +235,9 @@ class Law:
 
 
 @shared(KEPT)
-def self_affine_law(hurst: float, zeta_1: float, h_max: float | None, constants: Constants = CONSTANTS) -> Law:
+def self_affine_law(
+    hurst: float, zeta_1: float, h_max: float | None, constants: Constants = CONSTANTS
+) -> Law:
     """The law of a self-affine surface, cached."""
     return Law(Spectrum.self_affine(hurst, zeta_1), h_max, constants)
 
@@ -207,15 +245,24 @@ def self_affine_law(hurst: float, zeta_1: float, h_max: float | None, constants:
 @shared(KEPT)
 def spectrum_of(surface: Any) -> Spectrum:
     """The spectrum of a `MeasuredSurface`."""
-    return Spectrum.from_samples(*(np.ascontiguousarray(part, float) for part in (surface.q, surface.C)))
+    return Spectrum.from_samples(
+        *(np.ascontiguousarray(part, float) for part in (surface.q, surface.C))
+    )
 
 
-def force_at_area(area: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+def force_at_area(
+    area: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS
+) -> FloatArray:
     """F/(A0 E* g) at A/A0."""
     from scipy.special import erfinv
 
     share = np.asarray(area, float)
-    require("area", share, (share >= 0) & (share < 1), "below 1, which is reached at infinite load")
+    require(
+        "area",
+        share,
+        (share >= 0) & (share < 1),
+        "below 1, which is reached at infinite load",
+    )
     return force_of(erfinv(share), light, constants)
 
 

@@ -18,7 +18,13 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.surfaces.bearing_curve import FRACTIONS, Bearing, RadialSpectrum
 from mbma_tables.theories.calibrated import formulas as calibrated
-from mbma_tables.theories.calibrated.formulas import CONSTANTS, Constants, Law, Spectrum, light_factor
+from mbma_tables.theories.calibrated.formulas import (
+    CONSTANTS,
+    Constants,
+    Law,
+    Spectrum,
+    light_factor,
+)
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
 NODES = 500
@@ -34,15 +40,19 @@ ERF_INVERSE = (1e-7, 3.9)  # erfinv(A) over which F(A) is tabulated
 class MapConstants:
     """Constants of the map's law.
 
-    c = 0.8 max(1, b (alpha/2)^(curvature/2)/breadth_onset)^breadth for an isotropic map, once contacts have merged,
-    b the root mean square over the geometric mean wavenumber, alpha = m0 m4/m2^2.
+    c = 0.8 max(1, b (alpha/2)^(curvature/2)/breadth_onset)^breadth for an isotropic map,
+    once contacts have merged, b the root mean square over the geometric mean wavenumber,
+    alpha = m0 m4/m2^2.
     """
 
     breadth: float = 0.5988
     breadth_onset: float = 1.512
-    gaussian_area: float = 0.2897  # contact where the deviation of a Gaussian surface from M(c A) takes over,
+    # contact where the deviation of a Gaussian surface from M(c A) takes over,
+    gaussian_area: float = 0.2897
     valley_area: float = 0.6527  # and then the valleys
-    tension_area: float = 0.6  # contact above which the tensile area in full contact replaces that of the highest parts
+    # contact above which the tensile area in full contact replaces that of the highest
+    # parts
+    tension_area: float = 0.6
     merging_area: float = 0.00761  # contact over which c grows from a single contact's
     # further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces
     elliptic: float = 0.7245
@@ -50,9 +60,10 @@ class MapConstants:
 
 
 MAP_CONSTANTS = MapConstants()
-# of maps whose light- and full-contact curves disagree at 30% contact, fitted to machined surfaces: valleys take over
-# at a contact larger by shift (1 - exp(-(D/onset)^4)), D the difference of their pressure-weighted heights there
-# [h_rms], which is below 0.1 on Gaussian maps, larger on plateaus and with pits
+# of maps whose light- and full-contact curves disagree at 30% contact, fitted to machined
+# surfaces: valleys take over at a contact larger by shift (1 - exp(-(D/onset)^4)), D the
+# difference of their pressure-weighted heights there [h_rms], which is below 0.1 on
+# Gaussian maps, larger on plateaus and with pits
 PLATEAU_SHIFT, PLATEAU_ONSET, PLATEAU_AREA = 0.45, 0.8, 0.3
 
 
@@ -67,7 +78,12 @@ def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
         K, E = float(ellipkm1(b * b)), float(ellipe(m))
         return 2 * b / m * (E / (b * b) - K), 2 * b / m * (K - E)
 
-    b = brentq(lambda b: operator.truediv(*curvatures(b)) - anisotropy**2, 1e-9, 1 - 1e-7, xtol=1e-14)
+    b = brentq(
+        lambda b: operator.truediv(*curvatures(b)) - anisotropy**2,
+        1e-9,
+        1 - 1e-7,
+        xtol=1e-14,
+    )
     kb, ka = curvatures(b)
     product = np.sqrt(ka * kb)
     # the circle has curvatures pi/2 at semi-axis 1
@@ -82,7 +98,9 @@ def convex(force: FloatArray, u: FloatArray) -> FloatArray:
     Least squares of the compliances, weighted by steps of force; a monotone u is unchanged.
     """
     steps = np.diff(force)
-    compliance = isotonic_regression(-np.diff(u) / steps, weights=steps, increasing=False).x
+    compliance = isotonic_regression(
+        -np.diff(u) / steps, weights=steps, increasing=False
+    ).x
     return np.asarray(u[-1] + np.append(np.cumsum((compliance * steps)[::-1])[::-1], 0.0))
 
 
@@ -117,18 +135,24 @@ class MapLaw:
     def height_factor(self) -> float:
         """c of H_p = M(c A)."""
         r, m = self.anisotropy, self.map_constants
-        breadth = self.spectrum.gradient / np.exp(np.sum(self.spectrum.variance * np.log(self.spectrum.x)))
+        breadth = self.spectrum.gradient / np.exp(
+            np.sum(self.spectrum.variance * np.log(self.spectrum.x))
+        )
         # stretching an isotropic map by r multiplies it by sqrt(2 (1 + r^2))/(1 + r)
         breadth *= (1 + r) / np.sqrt(2 * (1 + r * r))
         breadth *= (self.spectrum.alpha / 2) ** (m.curvature / 2)
-        return float(0.8 * max(1.0, breadth / m.breadth_onset) ** m.breadth * self._ellipse[1])
+        return float(
+            0.8 * max(1.0, breadth / m.breadth_onset) ** m.breadth * self._ellipse[1]
+        )
 
     @shared_property
     def weighted_height(self) -> FloatArray:
         """M_w(a): mean height of the highest share a weighted by its gradient, to which pressures are proportional."""
         steps = np.diff(FRACTIONS, prepend=0.0)
         heights = np.diff(FRACTIONS * self.mean_height, prepend=0.0)
-        gradients = np.maximum(np.diff(FRACTIONS * self.top_gradient, prepend=0.0), MIN_GRADIENT * steps)
+        gradients = np.maximum(
+            np.diff(FRACTIONS * self.top_gradient, prepend=0.0), MIN_GRADIENT * steps
+        )
         mean = np.cumsum(heights / steps * gradients) / np.cumsum(gradients)
         return np.asarray(np.minimum.accumulate(mean))
 
@@ -147,7 +171,11 @@ class MapLaw:
 
     def _valleys_area(self) -> FloatArray:
         """A/A0 for which Gaussian pressures of full contact are tensile on the same share as the map's."""
-        pulled = np.exp(np.interp(np.exp(LOG_FORCE), self.tension_force[::-1], np.log(FRACTIONS[::-1])))
+        pulled = np.exp(
+            np.interp(
+                np.exp(LOG_FORCE), self.tension_force[::-1], np.log(FRACTIONS[::-1])
+            )
+        )
         beyond = np.maximum(np.exp(LOG_FORCE) / self.tension_force[0], 1.0)
         force = np.maximum(-ndtri(np.minimum(pulled, 0.5)) / 2, 0.0) * beyond
         # Hertz's elliptic factor, in the place of alpha's
@@ -162,13 +190,19 @@ class MapLaw:
     def _contact(self) -> FloatArray:
         """A/A0 on the curve's forces."""
         tops, valleys = self._tops_area(), self._valleys_area()
-        mixed = valleys + (tops - valleys) * np.exp(-((tops / self.map_constants.tension_area) ** 6))
-        return np.maximum.accumulate(np.minimum(mixed, 1 - 1e-15) * (1 + 1e-13 * np.arange(NODES)))
+        mixed = valleys + (tops - valleys) * np.exp(
+            -((tops / self.map_constants.tension_area) ** 6)
+        )
+        return np.maximum.accumulate(
+            np.minimum(mixed, 1 - 1e-15) * (1 + 1e-13 * np.arange(NODES))
+        )
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
         logit = np.log(self._contact / (1 - np.minimum(self._contact, 1 - 1e-15)))
-        return np.asarray(expit(np.interp(np.log(np.asarray(force, float)), LOG_FORCE, logit)))
+        return np.asarray(
+            expit(np.interp(np.log(np.asarray(force, float)), LOG_FORCE, logit))
+        )
 
     def gaussian_force(self, force: ArrayLike) -> FloatArray:
         """F_D: force at which Gaussian pressures of full contact have the same mean tension as the map's at F."""
@@ -179,7 +213,9 @@ class MapLaw:
         matched = np.interp(-np.log(self.tension[kept]), -np.log(gaussian), x)[::-1]
         own = self.tension_force[kept][::-1]
         given = np.asarray(force, float)
-        found = np.interp(given, own, matched) + np.maximum(given - own[-1], 0) * (matched[-1] / own[-1])
+        found = np.interp(given, own, matched) + np.maximum(given - own[-1], 0) * (
+            matched[-1] / own[-1]
+        )
         # at light loads another approximation applies: any positive increasing curve will do
         return np.asarray(np.maximum(found, MIN_RATIO * given))
 
@@ -192,10 +228,13 @@ class MapLaw:
         u = law.separation_persson(self.gaussian_force(force))[0]
         work = CubicSpline(log_force, u * force).antiderivative()
         # U_full - integral of F' (-du/dF') dF', by parts
-        full = np.sum(self.spectrum.x * self.spectrum.variance) / (4 * self.spectrum.gradient)
+        full = np.sum(self.spectrum.x * self.spectrum.variance) / (
+            4 * self.spectrum.gradient
+        )
         energy = full - u * force - (work(log_force[-1]) - work(log_force))
         valleys = u + 2 * energy / force
-        # the curve of the highest parts, with the deviation of a Gaussian surface from M(c A) at the same contact
+        # the curve of the highest parts, with the deviation of a Gaussian surface from M(c
+        # A) at the same contact
         grid = np.linspace(LIGHTEST - 2, HEAVIEST + 1, 2000)
         same = np.exp(np.interp(contact, law.area(np.exp(grid)), grid))
         height = law.separation_persson(same)[0] + 2 * law.energy(same) / same
@@ -203,12 +242,16 @@ class MapLaw:
         own = np.interp(-height, -calibrated.mean_top_height(np.exp(shares)), shares)
         near = np.exp(-((contact / m.gaussian_area) ** 2))
         single = 0.8 * self._ellipse[1]
-        factor = single + (self.height_factor - single) * -np.expm1(-contact / m.merging_area)
+        factor = single + (self.height_factor - single) * -np.expm1(
+            -contact / m.merging_area
+        )
         top = np.minimum(near * np.log(factor * contact) + (1 - near) * own, 0.0)
         tops = np.interp(top, np.log(FRACTIONS), self.weighted_height)
         # the highest parts have no influence in full contact
         apart = float(np.interp(PLATEAU_AREA, contact, valleys - tops))
-        valley_area = m.valley_area - self.plateau_shift * np.expm1(-((apart / PLATEAU_ONSET) ** 4))
+        valley_area = m.valley_area - self.plateau_shift * np.expm1(
+            -((apart / PLATEAU_ONSET) ** 4)
+        )
         share = (contact / valley_area) ** 4 / np.maximum(1 - contact**4, 1e-12)
         difference = np.exp(-share) * (tops - valleys)
         # u is linear in H_p

@@ -22,21 +22,29 @@ class Table(SurfaceSpline):
     """The shipped table: ln of the force on a surface without end; the core applies the end at h_max and the area."""
 
     constants: Constants  # of the law
-    error: float  # largest relative error of force against the law's own quadrature, at held-out points
+    # largest relative error of force against the law's own quadrature, at held-out points
+    error: float
 
-    def prepared(self, surfaces: FloatArray, entries: int) -> list[Callable[..., FloatArray]]:
+    def prepared(
+        self, surfaces: FloatArray, entries: int
+    ) -> list[Callable[..., FloatArray]]:
         """Force, area, -dF/du by (owners, u/h_rms), and u/h_rms by (owners, force > 0), NaN beyond the table."""
         ends = np.empty((surfaces.shape[1], 2))
         core.calibrated_ends(*self.core_table, *surfaces, None, None, ends)
         given = *self.core_table, *surfaces, ends, self.shared(surfaces, entries)
         loops = (core.calibrated_contact, 3), (core.calibrated_separation, 1)
-        return [functools.partial(filled, functools.partial(loop, *given), outputs=rows) for loop, rows in loops]
+        return [
+            functools.partial(filled, functools.partial(loop, *given), outputs=rows)
+            for loop, rows in loops
+        ]
 
 
 def load(path: pathlib.Path) -> Table:
     """Read a table file; one that is damaged, or is another file, is a TableFileError."""
     values, facts, covered = read_group(path)
-    constants = Constants(*(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants)))
+    constants = Constants(
+        *(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants))
+    )
     return Table(
         *nodes_of([values[name] for name in AXES]),
         np.array([covered[name] for name in AXES]),

@@ -16,7 +16,13 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import tested
 from mbma_tables.theories.base import Curve, Theory, TheoryAnswer, unfinished
 from mbma_tables.theories.calibrated import table as calibrated_table
-from mbma_tables.theories.calibrated.formulas import KEPT, Law, force_at_area, light_factor, self_affine_law
+from mbma_tables.theories.calibrated.formulas import (
+    KEPT,
+    Law,
+    force_at_area,
+    light_factor,
+    self_affine_law,
+)
 from mbma_tables.theories.calibrated.formulas import area as law_area
 from mbma_tables.theories.evidence import shipped_deviations
 from mbma_tables.theories.tested import TESTED_AREA
@@ -25,10 +31,18 @@ if TYPE_CHECKING:
     from mbma_tables.theories.calibrated.curves import OwnLaw
 
 NEAREST = 0.95  # share of h_max at which the certificate of the table ends
-TAIL = 3.0, 0.8  # u/h_rms from which the error of the table grows, and its rate: exp(0.8 (u/h_rms - 3))
-# standard deviations added to those of the data that the law was fitted to, for maps without `departures` and for
-# others, by which 70% of the errors of `python -m generate machined` lie within one and 97.5% within two
-MAP_SCATTER = {"area": (0.01, 0.15), "pressure": (0.029, 0.18), "stiffness": (0.056, 0.23)}
+TAIL = (
+    3.0,
+    0.8,
+)  # u/h_rms from which the error of the table grows, and its rate: exp(0.8 (u/h_rms - 3))
+# standard deviations added to those of the data that the law was fitted to, for maps
+# without `departures` and for others, by which 70% of the errors of `python -m generate
+# machined` lie within one and 97.5% within two
+MAP_SCATTER = {
+    "area": (0.01, 0.15),
+    "pressure": (0.029, 0.18),
+    "stiffness": (0.056, 0.23),
+}
 LIKE_SCANS = 1e-3, 0.9  # A/A0 at which scans are compared
 MANY = 1000  # entries for which polynomials of one surface are made
 ROUNDING = 1e-14  # rounding of a separation beside h_max
@@ -54,20 +68,36 @@ class Batch:
 
     def __init__(self, surface: Surface, entries: int) -> None:
         names = ("hurst", "zeta_1", "h_max", "h_rms", "rms_gradient")
-        hurst, zeta_1, h_max, h_rms, gradient = (np.asarray(getattr(surface, name), float).ravel() for name in names)
-        table, self.shape, self.h_rms, self.gradient = calibrated_table.shipped(), surface.shape, h_rms, gradient
+        hurst, zeta_1, h_max, h_rms, gradient = (
+            np.asarray(getattr(surface, name), float).ravel() for name in names
+        )
+        table, self.shape, self.h_rms, self.gradient = (
+            calibrated_table.shipped(),
+            surface.shape,
+            h_rms,
+            gradient,
+        )
         self.columns = np.array([hurst, np.log(zeta_1), h_max / h_rms])
-        self.covered = table.covers(*self.columns[:2]) & (self.columns[2] <= np.exp(table.covered[2, 1]))
+        self.covered = table.covers(*self.columns[:2]) & (
+            self.columns[2] <= np.exp(table.covered[2, 1])
+        )
         self.whole = bool(self.covered.all())
         self.contacts, self.separations = table.prepared(self.columns, entries)
 
     def placed(self, value: FloatArray) -> tuple[FloatArray, Any, tuple[int, ...], Any]:
         """Numbers that broadcast with the surfaces, flat; the surface of each, as a number and to index; the shape."""
         if not self.shape:
-            return np.ravel(value), np.zeros(value.size, np.int64), value.shape, slice(None)
+            return (
+                np.ravel(value),
+                np.zeros(value.size, np.int64),
+                value.shape,
+                slice(None),
+            )
         shape = np.broadcast_shapes(value.shape, self.shape)
         number = np.arange(self.h_rms.size).reshape(self.shape)
-        flat, owner = (np.ascontiguousarray(spread(each, shape)).ravel() for each in (value, number))
+        flat, owner = (
+            np.ascontiguousarray(spread(each, shape)).ravel() for each in (value, number)
+        )
         return flat, owner, shape, owner
 
     def outside(self, owner: Any, asked: Any = True) -> Iterator[tuple[Law, Any]]:
@@ -80,7 +110,9 @@ class Batch:
     def contact(self, u: FloatArray) -> FloatArray:
         """Force, area and stiffness at mean separations [length]."""
         flat, owner, shape, own = (
-            self.placed(u) if self.shape else (u.ravel(), np.zeros(u.size, np.int64), u.shape, slice(None))
+            self.placed(u)
+            if self.shape
+            else (u.ravel(), np.zeros(u.size, np.int64), u.shape, slice(None))
         )
         gradient, h_rms = self.gradient[own], self.h_rms[own]
         x = flat / h_rms
@@ -100,7 +132,11 @@ def _single(surface: Surface) -> Batch:
 
 
 def _bound(surface: Surface, value: FloatArray) -> Batch:
-    return Batch(surface, max(np.size(value), surface.hurst.size)) if surface.shape else _single(surface)
+    return (
+        Batch(surface, max(np.size(value), surface.hurst.size))
+        if surface.shape
+        else _single(surface)
+    )
 
 
 def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatArray:
@@ -114,25 +150,34 @@ def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatA
         if quantity == "pressure":
             found.append((closer - u) * steep / pressure)
         else:
-            found.append(np.log(own.area(pressure) if quantity == "area" else own.answer(closer)[0][2]))
+            found.append(
+                np.log(
+                    own.area(pressure) if quantity == "area" else own.answer(closer)[0][2]
+                )
+            )
     return np.asarray(np.std(found, axis=0, ddof=1))
 
 
 class Calibrated(Theory):
     """Persson's energy integral with cover and weight calibrated on boundary elements.
 
-    Self-affine surfaces are evaluated by its table, those outside of it (H below 0.1, zeta_1 above 1e5, h_max above
-    8 h_rms) by the law's quadrature. For a surface given by a spectrum, the spectrum is used; measured heights
-    determine the separation, and a measured map also determines the area, by its highest and lowest parts.
+    Self-affine surfaces are evaluated by its table, those outside of it (H below 0.1,
+    zeta_1 above 1e5, h_max above 8 h_rms) by the law's quadrature. For a surface given by a
+    spectrum, the spectrum is used; measured heights determine the separation, and a
+    measured map also determines the area, by its highest and lowest parts.
     """
 
     name = "calibrated"
 
-    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
+    def interval(
+        self, surface: AnySurface, quantity: str = "pressure"
+    ) -> tuple[FloatArray, FloatArray]:
         """From full contact, or from the end of a map's curve, to last contact."""
         high = np.asarray(surface.h_max, dtype=float)
         return (
-            np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else np.zeros_like(high)
+            np.asarray(_own_law(surface).end)
+            if isinstance(surface, MeasuredSurface)
+            else np.zeros_like(high)
         ), high
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
@@ -144,13 +189,24 @@ class Calibrated(Theory):
             error = _error(own_error, 1.0, gap / np.asarray(surface.h_max))
             return TheoryAnswer(pressure, area, stiffness, error)
         assert isinstance(surface, Surface)
-        gap, h_rms, (start, rate) = np.asarray(mean_separation, float), np.asarray(surface.h_rms), TAIL
+        gap, h_rms, (start, rate) = (
+            np.asarray(mean_separation, float),
+            np.asarray(surface.h_rms),
+            TAIL,
+        )
         found = _bound(surface, gap).contact(gap)
         x = gap / h_rms
         require("mean_separation", spread(gap, x.shape), x >= 0, "at least 0")
-        stated = calibrated_table.shipped().error * np.exp(rate * np.clip(x - start, 0, tested.HEIGHTS[1] - start))
+        stated = calibrated_table.shipped().error * np.exp(
+            rate * np.clip(x - start, 0, tested.HEIGHTS[1] - start)
+        )
         pressure, area, stiffness = found
-        return TheoryAnswer(pressure, area, stiffness, _error(stated, 2.0, x / (np.asarray(surface.h_max) / h_rms)))
+        return TheoryAnswer(
+            pressure,
+            area,
+            stiffness,
+            _error(stated, 2.0, x / (np.asarray(surface.h_max) / h_rms)),
+        )
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         if isinstance(surface, MeasuredSurface):
@@ -165,7 +221,9 @@ class Calibrated(Theory):
 
         return values
 
-    def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
+    def mean_separation_at(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
         wanted = np.asarray(wanted, float)
         u = self._mean_separation(surface, quantity, wanted)
@@ -175,7 +233,9 @@ class Calibrated(Theory):
             raise unfinished(rounded, f"the separation at this {quantity}")
         return u
 
-    def _mean_separation(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
+    def _mean_separation(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> FloatArray:
         """The same, also where u differs from h_max by rounding."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).mean_separation(quantity, wanted)
@@ -193,20 +253,31 @@ class Calibrated(Theory):
         u[some] = batch.separations((owner[some], loads[some]))[0]
         for law, mine in () if batch.whole else batch.outside(owner, loaded):
             u[mine] = law.separation(np.maximum(loads[mine], 1e-300))
-        require(quantity, np.broadcast_to(wanted, shape), ~np.isnan(u).reshape(shape), "less: u is 0")
-        return np.asarray(np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max))
+        require(
+            quantity,
+            np.broadcast_to(wanted, shape),
+            ~np.isnan(u).reshape(shape),
+            "less: u is 0",
+        )
+        return np.asarray(
+            np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max)
+        )
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).area(np.asarray(pressure, float))
         return law_area(
-            pressure / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants
+            pressure / np.asarray(surface.rms_gradient),
+            surface.alpha,
+            calibrated_table.shipped().constants,
         )
 
     def heights(self, surface: AnySurface) -> Any:
         """Heights of a map, or Gaussian."""
         own = _own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
-        return np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
+        return (
+            np.asarray(surface.h_max) / np.asarray(surface.h_rms) if own is None else own
+        )
 
     def reasons(
         self,
@@ -237,9 +308,15 @@ class Calibrated(Theory):
         assert isinstance(surface, MeasuredSurface)
         if surface.outside(PRESSED):
             return np.full(np.shape(area), np.nan)
-        stated = shipped_deviations().standard_deviation(self.scatter_name(surface), quantity, area)
+        stated = shipped_deviations().standard_deviation(
+            self.scatter_name(surface), quantity, area
+        )
         stated = np.hypot(stated, MAP_SCATTER[quantity][bool(self.departures(surface))])
-        return np.hypot(stated, _spread(surface, quantity, area)) if surface.scans else stated
+        return (
+            np.hypot(stated, _spread(surface, quantity, area))
+            if surface.scans
+            else stated
+        )
 
     def scatter_name(self, surface: AnySurface) -> str:
         """With a map its own."""

@@ -13,7 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, positive_array, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    positive_array,
+    require,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
@@ -22,7 +28,13 @@ from mbma_tables.theories.mbma.universal import Ranged
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
-NAMES = {"exp": np.exp, "log": np.log, "sqrt": np.sqrt, "where": np.where, "pow": lambda a, b: a**b}
+NAMES = {
+    "exp": np.exp,
+    "log": np.log,
+    "sqrt": np.sqrt,
+    "where": np.where,
+    "pow": lambda a, b: a**b,
+}
 Steps = Mapping[str, str]
 
 
@@ -38,7 +50,9 @@ class Function:
 
     def __call__(self, *given: Any) -> Any:
         """Of arrays, which broadcast."""
-        return evaluate(self.steps, dict(zip(self.arguments, given, strict=True)))[self.result]
+        return evaluate(self.steps, dict(zip(self.arguments, given, strict=True)))[
+            self.result
+        ]
 
 
 def read_functions(text: str) -> dict[str, dict[str, Function]]:
@@ -46,13 +60,17 @@ def read_functions(text: str) -> dict[str, dict[str, Function]]:
 
     def steps(lines: str) -> dict[str, str]:
         """Of lines, of which indented ones continue the one before."""
-        return dict(line.split(" = ", 1) for line in re.sub(r"\n +", " ", lines).splitlines())
+        return dict(
+            line.split(" = ", 1) for line in re.sub(r"\n +", " ", lines).splitlines()
+        )
 
     found: dict[str, dict[str, Function]] = {}
     for form, own in tomllib.loads(text).items():
         arguments, shared = tuple(own.pop("arguments")), steps(own.pop("shared"))
         found[form] = {
-            result: Function(form, result, arguments, one["title"], shared | steps(one["steps"]))
+            result: Function(
+                form, result, arguments, one["title"], shared | steps(one["steps"])
+            )
             for result, one in own.items()
         }
     return found
@@ -76,7 +94,9 @@ def evaluate(steps: Steps, given: Mapping[str, FloatArray]) -> dict[str, Any]:
     return names
 
 
-FUNCTIONS = read_functions(pathlib.Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+FUNCTIONS = read_functions(
+    pathlib.Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
 
 
 class FormulaModel(Ranged):
@@ -106,7 +126,11 @@ class FormulaModel(Ranged):
     def __init__(self, form: str = "standard") -> None:
         if form not in ISLAND_FORMS:
             raise InputError(f"form must be one of {ISLAND_FORMS}, got {form!r}")
-        self.form, self.ranges, self.holds = form, RANGES[form], f", where the {form} form holds"
+        self.form, self.ranges, self.holds = (
+            form,
+            RANGES[form],
+            f", where the {form} form holds",
+        )
 
     def _rows(self, X: FloatArray, mu: FloatArray) -> FloatArray:
         out = np.full((3, X.size), np.nan)
@@ -126,7 +150,9 @@ class ClosedTotals(NamedTuple):
     error: float
 
 
-def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> ClosedTotals:
+def closed_totals(
+    surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0
+) -> ClosedTotals:
     """Total force and area by the closed totals, variant "reported".
 
     Parameters
@@ -142,7 +168,8 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     Raises
     ------
     InputError, OutOfRangeError
-        For surfaces and separations outside the range of the form, and for less contact than it describes.
+        For surfaces and separations outside the range of the form, and for less contact
+        than it describes.
 
     Examples
     --------
@@ -152,17 +179,44 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     >>> error < 0.1
     True
     """
-    gap, modulus = finite_array("separation", separation), positive_array("E_star", E_star)
+    gap, modulus = (
+        finite_array("separation", separation),
+        positive_array("E_star", E_star),
+    )
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
-    fields = gap / surface.h_rms, surface.h_max / surface.h_rms, surface.zeta_1, surface.hurst
+    fields = (
+        gap / surface.h_rms,
+        surface.h_max / surface.h_rms,
+        surface.zeta_1,
+        surface.hurst,
+    )
     given = [np.broadcast_to(np.asarray(field), shape) for field in fields]
     for (name, (low, high)), field in zip(RANGES[TOTALS].items(), given, strict=False):
-        require(name, field, (field >= low) & (field <= high), f"in [{low:g}, {high:g}], where the closed totals hold")
-    gap, h_max = np.broadcast_to(gap, shape), np.broadcast_to(np.asarray(surface.h_max), shape)
+        require(
+            name,
+            field,
+            (field >= low) & (field <= high),
+            f"in [{low:g}, {high:g}], where the closed totals hold",
+        )
+    gap, h_max = (
+        np.broadcast_to(gap, shape),
+        np.broadcast_to(np.asarray(surface.h_max), shape),
+    )
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
-    require("separation", gap, gap < h_max, "below h_max: there is no contact from there on")
+    require(
+        "separation", gap, gap < h_max, "below h_max: there is no contact from there on"
+    )
     pressure, area = (FUNCTIONS[TOTALS][name](*given) for name in ("pressure", "area"))
     low, _ = RANGES[TOTALS]["area"]
-    require("area", np.asarray(area), area >= low, f"at least {low:g}, where the closed totals hold")
+    require(
+        "area",
+        np.asarray(area),
+        area >= low,
+        f"at least {low:g}, where the closed totals hold",
+    )
     scale = modulus * surface.q0 * surface.h_rms
-    return ClosedTotals(pressure * scale, area, max(found.largest for found in CERTIFICATES[TOTALS].values()))
+    return ClosedTotals(
+        pressure * scale,
+        area,
+        max(found.largest for found in CERTIFICATES[TOTALS].values()),
+    )

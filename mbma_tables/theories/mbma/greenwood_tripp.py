@@ -30,10 +30,14 @@ from mbma_tables.core import core
 from mbma_tables.theories.mbma.half_space import basis
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5)  # of height integrals
-LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), *range(256, 513, 64)])
+LEVELS = np.array(
+    [*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), *range(256, 513, 64)]
+)
 MIN_SOLVER_RTOL = 1e-13
 MAX_NODES = 1024  # a few seconds for an island
-BLOCK = 1 << 22  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
+BLOCK = (
+    1 << 22
+)  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
 COARSE_NODES = 12  # nodes of the initial guess
 
 
@@ -53,18 +57,33 @@ class IslandSolution:
     @functools.cached_property
     def _profiles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         count = int(np.max(self.nodes))
-        shape, profiles = (*np.shape(self.X), count), np.empty((3, np.size(self.X), count))
+        shape, profiles = (
+            (*np.shape(self.X), count),
+            np.empty((3, np.size(self.X), count)),
+        )
         _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles)
         rho, pressure, gap = (rows.reshape(shape) for rows in profiles)
         return rho, pressure, gap
 
-    rho = property(lambda self: self._profiles[0], doc="Radii of the profiles over L, shape (..., nodes).")
-    pressure = property(lambda self: self._profiles[1], doc="p(rho) over E* sigma/L, shape (..., nodes).")
-    gap = property(lambda self: self._profiles[2], doc="d(rho) over sigma, from sphere to mid-plane, (..., nodes).")
+    rho = property(
+        lambda self: self._profiles[0],
+        doc="Radii of the profiles over L, shape (..., nodes).",
+    )
+    pressure = property(
+        lambda self: self._profiles[1], doc="p(rho) over E* sigma/L, shape (..., nodes)."
+    )
+    gap = property(
+        lambda self: self._profiles[2],
+        doc="d(rho) over sigma, from sphere to mid-plane, (..., nodes).",
+    )
 
 
 def _newton(
-    X: FloatArray, mu: FloatArray, rtol: float, nodes: int, profiles: FloatArray | None = None
+    X: FloatArray,
+    mu: FloatArray,
+    rtol: float,
+    nodes: int,
+    profiles: FloatArray | None = None,
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """Phi_F, Phi_A and their error (entries, 3), and the steps, of all entries on one basis.
 
@@ -76,7 +95,17 @@ def _newton(
 
     def fill(part: slice) -> None:
         kept = (None,) * 3 if profiles is None else profiles[:, part]
-        core.solve_islands(X[part], mu[part], rtol, *bases, phi[part], steps[part], status[part], *kept, work)
+        core.solve_islands(
+            X[part],
+            mu[part],
+            rtol,
+            *bases,
+            phi[part],
+            steps[part],
+            status[part],
+            *kept,
+            work,
+        )
 
     in_blocks(fill, X.size, max(1, BLOCK // nodes**2))
     return phi, steps
@@ -85,8 +114,9 @@ def _newton(
 def height_integral(n: float, x: ArrayLike) -> Any:
     """F_n(x) = integral_x^inf (z - x)^n phi(z) dz of the normal density phi, for n = 1/2, 1, 3/2, 2 or 5/2.
 
-    Eqs. (36) and (38) are F_{3/2} and F_1; F_{5/2} and F_2 are their integrals over a rigid sphere. The relative error
-    is 1e-13 for x <= 10 and 5e-13 up to 37; scipy's parabolic cylinder functions lose up to seven digits.
+    Eqs. (36) and (38) are F_{3/2} and F_1; F_{5/2} and F_2 are their integrals over a rigid
+    sphere. The relative error is 1e-13 for x <= 10 and 5e-13 up to 37; scipy's parabolic
+    cylinder functions lose up to seven digits.
 
     Parameters
     ----------
@@ -114,7 +144,9 @@ def height_integral(n: float, x: ArrayLike) -> Any:
     if n not in ORDERS:
         raise InputError(f"n must be one of {ORDERS}, got {n!r}")
     argument = finite_array("x", x)
-    return answered(lambda part, found: core.height_integrals(int(2 * n), part, found), (argument,))[0][()]
+    return answered(
+        lambda part, found: core.height_integrals(int(2 * n), part, found), (argument,)
+    )[0][()]
 
 
 def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
@@ -122,12 +154,22 @@ def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
 
     Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2.
     """
-    return np.stack([math.pi / 5 * mu * height_integral(2.5, -X), math.pi / 2 * height_integral(2.0, -X)])
+    return np.stack(
+        [
+            math.pi / 5 * mu * height_integral(2.5, -X),
+            math.pi / 2 * height_integral(2.0, -X),
+        ]
+    )
 
 
-def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> tuple[Any, ...]:
+def _solve_newton(
+    X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None
+) -> tuple[Any, ...]:
     """Phi_F, Phi_A and error (entries, 3), steps, nodes, and which entries failed."""
-    phi, (steps, used) = np.full((X.size, 3), np.nan), np.zeros((2, X.size), dtype=np.int64)
+    phi, (steps, used) = (
+        np.full((X.size, 3), np.nan),
+        np.zeros((2, X.size), dtype=np.int64),
+    )
     failed = np.ones(X.size, dtype=bool)
     levels = LEVELS if nodes is None else np.array([nodes])
     # nodes that usually give `rtol`; the error estimate of each solution is then checked
@@ -146,7 +188,9 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
     return phi, steps, used, failed | ~np.isfinite(phi).all(axis=1)
 
 
-def solve(X: ArrayLike, mu: ArrayLike, rtol: float = 1e-10, nodes: int | None = None) -> IslandSolution:
+def solve(
+    X: ArrayLike, mu: ArrayLike, rtol: float = 1e-10, nodes: int | None = None
+) -> IslandSolution:
     """Solve the island problem for phi_F, phi_A and the profiles of pressure and gap.
 
     Parameters
@@ -184,9 +228,14 @@ def solve(X: ArrayLike, mu: ArrayLike, rtol: float = 1e-10, nodes: int | None = 
     rtol = number_in("rtol", rtol, MIN_SOLVER_RTOL, 0.1)
     nodes = None if nodes is None else whole_number_in("nodes", nodes, 8, MAX_NODES)
     shape = broadcast_shape(X=approach, mu=stiffness)
-    flat_X, flat_mu = (np.broadcast_to(each, shape).ravel() for each in (approach, stiffness))
+    flat_X, flat_mu = (
+        np.broadcast_to(each, shape).ravel() for each in (approach, stiffness)
+    )
     phi, steps, used, missed = _solve_newton(flat_X, flat_mu, rtol, nodes)
-    fields: list[Any] = [*(part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)), rtol]
+    fields: list[Any] = [
+        *(part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)),
+        rtol,
+    ]
     result = IslandSolution(*fields)
     if missed.any():
         first = int(np.flatnonzero(missed)[0])

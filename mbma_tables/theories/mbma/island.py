@@ -23,7 +23,11 @@ from mbma_tables.common.units import modulus_and_units
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.mbma.geometry import geometry, measured_islands
-from mbma_tables.theories.mbma.island_models import AnyModel, answer_islands, island_model_name
+from mbma_tables.theories.mbma.island_models import (
+    AnyModel,
+    answer_islands,
+    island_model_name,
+)
 from mbma_tables.theories.mbma.tables import get_model
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
@@ -37,7 +41,8 @@ class Island:
     zeta_u: Numbers
     R_d: Numbers  #: radii of the island's sphere and of its summits (26, 29) [length]
     R_u: Numbers
-    D: Numbers  #: density [1/length^2] and standard deviation of height [length] of its summits (32)
+    # : density [1/length^2] and standard deviation of height [length] of its summits (32)
+    D: Numbers
     sigma: Numbers
     h_d: Numbers  #: roughness above zeta_d (B.3) [length]
     eta: Numbers  #: reduction factor of a summit's contact area by finer roughness (39)
@@ -86,7 +91,8 @@ def island(
     variant : {"reported", "printed", "fitted"} or Variant
         Variant of the paper's equations.
     E_star : array_like or str
-        Effective modulus, a number or text with a unit, "100 GPa"; force is in that unit times length squared.
+        Effective modulus, a number or text with a unit, "100 GPa"; force is in that unit
+        times length squared.
     rtol : float
         Requested relative error of force and area.
 
@@ -110,7 +116,10 @@ def island(
     """
     E_star, units = modulus_and_units(E_star, surface)
     delta, rule = units.number("delta", delta), get_variant(variant)
-    named: dict[str, Any] = {"variant": rule.name, "island_model": island_model_name(island_model)}
+    named: dict[str, Any] = {
+        "variant": rule.name,
+        "island_model": island_model_name(island_model),
+    }
     if any_labelled(surface, delta, E_star):
         raise InputError("island takes plain arrays: use .values of the DataArrays")
     approach, modulus = positive_array("delta", delta), positive_array("E_star", E_star)
@@ -122,7 +131,13 @@ def island(
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
     phi = answer_islands(model, g)
-    sizes = {"R_d": 1 / (s * q0**2), "R_u": 1 / (s * q0**2), "D": q0**2, "sigma": s, "h_d": s}
+    sizes = {
+        "R_d": 1 / (s * q0**2),
+        "R_u": 1 / (s * q0**2),
+        "D": q0**2,
+        "sigma": s,
+        "h_d": s,
+    }
     values = {name: (g[name] * sizes.get(name, 1.0))[()] for name in GEOMETRY}
     return Island(
         delta=np.broadcast_to(np.asarray(delta, dtype=float), shape)[()],
@@ -134,13 +149,17 @@ def island(
     )
 
 
-def islands_of(surface: AnySurface, delta: FloatArray, variant: Variant) -> tuple[dict[str, FloatArray], Any, Any]:
+def islands_of(
+    surface: AnySurface, delta: FloatArray, variant: Variant
+) -> tuple[dict[str, FloatArray], Any, Any]:
     """`FIELDS` of islands at approaches > 0 [length], their Hurst exponent where they have one, and units s and q0."""
     if isinstance(surface, MeasuredSurface):
         return measured_islands(surface, delta, variant), 1.0, 1.0
     assert isinstance(surface, Surface)
     check_band(surface, variant)
-    hurst, zeta_1 = (np.broadcast_to(array, delta.shape) for array in (surface.hurst, surface.zeta_1))
+    hurst, zeta_1 = (
+        np.broadcast_to(array, delta.shape) for array in (surface.hurst, surface.zeta_1)
+    )
     g = geometry(np.asarray(delta / surface.h_rms), hurst, zeta_1, variant)
     return g | {"hurst": hurst}, surface.s, surface.q0
 

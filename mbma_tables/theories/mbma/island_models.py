@@ -61,7 +61,9 @@ class GeometryModel(Protocol):
     def name(self) -> str:
         """Name of the model in results."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+    def of_islands(
+        self, islands: Mapping[str, FloatArray], outside: str = "raise"
+    ) -> IslandAnswer:
         """Phi_F and Phi_A of islands, given as `theories.mbma.geometry.FIELDS` and hurst, arrays of one shape.
 
         `outside` is one of `OUTSIDE`. Used in place of `answer` where both exist.
@@ -71,20 +73,26 @@ class GeometryModel(Protocol):
 AnyModel = IslandModel | GeometryModel
 
 
-def answer_islands(model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+def answer_islands(
+    model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise"
+) -> IslandAnswer:
     """Phi_F and Phi_A of islands by any model; results of models of X and mu are checked."""
     if isinstance(model, GeometryModel):
         return model.of_islands(islands, outside)
     shape = islands["X"].shape
     given: Any = model.answer(islands["X"], islands["mu"])
     try:
-        phi_F, phi_A, error = (np.broadcast_to(np.asarray(part, dtype=float), shape) for part in given)
+        phi_F, phi_A, error = (
+            np.broadcast_to(np.asarray(part, dtype=float), shape) for part in given
+        )
     except (TypeError, ValueError) as fault:
         wanted = f"must answer Phi_F, Phi_A and error of shape {shape}"
         raise InputError(f"island model {model.name!r} {wanted}: {fault}") from None
     bad = ~(np.isfinite(phi_F) & np.isfinite(phi_A) & (error >= 0))
     if outside != "nan" and bad.any():
-        raise OutOfRangeError(f"island model {model.name!r} has no result for {int(bad.sum())} islands", bad)
+        raise OutOfRangeError(
+            f"island model {model.name!r} has no result for {int(bad.sum())} islands", bad
+        )
     return IslandAnswer(phi_F, phi_A, error)
 
 
@@ -123,4 +131,8 @@ def exact_model(rtol: float) -> ExactModel:
 
 def island_model_name(island_model: str | AnyModel) -> str:
     """The name of an island model in results."""
-    return island_model if isinstance(island_model, str) else getattr(island_model, "name", "")
+    return (
+        island_model
+        if isinstance(island_model, str)
+        else getattr(island_model, "name", "")
+    )

@@ -12,7 +12,13 @@ from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.netcdf import HDF5_LOCK, read_table
 from mbma_tables.common.shared import shared
-from mbma_tables.common.table_schema import ARGUMENTS, FUNCTIONS, ISLAND4D, UNIVERSAL, TableContent
+from mbma_tables.common.table_schema import (
+    ARGUMENTS,
+    FUNCTIONS,
+    ISLAND4D,
+    UNIVERSAL,
+    TableContent,
+)
 from mbma_tables.theories.mbma import greenwood_tripp
 from mbma_tables.theories.mbma import island_models as models
 from mbma_tables.theories.mbma.island4d import Island4dModel, to_axes
@@ -27,7 +33,9 @@ def shipped(kind: str) -> pathlib.Path:
 
 
 def _model(content: TableContent) -> UniversalModel | Island4dModel:
-    return UniversalModel(content) if content.kind == UNIVERSAL else Island4dModel(content)
+    return (
+        UniversalModel(content) if content.kind == UNIVERSAL else Island4dModel(content)
+    )
 
 
 @shared()
@@ -36,7 +44,9 @@ def _opened(kind: str) -> UniversalModel | Island4dModel:
     return _model(read_table(shipped(kind), kind))
 
 
-def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:
+def open_table(
+    table: os.PathLike[str] | str = UNIVERSAL,
+) -> UniversalModel | Island4dModel:
     """A table as an island model, for the argument `island_model` of `contact`, `contact_law`, `island` and `Scene`.
 
     Parameters
@@ -86,12 +96,18 @@ def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> An
             return models.RigidModel() if model == "rigid" else models.exact_model(asked)
         model = open_table(model)
     if isinstance(model, type) or not (
-        isinstance(model, models.IslandModel | models.GeometryModel) and isinstance(getattr(model, "name", None), str)
+        isinstance(model, models.IslandModel | models.GeometryModel)
+        and isinstance(getattr(model, "name", None), str)
     ):
-        known = f"one of {models.ISLAND_MODELS} or an object with a name and answer(X, mu)"
+        known = (
+            f"one of {models.ISLAND_MODELS} or an object with a name and answer(X, mu)"
+        )
         raise InputError(f"island_model must be {known}, got {island_model!r}")
     made_for = getattr(model, "variant", variant)
-    if isinstance(made_for, Variant) and (made_for.density_divisor, made_for.summit_sigma) != (
+    if isinstance(made_for, Variant) and (
+        made_for.density_divisor,
+        made_for.summit_sigma,
+    ) != (
         variant.density_divisor,
         variant.summit_sigma,
     ):
@@ -141,9 +157,13 @@ def verify(path: os.PathLike[str] | str, kind: str | None = None) -> Verdict:
     try:
         answers = _replay(content)
     except ValueError as fault:
-        raise TableFileError(f"{path}: its conformance points cannot be answered: {fault}") from None
+        raise TableFileError(
+            f"{path}: its conformance points cannot be answered: {fault}"
+        ) from None
     errors = []
-    for who, which, answer in zip(("the table", "the exact solver"), ("table", "exact"), answers, strict=True):
+    for who, which, answer in zip(
+        ("the table", "the exact solver"), ("table", "exact"), answers, strict=True
+    ):
         stored = np.stack([points[f"{which}_{function}"] for function in FUNCTIONS])
         difference = np.abs(answer / stored - 1)
         excess = difference / points["tolerance"]

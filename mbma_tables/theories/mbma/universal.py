@@ -8,7 +8,12 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    require,
+)
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared_property
@@ -31,7 +36,9 @@ class Ranged:
         """Phi_F, Phi_A and error of flat arguments, (3, entries); NaN outside the ranges."""
         raise NotImplementedError
 
-    def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise") -> IslandAnswer:
+    def answer(
+        self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise"
+    ) -> IslandAnswer:
         """Phi_F and Phi_A with a bound on their relative error.
 
         Parameters
@@ -45,17 +52,27 @@ class Ranged:
         given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
         for name, array in given.items() if outside == "raise" else ():
             low, high = self.ranges[name]
-            require(name, array, (array >= low) & (array <= high), f"in [{low:g}, {high:g}]{self.holds}")
+            require(
+                name,
+                array,
+                (array >= low) & (array <= high),
+                f"in [{low:g}, {high:g}]{self.holds}",
+            )
         require("mu", given["mu"], given["mu"] >= 0, "at least 0")
         shape = broadcast_shape(**given)
-        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
+        flat_X, flat_mu = (
+            np.ascontiguousarray(np.broadcast_to(a, shape)).ravel()
+            for a in given.values()
+        )
         out = self._rows(flat_X, flat_mu)
         missing = np.isnan(out[2])
         if outside == "exact" and missing.any():
             out[:, missing] = SOLVER.answer(flat_X[missing], flat_mu[missing])
         return IslandAnswer(*(row.reshape(shape)[()] for row in out))
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+    def of_islands(
+        self, islands: Mapping[str, FloatArray], outside: str = "raise"
+    ) -> IslandAnswer:
         """Phi_F and Phi_A of islands."""
         return self.answer(islands["X"], islands["mu"], outside=outside)
 
@@ -88,13 +105,19 @@ class UniversalModel(Ranged):
 
     def _rows(self, X: FloatArray, mu: FloatArray) -> FloatArray:
         out = np.empty((X.size, 3))
-        in_blocks(lambda block: core.phi(X[block], mu[block], *self.cells, out[block], None), X.size, BLOCK)
+        in_blocks(
+            lambda block: core.phi(X[block], mu[block], *self.cells, out[block], None),
+            X.size,
+            BLOCK,
+        )
         return out.T
 
     @shared_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
         """The table in the core's format, `mbma_cells` of mbma.h: cells, indices and numbers."""
-        X_low, X_high, mu_low, mu_high = (self.content.auxiliary[name][1] for name in CELL_EDGES)
+        X_low, X_high, mu_low, mu_high = (
+            self.content.auxiliary[name][1] for name in CELL_EDGES
+        )
         count = X_low.size
         # doubles on lines of the cache, eight each
         memory = np.zeros(RECORD * count + TERMS)
@@ -109,32 +132,52 @@ class UniversalModel(Ranged):
         by_X = np.einsum("cijf,ip->cfjp", self.content.coefficients, powers)
         records[:, 8:] = np.einsum("cfjp,jq->cfqp", by_X, powers).reshape(count, -1)
 
-        first, last = (int(bits >> BUCKET_BITS) for bits in np.array([mu_high.min(), self._mu.high]).view(np.int64))
+        first, last = (
+            int(bits >> BUCKET_BITS)
+            for bits in np.array([mu_high.min(), self._mu.high]).view(np.int64)
+        )
         # the bucket below the first edge contains all smaller values
         buckets = ((np.arange(first - 1, last + 1)) << BUCKET_BITS).view(float)
         buckets[0] = 0.0
         lows, firsts = np.unique(X_low, return_index=True)
         steps = np.arange(int((self._X.high - self._X.low) * X_STEPS) + 1)
-        strips = np.searchsorted(lows, self._X.low + (steps + 0.5) / X_STEPS, side="right") - 1
+        strips = (
+            np.searchsorted(lows, self._X.low + (steps + 0.5) / X_STEPS, side="right") - 1
+        )
         places = [steps.size + buckets.size * np.minimum(strips, lows.size - 1)]
         strip_cells = np.split(np.arange(count), firsts[1:])
-        places += [own[np.searchsorted(mu_low[own], buckets, side="right") - 1] for own in strip_cells]
+        places += [
+            own[np.searchsorted(mu_low[own], buckets, side="right") - 1]
+            for own in strip_cells
+        ]
         ends = self._X.low, self._X.high, float(X_STEPS), self._mu.high
         numbers = np.array([*ends, first - 1, buckets.size], dtype=float)
         starts, cells = places[0], np.concatenate(places[1:])
         # the core does not look whether places lie inside the table
-        if not (cells.min() >= 0 and cells.max() < count and starts.max() + buckets.size <= steps.size + cells.size):
-            raise TableFileError("the cells of the universal table do not cover its range")
+        if not (
+            cells.min() >= 0
+            and cells.max() < count
+            and starts.max() + buckets.size <= steps.size + cells.size
+        ):
+            raise TableFileError(
+                "the cells of the universal table do not cover its range"
+            )
         return records.reshape(-1), np.concatenate(places).astype(np.int32), numbers
 
 
 def fractions_of_mu(low: FloatArray, high: FloatArray) -> FloatArray:
     """(a, b, c, d) of y = (a mu + b)/(c mu + d), which goes from -1 at `low` to 1 at `high`, in the rows.
 
-    Between two powers of mu a fraction is nearly its logarithm; a cell that begins at 0 has y linear in mu.
+    Between two powers of mu a fraction is nearly its logarithm; a cell that begins at 0 has
+    y linear in mu.
     """
     middle = np.sqrt(low * high)
     slope = (np.sqrt(high) + np.sqrt(low)) / (np.sqrt(high) - np.sqrt(low))
     linear = low == 0
-    rows = [np.where(linear, 2 / high, slope), np.where(linear, -1.0, -slope * middle), ~linear, middle + linear]
+    rows = [
+        np.where(linear, 2 / high, slope),
+        np.where(linear, -1.0, -slope * middle),
+        ~linear,
+        middle + linear,
+    ]
     return np.array(rows, dtype=float)

@@ -1,9 +1,10 @@
 """Variants of the paper: named choices where its text is ambiguous or misprinted.
 
-`printed` is exactly the printed equations. `reported`, the default, takes every summit density without its
-pi, and so gives the results that the paper reports. Nothing else is adjusted in these two. `fitted` has its constants
-fitted to the contact area of boundary elements, and adds areas as a cover: its area at a force is good to full contact,
-its separation is no better than theirs.
+`printed` is exactly the printed equations. `reported`, the default, takes every summit
+density without its pi, and so gives the results that the paper reports. Nothing else is
+adjusted in these two. `fitted` has its constants fitted to the contact area of boundary
+elements, and adds areas as a cover: its area at a force is good to full contact, its
+separation is no better than theirs.
 """
 
 import dataclasses
@@ -37,24 +38,33 @@ class Variant:
     """
 
     name: str  # of the variant in results
-    density_divisor: float = NAYAK  # summit density is m4/(density_divisor m2), wherever one enters (2, 32, 39, 43a)
-    # K1 of (47): 1 - 4 beta/3, or "exact", 1 - (4 beta/3)/sqrt(1 - zeta_1^(-2H)) as (46) with (27b) gives
+    # summit density is m4/(density_divisor m2), wherever one enters (2, 32, 39, 43a)
+    density_divisor: float = NAYAK
+    # K1 of (47): 1 - 4 beta/3, or "exact", 1 - (4 beta/3)/sqrt(1 - zeta_1^(-2H)) as (46)
+    # with (27b) gives
     jacobian: Literal["printed", "exact"] = "printed"
     offset: bool = True  # whether islands are offset by h_d below z_max (35, 41)
-    summit_sigma: bool = True  # whether sigma of islands and of their heights is the summits' (32, 43a), or sqrt(m0)
+    # whether sigma of islands and of their heights is the summits' (32, 43a), or sqrt(m0)
+    summit_sigma: bool = True
     beta: float = 1 / 3  # share of the approach that deforms the sphere (B.6)
     phi: float = 0.05  # roughness over Hertz deformation below which roughness does not matter (28)
     floor_d: float = 1.5  # smallest zeta_d (27a)
     floor_u: float = 3.0  # and zeta_u (30a)
-    # areas of islands: as printed (49), or as islands placed at random "cover", A/A0 = 1 - exp(-sum)
+    # areas of islands: as printed (49), or as islands placed at random "cover", A/A0 = 1 -
+    # exp(-sum)
     addition: Literal["sum", "cover"] = "sum"
 
     def __post_init__(self) -> None:
         allowed = {
-            "density_divisor must be positive and finite": 0 < self.density_divisor < math.inf,
-            "jacobian must be 'printed' or 'exact'": self.jacobian in ("printed", "exact"),
+            "density_divisor must be positive and finite": 0
+            < self.density_divisor
+            < math.inf,
+            "jacobian must be 'printed' or 'exact'": self.jacobian
+            in ("printed", "exact"),
             "beta must lie in (0, 3/4)": 0 < self.beta < 0.75,
-            "phi must be positive, with phi/(1 + phi) < 4 beta/3": 0 < self.phi / (1 + self.phi) < 4 * self.beta / 3,
+            "phi must be positive, with phi/(1 + phi) < 4 beta/3": 0
+            < self.phi / (1 + self.phi)
+            < 4 * self.beta / 3,
             "addition must be 'sum' or 'cover'": self.addition in ("sum", "cover"),
             "floors must satisfy 1 < floor_d < floor_u": 1 < self.floor_d < self.floor_u,
         }
@@ -80,8 +90,17 @@ class Variant:
 
 PRINTED = Variant("printed")
 REPORTED = Variant("reported", density_divisor=NAYAK / math.pi)
-# fitted to the area at equal force of 105 surfaces by boundary elements (docs/fidelity.md); effective, not physical
-FITTED = Variant("fitted", density_divisor=4.10, beta=0.656, phi=0.0274, floor_d=1.036, floor_u=5.14, addition="cover")
+# fitted to the area at equal force of 105 surfaces by boundary elements (docs/fidelity.md);
+# effective, not physical
+FITTED = Variant(
+    "fitted",
+    density_divisor=4.10,
+    beta=0.656,
+    phi=0.0274,
+    floor_d=1.036,
+    floor_u=5.14,
+    addition="cover",
+)
 VARIANTS = {variant.name: variant for variant in (REPORTED, PRINTED)}  # of the paper
 NAMED = VARIANTS | {FITTED.name: FITTED}
 
@@ -91,5 +110,7 @@ def get_variant(variant: str | Variant) -> Variant:
     if isinstance(variant, Variant):
         return variant
     if not isinstance(variant, str) or variant not in NAMED:
-        raise InputError(f"variant must be one of {sorted(NAMED)} or a Variant, got {variant!r}")
+        raise InputError(
+            f"variant must be one of {sorted(NAMED)} or a Variant, got {variant!r}"
+        )
     return NAMED[variant]

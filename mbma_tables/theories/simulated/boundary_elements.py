@@ -1,8 +1,9 @@
 """Boundary elements: a height map pressed flat, elastic or with pressures that cannot exceed a hardness, E* = 1.
 
-Conjugate gradients run on the points that are free to move, and every step is projected exactly onto the pressures
-0 <= p <= p_m of a given mean; scaling the load instead can cycle. A map that its mirror images continue is solved by
-cosine transforms on its own points. Loading only, frictionless.
+Conjugate gradients run on the points that are free to move, and every step is projected
+exactly onto the pressures 0 <= p <= p_m of a given mean; scaling the load instead can
+cycle. A map that its mirror images continue is solved by cosine transforms on its own
+points. Loading only, frictionless.
 """
 
 import time
@@ -17,38 +18,68 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.surfaces.bearing_curve import wavevectors
 
 # F/(A0 E* g), g the rms gradient: from 0.1% to 97% contact of a Gaussian surface
-LOADS = (4.4e-4, 1e-3, 2e-3, 4.5e-3, 0.01, 0.02, 0.04, 0.07, 0.11, 0.17, 0.25, 0.37, 0.53, 0.75, 1.05)
+LOADS = (
+    4.4e-4,
+    1e-3,
+    2e-3,
+    4.5e-3,
+    0.01,
+    0.02,
+    0.04,
+    0.07,
+    0.11,
+    0.17,
+    0.25,
+    0.37,
+    0.53,
+    0.75,
+    1.05,
+)
 TOLERANCE = 1e-6  # mean complementarity error over mean pressure times h_rms
 MAX_ITERATIONS = 3000
 STIFFNESS_RTOL = 1e-4
 CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
-# of the boundary of the area in cell edges: elastic points beside yielded ones, and the yielded area's own boundary
+# of the boundary of the area in cell edges: elastic points beside yielded ones, and the
+# yielded area's own boundary
 MIXED, YIELDED = 0.8, 0.65
 
 
 def waves(values: FloatArray, mirrored: bool = False) -> FloatArray:
     """Amplitudes of the waves of a periodic map, or of the cosines of one that its mirror images continue."""
-    return np.asarray(scipy.fft.dctn(values, norm="forward") if mirrored else scipy.fft.rfft2(values, norm="forward"))
+    return np.asarray(
+        scipy.fft.dctn(values, norm="forward")
+        if mirrored
+        else scipy.fft.rfft2(values, norm="forward")
+    )
 
 
-def composed(modes: FloatArray, shape: tuple[int, ...], mirrored: bool = False) -> FloatArray:
+def composed(
+    modes: FloatArray, shape: tuple[int, ...], mirrored: bool = False
+) -> FloatArray:
     """The map of such amplitudes; of cosines on another number of points, too."""
     if mirrored:
         return np.asarray(scipy.fft.idctn(modes, s=shape, norm="forward"))
     return np.asarray(scipy.fft.irfft2(modes, s=shape, norm="forward"))
 
 
-def wavenumbers(shape: tuple[int, ...], sizes: tuple[float, float], mirrored: bool = False) -> FloatArray:
+def wavenumbers(
+    shape: tuple[int, ...], sizes: tuple[float, float], mirrored: bool = False
+) -> FloatArray:
     """Wavenumber of each of these amplitudes [1/length]."""
     if not mirrored:
         return np.asarray(np.hypot(*wavevectors(shape, sizes)))
-    x, y = (np.pi * np.arange(count) / side for count, side in zip(shape, sizes, strict=True))
+    x, y = (
+        np.pi * np.arange(count) / side for count, side in zip(shape, sizes, strict=True)
+    )
     return np.asarray(np.hypot(x[:, None], y))
 
 
 def project(p: FloatArray, mean: float, cap: float) -> FloatArray:
     """The nearest pressures in [0, cap] of that mean: all shifted alike, then clipped; the shift by Newton's method."""
-    low, high = float(p.min()) - cap if np.isfinite(cap) else float(p.min()) - mean - 1, float(p.max())
+    low, high = (
+        float(p.min()) - cap if np.isfinite(cap) else float(p.min()) - mean - 1,
+        float(p.max()),
+    )
     shift, total = 0.0, mean * p.size
     for _ in range(200):
         moved = p - shift
@@ -86,17 +117,26 @@ class Contact:
         mirrored: bool = False,
     ) -> None:  # fmt: skip
         self.surface = np.asarray(surface, float) - np.mean(surface)
-        self.sizes, self.tolerance, self.cap, self.mirrored = sizes, tolerance, hardness, mirrored
+        self.sizes, self.tolerance, self.cap, self.mirrored = (
+            sizes,
+            tolerance,
+            hardness,
+            mirrored,
+        )
         self.h_rms = float(self.surface.std())
         q = wavenumbers(self.surface.shape, sizes, mirrored)
         self._compliance = np.divide(2.0, q, out=np.zeros_like(q), where=q > 0)
         self._stiffness = q / 2
         self.pressure: FloatArray | None = None
 
-    def deflect(self, pressure: FloatArray, filter_: FloatArray | None = None) -> FloatArray:
+    def deflect(
+        self, pressure: FloatArray, filter_: FloatArray | None = None
+    ) -> FloatArray:
         """Displacement of mean zero, or the field after another filter."""
         own = self._compliance if filter_ is None else filter_
-        return composed(waves(pressure, self.mirrored) * own, pressure.shape, self.mirrored)
+        return composed(
+            waves(pressure, self.mirrored) * own, pressure.shape, self.mirrored
+        )
 
     def press(self, force: float) -> dict[str, float]:
         """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map.
@@ -108,7 +148,11 @@ class Contact:
         """
         started = time.process_time()
         shape, cap = self.surface.shape, self.cap
-        p = np.full(shape, force) if self.pressure is None else project(self.pressure, force, cap)
+        p = (
+            np.full(shape, force)
+            if self.pressure is None
+            else project(self.pressure, force, cap)
+        )
         gap = self.deflect(p) - self.surface
         direction, size, free_before = np.zeros(shape), 1.0, None
         for iteration in range(MAX_ITERATIONS):
@@ -117,7 +161,10 @@ class Contact:
                 level = float(gap[inside].mean())
             else:
                 # any level between open and yielded points
-                level = 0.5 * (float(gap[p <= 0].min(initial=np.inf)) + float(gap[p >= cap].max(initial=-np.inf)))
+                level = 0.5 * (
+                    float(gap[p <= 0].min(initial=np.inf))
+                    + float(gap[p >= cap].max(initial=-np.inf))
+                )
             rest = gap - level
             # what is left to gain by each point, over the load
             wrong = np.where(rest > 0, rest * p, -rest * np.minimum(cap - p, force))
@@ -128,27 +175,39 @@ class Contact:
             slope = np.where(free, rest - rest[free].mean(), 0.0)
             new_size = float(np.sum(slope * slope))
             kept = free_before is not None and np.array_equal(free, free_before)
-            direction = slope + (new_size / size if iteration and size > 0 else 0.0) * np.where(free, direction, 0.0)
+            direction = slope + (
+                new_size / size if iteration and size > 0 else 0.0
+            ) * np.where(free, direction, 0.0)
             if free_before is not None and not kept:
                 direction = np.where(free, direction - direction[free].mean(), 0.0)
             size, free_before = new_size, free
             moved = self.deflect(direction)
             step = float(np.sum(slope * direction)) / float(np.sum(direction * moved))
             if not step > 0:
-                direction, step = slope, new_size / float(np.sum(slope * self.deflect(slope)))
-            # held points are pushed against their bounds, so that the projection's shift does not free them
+                direction, step = (
+                    slope,
+                    new_size / float(np.sum(slope * self.deflect(slope))),
+                )
+            # held points are pushed against their bounds, so that the projection's shift
+            # does not free them
             p = project(p - step * np.where(free, direction, rest), force, cap)
             gap = self.deflect(p) - self.surface
         else:
             what = f"F/(A0 E*) = {force:g}" + (f", p_m = {cap:g}" if cap < np.inf else "")
-            raise ConvergenceError(f"boundary elements at {what} end with a residual of {residual:.1e}")
+            raise ConvergenceError(
+                f"boundary elements at {what} end with a residual of {residual:.1e}"
+            )
         self.pressure, self._rest = p, rest
-        return self._found(force, residual, iteration) | {"seconds": time.process_time() - started}
+        return self._found(force, residual, iteration) | {
+            "seconds": time.process_time() - started
+        }
 
     def _beside(self, field: Any) -> Any:
         """The field at the four neighbours of each point."""
         wide = np.pad(field, 1, "symmetric" if self.mirrored else "wrap")
-        return np.stack([wide[2:, 1:-1], wide[:-2, 1:-1], wide[1:-1, 2:], wide[1:-1, :-2]])
+        return np.stack(
+            [wide[2:, 1:-1], wide[:-2, 1:-1], wide[1:-1, 2:], wide[1:-1, :-2]]
+        )
 
     def _found(self, force: float, residual: float, iterations: int) -> dict[str, float]:
         p, rest = self.traction, self._rest
@@ -156,12 +215,21 @@ class Contact:
         elastic = touching & ~yielded
         held, hard = self._beside(touching), self._beside(yielded)
         open_edges = np.count_nonzero(elastic & ~held)
-        mixed_edges, own_edges = np.count_nonzero(elastic & hard.any(axis=0) & ~held), np.count_nonzero(yielded & ~hard)
-        raw, raw_yielded, full = float(touching.mean()), float(yielded.mean()), force / self.cap
+        mixed_edges, own_edges = (
+            np.count_nonzero(elastic & hard.any(axis=0) & ~held),
+            np.count_nonzero(yielded & ~hard),
+        )
+        raw, raw_yielded, full = (
+            float(touching.mean()),
+            float(yielded.mean()),
+            force / self.cap,
+        )
         area = raw - CORRECTION * (open_edges + MIXED * mixed_edges) / p.size
         return {
             "area": max(area, full),
-            "area_yielded": min(raw_yielded + YIELDED * CORRECTION * own_edges / p.size, full),
+            "area_yielded": min(
+                raw_yielded + YIELDED * CORRECTION * own_edges / p.size, full
+            ),
             "area_raw": raw,
             "area_yielded_raw": raw_yielded,
             "mean_separation": float(np.maximum(rest, 0).mean()),
@@ -186,7 +254,8 @@ class Contact:
     def frozen_stiffness(self) -> float:
         """-dF/du of the contact area as it is, sticking neither to yielding nor to opening [E*/length].
 
-        Pressures on the area alone, of mean 1, that move it as a whole: preconditioned conjugate gradients.
+        Pressures on the area alone, of mean 1, that move it as a whole: preconditioned
+        conjugate gradients.
         """
         shape, touching = self.surface.shape, self.traction > 0
         even = np.where(touching, touching.size / touching.sum(), 0.0)
@@ -202,7 +271,9 @@ class Contact:
 
         compliance, stiffness = inside(self._compliance), inside(self._stiffness)
         start = -compliance @ even.ravel()
-        more, failed = cg(compliance, start, rtol=STIFFNESS_RTOL, maxiter=MAX_ITERATIONS, M=stiffness)
+        more, failed = cg(
+            compliance, start, rtol=STIFFNESS_RTOL, maxiter=MAX_ITERATIONS, M=stiffness
+        )
         if failed:
             raise ConvergenceError("the stiffness of a frozen contact was not found")
         return 1 / float(self.deflect(even + more.reshape(shape))[touching].mean())

@@ -1,12 +1,13 @@
 """Curves through simulated loads of one surface, which use the elastic energy, and go on beyond the loads.
 
-Lengths in one unit, force and energy over A0 E*. Since dU = -F du, the integral of u over F between two loads is known
-exactly: G2 - G1 with G = U + F u. So a cubic spline of u over ln F has an extra knot between each two loads, whose
-value follows from this integral. A/A0 = erf(F exp(s)) with a natural cubic spline s of ln(erfinv(A)/F) over ln F. Where
-a spline is not monotone, as with few, distant loads, monotone cubics through the loads replace it.
+Lengths in one unit, force and energy over A0 E*. Since dU = -F du, the integral of u over F
+between two loads is known exactly: G2 - G1 with G = U + F u. So a cubic spline of u over ln
+F has an extra knot between each two loads, whose value follows from this integral. A/A0 =
+erf(F exp(s)) with a natural cubic spline s of ln(erfinv(A)/F) over ln F. Where a spline is
+not monotone, as with few, distant loads, monotone cubics through the loads replace it.
 
-Beyond the loads, with the stiffness at the first and the last, H the height of the highest point, in proportion at
-light load and as Gaussian pressures near full contact: ::
+Beyond the loads, with the stiffness at the first and the last, H the height of the highest
+point, in proportion at light load and as Gaussian pressures near full contact: ::
 
     light: F ~ (H - u)^n       heavy: F^2 linear in ln u       both: erfinv(A) ~ F
 """
@@ -28,15 +29,18 @@ LARGEST_AREA = 1 - 1e-12
 class LoadCurve:
     """Mean separation, area and energy by ln F, from first contact to full compression; arguments are not checked.
 
-    `rows`, shape (4, n), are F/(A0 E*), rising, A/A0, rising, u [length], falling, and U/(A0 E*) [length]; `top` is u
-    of first contact [length], above the first load's.
+    `rows`, shape (4, n), are F/(A0 E*), rising, A/A0, rising, u [length], falling, and
+    U/(A0 E*) [length]; `top` is u of first contact [length], above the first load's.
     """
 
     def __init__(self, rows: FloatArray, top: float) -> None:
         force, area, u, energy = rows
         self.x, self.top = np.log(force), top
         self._work = energy + force * u
-        fine = np.append(self.x[:-1, None] + np.diff(self.x)[:, None] * np.arange(FINE) / FINE, self.x[-1])
+        fine = np.append(
+            self.x[:-1, None] + np.diff(self.x)[:, None] * np.arange(FINE) / FINE,
+            self.x[-1],
+        )
         self._spline: Any = _constrained(self.x, u, np.diff(self._work))
         self._slope = self._spline.derivative()
         if not (self._slope(fine) < 0).all():
@@ -68,16 +72,30 @@ class LoadCurve:
         inside, light, heavy = self._split(x)
         lighter = self.top - (self.top - self._gaps[0]) * np.exp(light / self._power)
         heavier = self._gaps[1] * np.exp(-np.expm1(2 * heavy) / (2 * self._rate))
-        return np.asarray(np.where(light < 0, lighter, np.where(heavy > 0, heavier, self._spline(inside))))
+        return np.asarray(
+            np.where(
+                light < 0, lighter, np.where(heavy > 0, heavier, self._spline(inside))
+            )
+        )
 
     @np.errstate(all="ignore")
     def stiffness(self, x: FloatArray) -> FloatArray:
         """-dF/du at ln F; infinite where u does not change, zero at first contact."""
         inside, light, heavy = self._split(x)
         n = self._power
-        lighter = n * np.exp(self._ends[0] + light * (1 - 1 / n)) / (self.top - self._gaps[0])
-        heavier = np.where(heavy < np.inf, self._rate * np.exp(self._ends[1] - heavy) / self.separation(x), np.inf)
-        return np.where(light < 0, lighter, np.where(heavy > 0, heavier, np.exp(inside) / -self._slope(inside)))
+        lighter = (
+            n * np.exp(self._ends[0] + light * (1 - 1 / n)) / (self.top - self._gaps[0])
+        )
+        heavier = np.where(
+            heavy < np.inf,
+            self._rate * np.exp(self._ends[1] - heavy) / self.separation(x),
+            np.inf,
+        )
+        return np.where(
+            light < 0,
+            lighter,
+            np.where(heavy > 0, heavier, np.exp(inside) / -self._slope(inside)),
+        )
 
     def area(self, x: FloatArray) -> FloatArray:
         """A/A0 at ln F."""
@@ -88,9 +106,18 @@ class LoadCurve:
         """ln F at mean separations from 0 to `top`: infinite at either."""
         inside = self._inverse(self._spline, np.clip(u, *self._gaps[::-1]))
         with np.errstate(divide="ignore"):
-            lighter = self._ends[0] + self._power * np.log(np.maximum(self.top - u, 0) / (self.top - self._gaps[0]))
-            heavier = self._ends[1] + np.log1p(-2 * self._rate * np.log(np.minimum(u / self._gaps[1], 1))) / 2
-        return np.asarray(np.where(u > self._gaps[0], lighter, np.where(u < self._gaps[1], heavier, inside)))
+            lighter = self._ends[0] + self._power * np.log(
+                np.maximum(self.top - u, 0) / (self.top - self._gaps[0])
+            )
+            heavier = (
+                self._ends[1]
+                + np.log1p(-2 * self._rate * np.log(np.minimum(u / self._gaps[1], 1))) / 2
+            )
+        return np.asarray(
+            np.where(
+                u > self._gaps[0], lighter, np.where(u < self._gaps[1], heavier, inside)
+            )
+        )
 
     def log_force_at(self, area: FloatArray) -> FloatArray:
         """ln F at A/A0 from 0 to below 1."""
@@ -105,7 +132,11 @@ class LoadCurve:
 
     def _inverse(self, curve: Any, wanted: FloatArray) -> FloatArray:
         """ln F within the loads at which a monotone curve has these values."""
-        return np.asarray(find_root(lambda x, value: curve(x) - value, tuple(self._ends), args=(wanted,)).x)
+        return np.asarray(
+            find_root(
+                lambda x, value: curve(x) - value, tuple(self._ends), args=(wanted,)
+            ).x
+        )
 
     @np.errstate(all="ignore")
     def energy(self, x: FloatArray) -> FloatArray:
@@ -114,14 +145,25 @@ class LoadCurve:
         k = np.clip(np.searchsorted(self.x, inside, side="right") - 1, 0, self.x.size - 2)
         force, start, end = np.exp(inside), np.exp(self.x[k]), np.exp(self.x[k + 1])
         missed = np.diff(self._work)[k] - self._integral(self.x[k], self.x[k + 1])
-        work = self._work[k] + self._integral(self.x[k], inside) + missed * (force - start) / (end - start)
-        energy = np.asarray((work - force * self._spline(inside)) * np.exp(light * (1 + 1 / self._power)))
+        work = (
+            self._work[k]
+            + self._integral(self.x[k], inside)
+            + missed * (force - start) / (end - start)
+        )
+        energy = np.asarray(
+            (work - force * self._spline(inside)) * np.exp(light * (1 + 1 / self._power))
+        )
         heavier = heavy > 0
         if heavier.any():
             # and the integral of F over u
             gap = self.separation(x)[heavier]
             half = (self._gaps[1] - gap)[..., None] / 2
-            energy[heavier] += np.sum(np.exp(self.log_force(gap[..., None] + half * (1 + NODES))) * half * WEIGHTS, -1)
+            energy[heavier] += np.sum(
+                np.exp(self.log_force(gap[..., None] + half * (1 + NODES)))
+                * half
+                * WEIGHTS,
+                -1,
+            )
         return energy
 
     def _integral(self, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -48,7 +48,9 @@ POWERS = {
 
 def sides(treated: Treated) -> tuple[float, float]:
     """Sides of a map [length]."""
-    return treated.heights.shape[0] * treated.steps[0], treated.heights.shape[1] * treated.steps[1]
+    return treated.heights.shape[0] * treated.steps[0], treated.heights.shape[
+        1
+    ] * treated.steps[1]
 
 
 def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
@@ -56,7 +58,9 @@ def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
     return surface.shortest(ROUNDED) / max(whole.steps)
 
 
-def reduced(values: FloatArray, points: float, mirrored: bool) -> tuple[FloatArray, float, float]:
+def reduced(
+    values: FloatArray, points: float, mirrored: bool
+) -> tuple[FloatArray, float, float]:
     """A map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps."""
     step, cut = 1.0, 0.0
     while values.size > MOST_POINTS:
@@ -71,7 +75,9 @@ def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
     """F/(A0 E*) at which the quick law of a map has given contact areas; uses areas only, which never fail."""
     octaves = np.arange(-20 * REFINED, 4 * REFINED) / REFINED
     pressure = float(surface.rms_gradient) * 2.0**octaves
-    area = np.maximum.accumulate(own_law(surface).area(pressure)) + 1e-15 * np.arange(pressure.size)
+    area = np.maximum.accumulate(own_law(surface).area(pressure)) + 1e-15 * np.arange(
+        pressure.size
+    )
     return np.asarray(np.exp(np.interp(np.log(areas), np.log(area), np.log(pressure))))
 
 
@@ -97,14 +103,34 @@ def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
     for row, (name, (meaning, unit)) in zip(theory.rows, ROWS.items(), strict=True):
         table[name] = ("load",), row, meaning, unit
     gaps, flow = theory.flows
-    table["flow_gaps"] = ("flow_load",), gaps, "u of a load whose flow is known", "{length}"
-    table["flow"] = ("flow_load", "axis"), flow, "flow coefficients xx, yy and xy, 0 where blocked", "{length}^3"
+    table["flow_gaps"] = (
+        ("flow_load",),
+        gaps,
+        "u of a load whose flow is known",
+        "{length}",
+    )
+    table["flow"] = (
+        ("flow_load", "axis"),
+        flow,
+        "flow coefficients xx, yy and xy, 0 where blocked",
+        "{length}^3",
+    )
     numbers = (theory.points, theory.pressed.left_out, surface.anisotropy)
     for (name, meaning), value in zip(NUMBERS.items(), numbers, strict=True):
         table[name] = (), value, meaning, "{length}" if name == "left_out" else "1"
     table["q"] = ("wave",), surface.q, "wavenumber", "1/{length}"
-    table["C"] = ("wave",), surface.C, "power spectrum, h_rms^2 = 2 pi integral C q dq", "{length}^4"
-    table["samples"] = ("wave",), surface.samples, "independent samples of the spectrum", "1"
+    table["C"] = (
+        ("wave",),
+        surface.C,
+        "power spectrum, h_rms^2 = 2 pi integral C q dq",
+        "{length}^4",
+    )
+    table["samples"] = (
+        ("wave",),
+        surface.samples,
+        "independent samples of the spectrum",
+        "1",
+    )
     table["h_max"] = (), surface.h_max, "highest point above the mean", "{length}"
     held = surface.bands.variance > 0
     for part, kind in PARTS.items():
@@ -113,7 +139,12 @@ def write_table(theory: Any, path: os.PathLike[str] | str) -> None:
             values = values[held] if part == "bands" else values
             over = (f"{part}_{values.size}",) if values.ndim else ()
             unit = POWERS.get(name, "1")
-            table[f"{part}_{name}"] = over, values, f"{name} of mbma_tables {kind.__name__}", unit
+            table[f"{part}_{name}"] = (
+                over,
+                values,
+                f"{name} of mbma_tables {kind.__name__}",
+                unit,
+            )
     length = surface.unit or "length"
     attributes = {
         "Conventions": "CF-1.11",
@@ -134,18 +165,28 @@ def read_surface(path: os.PathLike[str] | str) -> MeasuredSurface:
     """The surface of such a file, with its table."""
     values, own = read_own(path)
     try:
-        plain = {name: value.item() if value.size == 1 else value for name, value in values.items()}
-        parts = {part: kind(**{n: plain[f"{part}_{n}"] for n in _fields(part)}) for part, kind in PARTS.items()}
+        plain = {
+            name: value.item() if value.size == 1 else value
+            for name, value in values.items()
+        }
+        parts = {
+            part: kind(**{n: plain[f"{part}_{n}"] for n in _fields(part)})
+            for part, kind in PARTS.items()
+        }
         numbers = [values[name].item() for name in NUMBERS]
         rows = np.stack([values[name] for name in ROWS])
         if values["flow"].shape != (*values["flow_gaps"].shape, 3) or rows.ndim != 2:
             raise InputError("has loads and flows that do not fit each other")
         points, left_out, anisotropy = numbers
-        table = MapSimulation(rows, values["flow_gaps"], values["flow"], points, left_out, own["source"])
+        table = MapSimulation(
+            rows, values["flow_gaps"], values["flow"], points, left_out, own["source"]
+        )
         return MeasuredSurface(
             values["q"], values["C"], values["h_max"].item(), **parts, table=table,
             samples=values["samples"], anisotropy=anisotropy, unit=own.get("length_unit"),
             provenance=tuple(json.loads(own["provenance"])),
         )  # fmt: skip
     except (InputError, LookupError, TypeError, ValueError) as fault:
-        raise TableFileError(f"{path}: is no table of a simulated map ({fault}); {OWN_REMEDY}") from None
+        raise TableFileError(
+            f"{path}: is no table of a simulated map ({fault}); {OWN_REMEDY}"
+        ) from None

@@ -17,26 +17,41 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.surfaces.map_simulation import ROUNDING
-from mbma_tables.theories.simulated.boundary_elements import Contact, composed, wavenumbers, waves
+from mbma_tables.theories.simulated.boundary_elements import (
+    Contact,
+    composed,
+    wavenumbers,
+    waves,
+)
 from mbma_tables.theories.simulated.reynolds import flow_tensor
 
 TOLERANCE = 1e-5
 LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
-# loads added where the areas of two neighbours differ by more than this factor, at most so many; where an area jumps,
-# as when a plateau is reached, no two loads closer than this in ln F
+# loads added where the areas of two neighbours differ by more than this factor, at most so
+# many; where an area jumps, as when a plateau is reached, no two loads closer than this in
+# ln F
 SPACING, BETWEEN, CLOSEST = 2.5, 10, 0.1
-# loads added for the flow, at most: where its logarithm falls by more than this, and where an axis closes between
-# loads further apart than this in ln F, which counts as such a fall
+# loads added for the flow, at most: where its logarithm falls by more than this, and where
+# an axis closes between loads further apart than this in ln F, which counts as such a fall
 FLOWS, STEEP, NARROW, CLOSING = 6, 1.2, 0.1, 3.5
-# A/A0 up to which flow along both axes was open on most maps, so that its scatter is known; a fall beyond counts less
+# A/A0 up to which flow along both axes was open on most maps, so that its scatter is known;
+# a fall beyond counts less
 AREA_OF_FLOW, BEYOND = 0.2, 0.6
 KEPT = "pressed 2"  # of what is cached: another text where this file finds other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
-YIELDING = (*QUANTITIES, "plane_separation", "area_yielded", "frozen_stiffness", "pressure_weighted_height")
+YIELDING = (
+    *QUANTITIES,
+    "plane_separation",
+    "area_yielded",
+    "frozen_stiffness",
+    "pressure_weighted_height",
+)
 
 
-def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> FloatArray:
+def coarser(
+    values: FloatArray, points: float = 0.0, mirrored: bool = False
+) -> FloatArray:
     """A map on half as many points along each axis, by its waves of at least `points` of the new sampling steps."""
     from scipy.signal import resample
 
@@ -53,8 +68,9 @@ def coarser(values: FloatArray, points: float = 0.0, mirrored: bool = False) -> 
 class Press:
     """A map that is pressed when it is first called with a load over A0 E*; lengths of the map.
 
-    `gradient` is about its rms gradient, `hardness` is over E*, and `left_out` the wavelength [length] below which a
-    large map was cut off, 0 if it was not; `mirrored` as for `Contact`.
+    `gradient` is about its rms gradient, `hardness` is over E*, and `left_out` the
+    wavelength [length] below which a large map was cut off, 0 if it was not; `mirrored` as
+    for `Contact`.
     """
 
     def __init__(
@@ -62,18 +78,37 @@ class Press:
         mirrored: bool = False, hardness: float = np.inf, left_out: float = 0.0,
     ) -> None:  # fmt: skip
         self.left_out = left_out
-        self.heights, self.sizes, self.gradient, self.mirrored = heights, sizes, gradient, mirrored
+        self.heights, self.sizes, self.gradient, self.mirrored = (
+            heights,
+            sizes,
+            gradient,
+            mirrored,
+        )
         self._tolerance, self._cap = tolerance, hardness / gradient
         self._engine: Contact | None = None
         self.quantities = YIELDING if hardness < np.inf else QUANTITIES
         # of rms gradient one, heights of order one
         self.scale = float(np.abs(heights).max())
         self._sizes = sizes[0] * gradient / self.scale, sizes[1] * gradient / self.scale
-        settings = heights.shape, *(f"{side:.9g}" for side in self._sizes), tolerance, mirrored, f"{self._cap:.9g}"
+        settings = (
+            heights.shape,
+            *(f"{side:.9g}" for side in self._sizes),
+            tolerance,
+            mirrored,
+            f"{self._cap:.9g}",
+        )
         self._own = _digest(heights / self.scale, *settings)
-        units = {"energy": gradient * self.scale, "frozen_stiffness": gradient / self.scale}
-        lengths = dict.fromkeys(("mean_separation", "plane_separation", "pressure_weighted_height"), self.scale)
-        self._units = np.array([(units | lengths).get(name, 1.0) for name in self.quantities])
+        units = {
+            "energy": gradient * self.scale,
+            "frozen_stiffness": gradient / self.scale,
+        }
+        lengths = dict.fromkeys(
+            ("mean_separation", "plane_separation", "pressure_weighted_height"),
+            self.scale,
+        )
+        self._units = np.array(
+            [(units | lengths).get(name, 1.0) for name in self.quantities]
+        )
         self._found: dict[float, tuple[FloatArray, FloatArray]] = {}
 
     def name(self, load: float) -> str:
@@ -88,25 +123,33 @@ class Press:
             if kept is None:
                 if self._engine is None:
                     own = self.heights / self.scale
-                    self._engine = Contact(own, self._sizes, self._tolerance, self._cap, self.mirrored)
+                    self._engine = Contact(
+                        own, self._sizes, self._tolerance, self._cap, self.mirrored
+                    )
                 result = self._engine.press(load / self.gradient)
                 if self._cap < np.inf:
                     result["frozen_stiffness"] = self._engine.frozen_stiffness()
                 row = np.array([result[name] for name in self.quantities])
                 kept = {"row": row, "gap": self._engine.gap.astype(np.float32)}
                 cache.keep(name, **kept)
-            self._found[load] = kept["row"] * self._units, kept["gap"] * np.float32(self.scale)
+            self._found[load] = (
+                kept["row"] * self._units,
+                kept["gap"] * np.float32(self.scale),
+            )
         return self._found[load]
 
     def loads(self, wanted: FloatArray, more: bool) -> tuple[FloatArray, FloatArray]:
         """Loads, and rows of `quantities` at them, rising.
 
-        `more` are added until contact is covered far enough, and where it grows too much from load to load.
+        `more` are added until contact is covered far enough, and where it grows too much
+        from load to load.
         """
         found: dict[float, FloatArray] = {}
 
         def add(load: float) -> None:
-            doing(f"boundary elements {_bar(len(found), max(len(wanted), len(found) + 1))}")
+            doing(
+                f"boundary elements {_bar(len(found), max(len(wanted), len(found) + 1))}"
+            )
             found[load] = self(load)[0]
 
         with shown("boundary elements"):
@@ -118,34 +161,49 @@ class Press:
                 if found[low][0] > LOWEST:
                     with contextlib.suppress(ConvergenceError):
                         add(low * LIGHTER)
-                if found[high][0] < HIGHEST and high * HEAVIER < self._cap * self.gradient:
+                if (
+                    found[high][0] < HIGHEST
+                    and high * HEAVIER < self._cap * self.gradient
+                ):
                     add(high * HEAVIER)
             for _ in range(BETWEEN if more else 0):
-                between = _widest(np.array(sorted(found)), np.array([found[load][0] for load in sorted(found)]))
+                between = _widest(
+                    np.array(sorted(found)),
+                    np.array([found[load][0] for load in sorted(found)]),
+                )
                 if between is None:
                     break
                 add(between)
         cache.trim()
-        return np.array(sorted(found)), np.array([found[load] for load in sorted(found)]).T
+        return np.array(sorted(found)), np.array(
+            [found[load] for load in sorted(found)]
+        ).T
 
     def flow(self, load: float) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3] through the gaps under a load over A0 E*; 0 where blocked."""
         name = f"{self.name(load)}-flow"
         kept = cache.load(name, flow=(3,))
         if kept is None:
-            kept = {"flow": flow_tensor(self(load)[1] / self.scale, self.sizes, self.mirrored)}
+            kept = {
+                "flow": flow_tensor(self(load)[1] / self.scale, self.sizes, self.mirrored)
+            }
             cache.keep(name, **kept)
         return np.asarray(kept["flow"] * self.scale**3)
 
-    def flows(self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
+    def flows(
+        self, x: FloatArray, separation: Callable[[FloatArray], FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
         """Mean gaps u of some loads [length], falling, and their flow, shape (m, 3).
 
-        At every second ln F, then between loads where it falls most, or an axis closes; `separation` is u at ln F.
+        At every second ln F, then between loads where it falls most, or an axis closes;
+        `separation` is u at ln F.
         """
         found: dict[float, FloatArray] = {}
 
         def add(own: float) -> bool:
-            doing(f"flow through the gaps {_bar(len(found), max(x.size // 2 + FLOWS // 2, len(found) + 1))}")
+            doing(
+                f"flow through the gaps {_bar(len(found), max(x.size // 2 + FLOWS // 2, len(found) + 1))}"
+            )
             found[own] = self.flow(float(np.exp(own)))
             return bool(found[own][:2].any())
 
@@ -160,13 +218,22 @@ class Press:
                 with np.errstate(divide="ignore", invalid="ignore"):
                     fall = np.nan_to_num(np.log(K[:-1] / K[1:]), posinf=np.inf)
                 closing = np.where(np.diff(at) > NARROW, CLOSING, 0.0)[:, None]
-                heavy = np.array([self(float(np.exp(own)))[0][0] for own in at[:-1].tolist()]) > AREA_OF_FLOW
-                worst = np.where(np.isinf(fall), closing, fall).max(axis=1) * np.where(heavy, BEYOND, 1.0)
+                heavy = (
+                    np.array([self(float(np.exp(own)))[0][0] for own in at[:-1].tolist()])
+                    > AREA_OF_FLOW
+                )
+                worst = np.where(np.isinf(fall), closing, fall).max(axis=1) * np.where(
+                    heavy, BEYOND, 1.0
+                )
                 k = int(worst.argmax())
                 if worst[k] < STEEP:
                     break
                 between = x[(x > at[k]) & (x < at[k + 1])]
-                add(float(between[between.size // 2]) if between.size else float(at[k] + at[k + 1]) / 2)
+                add(
+                    float(between[between.size // 2])
+                    if between.size
+                    else float(at[k] + at[k + 1]) / 2
+                )
         at = np.array(sorted(found))
         cache.trim()
         return separation(at), np.array([found[own] for own in at.tolist()])
@@ -176,7 +243,11 @@ def _widest(force: FloatArray, area: FloatArray) -> float | None:
     """The load in the middle, in ln F, of the neighbours whose areas differ most; None if they are close enough."""
     ratio = area[1:] / area[:-1]
     # lighter and heavier contacts than those that the loads reach are not valid
-    inside = (area[1:] > LOWEST) & (area[:-1] < HIGHEST) & (np.diff(np.log(force)) > 2 * CLOSEST)
+    inside = (
+        (area[1:] > LOWEST)
+        & (area[:-1] < HIGHEST)
+        & (np.diff(np.log(force)) > 2 * CLOSEST)
+    )
     ratio = np.where(inside, ratio, 0.0)
     widest = int(ratio.argmax())
     if ratio[widest] <= SPACING:
@@ -189,7 +260,11 @@ def _digest(*parts: Any) -> str:
     digest = hashlib.sha256(KEPT.encode())
     for part in parts:
         array = isinstance(part, np.ndarray)
-        digest.update(np.ascontiguousarray(part, "<f4").tobytes() if array else f";{part!r};".encode())
+        digest.update(
+            np.ascontiguousarray(part, "<f4").tobytes()
+            if array
+            else f";{part!r};".encode()
+        )
     return digest.hexdigest()
 
 

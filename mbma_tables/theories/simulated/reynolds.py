@@ -1,7 +1,8 @@
 """Flow through the gaps of a contact: Reynolds' equation div(h^3 grad p) = 0 on a periodic grid of gaps.
 
-Finite volumes with the harmonic mean of h^3 at faces; mean pressure gradients along both axes share one sparse
-factorisation. Closed gaps are found by labelling connected gaps, not by a small conductance.
+Finite volumes with the harmonic mean of h^3 at faces; mean pressure gradients along both
+axes share one sparse factorisation. Closed gaps are found by labelling connected gaps, not
+by a small conductance.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from mbma_tables.common.interrupts import interruptible
 def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
     """Label of the connected gap at each point, 0 where closed or leading nowhere, and which axes are open.
 
-    A connected gap leads along an axis of the periodic cell where a closed path in it winds around that axis.
+    A connected gap leads along an axis of the periodic cell where a closed path in it winds
+    around that axis.
     """
     labels, number = label(gap > 0)
     joins: list[list[tuple[int, int, int]]] = [[] for _ in range(number + 1)]
@@ -52,7 +54,9 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
     return component[labels], (bool(winds[:, 0].any()), bool(winds[:, 1].any()))
 
 
-def flow_conductance(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) -> FloatArray:
+def flow_conductance(
+    gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)
+) -> FloatArray:
     """K [length^3] of flow per width K dp/(12 viscosity length) along both axes of a periodic cell; 0 where blocked.
 
     Parameters
@@ -83,11 +87,13 @@ def flow_conductance(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) ->
     return flow_tensor(gap, sizes)[:2]
 
 
-def flow_tensor(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0), mirrored: bool = False) -> FloatArray:
+def flow_tensor(
+    gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0), mirrored: bool = False
+) -> FloatArray:
     """K of `flow_conductance` along both axes, and K_xy [length^3], of gaps that may be continued by mirror images.
 
-    Flow per width along an axis is K_xx or K_yy times the mean pressure gradient along it, and K_xy times that along
-    the other one; images have no K_xy.
+    Flow per width along an axis is K_xx or K_yy times the mean pressure gradient along it,
+    and K_xy times that along the other one; images have no K_xy.
     """
     values = _checked(gap)
     if not mirrored:
@@ -96,12 +102,15 @@ def flow_tensor(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0), mirrore
     return np.array([*(_between_mirrors(values, sizes, axis) for axis in (0, 1)), 0.0])
 
 
-def flow_and_couette(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) -> tuple[FloatArray, FloatArray]:
+def flow_and_couette(
+    gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)
+) -> tuple[FloatArray, FloatArray]:
     """K of `flow_conductance`, and the gap h_c that Couette flow sees where a smooth face slides over the rough one.
 
-    At rest beside the rough face, flow is -h_c U/2 at the speed U along an axis, without a mean pressure gradient: the
-    pressure of div(h^3 grad p) = 6 viscosity U dh/dx, by reciprocity from that of `flow_conductance`. A shear flow
-    factor (Patir, Cheng, J. Lubrication Tech. 101 (1979) 220) is (u - h_c)/h_rms, u the mean gap.
+    At rest beside the rough face, flow is -h_c U/2 at the speed U along an axis, without a
+    mean pressure gradient: the pressure of div(h^3 grad p) = 6 viscosity U dh/dx, by
+    reciprocity from that of `flow_conductance`. A shear flow factor (Patir, Cheng, J.
+    Lubrication Tech. 101 (1979) 220) is (u - h_c)/h_rms, u the mean gap.
     """
     K, couette = _solved(_checked(gap), sizes)
     return np.diagonal(K).copy(), couette
@@ -128,7 +137,12 @@ def _faces(
         if mirrored:
             joined[(-1, slice(None)) if axis == 0 else (slice(None), -1)] = False
         # a b/(a + b) would underflow where both are tiny
-        face = 2 / (1 / cubes[joined] + 1 / np.roll(cubes, -1, axis)[joined]) * steps[1 - axis] / steps[axis]
+        face = (
+            2
+            / (1 / cubes[joined] + 1 / np.roll(cubes, -1, axis)[joined])
+            * steps[1 - axis]
+            / steps[axis]
+        )
         faces.append((joined, number[joined], beside[joined], face))
     return number, steps, faces
 
@@ -161,11 +175,16 @@ def _solved(gap: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, Fl
     uniform, mean = np.zeros((2, 2))
     for axis, (joined, i, j, face) in enumerate(faces):
         one, other = gap[joined], np.roll(gap, -1, axis)[joined]
-        wider, ratio = np.maximum(one, other), np.minimum(one, other) / np.maximum(one, other)
+        wider, ratio = (
+            np.maximum(one, other),
+            np.minimum(one, other) / np.maximum(one, other),
+        )
         couette = wider * ratio * (1 + ratio**2) / (1 + ratio**3) * steps[1 - axis]
         carried[:, axis] = np.bincount(i, couette, count) - np.bincount(j, couette, count)
         mean[axis] = couette.sum() * steps[axis]
-        forces[:, axis] = (np.bincount(i, face, count) - np.bincount(j, face, count)) * steps[axis]
+        forces[:, axis] = (
+            np.bincount(i, face, count) - np.bincount(j, face, count)
+        ) * steps[axis]
         uniform[axis] = face.sum() * steps[axis] ** 2
     # pressure is free by a constant in each connected gap
     free = np.delete(np.arange(count), np.unique(owner[owner > 0], return_index=True)[1])
@@ -179,7 +198,10 @@ def _solved(gap: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, Fl
 def _between_mirrors(gap: FloatArray, sizes: tuple[float, float], axis: int) -> float:
     """K along an axis of gaps continued by their mirror images, between the mirrors at its ends."""
     labels, _ = label(gap > 0)
-    open_ = np.isin(labels, np.setdiff1d(np.intersect1d(labels.take(0, axis), labels.take(-1, axis)), 0))
+    open_ = np.isin(
+        labels,
+        np.setdiff1d(np.intersect1d(labels.take(0, axis), labels.take(-1, axis)), 0),
+    )
     if not open_.any():
         return 0.0
     number, steps, faces = _faces(gap, open_, sizes, True)

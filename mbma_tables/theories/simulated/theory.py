@@ -15,21 +15,33 @@ from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared_property
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING, MapSimulation, resolving
+from mbma_tables.surfaces.map_simulation import (
+    MIN_POINTS,
+    ROUNDING,
+    MapSimulation,
+    resolving,
+)
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.calibrated.theory import Calibrated
 from mbma_tables.theories.simulated import own_map
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
-from mbma_tables.theories.simulated.pressing import AREA_OF_FLOW, HIGHEST, LOWEST, TOLERANCE, Press
+from mbma_tables.theories.simulated.pressing import (
+    AREA_OF_FLOW,
+    HIGHEST,
+    LOWEST,
+    TOLERANCE,
+    Press,
+)
 
 # A/A0 of the 142 maps of `python -m generate machined` at which scatter was measured
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
-# scatter increases by this power of a map's `sensitivity_at` over that of most maps, found between these A/A0
+# scatter increases by this power of a map's `sensitivity_at` over that of most maps, found
+# between these A/A0
 POWER, TYPICAL, SENSITIVE = 0.75, 0.0025, (0.003, 0.95)
-# of ln A by the map's own grid at `MIN_POINTS` steps a wavelength: on a grid four times finer areas are 0.8 to 1.5%
-# larger; of the second order in the step
+# of ln A by the map's own grid at `MIN_POINTS` steps a wavelength: on a grid four times
+# finer areas are 0.8 to 1.5% larger; of the second order in the step
 GRID = 0.012
 EVALUATED = 1e-5  # error of the curves through the loads; laws need not be more accurate
 STEEPEST = 8.0  # largest power of u - u1 by which an axis closes
@@ -46,7 +58,8 @@ class BoundaryElements(Theory):
     rows : ndarray, shape (4, n)
         Pressure over E*, A/A0, u [length] and elastic energy over A0 E* [length] of the loads.
     points : float
-        Sampling steps per shortest wavelength; below four, areas are too large and results are not `valid`.
+        Sampling steps per shortest wavelength; below four, areas are too large and results
+        are not `valid`.
 
     Notes
     -----
@@ -74,8 +87,9 @@ class BoundaryElements(Theory):
     areas: tuple[float, ...] = own_map.AREAS  # by the law of the map, at its loads
     tolerance, tested = TOLERANCE, (LOWEST, HIGHEST)  # of boundary elements; A/A0
     remedies = "", ""  # for lighter and for heavier contacts
-    # standard deviations against contact on the full grid at tolerance 1e-6, at `TESTED_AREAS`, which lie between the
-    # loads, of a map of typical sensitivity: the larger of the 70% and half of the 97.5% quantile of the errors
+    # standard deviations against contact on the full grid at tolerance 1e-6, at
+    # `TESTED_AREAS`, which lie between the loads, of a map of typical sensitivity: the
+    # larger of the 70% and half of the 97.5% quantile of the errors
     scatters: ClassVar[dict[str, tuple[float, ...]]] = {
         "area": (0.0649, 0.0233, 0.0105, 0.00936, 0.00987, 0.00321, 0.00615),
         "pressure": (0.00529, 0.00286, 0.00041, 0.000948, 0.000686, 0.00022, 0.00187),
@@ -84,11 +98,27 @@ class BoundaryElements(Theory):
     }
 
     def __init__(
-        self, surface: MeasuredSurface, rows: FloatArray, points: float, pressed: Press | MapSimulation, origin: str
+        self,
+        surface: MeasuredSurface,
+        rows: FloatArray,
+        points: float,
+        pressed: Press | MapSimulation,
+        origin: str,
     ) -> None:
-        self.surface, self.rows, self.points, self.pressed, self.origin = surface, rows, points, pressed, origin
+        self.surface, self.rows, self.points, self.pressed, self.origin = (
+            surface,
+            rows,
+            points,
+            pressed,
+            origin,
+        )
         top, steps = float(surface.h_max), np.diff(rows)
-        if not ((rows > 0).all() and (steps[:2] >= 0).all() and (steps[2] < 0).all() and rows[2, 0] < top):
+        if not (
+            (rows > 0).all()
+            and (steps[:2] >= 0).all()
+            and (steps[2] < 0).all()
+            and rows[2, 0] < top
+        ):
             raise OutOfRangeError(
                 f"the simulation of this map is no law up to h_max = {top:.4g}: at rising loads, areas {rows[1]} must "
                 f"rise, and mean separations {rows[2]} fall from below h_max"
@@ -106,13 +136,19 @@ class BoundaryElements(Theory):
         ConvergenceError
             Where boundary elements do not converge.
         """
-        table = surface.table if isinstance(surface, MeasuredSurface) and cls is BoundaryElements else None
+        table = (
+            surface.table
+            if isinstance(surface, MeasuredSurface) and cls is BoundaryElements
+            else None
+        )
         if table is not None:
             return cls(surface, table.rows, table.points, table, table.origin)  # type: ignore[arg-type]
         whole = own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
         steps, mirrored = own_map.steps_along(surface, whole), not whole.periodic
-        values, points, cut = own_map.reduced(whole.heights - whole.heights.mean(), steps, mirrored)
+        values, points, cut = own_map.reduced(
+            whole.heights - whole.heights.mean(), steps, mirrored
+        )
         press = Press(
             values,
             own_map.sides(whole),
@@ -122,7 +158,9 @@ class BoundaryElements(Theory):
             left_out=cut * max(whole.steps),
         )
         force, rows = press.loads(own_map.law_loads(surface, cls.areas), True)
-        digest = hashlib.sha256(np.ascontiguousarray(whole.heights, "<f8").tobytes()).hexdigest()[:16]
+        digest = hashlib.sha256(
+            np.ascontiguousarray(whole.heights, "<f8").tobytes()
+        ).hexdigest()[:16]
         own = f"of the map of {' x '.join(map(str, whole.heights.shape))} points with SHA-256 {digest}"
         origin = f"boundary elements, tolerance {cls.tolerance:g}, {own}"
         return cls(surface, np.array([force, *rows]), points, press, origin)
@@ -156,15 +194,31 @@ class BoundaryElements(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; an error for surfaces other than this map."""
         x = self.fit.log_force(self._within(surface, mean_separation))
-        return TheoryAnswer(np.exp(x), self.fit.area(x), self.fit.stiffness(x), np.full(np.shape(x), EVALUATED))
+        return TheoryAnswer(
+            np.exp(x),
+            self.fit.area(x),
+            self.fit.stiffness(x),
+            np.full(np.shape(x), EVALUATED),
+        )
 
-    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    def inverted(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
         if quantity == "area":
             require(quantity, wanted, wanted < 1, "less than 1")
         with np.errstate(divide="ignore"):
-            x = np.log(wanted) if quantity == "pressure" else self.fit.log_force_at(wanted)
+            x = (
+                np.log(wanted)
+                if quantity == "pressure"
+                else self.fit.log_force_at(wanted)
+            )
         u = self.fit.separation(x)
-        require(quantity, wanted, u > np.finfo(float).eps * self.rows[2, 0], "less: the mean separation vanishes")
+        require(
+            quantity,
+            wanted,
+            u > np.finfo(float).eps * self.rows[2, 0],
+            "less: the mean separation vanishes",
+        )
         return u, np.zeros(np.shape(wanted), bool)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
@@ -174,20 +228,25 @@ class BoundaryElements(Theory):
         """The map's own bearing curve, for a hardness."""
         return Calibrated().heights(surface)
 
-    def reasons(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def reasons(
+        self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
+    ) -> dict[str, Any]:
         area, left_out = answer.area, self.pressed.left_out
         coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
         whole = self.surface.map
         if whole is None:
             coarse += f": simulate it again with a short_cutoff of {MIN_POINTS:g} steps"
         else:
-            cutoff = resolving(self.points * max(whole.steps), max(whole.steps), self.surface.unit)
+            cutoff = resolving(
+                self.points * max(whole.steps), max(whole.steps), self.surface.unit
+            )
             coarse += f": give Surface.from_map(..., {cutoff})"
         cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
         return {
             coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
             cut: np.full(area.shape, left_out > 0),
-            f"A/A0 is below {self.tested[0]:g}{self.remedies[0]}": (area < self.tested[0]) & (area > 0),
+            f"A/A0 is below {self.tested[0]:g}{self.remedies[0]}": (area < self.tested[0])
+            & (area > 0),
             f"A/A0 is above {self.tested[1]:g}{self.remedies[1]}": area > self.tested[1],
         }
 
@@ -199,7 +258,9 @@ class BoundaryElements(Theory):
         if quantity == "area":
             stated = np.hypot(stated, GRID * (MIN_POINTS / self.points) ** 2)
         low, high = self.rows[1, [0, -1]]
-        return np.where((area < low * (1 - ROUNDING)) | (area > high * (1 + ROUNDING)), np.nan, stated)
+        return np.where(
+            (area < low * (1 - ROUNDING)) | (area > high * (1 + ROUNDING)), np.nan, stated
+        )
 
     @shared_property
     def changes(self) -> FloatArray:
@@ -235,15 +296,18 @@ class BoundaryElements(Theory):
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked."""
-        # ln K is a monotone cubic of ln(u - u1) where an axis closes at u1; xy is sqrt(xx yy) times what is linear in u
-        # bodies apart are farther apart than the theory needs
+        # ln K is a monotone cubic of ln(u - u1) where an axis closes at u1; xy is sqrt(xx
+        # yy) times what is linear in u bodies apart are farther apart than the theory needs
         u = np.maximum(self._within(surface, mean_separation), mean_separation)
         gaps, known = self.flows
         found = np.zeros((3, *u.shape))
         for axis, (last, end, _) in enumerate(self.closing):
             passing = (gaps >= last) & (known[:, axis] > 0)
             if passing.any():
-                x, y = np.log(gaps[passing][::-1] - end), np.log(known[passing, axis][::-1])
+                x, y = (
+                    np.log(gaps[passing][::-1] - end),
+                    np.log(known[passing, axis][::-1]),
+                )
                 if x.size == 1:
                     x, y = np.append(x - 1, x), np.append(y - 3, y)
                 curve = PchipInterpolator(x, y)
@@ -268,8 +332,14 @@ class BoundaryElements(Theory):
             end = blocked = float(u[count])
             if count > 1:
                 # between the last two open loads the power of u - u1 is at most STEEPEST
-                ratio = (known[count - 2, axis] / known[count - 1, axis]) ** (1 / STEEPEST)
-                end = max(end, float((ratio * u[count - 1] - u[count - 2]) / (ratio - 1))) if ratio > 1 else end
+                ratio = (known[count - 2, axis] / known[count - 1, axis]) ** (
+                    1 / STEEPEST
+                )
+                end = (
+                    max(end, float((ratio * u[count - 1] - u[count - 2]) / (ratio - 1)))
+                    if ratio > 1
+                    else end
+                )
             found.append((float(u[max(count - 1, 0)]), end, blocked))
         return found
 
@@ -277,9 +347,14 @@ class BoundaryElements(Theory):
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Standard deviation of ln of that flow on tested maps, and a mask where an axis may be blocked."""
-        near = [(mean_separation < last) & (mean_separation > blocked) for last, _, blocked in self.closing]
+        near = [
+            (mean_separation < last) & (mean_separation > blocked)
+            for last, _, blocked in self.closing
+        ]
         reasons = {
-            "leakage: the map may be blocked, as it is at the next simulated load": np.logical_or(*near),
+            "leakage: the map may be blocked, as it is at the next simulated load": np.logical_or(
+                *near
+            ),
             f"leakage: A/A0 is above {AREA_OF_FLOW:g}": area > AREA_OF_FLOW,
         }
         return self.scatter(surface, "flow", area), reasons
@@ -287,11 +362,20 @@ class BoundaryElements(Theory):
     def _within(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations of this map; bodies that are apart are at first contact."""
         for name in ("h_rms", "h_max"):
-            own, given = float(getattr(self.surface, name)), np.asarray(getattr(surface, name))
+            own, given = (
+                float(getattr(self.surface, name)),
+                np.asarray(getattr(surface, name)),
+            )
             good = np.abs(given - own) <= MATCHED * own
-            require(name, given, good, f"{own:.9g}: a simulation of one map is for that map only, its .surface")
+            require(
+                name,
+                given,
+                good,
+                f"{own:.9g}: a simulation of one map is for that map only, its .surface",
+            )
         u = np.broadcast_to(
-            np.asarray(mean_separation, float), np.broadcast_shapes(np.shape(mean_separation), surface.shape)
+            np.asarray(mean_separation, float),
+            np.broadcast_shapes(np.shape(mean_separation), surface.shape),
         )
         require("mean_separation", u, u >= 0, "at least 0")
         return np.asarray(np.minimum(u, self.surface.h_max))

@@ -28,7 +28,9 @@ KEPT = 8  # hardnesses of maps whose simulations are kept
 # standard deviations of ln of a quantity, by `python -m generate machined`
 SCATTER = {"area": 0.010, "pressure": 0.011, "unloading_stiffness": 0.033}
 
-Loaded = collections.namedtuple("Loaded", ("answer", "yielded", "unloading_stiffness", "plane_separation"))
+Loaded = collections.namedtuple(
+    "Loaded", ("answer", "yielded", "unloading_stiffness", "plane_separation")
+)
 
 
 class Plastic(BoundaryElements):
@@ -42,45 +44,84 @@ class Plastic(BoundaryElements):
         elastic = own_map.law_loads(surface, own_map.AREAS)
         loads = ((cap * np.array(own_map.AREAS)) ** -2 + elastic**-2) ** -0.5
         press = Press(
-            known.heights, known.sizes, known.gradient, TOLERANCE, known.mirrored, cap, left_out=known.left_out
+            known.heights,
+            known.sizes,
+            known.gradient,
+            TOLERANCE,
+            known.mirrored,
+            cap,
+            left_out=known.left_out,
         )
-        force, (area, u, energy, plane, yielded, frozen, height) = press.loads(loads, True)
+        force, (area, u, energy, plane, yielded, frozen, height) = press.loads(
+            loads, True
+        )
         # d(F H_p - U)/dF is the gap of the mean planes, to which what is flattened comes
         flattened = PchipInterpolator(force, u - plane).antiderivative()(force)
         stored = force * height - energy + flattened - force * u
         stored = stored + 2 * np.abs(stored).max()
-        super().__init__(surface, np.array([force, area, u, stored]), theory.points, press, theory.origin)
+        super().__init__(
+            surface,
+            np.array([force, area, u, stored]),
+            theory.points,
+            press,
+            theory.origin,
+        )
         # yielded share, ln of the frozen stiffness and u less the gap of the mean planes, by ln F
-        self._more = PchipInterpolator(self.fit.x, np.array([yielded / area, np.log(frozen), u - plane]).T)
-        # what the heaviest load lacks of the hardness, and its area of full contact; both vanish as this power of u
-        self._ends, self._last = np.array([cap, 1.0]), np.array([cap - force[-1], 1 - area[-1]])
-        self._power = float(self.fit.stiffness(self.fit.x[-1:])[0]) * u[-1] / (cap - force[-1])
+        self._more = PchipInterpolator(
+            self.fit.x, np.array([yielded / area, np.log(frozen), u - plane]).T
+        )
+        # what the heaviest load lacks of the hardness, and its area of full contact; both
+        # vanish as this power of u
+        self._ends, self._last = (
+            np.array([cap, 1.0]),
+            np.array([cap - force[-1], 1 - area[-1]]),
+        )
+        self._power = (
+            float(self.fit.stiffness(self.fit.x[-1:])[0]) * u[-1] / (cap - force[-1])
+        )
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness; heavier contacts go over to the hardness everywhere."""
         last = self.rows[2, -1]
         inside = super().answer(surface, np.maximum(mean_separation, last))
         left, beyond = (mean_separation / last) ** self._power, mean_separation < last
-        pressure, area = (end - rest * left for end, rest in zip(self._ends, self._last, strict=True))
+        pressure, area = (
+            end - rest * left for end, rest in zip(self._ends, self._last, strict=True)
+        )
         with np.errstate(all="ignore"):
             steep = self._power * self._last[0] * left / mean_separation
         heavy = pressure, area, steep, inside.error
-        return TheoryAnswer(*(np.where(beyond, one, other) for one, other in zip(heavy, inside, strict=True)))
+        return TheoryAnswer(
+            *(
+                np.where(beyond, one, other)
+                for one, other in zip(heavy, inside, strict=True)
+            )
+        )
 
-    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    def inverted(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
         row = 0 if quantity == "pressure" else 1
         end = self.rows[row, -1]
         u, missed = super().inverted(surface, quantity, np.minimum(wanted, end))
         left = np.minimum((self._ends[row] - wanted) / self._last[row], 1.0)
-        return np.where(wanted > end, self.rows[2, -1] * left ** (1 / self._power), u), missed
+        return np.where(
+            wanted > end, self.rows[2, -1] * left ** (1 / self._power), u
+        ), missed
 
     def found(self, mean_separation: FloatArray) -> FloatArray:
         """Force, area, stiffness, error, yielded share, frozen stiffness and gap of the mean planes."""
         answer = self.answer(self.surface, mean_separation)
-        x = self.fit.log_force(np.clip(mean_separation, self.rows[2, -1], self.rows[2, 0]))
+        x = self.fit.log_force(
+            np.clip(mean_separation, self.rows[2, -1], self.rows[2, 0])
+        )
         share, frozen, flattened = np.moveaxis(self._more(x), -1, 0)
         touching = answer.pressure > 0
-        more = np.where(touching, share, 0.0), np.where(touching, np.exp(frozen), 0.0), mean_separation - flattened
+        more = (
+            np.where(touching, share, 0.0),
+            np.where(touching, np.exp(frozen), 0.0),
+            mean_separation - flattened,
+        )
         return np.array([*answer, *more])
 
 
@@ -97,7 +138,9 @@ class Saturated(Yielding):
         """What simulations answer at entries with their hardnesses; rows first."""
         caps, *values = np.broadcast_arrays(self.hardness, *given)
         parts = {
-            cap: np.asarray(ask(self._simulation(cap), *(value[caps == cap] for value in values)))
+            cap: np.asarray(
+                ask(self._simulation(cap), *(value[caps == cap] for value in values))
+            )
             for cap in np.unique(caps).tolist()
         }
         found = np.empty((*next(iter(parts.values())).shape[:-1], *caps.shape))
@@ -108,7 +151,9 @@ class Saturated(Yielding):
     def _simulation(self, cap: float) -> Any:
         return self.elastic if np.isinf(cap) else plastic(self.elastic, cap)
 
-    def loaded(self, surface: AnySurface, mean_separation: FloatArray, lighter: Any = None) -> Any:
+    def loaded(
+        self, surface: AnySurface, mean_separation: FloatArray, lighter: Any = None
+    ) -> Any:
         """The answer at mean separations u [length], and what follows from the simulation."""
 
         def ask(own: Any, u: FloatArray) -> Any:
@@ -120,27 +165,37 @@ class Saturated(Yielding):
         found = self._each(ask, mean_separation)
         return Loaded(TheoryAnswer(*found[:4]), *found[4:])
 
-    def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, None]:
+    def pressed(
+        self, surface: AnySurface, pressure: FloatArray
+    ) -> tuple[FloatArray, None]:
         """Mean separations u at forces over A0 E*."""
         return self.mean_separation_at(surface, "pressure", pressure), None
 
-    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    def inverted(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Mean separation [length] at a pressure over E* or an area; no force is beyond the hardness."""
         self._refuse(quantity, wanted)
-        u = self._each(lambda own, value: own.inverted(surface, quantity, value)[0], wanted)
+        u = self._each(
+            lambda own, value: own.inverted(surface, quantity, value)[0], wanted
+        )
         return u, np.zeros(u.shape, bool)
 
     def curve(self, surface: AnySurface, quantity: str) -> Any:
         return Theory.curve(self, surface, quantity)
 
-    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
+    def interval(
+        self, surface: AnySurface, quantity: str = "pressure"
+    ) -> tuple[FloatArray, FloatArray]:
         return self.elastic.interval(surface, quantity)
 
     def bends(self, surface: AnySurface) -> FloatArray:
         return np.asarray(self._simulation(float(self.hardness)).bends(surface))
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        return np.asarray(self._each(lambda own, u: own.flow(surface, u), mean_separation))
+        return np.asarray(
+            self._each(lambda own, u: own.flow(surface, u), mean_separation)
+        )
 
     def flow_trust(
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
@@ -171,10 +226,13 @@ class Saturated(Yielding):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against contact at a tolerance of 1e-6.
 
-        "stiffness", the slope of the loading curve, was not compared: NaN, but where the hardness is infinite.
+        "stiffness", the slope of the loading curve, was not compared: NaN, but where the
+        hardness is infinite.
         """
         elastic = elastic_scatter(self.elastic, surface, quantity, area)
-        measured = np.hypot(elastic, SCATTER.get(quantity, np.nan if quantity == "stiffness" else 0.0))
+        measured = np.hypot(
+            elastic, SCATTER.get(quantity, np.nan if quantity == "stiffness" else 0.0)
+        )
         return np.where(np.isinf(self.hardness), elastic, measured)
 
 
@@ -208,13 +266,21 @@ class Corrected(BoundaryElements):
 
 def applies(surface: AnySurface) -> bool:
     """Whether it is the default for a surface: of a map that is resolved, and pressed within seconds."""
-    if not isinstance(surface, MeasuredSurface) or surface.map is None or surface.bands is None:
+    if (
+        not isinstance(surface, MeasuredSurface)
+        or surface.map is None
+        or surface.bands is None
+    ):
         return False
     whole = surface.map
     if whole.heights.ndim != 2:
         return False
     resolved = own_map.steps_along(surface, whole) >= MIN_POINTS * (1 - ROUNDING)
-    if whole.heights.size > MOST_POINTS or min(whole.heights.shape) < LEAST_SIDE or not resolved:
+    if (
+        whole.heights.size > MOST_POINTS
+        or min(whole.heights.shape) < LEAST_SIDE
+        or not resolved
+    ):
         return False
     try:
         of_map(Corrected.name, surface)

@@ -1,7 +1,7 @@
 """Contact whose pressure cannot exceed a hardness p_m, from the elastic contact of the same surface; docs/yield.md.
 
-eta = p_m/(E* g), g the rms gradient, x = F/(p_m A0) and F in A0 E* g. Loading only, frictionless. The mean gap u has no
-negative gaps: points that yield are flattened.
+eta = p_m/(E* g), g the rms gradient, x = F/(p_m A0) and F in A0 E* g. Loading only,
+frictionless. The mean gap u has no negative gaps: points that yield are flattened.
 """
 
 from __future__ import annotations
@@ -19,15 +19,26 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.bearing_curve import FRACTIONS
 
-IMAGES, TERMS = 0.06, 10  # tau below which images converge faster than a series; its terms, and one
-SHARPEST, NARROW = 1e-200, 3e-3  # least tau; half-width over which a difference goes by powers
+IMAGES, TERMS = (
+    0.06,
+    10,
+)  # tau below which images converge faster than a series; its terms, and one
+SHARPEST, NARROW = (
+    1e-200,
+    3e-3,
+)  # least tau; half-width over which a difference goes by powers
 SEEN = 6.0  # above which erfc is below rounding of 1
 MOST_SHARE = 0.9  # largest share of a map's heights in one node
 DEPTH = 30.0  # deepest valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
-LEVELS = -37.2, 9.0, 1500  # of Gaussian heights: nodes; above, the mean gap is the level itself
+LEVELS = (
+    -37.2,
+    9.0,
+    1500,
+)  # of Gaussian heights: nodes; above, the mean gap is the level itself
 LEAST_GAP = 1e-300  # mean gap at which all heights lie above the level
-# the shares of heights and of elastic contact join as this power of their odds: by 0.1% where one is half the other
+# the shares of heights and of elastic contact join as this power of their odds: by 0.1%
+# where one is half the other
 SHARPNESS = 8.0
 NEGLIGIBLE = 1e-17  # part of the larger one's odds that does not change its last digit
 FULLEST = 1 - 1e-12  # largest share of elastic contact, whose odds are finite
@@ -48,7 +59,8 @@ class Constants:
     force_share: float = 0.4736
     frozen: float = 0.3685  # e and f of the frozen contact's stiffness
     frozen_eta: float = 0.2407
-    plane_eta: float = 3.375  # between mean planes interpenetration falls as exp(-(plane_eta - plane_load x) eta)
+    # between mean planes interpenetration falls as exp(-(plane_eta - plane_load x) eta)
+    plane_eta: float = 3.375
     plane_load: float = 2.505
 
 
@@ -56,18 +68,30 @@ CONSTANTS = Constants()
 
 
 def area(
-    force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS, yielded: bool = False
+    force: ArrayLike,
+    elastic_area: ArrayLike,
+    eta: ArrayLike,
+    constants: Constants = CONSTANTS,
+    yielded: bool = False,
 ) -> FloatArray:
     """A/A0, or its yielded part, at F/(A0 E* g), at most eta, from the elastic A/A0 there; above 1 only if that is."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
     if yielded:
         return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
-    return answered(_area, given, 1, c.area_power, c.area_scale, False)[0] * np.maximum(elastic_area, 1.0)
+    return answered(_area, given, 1, c.area_power, c.area_scale, False)[0] * np.maximum(
+        elastic_area, 1.0
+    )
 
 
 @np.errstate(all="ignore")
 def _area(
-    force: FloatArray, e: FloatArray, eta: FloatArray, power: float, scale: float, yielded: bool, out: Any
+    force: FloatArray,
+    e: FloatArray,
+    eta: FloatArray,
+    power: float,
+    scale: float,
+    yielded: bool,
+    out: Any,
 ) -> None:
     """A/A0, or its yielded part, at F/(A0 E* g) by e, erf(e) being the elastic A/A0 there."""
     x = np.minimum(force / eta, 1.0)
@@ -75,7 +99,9 @@ def _area(
     half, limit = 0.5 * x / e, 0.125 / (scale * np.sqrt(eta))
     elastic = half * half
     small = np.minimum(elastic, limit)
-    joint = np.exp(np.log1p(np.exp(power * np.log(small / np.maximum(elastic, limit)))) / (2 * power))
+    joint = np.exp(
+        np.log1p(np.exp(power * np.log(small / np.maximum(elastic, limit)))) / (2 * power)
+    )
     reach = np.where(elastic < limit, e, 0.5 * x / np.sqrt(limit)) * joint
     between = diffused(x, small / joint**2, -1.0 if yielded else 1.0, reach)
     # clip rounding; then the cases of full contact, no contact and no yielding
@@ -84,13 +110,18 @@ def _area(
     else:
         share = np.where(e < np.inf, np.minimum(np.maximum(between, x), 1.0), 1.0)
     share = np.where(x > 0, share, 0.0 if yielded else np.where(force > 0, erf(e), 0.0))
-    out[:] = np.where((force >= 0) & (force < np.inf) & (e >= 0) & (eta > 0), share, np.nan)
+    out[:] = np.where(
+        (force >= 0) & (force < np.inf) & (e >= 0) & (eta > 0), share, np.nan
+    )
 
 
-def diffused(x: FloatArray, tau: FloatArray, sign: float, reach: FloatArray | None = None) -> FloatArray:
+def diffused(
+    x: FloatArray, tau: FloatArray, sign: float, reach: FloatArray | None = None
+) -> FloatArray:
     """Share of a diffusion from x, between walls at 0 and 1, after a variance of 2 tau.
 
-    The share not absorbed at 0, or with a negative `sign` that absorbed at 1; `reach` is x/sqrt(4 tau).
+    The share not absorbed at 0, or with a negative `sign` that absorbed at 1; `reach` is
+    x/sqrt(4 tau).
     """
     over = 0.5 / np.sqrt(np.maximum(tau, SHARPEST))
     reach = x * over if reach is None else reach
@@ -104,7 +135,11 @@ def diffused(x: FloatArray, tau: FloatArray, sign: float, reach: FloatArray | No
     if wide.any():
         own, first = x[wide], np.exp(-(np.pi**2) * tau[wide])
         # sign^n sin(n pi x), and exp(-n^2 pi^2 tau) by the odd powers between the squares
-        before, sine, twice = np.zeros_like(own), sign * np.sin(np.pi * own), 2 * sign * np.cos(np.pi * own)
+        before, sine, twice = (
+            np.zeros_like(own),
+            sign * np.sin(np.pi * own),
+            2 * sign * np.cos(np.pi * own),
+        )
         odd, factor, total = first, first, np.zeros_like(own)
         for n in range(1, TERMS):
             total = total + sine * factor / n
@@ -120,7 +155,9 @@ def _difference(centre: FloatArray, half: FloatArray) -> FloatArray:
     series = 1 + (2 * a - b) / 3 + (a * (2 / 3 * a - 2 * b) + b * b / 2) / 5
     narrow = half * np.maximum(centre, 1.0) < NARROW
     cancelled = 4 / np.sqrt(np.pi) * half * np.exp(-centre * centre) * series
-    return np.asarray(np.where(narrow, cancelled, erfc(centre - half) - erfc(centre + half)))
+    return np.asarray(
+        np.where(narrow, cancelled, erfc(centre - half) - erfc(centre + half))
+    )
 
 
 @np.errstate(all="ignore")
@@ -134,14 +171,20 @@ def force(
 ) -> tuple[FloatArray, FloatArray]:
     """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness there.
 
-    `share` is Q(u), that of the heights above the level, and `slope` is dQ/du. A theory's own heights
-    need not be those of Q: Persson's force falls as exp(-u), Gaussian heights fall as exp(-u^2/2), and
-    at light loads its elastic contact covers more than all heights that lie above. What it covers
-    without yielding is a lower bound of the share that bears: erf(sqrt(2) F) of the nominal area by
-    Persson's theory, and of that the part 1 - exp(-2 eta^2) whose pressure in a light contact is below
-    the hardness. So a hard contact is the elastic one, and a soft one follows the heights alone.
+    `share` is Q(u), that of the heights above the level, and `slope` is dQ/du. A theory's
+    own heights need not be those of Q: Persson's force falls as exp(-u), Gaussian heights
+    fall as exp(-u^2/2), and at light loads its elastic contact covers more than all heights
+    that lie above. What it covers without yielding is a lower bound of the share that
+    bears: erf(sqrt(2) F) of the nominal area by Persson's theory, and of that the part 1 -
+    exp(-2 eta^2) whose pressure in a light contact is below the hardness. So a hard contact
+    is the elastic one, and a soft one follows the heights alone.
     """
-    own, heights, cap, c = np.asarray(elastic_force), np.asarray(share), np.asarray(eta), constants
+    own, heights, cap, c = (
+        np.asarray(elastic_force),
+        np.asarray(share),
+        np.asarray(eta),
+        constants,
+    )
     unyielded = -np.expm1(-2 * np.minimum(cap, MOST_ETA) ** 2)
     covered = np.minimum(unyielded * erf(np.sqrt(2) * own), FULLEST)
     covered_rate = -unyielded * np.sqrt(8 / np.pi) * np.exp(-2 * own * own) * stiffness
@@ -167,7 +210,8 @@ def force(
     gain = np.log(np.minimum(np.maximum(own, level) / small, MOST_RATIO))
     power = np.exp(-exponent * gain)
     weight = power / (1 + power)
-    # ln F lies so much below that of the smaller; derivatives by the exponent, by the elastic force, and by Q
+    # ln F lies so much below that of the smaller; derivatives by the exponent, by the
+    # elastic force, and by Q
     lower = np.log1p(power) / exponent
     by_elastic = np.where(own <= level, 1 - weight, weight)
     by_level = (1 - by_elastic) / Q + c.force_share * (lower + weight * gain) / exponent
@@ -180,37 +224,57 @@ def force(
 
 
 def closed(
-    heights: Any, h_rms: FloatArray, gradient: FloatArray, eta: FloatArray, u: Any, pressure: Any, stiffness: Any
+    heights: Any,
+    h_rms: FloatArray,
+    gradient: FloatArray,
+    eta: FloatArray,
+    u: Any,
+    pressure: Any,
+    stiffness: Any,
 ) -> tuple[FloatArray, FloatArray]:
     """`force` over A0 E* at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
     x = u / h_rms
-    share, slope = heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
-    load, steep = force(pressure / gradient, stiffness / gradient, share, slope / h_rms, eta)
+    share, slope = (
+        heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
+    )
+    load, steep = force(
+        pressure / gradient, stiffness / gradient, share, slope / h_rms, eta
+    )
     return load * gradient, steep * gradient
 
 
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """Stiffness of the frozen contact over the elastic -dF/du at the same mean gap."""
-    return np.asarray(1 + constants.frozen * np.exp(-np.asarray(eta, float) / constants.frozen_eta))
+    return np.asarray(
+        1 + constants.frozen * np.exp(-np.asarray(eta, float) / constants.frozen_eta)
+    )
 
 
-def plane_separation(u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+def plane_separation(
+    u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
+) -> FloatArray:
     """Gap between mean planes [h_rms] at mean gap u and x = F/(p_m A0): less the flattening of yielded points."""
     x, cap = np.asarray(load, float), np.asarray(eta, float)
     d = -ndtri(x)
     with np.errstate(invalid="ignore"):
         flattened = np.where(x > 0, np.exp(-d * d / 2) / np.sqrt(2 * np.pi) - d * x, 0.0)
-    return np.asarray(u - flattened * np.exp(-(constants.plane_eta - constants.plane_load * x) * cap))
+    return np.asarray(
+        u - flattened * np.exp(-(constants.plane_eta - constants.plane_load * x) * cap)
+    )
 
 
 @np.errstate(all="ignore")
-def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
+def bearing_share(
+    u: ArrayLike, h_max: ArrayLike | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
     gap, last = np.asarray(u, float), np.asarray(np.inf if h_max is None else h_max)
     d, end = _levels(gap), _level_at_end(last.item()) if last.size == 1 else _levels(last)
     below, whole = ndtr(d), ndtr(end)
     share = np.maximum(np.where(end > 0, ndtr(-d) - ndtr(-end), whole - below), 0.0)
-    slope = np.where(gap <= LEAST_GAP, -np.inf, np.exp(-d * d / 2) / (-ROOT_TWO_PI * below))
+    slope = np.where(
+        gap <= LEAST_GAP, -np.inf, np.exp(-d * d / 2) / (-ROOT_TWO_PI * below)
+    )
     return share / whole, np.where(gap >= last, 0.0, slope) / whole
 
 
@@ -245,7 +309,8 @@ class BearingCurve:
         level = np.minimum.accumulate(np.diff(above) / np.diff(FRACTIONS))
         share = np.sqrt(FRACTIONS[1:] * FRACTIONS[:-1])
         gap = level * (1 - share) + np.interp(share, FRACTIONS, above)
-        # the smallest shares are single points, so nodes must not be as close; the last node ends at the valleys
+        # the smallest shares are single points, so nodes must not be as close; the last
+        # node ends at the valleys
         kept, last = np.zeros(gap.size, bool), h_max
         for k, own in enumerate(gap):
             if 0 < own < (1 - MIN_SPACING) * last and share[k] < MOST_SHARE:
@@ -254,11 +319,17 @@ class BearingCurve:
             raise InputError(
                 f"nearly {MOST_SHARE:.0%} of the map or more is its highest point: it has no bearing curve"
             )
-        self._top, self._lightest, self._h_max = float(gap[kept][0]), float(share[kept][0]), h_max
+        self._top, self._lightest, self._h_max = (
+            float(gap[kept][0]),
+            float(share[kept][0]),
+            h_max,
+        )
         # against Gaussian heights; valleys below the last node as deep as theirs
         level, own = _levels(gap[kept][::-1]), -ndtri(share[kept][::-1])
         self._deepest = float(level[0]) - DEPTH
-        self._level = PchipInterpolator(np.append(self._deepest, level), np.append(own[0] - DEPTH, own))
+        self._level = PchipInterpolator(
+            np.append(self._deepest, level), np.append(own[0] - DEPTH, own)
+        )
         self._rate = self._level.derivative()
 
     def __call__(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -266,7 +337,12 @@ class BearingCurve:
         gap = np.asarray(u, float)
         d = np.maximum(_levels(np.clip(gap, 0.0, self._top)), self._deepest)
         own = self._level(d)
-        share, slope = ndtr(-own), -np.exp(-own * own / 2) / np.sqrt(2 * np.pi) * self._rate(d) / ndtr(d)
+        share, slope = (
+            ndtr(-own),
+            -np.exp(-own * own / 2) / np.sqrt(2 * np.pi) * self._rate(d) / ndtr(d),
+        )
         steep = -self._lightest / (self._h_max - self._top)
         light, rest = gap > self._top, np.maximum(self._h_max - gap, 0.0)
-        return np.where(light, -steep * rest, share), np.where(light, np.where(rest > 0, steep, 0.0), slope)
+        return np.where(light, -steep * rest, share), np.where(
+            light, np.where(rest > 0, steep, 0.0), slope
+        )

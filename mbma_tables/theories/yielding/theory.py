@@ -22,13 +22,18 @@ GROUP = "hardness"  # group of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "unloading_stiffness")
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) above which areas are those of full contact
-CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
+CLOSED, LEAST = (
+    1e-9,
+    1e-300,
+)  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
 MANY = 200  # most hardnesses for which inversions use as many gaps as without
 ROUNDING = 1e-9  # relative, of numbers beside the ends of ranges
-# nominal pressure over the hardness from which the bulk yields: D. Tabor, The Hardness of Metals (1951),
-# the hardness of a metal is three times its yield stress
+# nominal pressure over the hardness from which the bulk yields: D. Tabor, The Hardness of
+# Metals (1951), the hardness of a metal is three times its yield stress
 BULK_YIELD = 1 / 3
-FROZEN_ERROR = 0.05  # of the stiffness of a frozen contact, root mean square (docs/yield.md)
+FROZEN_ERROR = (
+    0.05  # of the stiffness of a frozen contact, root mean square (docs/yield.md)
+)
 MAX_LEVEL = 37.0  # heights over h_rms above which shares underflow
 
 
@@ -37,8 +42,12 @@ class Scatter(NamedTuple):
 
     eta: FloatArray  # p_m/(E* g), rising
     log_area: FloatArray  # ln of contact fractions
-    rms: dict[str, FloatArray]  # of ln(theory/simulation), by theory; rows `QUANTITIES`, hardnesses, contact fractions
-    weight: dict[str, FloatArray]  # d ln of force and of area by d ln of the elastic one; hardnesses, contact fractions
+    rms: dict[
+        str, FloatArray
+    ]  # of ln(theory/simulation), by theory; rows `QUANTITIES`, hardnesses, contact fractions
+    weight: dict[
+        str, FloatArray
+    ]  # d ln of force and of area by d ln of the elastic one; hardnesses, contact fractions
 
     def _at(self, rows: FloatArray, eta: FloatArray, area: FloatArray) -> FloatArray:
         """Errors at hardnesses and contact fractions; constant beyond those simulated."""
@@ -46,13 +55,24 @@ class Scatter(NamedTuple):
         with np.errstate(divide="ignore"):
             log_area = np.log(np.broadcast_to(area, shape))
         values = np.array([known_at(self.log_area, row, log_area) for row in rows])
-        y = np.interp(np.log(np.broadcast_to(eta, shape)), np.log(self.eta), np.arange(self.eta.size))
+        y = np.interp(
+            np.log(np.broadcast_to(eta, shape)),
+            np.log(self.eta),
+            np.arange(self.eta.size),
+        )
         below = np.minimum(y.astype(int), self.eta.size - 2)
-        low, high = (np.take_along_axis(values, k[None], 0)[0] for k in (below, below + 1))
+        low, high = (
+            np.take_along_axis(values, k[None], 0)[0] for k in (below, below + 1)
+        )
         return np.asarray(low + (high - low) * (y - below))
 
     def standard_deviation(
-        self, theory: str, quantity: str, eta: FloatArray, area: FloatArray, elastic: FloatArray
+        self,
+        theory: str,
+        quantity: str,
+        eta: FloatArray,
+        area: FloatArray,
+        elastic: FloatArray,
     ) -> FloatArray:
         """Standard deviation of ln(theory/simulation), or from those of the `elastic` theory and the law; else NaN."""
         row = QUANTITIES.index(quantity)
@@ -71,14 +91,20 @@ class Scatter(NamedTuple):
 def shipped() -> Scatter:
     """The errors in the shipped file, read once."""
     variables, attributes = shipped_part(GROUP)
-    known = zip(str(attributes["theories"]).split(), variables["stated_scatter"], strict=True)
+    known = zip(
+        str(attributes["theories"]).split(), variables["stated_scatter"], strict=True
+    )
     weights = dict(zip(("area", "pressure"), variables["elastic_weight"], strict=True))
     return Scatter(variables["eta"], np.log(variables["contact"]), dict(known), weights)
 
 
-def elastic_scatter(theory: Theory, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+def elastic_scatter(
+    theory: Theory, surface: AnySurface, quantity: str, area: FloatArray
+) -> FloatArray:
     """Standard deviation of an elastic theory, whose unloading stiffness is that of loading."""
-    return theory.scatter(surface, "stiffness" if quantity == "unloading_stiffness" else quantity, area)
+    return theory.scatter(
+        surface, "stiffness" if quantity == "unloading_stiffness" else quantity, area
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,7 +123,10 @@ class Loaded:
     def yielded(self) -> FloatArray:
         """Share of the contact area at the hardness."""
         with np.errstate(invalid="ignore"):
-            share = law.area(self.load, self.elastic_area, self.eta, yielded=True) / self.answer.area
+            share = (
+                law.area(self.load, self.elastic_area, self.eta, yielded=True)
+                / self.answer.area
+            )
         return np.where(np.isinf(self.eta) | (self.answer.area == 0), 0.0, share)
 
     @property
@@ -109,7 +138,9 @@ class Loaded:
     def plane_separation(self) -> FloatArray:
         """Gap between mean planes [length]."""
         with np.errstate(invalid="ignore"):
-            planes = self.h_rms * law.plane_separation(self.u / self.h_rms, self.load / self.eta, self.eta)
+            planes = self.h_rms * law.plane_separation(
+                self.u / self.h_rms, self.load / self.eta, self.eta
+            )
         return np.where(np.isinf(self.eta), self.u, planes)
 
 
@@ -121,14 +152,19 @@ class Yielding(Theory):
     theory : Theory
         The elastic one.
     hardness : array_like
-        p_m/E*, positive; broadcasts with surfaces and separations. Where it is infinite, nothing yields.
+        p_m/E*, positive; broadcasts with surfaces and separations. Where it is infinite,
+        nothing yields.
     """
 
     elastic: Any = None
     tested_eta = 0.025  # smallest p_m/(E* g) that was simulated
 
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
-        self.elastic, self.hardness, self.reached = theory, np.asarray(hardness, dtype=float), REACHED
+        self.elastic, self.hardness, self.reached = (
+            theory,
+            np.asarray(hardness, dtype=float),
+            REACHED,
+        )
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
         self.looks = FEW_LOOKS if self.hardness.size > MANY else theory.looks
         # whether the elastic area at a force needs no separation
@@ -138,7 +174,9 @@ class Yielding(Theory):
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
         if self.hardness.ndim == 0:
             return self
-        chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
+        chosen = np.broadcast_to(self.hardness, shape).ravel()[
+            np.asarray(place).astype(np.intp)
+        ]
         return type(self)(self.elastic, chosen)
 
     def _eta(self, surface: AnySurface) -> FloatArray:
@@ -150,7 +188,12 @@ class Yielding(Theory):
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
         return self.loaded(surface, mean_separation).answer
 
-    def loaded(self, surface: AnySurface, mean_separation: FloatArray, lighter: FloatArray | None = None) -> Loaded:
+    def loaded(
+        self,
+        surface: AnySurface,
+        mean_separation: FloatArray,
+        lighter: FloatArray | None = None,
+    ) -> Loaded:
         """The answer at mean separations u [length]; `lighter` are those of the elastic contact at the same forces."""
         u, h_rms = np.asarray(mean_separation, dtype=float), np.asarray(surface.h_rms)
         at_force: Any = None
@@ -158,33 +201,55 @@ class Yielding(Theory):
             elastic = self.elastic.answer(surface, u)
         else:
             both = self.elastic.answer(surface, np.stack([u, lighter]))
-            elastic, (_, at_force, *_) = (TheoryAnswer(*(part[k] for part in both)) for k in range(2))
+            elastic, (_, at_force, *_) = (
+                TheoryAnswer(*(part[k] for part in both)) for k in range(2)
+            )
         eta, closed = self._closed(surface)
         gradient, endless = np.asarray(surface.rms_gradient), np.isinf(self.hardness)
         if endless.all():
-            return Loaded(u, h_rms, eta, elastic.pressure / gradient, elastic, elastic, elastic.area)
+            return Loaded(
+                u, h_rms, eta, elastic.pressure / gradient, elastic, elastic, elastic.area
+            )
         pressure, stiffness = closed(u, elastic.pressure, elastic.stiffness)
         if at_force is None:
             needed = (pressure > 0) & ~endless
             # without yielding or contact, a force that the theory certainly reaches
-            known = np.minimum(np.where(needed, pressure, elastic.pressure), np.where(needed, HEAVIEST, 1.0) * gradient)
+            known = np.minimum(
+                np.where(needed, pressure, elastic.pressure),
+                np.where(needed, HEAVIEST, 1.0) * gradient,
+            )
             at_force = np.where(needed, self.elastic.area_at(surface, known), 0.0)
         # both of the elastic errors, force and area at that force, may add up
         area = law.area(pressure / gradient, at_force, eta)
         capped = TheoryAnswer(pressure, area, stiffness, 2 * elastic.error)
         if endless.any():
-            capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
-        return Loaded(u, h_rms, eta, capped.pressure / gradient, capped, elastic, at_force)
+            capped = TheoryAnswer(
+                *(
+                    np.where(endless, one, other)
+                    for one, other in zip(elastic, capped, strict=True)
+                )
+            )
+        return Loaded(
+            u, h_rms, eta, capped.pressure / gradient, capped, elastic, at_force
+        )
 
     def _closed(self, surface: AnySurface) -> Any:
         """p_m/(E* g), and the force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
         if self._bound[0] is not surface:
             eta = self._eta(surface)
             sizes = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient), eta
-            self._bound = surface, (eta, functools.partial(law.closed, self.elastic.heights(surface), *sizes))
+            self._bound = (
+                surface,
+                (
+                    eta,
+                    functools.partial(law.closed, self.elastic.heights(surface), *sizes),
+                ),
+            )
         return self._bound[1]
 
-    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
+    def interval(
+        self, surface: AnySurface, quantity: str = "pressure"
+    ) -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
         low, high = self.elastic.interval(surface, "pressure")
         h_rms = np.asarray(surface.h_rms)
@@ -204,7 +269,9 @@ class Yielding(Theory):
 
         return values
 
-    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    def inverted(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """As of any theory; no force is beyond the hardness."""
         shape = self._refuse(quantity, wanted)
         return super().inverted(surface, quantity, np.broadcast_to(wanted, shape))
@@ -231,16 +298,22 @@ class Yielding(Theory):
     def gaps(self) -> Any:
         return self.elastic.gaps()
 
-    def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+    def pressed(
+        self, surface: AnySurface, pressure: FloatArray
+    ) -> tuple[FloatArray, FloatArray | None]:
         """Mean separations u at forces over A0 E*, and `lighter` of `loaded` where areas need that."""
         elastic = np.isinf(self.hardness).all()
         if self.knows_areas or elastic:
             asked: Theory = self.elastic if elastic else super()  # type: ignore[assignment]
             return asked.mean_separation_at(surface, "pressure", pressure), None
         shape = np.broadcast_shapes(pressure.shape, surface.shape, self.hardness.shape)
-        cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
+        cap = np.reshape(
+            self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape
+        )
         both = Yielding(self.elastic, np.stack([cap, np.full(cap.shape, np.inf)]))
-        u, missed = both.inverted(surface, "pressure", np.broadcast_to(pressure, (2, *shape)))
+        u, missed = both.inverted(
+            surface, "pressure", np.broadcast_to(pressure, (2, *shape))
+        )
         if missed[0].any():
             raise unfinished(missed[0], "the separation at this pressure")
         return u[0], u[1]
@@ -248,16 +321,19 @@ class Yielding(Theory):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against boundary elements with a hardness.
 
-        That of the calibrated law is measured; for others that of the elastic theory is propagated and combined with
-        that of the hardness law. NaN if the elastic theory's is not known, and for an unloading stiffness that was not
-        measured. "stiffness", the slope of the loading curve, was not compared with simulations: NaN, but where the
+        That of the calibrated law is measured; for others that of the elastic theory is
+        propagated and combined with that of the hardness law. NaN if the elastic theory's
+        is not known, and for an unloading stiffness that was not measured. "stiffness", the
+        slope of the loading curve, was not compared with simulations: NaN, but where the
         hardness is infinite.
         """
         elastic = elastic_scatter(self.elastic, surface, quantity, area)
         if quantity == "stiffness":
             return np.where(np.isinf(self.hardness), elastic, np.nan)
         eta = self._eta(surface)
-        return shipped().standard_deviation(self.elastic.scatter_name(surface), quantity, eta, area, elastic)
+        return shipped().standard_deviation(
+            self.elastic.scatter_name(surface), quantity, eta, area, elastic
+        )
 
     def reasons(
         self,
@@ -265,7 +341,8 @@ class Yielding(Theory):
         answer: TheoryAnswer,
         mean_separation: FloatArray,
     ) -> Mapping[str, Any]:
-        # the frozen contact is at least as stiff as that of loading, in which yielded points give way
+        # the frozen contact is at least as stiff as that of loading, in which yielded
+        # points give way
         elastic = self.elastic.answer(surface, np.asarray(mean_separation, dtype=float))
         unloading = elastic.stiffness * law.frozen_factor(self._eta(surface))
         softer = answer.stiffness > unloading * (1 + FROZEN_ERROR)
@@ -282,7 +359,9 @@ class Yielding(Theory):
         soft = self._eta(surface) < self.tested_eta * (1 - ROUNDING)
         # a pressure that the whole face bears is the stress of the bulk
         bulk = answer.pressure > BULK_YIELD * self.hardness * (1 + ROUNDING)
-        soft_text = f"the hardness over E* times the rms gradient is below {self.tested_eta:g}"
+        soft_text = (
+            f"the hardness over E* times the rms gradient is below {self.tested_eta:g}"
+        )
         bulk_text = (
             "the nominal pressure is above a third of the hardness, which is about the yield stress: the bulk "
             "of the softer body yields, not its asperities alone; at most hardness/3 is covered"

@@ -28,7 +28,9 @@ def energy(u):
     return self_affine_law(0.8, 64.0, None).energy(0.01 / u)
 
 
-@pytest.mark.parametrize("computed", [pytest.param(flow, marks=pytest.mark.slow), gas, energy])
+@pytest.mark.parametrize(
+    "computed", [pytest.param(flow, marks=pytest.mark.slow), gas, energy]
+)
 def test_blocks_have_the_bits_of_single_entries_and_little_memory(computed):
     computed(GAPS[:2])
     tracemalloc.start()
@@ -48,7 +50,9 @@ def test_numbers_of_any_size_raise_no_warning():
         Surface.from_roughness(**rough, nominal_area=5e-324)
     assert mean_conductivity(1.0, 1e-320) == pytest.approx(2e-320, rel=1e-3)
     assert mean_conductivity(1e308, 1e308) == 1e308
-    assert mean_conductivity(45.0, 167.0) == pytest.approx(2 * 45.0 * 167.0 / 212.0, rel=1e-15)
+    assert mean_conductivity(45.0, 167.0) == pytest.approx(
+        2 * 45.0 * 167.0 / 212.0, rel=1e-15
+    )
 
 
 def test_one_wavelength_is_refused_by_its_name():

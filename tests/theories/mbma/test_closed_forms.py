@@ -7,7 +7,13 @@ import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp
 from mbma_tables.theories.mbma import closed_forms
-from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, RANGES, TOTALS, FormulaModel, closed_totals
+from mbma_tables.theories.mbma.closed_forms import (
+    FUNCTIONS,
+    RANGES,
+    TOTALS,
+    FormulaModel,
+    closed_totals,
+)
 
 CERTIFICATES, RESULTS = closed_forms.CERTIFICATES, closed_forms.RESULTS
 BULK = pytest.param(20_000, marks=pytest.mark.slow)
@@ -23,29 +29,53 @@ def test_errors_of_islands_are_as_certified(form, count):
     for name in RESULTS:
         error = np.abs(FUNCTIONS[form][name](X, mu) / getattr(solved, name) - 1).max()
         # a tenth for points that the certificate's own did not meet
-        assert 0.3 * CERTIFICATES[form][name].largest <= error <= 1.1 * CERTIFICATES[form][name].largest
+        assert (
+            0.3 * CERTIFICATES[form][name].largest
+            <= error
+            <= 1.1 * CERTIFICATES[form][name].largest
+        )
 
 
 @pytest.mark.parametrize("count", [3000, BULK])
 def test_errors_of_totals_are_as_certified(count):
     rng = np.random.default_rng(78)
     zeta_1 = np.exp(rng.uniform(np.log(10), np.log(1000), count))
-    surface = Surface(rng.uniform(0.5, 1, count), 1.0, zeta_1, 1.0, rng.uniform(3, 4.5, count))
+    surface = Surface(
+        rng.uniform(0.5, 1, count), 1.0, zeta_1, 1.0, rng.uniform(3, 4.5, count)
+    )
     gap = surface.h_max - np.exp(rng.uniform(np.log(0.1), np.log(2 * surface.h_max)))
     exact = contact(surface, separation=gap)
     some = exact.area > RANGES[TOTALS]["area"][0]
     for name, function in FUNCTIONS[TOTALS].items():
-        error = np.abs(function(gap, surface.h_max, zeta_1, surface.hurst) / getattr(exact, name) - 1)[some].max()
-        assert 0.3 * CERTIFICATES[TOTALS][name].largest <= error <= 1.1 * CERTIFICATES[TOTALS][name].largest
+        error = np.abs(
+            function(gap, surface.h_max, zeta_1, surface.hurst) / getattr(exact, name) - 1
+        )[some].max()
+        assert (
+            0.3 * CERTIFICATES[TOTALS][name].largest
+            <= error
+            <= 1.1 * CERTIFICATES[TOTALS][name].largest
+        )
 
 
 def test_totals_are_within_a_tenth_of_the_exact_solver_in_the_corners():
-    h_max, zeta_1, hurst = np.array(list(itertools.product((3.0, 4.5), (10.0, 1000.0), (0.5, 1.0)))).T[:, :, None]
+    h_max, zeta_1, hurst = np.array(
+        list(itertools.product((3.0, 4.5), (10.0, 1000.0), (0.5, 1.0)))
+    ).T[:, :, None]
     gap = h_max * np.linspace(-1, 0.9, 40)
-    exact = contact(Surface(hurst, 1.0, zeta_1, 1.0, h_max), separation=gap, island_model="exact", rtol=1e-6)
+    exact = contact(
+        Surface(hurst, 1.0, zeta_1, 1.0, h_max),
+        separation=gap,
+        island_model="exact",
+        rtol=1e-6,
+    )
     some = exact.area > RANGES[TOTALS]["area"][0]
     for name, function in FUNCTIONS[TOTALS].items():
-        assert np.abs(function(gap, h_max, zeta_1, hurst) / getattr(exact, name) - 1)[some].max() <= 0.1
+        assert (
+            np.abs(function(gap, h_max, zeta_1, hurst) / getattr(exact, name) - 1)[
+                some
+            ].max()
+            <= 0.1
+        )
 
 
 @pytest.mark.parametrize(
@@ -66,14 +96,20 @@ def test_what_is_promised(form, largest, count):
 @pytest.mark.parametrize("form", closed_forms.ISLAND_FORMS)
 def test_the_rigid_limit(form):
     X = np.linspace(*RANGES[form]["X"], 200)
-    for name, rigid in zip(RESULTS, greenwood_tripp.rigid_sphere(X, np.full(200, 1e-12)), strict=True):
-        assert np.abs(FUNCTIONS[form][name](X, np.full(200, 1e-12)) / rigid - 1).max() < 3e-3
+    for name, rigid in zip(
+        RESULTS, greenwood_tripp.rigid_sphere(X, np.full(200, 1e-12)), strict=True
+    ):
+        assert (
+            np.abs(FUNCTIONS[form][name](X, np.full(200, 1e-12)) / rigid - 1).max() < 3e-3
+        )
 
 
 @pytest.mark.parametrize("form", closed_forms.ISLAND_FORMS)
 def test_positive_and_rising_down_to_no_load(form):
     X = np.linspace(*RANGES[form]["X"], 500)[:, None]
-    mu = np.concatenate([[0.0, 5e-324, 1e-300], np.geomspace(1e-30, RANGES[form]["mu"][1], 500)])
+    mu = np.concatenate(
+        [[0.0, 5e-324, 1e-300], np.geomspace(1e-30, RANGES[form]["mu"][1], 500)]
+    )
     for name in RESULTS:
         field = FUNCTIONS[form][name](X, mu)
         assert (field >= 0).all()
@@ -85,7 +121,10 @@ def test_totals_by_the_island_model_are_within_one_percent():
     zeta_1, h_max = 10 ** rng.uniform(0.5, 4, 150), rng.uniform(2.5, 4.5, 150)
     surface = Surface(rng.uniform(0.35, 1, 150), 1.0, zeta_1, 1.0, h_max)
     gap = rng.uniform(-1, 0.999, 150) * h_max
-    found, exact = contact(surface, separation=gap, island_model="formula", rtol=1e-3), contact(surface, separation=gap)
+    found, exact = (
+        contact(surface, separation=gap, island_model="formula", rtol=1e-3),
+        contact(surface, separation=gap),
+    )
     for name in ("pressure", "area"):
         error = np.abs(getattr(found, name) / getattr(exact, name) - 1)
         assert error.max() <= 0.01
@@ -101,7 +140,9 @@ def test_outside_the_range():
     lost = model.answer(X, mu, outside="nan")
     assert np.isnan(lost.phi_F).tolist() == [False, True, True]
     solved = model.answer(X, mu, outside="exact")
-    np.testing.assert_allclose(solved.phi_F[1:], greenwood_tripp.solve(X, mu).phi_F[1:], rtol=1e-8)
+    np.testing.assert_allclose(
+        solved.phi_F[1:], greenwood_tripp.solve(X, mu).phi_F[1:], rtol=1e-8
+    )
     assert solved.phi_F[0] == 0
     assert solved.phi_A[0] > 0
 

@@ -23,7 +23,9 @@ def brute(surface, separation, variant):
     reach = (surface.h_max - separation) / h_rms
     layer = zeta_1**-hurst
     # geometric towards first contact, even beyond, and broken where the floors are met
-    graded = reach * 2.0 ** -np.arange(math.ceil(math.log2(reach / (1e-9 * min(layer, reach)))))
+    graded = reach * 2.0 ** -np.arange(
+        math.ceil(math.log2(reach / (1e-9 * min(layer, reach))))
+    )
     even = np.arange(0, reach, 0.1)
     own_kinks = [k for k in kinks(hurst, zeta_1, rule) if k < reach]
     edges = np.unique(np.concatenate([[0.0, reach], graded, even, own_kinks]))
@@ -38,7 +40,11 @@ def brute(surface, separation, variant):
     force = g["sigma"] * L * phi.phi_F
     area = g["eta"] * math.pi * g["D"] * g["R_u"] * g["sigma"] * L**2 * phi.phi_A
     z = (separation / h_rms + delta) * room - g["h_d"]
-    density = g["D_d"] * np.exp(-0.5 * (z / g["sigma_d"]) ** 2) / (math.sqrt(2 * math.pi) * g["sigma_d"])
+    density = (
+        g["D_d"]
+        * np.exp(-0.5 * (z / g["sigma_d"]) ** 2)
+        / (math.sqrt(2 * math.pi) * g["sigma_d"])
+    )
     slope = 4 / 3 * rule.beta
     if rule.jacobian == "exact":
         slope = slope / room if rule.offset else 0.0
@@ -79,7 +85,10 @@ def test_against_brute_force(hurst, zeta_1, share, variant):
     force, area = brute(surface, separation, variant)
     assert abs(found.pressure / force - 1) <= 1e-9
     assert abs(found.area / area - 1) <= 1e-9
-    assert max(abs(found.pressure / force - 1), abs(found.area / area - 1)) <= found.error + 5e-12
+    assert (
+        max(abs(found.pressure / force - 1), abs(found.area / area - 1))
+        <= found.error + 5e-12
+    )
 
 
 def test_the_papers_yang_persson_case():
@@ -92,22 +101,44 @@ def test_the_papers_yang_persson_case():
 
 @pytest.mark.parametrize("island_model", ["exact", "rigid"])
 def test_no_contact_is_exactly_zero(island_model):
-    surface, separation = one_surface(0.8, 216.0), np.array([3.0, math.nextafter(3, 4), 50.0, 1e300])
+    surface, separation = (
+        one_surface(0.8, 216.0),
+        np.array([3.0, math.nextafter(3, 4), 50.0, 1e300]),
+    )
     found = contact(surface, separation=separation, island_model=island_model)
-    assert found.pressure.tolist() == found.area.tolist() == found.error.tolist() == [0.0] * 4
-    assert contact(surface, separation=math.nextafter(3, 2), island_model=island_model).pressure > 0
-    assert separation.tolist() == [3.0, math.nextafter(3, 4), 50.0, 1e300]  # arguments stay as they are
+    assert (
+        found.pressure.tolist()
+        == found.area.tolist()
+        == found.error.tolist()
+        == [0.0] * 4
+    )
+    assert (
+        contact(
+            surface, separation=math.nextafter(3, 2), island_model=island_model
+        ).pressure
+        > 0
+    )
+    assert separation.tolist() == [
+        3.0,
+        math.nextafter(3, 4),
+        50.0,
+        1e300,
+    ]  # arguments stay as they are
 
 
 def test_below_full_compression():
     surfaces = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, [[3.0], [4.0]])
-    with pytest.raises(OutOfRangeError, match="at least -h_max, where the model ends") as caught:
+    with pytest.raises(
+        OutOfRangeError, match="at least -h_max, where the model ends"
+    ) as caught:
         contact(surfaces, separation=[0.0, -3.5, -5.0])
     assert caught.value.mask.tolist() == [[False, True, True], [False, False, True]]
 
 
 def test_failure_has_the_shape_of_the_arguments(monkeypatch):
-    monkeypatch.setattr(greenwood_tripp, "LEVELS", np.array([12]))  # too few nodes for any island at 1e-8
+    monkeypatch.setattr(
+        greenwood_tripp, "LEVELS", np.array([12])
+    )  # too few nodes for any island at 1e-8
     surfaces = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, [[3.0], [4.0]])
     with pytest.raises(ConvergenceError) as caught:
         contact(surfaces, separation=[0.0, 3.5, 1.0])
@@ -129,7 +160,9 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_layout_does_not_matter(kind):
-    found, expected = (contact_by_island_model(ROUGH, separation=gaps) for gaps in (KINDS[kind], GAPS))
+    found, expected = (
+        contact_by_island_model(ROUGH, separation=gaps) for gaps in (KINDS[kind], GAPS)
+    )
     np.testing.assert_array_equal(np.ravel(found.pressure), expected.pressure)
     np.testing.assert_array_equal(np.ravel(found.area), expected.area)
 
@@ -137,18 +170,38 @@ def test_layout_does_not_matter(kind):
 @pytest.mark.parametrize(
     ("variant", "numbers", "compression", "rtol"),
     [
-        ("printed", (0.531947294354621, 716405.4119302577, 3.982572903065155), 1.67147, 1e-8),
-        ("printed", (0.5913947825075665, 463746.61320114444, 3.708447610995201), 1.26928, 1e-5),
-        ("fitted", (0.24255115327802002, 31377.867654901776, 0.8042366230900542), 1.21085, 1e-5),
+        (
+            "printed",
+            (0.531947294354621, 716405.4119302577, 3.982572903065155),
+            1.67147,
+            1e-8,
+        ),
+        (
+            "printed",
+            (0.5913947825075665, 463746.61320114444, 3.708447610995201),
+            1.26928,
+            1e-5,
+        ),
+        (
+            "fitted",
+            (0.24255115327802002, 31377.867654901776, 0.8042366230900542),
+            1.21085,
+            1e-5,
+        ),
     ],
 )
-def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(variant, numbers, compression, rtol):
+def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(
+    variant, numbers, compression, rtol
+):
     hurst, zeta_1, top = numbers
     surfaces = Surface(hurst, 1.0, zeta_1, 1.0, np.full((30, 1), top))
     gaps = top - compression * (1 + np.linspace(-1e-3, 1e-3, 41))
     found, known = (
-        contact_by_island_model(surfaces, separation=gaps, variant=variant, rtol=asked) for asked in (rtol, 1e-11)
+        contact_by_island_model(surfaces, separation=gaps, variant=variant, rtol=asked)
+        for asked in (rtol, 1e-11)
     )
     for name in ("pressure", "area"):
-        assert (np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error).all()
+        assert (
+            np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error
+        ).all()
     assert found.error.max() <= rtol

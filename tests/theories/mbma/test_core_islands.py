@@ -11,7 +11,11 @@ import scipy.special
 
 from mbma_tables import InputError
 from mbma_tables.core import core
-from mbma_tables.theories.mbma.greenwood_tripp import COARSE_NODES, ORDERS, height_integral
+from mbma_tables.theories.mbma.greenwood_tripp import (
+    COARSE_NODES,
+    ORDERS,
+    height_integral,
+)
 from mbma_tables.theories.mbma.half_space import basis
 
 OK, UNRESOLVED, INVALID = 0, 4, 5
@@ -46,7 +50,9 @@ EXTREME = [0.0, -0.0, 5e-324, 1e-300, 1e-17, 1.0, 1e6, 1e17, 1e100, 1.7e308]
 
 
 def test_extremes_end_with_finite_answers_or_a_status():
-    X, mu = np.array(list(itertools.product([*EXTREME, *(-x for x in EXTREME)], EXTREME))).T
+    X, mu = np.array(
+        list(itertools.product([*EXTREME, *(-x for x in EXTREME)], EXTREME))
+    ).T
     with np.errstate(all="raise"):
         phi, steps, status, profiles = solve(X, mu, 16)
     good = status == OK
@@ -59,7 +65,9 @@ def test_extremes_end_with_finite_answers_or_a_status():
     expected = np.empty((2, np.count_nonzero(still)))
     for row, twice_n in zip(expected, (5, 4), strict=True):
         core.height_integrals(twice_n, -X[still], row)
-    np.testing.assert_allclose(phi[still, 0], math.pi / 5 * mu[still] * expected[0], rtol=1e-14, atol=5e-324)
+    np.testing.assert_allclose(
+        phi[still, 0], math.pi / 5 * mu[still] * expected[0], rtol=1e-14, atol=5e-324
+    )
     np.testing.assert_allclose(phi[still, 1], math.pi / 2 * expected[1], rtol=1e-14)
     assert steps.max() <= 21 * 200 + 200
 
@@ -93,14 +101,21 @@ def reference(n: float, x: float) -> mp.mpf:
 
 def relative_errors(n: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
     with mp.workdps(40):
-        return np.array([float(abs(mp.mpf(float(v)) / reference(n, a) - 1)) for a, v in zip(x, values, strict=True)])
+        return np.array(
+            [
+                float(abs(mp.mpf(float(v)) / reference(n, a) - 1))
+                for a, v in zip(x, values, strict=True)
+            ]
+        )
 
 
 def test_reference_is_the_integral():
     for n, x in ((0.5, -3.0), (1.5, 0.7), (2.5, 6.0)):
         with mp.workdps(30):
             direct = mp.quad(
-                lambda z, n=n, x=x: (z - x) ** n * mp.npdf(z), [x, x + 1, x + 3, x + 8, x + 20], maxdegree=10
+                lambda z, n=n, x=x: (z - x) ** n * mp.npdf(z),
+                [x, x + 1, x + 3, x + 8, x + 20],
+                maxdegree=10,
             )
             assert abs(direct / reference(n, x) - 1) < 1e-15
 
@@ -109,7 +124,9 @@ def test_reference_is_the_integral():
 def test_accuracy_and_independence_of_neighbours(n):
     rng = np.random.default_rng(round(2 * n))
     edges = [*EDGES, *np.nextafter(EDGES, -np.inf), *np.nextafter(EDGES, np.inf)]
-    near = np.concatenate([-(10 ** rng.uniform(0, 6, 120)), rng.uniform(-9, 10, 250), edges, [-1e6, 10.0]])
+    near = np.concatenate(
+        [-(10 ** rng.uniform(0, 6, 120)), rng.uniform(-9, 10, 250), edges, [-1e6, 10.0]]
+    )
     for x, allowed in ((near, 1e-13), (np.append(rng.uniform(10, 37, 150), 37.0), 5e-13)):
         found = height_integral(n, x)
         assert relative_errors(n, x, found).max() <= allowed

@@ -18,7 +18,9 @@ from mbma_tables.theories.mbma.variants import PRINTED, REPORTED, VARIANTS
 
 
 def one_geometry(approach, hurst, zeta_1, variant):
-    arrays = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in (approach, hurst, zeta_1)))
+    arrays = np.broadcast_arrays(
+        *(np.asarray(value, dtype=float) for value in (approach, hurst, zeta_1))
+    )
     return geometry(*(np.array(array) for array in arrays), variant)
 
 
@@ -43,9 +45,13 @@ def test_against_sixty_digits(name):
 def test_switches_of_a_variant():
     plain = one_geometry([0.3], 0.7, 300.0, PRINTED)
     level = one_geometry([0.3], 0.7, 300.0, dataclasses.replace(PRINTED, offset=False))
-    heights = one_geometry([0.3], 0.7, 300.0, dataclasses.replace(PRINTED, summit_sigma=False))
+    heights = one_geometry(
+        [0.3], 0.7, 300.0, dataclasses.replace(PRINTED, summit_sigma=False)
+    )
     assert level["h_d"] == 0
-    assert level["X"] * plain["sigma"] == pytest.approx(plain["X"] * plain["sigma"] + plain["h_d"], rel=1e-15, abs=0)
+    assert level["X"] * plain["sigma"] == pytest.approx(
+        plain["X"] * plain["sigma"] + plain["h_d"], rel=1e-15, abs=0
+    )
     m0 = plain["h_u"] ** 2 - plain["h_d"] ** 2
     assert heights["sigma"] ** 2 == pytest.approx(-m0, rel=1e-13, abs=0)
 
@@ -60,21 +66,43 @@ def exact(spread, sphere, hurst, summits):
     def moment(order, low, high):
         power = order - 2 * H
         share = {0: 2, 2: 1, 4: mpmath.mpf(3) / 4}[order]
-        return share * H * (mpmath.log(high / low) if power == 0 else (high**power - low**power) / power)
+        return (
+            share
+            * H
+            * (
+                mpmath.log(high / low)
+                if power == 0
+                else (high**power - low**power) / power
+            )
+        )
 
     m0, m2, m4 = (moment(order, zeta_d, zeta_u) for order in (0, 2, 4))
     D = m4 / m2 / REPORTED.density_divisor
-    sigma = mpmath.sqrt((1 - (mpmath.mpf(BROADENING) * m2**2 / (m0 * m4) if summits else 0)) * m0)
-    R_d, R_u = (3 * mpmath.sqrt(mpmath.pi) / 8 / mpmath.sqrt(moment(4, 1, zeta)) for zeta in (zeta_d, zeta_u))
+    sigma = mpmath.sqrt(
+        (1 - (mpmath.mpf(BROADENING) * m2**2 / (m0 * m4) if summits else 0)) * m0
+    )
+    R_d, R_u = (
+        3 * mpmath.sqrt(mpmath.pi) / 8 / mpmath.sqrt(moment(4, 1, zeta))
+        for zeta in (zeta_d, zeta_u)
+    )
     mu = 8 * D * sigma * mpmath.sqrt(2 * R_u * R_d) / 3
-    force, area = sigma * mpmath.sqrt(2 * R_d * sigma), 2 * mpmath.pi * D * R_u * R_d * sigma**2
+    force, area = (
+        sigma * mpmath.sqrt(2 * R_d * sigma),
+        2 * mpmath.pi * D * R_u * R_d * sigma**2,
+    )
     return mu, sigma * zeta_d**H, force * zeta_d ** (1 + H), area * zeta_d**2
 
 
 @pytest.mark.parametrize("summits", [False, True])
 def test_bands_at_fifty_digits(summits):
     rng = np.random.default_rng(7)
-    given = np.stack([10 ** rng.uniform(-15, 4, 60), 10 ** rng.uniform(-9, 0, 60), rng.uniform(0.05, 1, 60)])
+    given = np.stack(
+        [
+            10 ** rng.uniform(-15, 4, 60),
+            10 ** rng.uniform(-9, 0, 60),
+            rng.uniform(0.05, 1, 60),
+        ]
+    )
     given[2, :10] = 1.0
     out = band_fields(*given, dataclasses.replace(REPORTED, summit_sigma=summits))
     with mpmath.workdps(60):
@@ -85,7 +113,9 @@ def test_bands_at_fifty_digits(summits):
 
 def test_spheres_without_end_are_finite():
     out = band_fields(np.array([1e-3, 1.0]), np.zeros(2), np.array([0.8, 1.0]), REPORTED)
-    near = band_fields(np.array([1e-3, 1.0]), np.full(2, 1e-30), np.array([0.8, 1.0]), REPORTED)
+    near = band_fields(
+        np.array([1e-3, 1.0]), np.full(2, 1e-30), np.array([0.8, 1.0]), REPORTED
+    )
     np.testing.assert_allclose(out, near, rtol=1e-15)
 
 
@@ -111,7 +141,13 @@ def test_units(surface, variant):
         exact = exact_island(approach, surface.hurst, surface.zeta_1, divisor(variant))
         # the unit of height and of length that the paper's geometry is in
         s, length = surface.s, 1 / surface.q0
-        units = {"R_d": length**2 / s, "R_u": length**2 / s, "D": length**-2, "sigma": s, "h_d": s}
+        units = {
+            "R_d": length**2 / s,
+            "R_u": length**2 / s,
+            "D": length**-2,
+            "sigma": s,
+            "h_d": s,
+        }
         for name in ("zeta_d", "zeta_u", "eta", "X", "mu", *units):
             known = float(exact[name]) * units.get(name, 1.0)
             assert getattr(found, name) == pytest.approx(known, rel=2e-12, abs=0), name
@@ -144,13 +180,20 @@ def test_a_band_that_ends_at_the_floor_of_zeta_u_is_refused():
     own = dataclasses.replace(PRINTED, name="own", floor_u=3.5)
     with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5"):
         island(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, variant=own)
-    assert island(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, variant=own).force > 0
+    assert (
+        island(
+            Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, variant=own
+        ).force
+        > 0
+    )
 
 
 @pytest.mark.parametrize("approach", [1e-150, 1e-160, 1e-200, 1e-300])
 def test_vanishing_approach_is_answered_or_refused(surface, approach):
     room = surface.h_rms / surface.s
-    limit = (room - 4 / 9) / (math.sqrt(1 - 0.8968 / 1.5) * math.sqrt(16 / 81 - room**2 / 441))
+    limit = (room - 4 / 9) / (
+        math.sqrt(1 - 0.8968 / 1.5) * math.sqrt(16 / 81 - room**2 / 441)
+    )
     try:
         found = island(surface, approach * surface.h_rms)
     except OutOfRangeError:

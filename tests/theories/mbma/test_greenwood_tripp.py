@@ -14,7 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generate.cost import iterated, ring_matrix
-from mbma_tables import ConvergenceError, InputError, OutOfRangeError, greenwood_tripp, height_integral
+from mbma_tables import (
+    ConvergenceError,
+    InputError,
+    OutOfRangeError,
+    greenwood_tripp,
+    height_integral,
+)
 
 PUBLISHED = pathlib.Path(__file__).parents[2] / "data" / "greenwood_tripp.csv"
 
@@ -24,11 +30,15 @@ several = settings(deadline=None, max_examples=60)
 
 
 def rigid(X, mu):
-    return mu * math.pi / 5 * height_integral(2.5, -X), math.pi / 2 * height_integral(2.0, -X)
+    return mu * math.pi / 5 * height_integral(2.5, -X), math.pi / 2 * height_integral(
+        2.0, -X
+    )
 
 
 def true_error(found, exact):
-    return np.maximum(np.abs(found.phi_F / exact.phi_F - 1), np.abs(found.phi_A / exact.phi_A - 1))
+    return np.maximum(
+        np.abs(found.phi_F / exact.phi_F - 1), np.abs(found.phi_A / exact.phi_A - 1)
+    )
 
 
 def scatter(count, low_X, high_X, low_mu, high_mu, seed):
@@ -36,7 +46,10 @@ def scatter(count, low_X, high_X, low_mu, high_mu, seed):
     return rng.uniform(low_X, high_X, count), 10 ** rng.uniform(low_mu, high_mu, count)
 
 
-@pytest.mark.parametrize("options", [{"rtol": 10.0**-k} for k in (3, 6, 9, 11)] + [{"nodes": n} for n in (16, 32, 64)])
+@pytest.mark.parametrize(
+    "options",
+    [{"rtol": 10.0**-k} for k in (3, 6, 9, 11)] + [{"nodes": n} for n in (16, 32, 64)],
+)
 def test_estimate_covers_the_true_error(options):
     X, mu = scatter(
         2000 if "rtol" in options else 500,
@@ -85,7 +98,9 @@ def test_smooth_hertz_is_approached(mu):
     shift = X * (ratio ** (2 / 3) - 1)
     if mu >= 100:
         assert ((solved.gap[:, 0] < shift) & (shift < solved.gap[:, 0] + 0.6)).all()
-        assert distance[-1] < 1.5 * (solved.gap[-1, 0] + 0.6) / X[-1] * (1 + 0.5 * 6 / X[-1])
+        assert distance[-1] < 1.5 * (solved.gap[-1, 0] + 0.6) / X[-1] * (
+            1 + 0.5 * 6 / X[-1]
+        )
 
 
 def test_published_codes():
@@ -117,7 +132,10 @@ def test_rising_with_stiffness_and_below_rigid(X, mu, factor):
     assert (solved.phi_A <= area * rounded).all()
 
 
-@pytest.mark.parametrize(("X", "mu"), [(-6.0, 1e-14), (-4.0, 1e3), (2.0, 0.3), (8.0, 20.0), (30.0, 1e5), (40.0, 1e8)])
+@pytest.mark.parametrize(
+    ("X", "mu"),
+    [(-6.0, 1e-14), (-4.0, 1e3), (2.0, 0.3), (8.0, 20.0), (30.0, 1e5), (40.0, 1e8)],
+)
 def test_profiles(X, mu):
     solved = greenwood_tripp.solve(X, mu, rtol=1e-11)
     rho, pressure, gap = solved.rho, solved.pressure, solved.gap
@@ -129,18 +147,31 @@ def test_profiles(X, mu):
     # Gauss points in rho^2: their rule gives the totals, their interpolant Eq. (37) at any radius
     x, weights = np.polynomial.legendre.leggauss(rho.size)
     squared = rho[-1] ** 2 / ((1 + x[-1]) / 2)
-    assert math.pi * squared * (weights / 2) @ pressure == pytest.approx(float(solved.phi_F), rel=1e-10, abs=0)
+    assert math.pi * squared * (weights / 2) @ pressure == pytest.approx(
+        float(solved.phi_F), rel=1e-10, abs=0
+    )
     covered = height_integral(1, gap)
-    assert math.pi * squared * (weights / 2) @ covered == pytest.approx(float(solved.phi_A), rel=1e-10, abs=0)
+    assert math.pi * squared * (weights / 2) @ covered == pytest.approx(
+        float(solved.phi_A), rel=1e-10, abs=0
+    )
     at = scipy.interpolate.BarycentricInterpolator(2 * rho**2 / squared - 1, pressure)
 
     def kernel(t, r):
         complement = ((t - r) / (t + r)) ** 2
-        return 4 / math.pi * t / (t + r) * at(2 * t * t / squared - 1) * scipy.special.ellipkm1(complement)
+        return (
+            4
+            / math.pi
+            * t
+            / (t + r)
+            * at(2 * t * t / squared - 1)
+            * scipy.special.ellipkm1(complement)
+        )
 
     for k in (2, rho.size // 2, rho.size - 3):
         w = sum(
-            scipy.integrate.quad(kernel, low, high, args=(rho[k],), epsrel=1e-11, limit=200)[0]
+            scipy.integrate.quad(
+                kernel, low, high, args=(rho[k],), epsrel=1e-11, limit=200
+            )[0]
             for low, high in ((0, rho[k]), (rho[k], math.sqrt(squared)))
         )
         assert gap[k] == pytest.approx(rho[k] ** 2 - X + w, abs=1e-8 * max(1, abs(X)))
@@ -154,14 +185,20 @@ def test_underflow_is_smooth_and_no_touch_is_zero_without_a_warning():
 
 
 def test_failure_says_where():
-    with pytest.raises(ConvergenceError, match="1 of 3 entries, the first at X = 100000") as caught:
+    with pytest.raises(
+        ConvergenceError, match="1 of 3 entries, the first at X = 100000"
+    ) as caught:
         greenwood_tripp.solve([1.0, 1e5, 2.0], 1.0, rtol=1e-12)
     assert caught.value.mask.tolist() == [False, True, False]
-    assert caught.value.result.phi_F[2] == greenwood_tripp.solve(2.0, 1.0, rtol=1e-12).phi_F
+    assert (
+        caught.value.result.phi_F[2] == greenwood_tripp.solve(2.0, 1.0, rtol=1e-12).phi_F
+    )
 
 
 def test_negative_stiffness():
-    with pytest.raises(OutOfRangeError, match=r"mu must be at least 0, got -1 at \(1,\)") as caught:
+    with pytest.raises(
+        OutOfRangeError, match=r"mu must be at least 0, got -1 at \(1,\)"
+    ) as caught:
         greenwood_tripp.solve(1.0, [1.0, -1.0])
     assert caught.value.mask.tolist() == [False, True]
 
@@ -169,20 +206,32 @@ def test_negative_stiffness():
 BAD = {"rtol": (0.0, 1e-14, 0.5, math.nan, "tight"), "nodes": (7, 1025, 20.5)}
 
 
-@pytest.mark.parametrize(("option", "value"), [(option, value) for option in BAD for value in BAD[option]])
+@pytest.mark.parametrize(
+    ("option", "value"), [(option, value) for option in BAD for value in BAD[option]]
+)
 def test_bad_options(option, value):
     with pytest.raises(InputError, match=option):
         greenwood_tripp.solve(1.0, 1.0, **{option: value})
 
 
-OTHERS = pytest.mark.skipif(find_spec("ContactMechanics") is None, reason="ContactMechanics is not installed")
+OTHERS = pytest.mark.skipif(
+    find_spec("ContactMechanics") is None, reason="ContactMechanics is not installed"
+)
 
 
 @pytest.fixture(scope="module")
 def theirs():
     """The function of the notebook that compares both programs."""
-    page, names = pathlib.Path(__file__).parents[3] / "docs" / "tutorials" / "other_program.md", {}
-    exec(page.read_text(encoding="utf-8").partition("```{code-cell}\n")[2].partition("```")[0], names)
+    page, names = (
+        pathlib.Path(__file__).parents[3] / "docs" / "tutorials" / "other_program.md",
+        {},
+    )
+    exec(
+        page.read_text(encoding="utf-8")
+        .partition("```{code-cell}\n")[2]
+        .partition("```")[0],
+        names,
+    )
     return names["theirs"]
 
 
@@ -204,11 +253,15 @@ def test_pressures_of_the_package_contactmechanics(theirs):
     solution = greenwood_tripp.solve(2.0, 0.1)
     rho, pressure, _ = theirs(solution, 21)
     inside = rho < solution.rho[-1]
-    own = scipy.interpolate.BarycentricInterpolator(solution.rho**2, solution.pressure)(rho[inside] ** 2)
+    own = scipy.interpolate.BarycentricInterpolator(solution.rho**2, solution.pressure)(
+        rho[inside] ** 2
+    )
     assert np.abs(pressure[inside] - own).max() < 1e-4 * pressure[0]
 
 
-@pytest.mark.parametrize(("X", "mu"), [(5.0, 0.01), (5.0, 1.0), (2.0, 0.5), (5.0, 3.0), (0.0, 4.0)])
+@pytest.mark.parametrize(
+    ("X", "mu"), [(5.0, 0.01), (5.0, 1.0), (2.0, 0.5), (5.0, 3.0), (0.0, 4.0)]
+)
 def test_the_damped_iteration_errs_like_the_square_of_the_ring_width(X, mu):
     exact, error = greenwood_tripp.solve(X, mu, rtol=1e-12), []
     for rings in (50, 100, 200, 400):

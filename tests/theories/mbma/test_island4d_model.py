@@ -33,7 +33,9 @@ def test_edges_to_the_last_bit(small):
     with pytest.raises(OutOfRangeError, match="zeta_u/zeta_d - 1 must be at most 100"):
         small.lookup(3.0, 2.0, np.nextafter(202.0, 300), 0.7)
     # one bit apart, at X = 5
-    sigma = to_axes(*(np.array([v]) for v in (1.0, 2.0, np.nextafter(2.0, 3), 0.7)), REPORTED).sigma[0]
+    sigma = to_axes(
+        *(np.array([v]) for v in (1.0, 2.0, np.nextafter(2.0, 3), 0.7)), REPORTED
+    ).sigma[0]
     small.lookup(2.0**-0.7 * (1 + 5 * sigma), 2.0, np.nextafter(2.0, 3), 0.7)
     for top in (2.0, 1.9):
         with pytest.raises(OutOfRangeError, match="zeta_u must be above zeta_d"):
@@ -41,7 +43,18 @@ def test_edges_to_the_last_bit(small):
 
 
 @pytest.mark.parametrize(
-    ("position", "bad"), [(0, 0.1), (0, 1e3), (0, -1.0), (1, 1.0), (1, -3.0), (2, 1e6), (2, 1.0), (3, 0.1), (3, 1.2)]
+    ("position", "bad"),
+    [
+        (0, 0.1),
+        (0, 1e3),
+        (0, -1.0),
+        (1, 1.0),
+        (1, -3.0),
+        (2, 1e6),
+        (2, 1.0),
+        (3, 0.1),
+        (3, 1.2),
+    ],
 )
 def test_what_is_out_of_range_is_marked(small, position, bad):
     raw = [1.5, 2.0, 20.0, 0.7]
@@ -53,16 +66,22 @@ def test_what_is_out_of_range_is_marked(small, position, bad):
 
 def islands(approach, hurst, zeta_1):
     """The four numbers of islands of surfaces, and F_hat and A_hat by the solver."""
-    approach, hurst, zeta_1 = (np.array(a, dtype=float) for a in np.broadcast_arrays(approach, hurst, zeta_1))
+    approach, hurst, zeta_1 = (
+        np.array(a, dtype=float) for a in np.broadcast_arrays(approach, hurst, zeta_1)
+    )
     g = geometry(approach, hurst, zeta_1, REPORTED)
     solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-10)
-    raw = np.stack([g["X"] * g["sigma"] + g["zeta_d"] ** -hurst, g["zeta_d"], g["zeta_u"], hurst])
+    raw = np.stack(
+        [g["X"] * g["sigma"] + g["zeta_d"] ** -hurst, g["zeta_d"], g["zeta_u"], hurst]
+    )
     return raw, scale_force(g) * solved.phi_F, scale_area(g) * solved.phi_A / g["eta"]
 
 
 # inside; H and zeta_d beyond their axes; X beyond its own
 INSIDE = [True, False, True, False]
-RAW, FORCE, AREA = islands([1.0, 0.5, 3.0, 60.0], [0.8, 0.12, 0.5, 0.8], [30.0, 30.0, 500.0, 30.0])
+RAW, FORCE, AREA = islands(
+    [1.0, 0.5, 3.0, 60.0], [0.8, 0.12, 0.5, 0.8], [30.0, 30.0, 500.0, 30.0]
+)
 
 
 def test_outside_the_solver_answers_where_asked():
@@ -105,6 +124,12 @@ def narrow_island(spread):
 @pytest.mark.parametrize("power", range(-12, -1))
 def test_narrow_bands(power):
     raw, place = narrow_island(10.0**power)
-    found, solved = open_table("island4d").lookup(*raw), greenwood_tripp.solve(place.X, place.mu, rtol=1e-10)
-    for hat, scale, phi in ((found.F_hat, place.force, solved.phi_F), (found.A_hat, place.area, solved.phi_A)):
+    found, solved = (
+        open_table("island4d").lookup(*raw),
+        greenwood_tripp.solve(place.X, place.mu, rtol=1e-10),
+    )
+    for hat, scale, phi in (
+        (found.F_hat, place.force, solved.phi_F),
+        (found.A_hat, place.area, solved.phi_A),
+    ):
         np.testing.assert_allclose(hat, scale * phi, rtol=found.error.max() + 1e-10)

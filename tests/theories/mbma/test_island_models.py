@@ -12,23 +12,42 @@ import pytest
 from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 from helpers import refusals
 
-from mbma_tables import InputError, OutOfRangeError, Scene, Surface, contact, contact_law, greenwood_tripp, island
+from mbma_tables import (
+    InputError,
+    OutOfRangeError,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    greenwood_tripp,
+    island,
+)
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.variants import REPORTED, VARIANTS
 
 SHALLOW = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
-OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0)
+OPEN = dataclasses.replace(
+    REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0
+)
 
 
 @functools.cache
 def solved(variant):
     surfaces = random_surfaces(80, seed=101, hurst=(0.3, 1.0), zeta_1=(3.01, 1e4))
     gaps = random_gaps(surfaces, seed=102)
-    return surfaces, gaps, contact(surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-10)
+    return (
+        surfaces,
+        gaps,
+        contact(
+            surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-10
+        ),
+    )
 
 
 def apart(found, true):
-    return np.maximum(np.abs(found.pressure / true.pressure - 1), np.abs(found.area / true.area - 1))
+    return np.maximum(
+        np.abs(found.pressure / true.pressure - 1), np.abs(found.area / true.area - 1)
+    )
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -57,7 +76,9 @@ def test_island4d_within_1e3_of_exact():
 def test_a_variant_of_ones_own(variant):
     surfaces = random_surfaces(25, seed=102, hurst=(0.4, 1.0), zeta_1=(3.6, 1e4))
     gaps = random_gaps(surfaces, seed=103)
-    true = contact(surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-9)
+    true = contact(
+        surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-9
+    )
     found = contact(surfaces, separation=gaps, variant=variant, rtol=1e-9)
     assert (found.variant, true.variant) == (variant.name, variant.name)
     error = apart(found, true)
@@ -69,23 +90,44 @@ def test_a_variant_of_ones_own(variant):
 @pytest.mark.parametrize("island_model", ["universal", "exact", "rigid"])
 def test_a_floor_above_the_largest_magnification_or_at_it(island_model):
     options = {"separation": 1.0, "island_model": island_model, "variant": OWN}
-    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5, the variant's floor") as caught:
+    with pytest.raises(
+        OutOfRangeError, match=r"q1/q0 must be greater than 3\.5, the variant's floor"
+    ) as caught:
         contact(Surface([0.5, 0.8, 0.8], 0.2, [0.68, 40.0, 0.7], 1.0, 3.0), **options)
     assert caught.value.mask.tolist() == [True, False, True]
-    assert contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), **options).pressure > 0
-    with pytest.raises(InputError, match=r"greater than 5\.14, the variant's floor of zeta_u"):
-        contact_law(Surface(0.8, 1.0, 5.0, 1.0, 3.0), variant="fitted", island_model=island_model)
+    assert (
+        contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), **options).pressure
+        > 0
+    )
+    with pytest.raises(
+        InputError, match=r"greater than 5\.14, the variant's floor of zeta_u"
+    ):
+        contact_law(
+            Surface(0.8, 1.0, 5.0, 1.0, 3.0), variant="fitted", island_model=island_model
+        )
 
 
 @pytest.mark.parametrize(
-    "variant", ["printed", LEVEL, dataclasses.replace(REPORTED, name="own", density_divisor=11.0)], ids=str
+    "variant",
+    ["printed", LEVEL, dataclasses.replace(REPORTED, name="own", density_divisor=11.0)],
+    ids=str,
 )
 def test_the_four_parameter_table_is_of_one_variant(variant):
-    with pytest.raises(InputError, match=r"island4d table was made for the variant 'reported', not for .*'universal'"):
-        contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, island_model="island4d", variant=variant)
+    with pytest.raises(
+        InputError,
+        match=r"island4d table was made for the variant 'reported', not for .*'universal'",
+    ):
+        contact(
+            Surface(0.8, 0.2, 40.0, 1.0, 3.0),
+            separation=1.0,
+            island_model="island4d",
+            variant=variant,
+        )
 
 
-ROUGH = Surface([[0.05], [0.8]], 0.2, 0.2 * 1e8, 1.0, 3.0)  # the first row leaves the table where it is pressed
+ROUGH = Surface(
+    [[0.05], [0.8]], 0.2, 0.2 * 1e8, 1.0, 3.0
+)  # the first row leaves the table where it is pressed
 GAPS = np.array([2.9999, 0.0, -2.0, 3.5])
 MISSING = np.array([[False, True, True, False], [False] * 4])
 
@@ -94,7 +136,11 @@ def test_outside_raises_with_a_mask_in_the_callers_shape():
     with pytest.raises(OutOfRangeError) as caught:
         contact(ROUGH, separation=GAPS, variant="reported")
     np.testing.assert_array_equal(caught.value.mask, MISSING)
-    facts = "2 of 8 entries", "(-6.25 <= X <= 41, mu <= 1.1e+06)", "hurst = 0.05, zeta_1 = 1e+08"
+    facts = (
+        "2 of 8 entries",
+        "(-6.25 <= X <= 41, mu <= 1.1e+06)",
+        "hurst = 0.05, zeta_1 = 1e+08",
+    )
     assert all(fact in str(caught.value) for fact in (*facts, "outside='exact'"))
     one = Surface(0.05, 0.2, 0.2 * 1e8, 1.0, 3.0)
     with pytest.raises(OutOfRangeError) as caught:
@@ -108,8 +154,14 @@ def test_outside_raises_with_a_mask_in_the_callers_shape():
 @pytest.mark.parametrize("variant", [REPORTED, SHALLOW], ids=lambda variant: variant.name)
 def test_outside_answered_by_the_solver(variant):
     surface = ROUGH if variant is REPORTED else Surface(0.9, 0.2, 400.0, 1.0, 3.0)
-    found, table = (contact(surface, separation=GAPS, variant=variant, outside=way) for way in ("exact", "nan"))
-    true, missing = contact(surface, separation=GAPS, variant=variant, island_model="exact"), np.isnan(table.pressure)
+    found, table = (
+        contact(surface, separation=GAPS, variant=variant, outside=way)
+        for way in ("exact", "nan")
+    )
+    true, missing = (
+        contact(surface, separation=GAPS, variant=variant, island_model="exact"),
+        np.isnan(table.pressure),
+    )
     assert missing.any()
     for name in ("pressure", "area", "error"):
         expected = np.where(missing, getattr(true, name), getattr(table, name))
@@ -143,7 +195,10 @@ def test_what_is_nearly_nothing_ends_and_states_its_digits(island_model):
     gaps = np.array([31.9, 31.998, 31.999])
     found = contact(surface, separation=gaps, island_model=island_model)
     known = contact(surface, separation=gaps, island_model="exact", rtol=1e-10)
-    assert (np.abs(found.pressure - known.pressure) <= (found.error + known.error) * known.pressure).all()
+    assert (
+        np.abs(found.pressure - known.pressure)
+        <= (found.error + known.error) * known.pressure
+    ).all()
     assert found.error[2] > 1e-7
 
 
@@ -154,13 +209,21 @@ COVERED_GAPS = np.array([2.9, 2.0, 0.5, -1.0, -2.9])
 
 
 def test_cover_is_what_islands_at_random_leave_uncovered():
-    added, covered = (Mbma(variant=r).totals(COVERED, COVERED_GAPS, slopes=True) for r in (REPORTED, COVER))
+    added, covered = (
+        Mbma(variant=r).totals(COVERED, COVERED_GAPS, slopes=True)
+        for r in (REPORTED, COVER)
+    )
     assert covered.pressure == pytest.approx(added.pressure, rel=1e-15)
     assert covered.area == pytest.approx(-np.expm1(-added.area), rel=1e-15)
-    assert covered.area_slope == pytest.approx(added.area_slope * np.exp(-added.area), rel=1e-14)
+    assert covered.area_slope == pytest.approx(
+        added.area_slope * np.exp(-added.area), rel=1e-14
+    )
     law = contact_law(COVERED, variant=COVER)
     assert law.area(separation=COVERED_GAPS) == pytest.approx(covered.area, rel=2e-8)
-    assert not any("added" in reason for reason in contact(COVERED, separation=COVERED_GAPS, variant=COVER).reasons)
+    assert not any(
+        "added" in reason
+        for reason in contact(COVERED, separation=COVERED_GAPS, variant=COVER).reasons
+    )
     with pytest.raises(InputError, match="addition must be"):
         dataclasses.replace(REPORTED, addition="integral")
 
@@ -171,16 +234,30 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
         rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
     errors = []
     keys = ("hurst", "L_over_lambda0", "zeta_1", "seed")
-    for seed in sorted({tuple(row[k] for k in keys) for row in rows if row["L_over_lambda0"] != "1"}):
+    for seed in sorted(
+        {tuple(row[k] for k in keys) for row in rows if row["L_over_lambda0"] != "1"}
+    ):
         own = [row for row in rows if tuple(row[k] for k in keys) == seed]
-        surface = Surface(float(seed[0]), 1.0, float(seed[2]), 1.0, float(own[0]["h_max_over_h_rms"]))
-        found = contact(surface, separation=np.linspace(-1, 0.99, 200) * surface.h_max, variant="fitted", rtol=1e-5)
+        surface = Surface(
+            float(seed[0]), 1.0, float(seed[2]), 1.0, float(own[0]["h_max_over_h_rms"])
+        )
+        found = contact(
+            surface,
+            separation=np.linspace(-1, 0.99, 200) * surface.h_max,
+            variant="fitted",
+            rtol=1e-5,
+        )
         branch = slice(int(np.argmax(found.pressure)), None)
-        log_force, log_area = (np.log(x[branch][::-1]) for x in (found.pressure / surface.rms_gradient, found.area))
+        log_force, log_area = (
+            np.log(x[branch][::-1])
+            for x in (found.pressure / surface.rms_gradient, found.area)
+        )
         for row in own:
             force, area = float(row["force"]), float(row["area"])
             if 0.01 < area < 0.97 and np.log(force) < log_force[-1]:
-                errors.append(np.interp(np.log(force), log_force, log_area) - np.log(area))
+                errors.append(
+                    np.interp(np.log(force), log_force, log_area) - np.log(area)
+                )
     assert len(errors) > 400
     assert np.quantile(np.abs(errors), 0.9) < 0.06
     assert abs(np.mean(errors)) < 0.02
@@ -206,37 +283,65 @@ def test_totals_laws_islands_and_scenes():
         (contact, {"separation": OWN_GAPS}, "pressure"),
         (island, {"delta": [0.1, 1.0]}, "force"),
     ):
-        found, known = (ask(FLAT, **given, island_model=island_model) for island_model in (Own(), "rigid"))
+        found, known = (
+            ask(FLAT, **given, island_model=island_model)
+            for island_model in (Own(), "rigid")
+        )
         assert found.island_model == "own"
         for name in (load, "area", "error"):
-            np.testing.assert_allclose(getattr(found, name), getattr(known, name), rtol=1e-13)
-    law, known = (contact_law(FLAT, rtol=1e-4, island_model=island_model) for island_model in (Own(), "rigid"))
+            np.testing.assert_allclose(
+                getattr(found, name), getattr(known, name), rtol=1e-13
+            )
+    law, known = (
+        contact_law(FLAT, rtol=1e-4, island_model=island_model)
+        for island_model in (Own(), "rigid")
+    )
     assert law.island_model == "own"
-    np.testing.assert_allclose(law.pressure(separation=OWN_GAPS), known.pressure(separation=OWN_GAPS), rtol=1e-12)
-    scene = Scene(FLAT, effects=("pressure",), separations=[1.0], rtol=1e-4, island_model=Own()).run()
+    np.testing.assert_allclose(
+        law.pressure(separation=OWN_GAPS), known.pressure(separation=OWN_GAPS), rtol=1e-12
+    )
+    scene = Scene(
+        FLAT, effects=("pressure",), separations=[1.0], rtol=1e-4, island_model=Own()
+    ).run()
     expected = contact(FLAT, separation=1.0, island_model="rigid").pressure
     assert float(scene["pressure"][0]) == pytest.approx(expected, rel=1e-4, abs=0)
 
 
-@pytest.mark.parametrize("bad", [None, 3, Own, object(), "unknown", type("Nameless", (), {"answer": 1})()])
+@pytest.mark.parametrize(
+    "bad", [None, 3, Own, object(), "unknown", type("Nameless", (), {"answer": 1})()]
+)
 def test_what_is_no_island_model(bad):
-    for ask, given in ((contact, {"separation": 1.0}), (contact_law, {}), (island, {"delta": 1.0})):
+    for ask, given in (
+        (contact, {"separation": 1.0}),
+        (contact_law, {}),
+        (island, {"delta": 1.0}),
+    ):
         with pytest.raises(InputError, match="island_model must be one of"):
             ask(FLAT, **given, island_model=bad)
 
 
 def test_answers_are_checked():
-    with pytest.raises(InputError, match=r"'own' must answer Phi_F, Phi_A and error of shape"):
-        contact(FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F[:3], A, error)))
+    with pytest.raises(
+        InputError, match=r"'own' must answer Phi_F, Phi_A and error of shape"
+    ):
+        contact(
+            FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F[:3], A, error))
+        )
     with pytest.raises(InputError, match=r"'own' must answer"):
         contact(FLAT, separation=1.0, island_model=Own(lambda F, A, error: F))
     silent = Own(lambda F, A, error: (np.where(F > 10, np.nan, F), A, error))
-    with pytest.raises(OutOfRangeError, match="1 of 2 entries lie outside of island model 'own'") as caught:
+    with pytest.raises(
+        OutOfRangeError, match="1 of 2 entries lie outside of island model 'own'"
+    ) as caught:
         contact(FLAT, separation=[2.5, 1.0], island_model=silent)
     assert caught.value.mask.tolist() == [False, True]
-    found = contact(FLAT, separation=[2.5, 1.0], island_model=silent, outside="nan").pressure
+    found = contact(
+        FLAT, separation=[2.5, 1.0], island_model=silent, outside="nan"
+    ).pressure
     assert np.isnan(found).tolist() == [False, True]
-    one = contact(FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3)))
+    one = contact(
+        FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3))
+    )
     assert 1e-3 <= one.error < 1.1e-3
 
 

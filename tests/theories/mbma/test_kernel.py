@@ -14,13 +14,17 @@ from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import PRINTED, REPORTED
 
 
-@pytest.mark.parametrize("variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name)
+@pytest.mark.parametrize(
+    "variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name
+)
 def test_islands_are_those_of_geometry(variant):
     rng = np.random.default_rng(40)
     hurst = rng.uniform(0.1, 1, 3000)
     hurst[::10] = 1
     hurst[1::10] = 1 - 10 ** rng.uniform(-15, -3, 300)
-    zeta_1 = np.maximum(10 ** rng.uniform(math.log10(3.01), 8, 3000), 1.001 * variant.floor_u)
+    zeta_1 = np.maximum(
+        10 ** rng.uniform(math.log10(3.01), 8, 3000), 1.001 * variant.floor_u
+    )
     x = 10 ** rng.uniform(-12, 1, 3000)
     g = geometry(x, hurst, zeta_1, variant)
     nodes = np.empty((3000, len(FIELDS)))
@@ -28,16 +32,33 @@ def test_islands_are_those_of_geometry(variant):
         assert core.island_geometry(*numbers, variant.numbers, node) == OK
     expected = np.stack([g[name] for name in FIELDS], axis=-1)
     np.testing.assert_allclose(nodes, expected, rtol=1e-11)
-    assert np.median(np.abs(nodes / np.where(expected == 0, 1.0, expected) - (expected != 0))) < 1e-14
-    for bad in [(math.nan, 0.8, 9.0), (1.0, math.nan, 9.0), (1.0, 0.8, math.inf), (0.0, 0.8, 9.0), (1.0, 1.5, 9.0)]:
+    assert (
+        np.median(
+            np.abs(nodes / np.where(expected == 0, 1.0, expected) - (expected != 0))
+        )
+        < 1e-14
+    )
+    for bad in [
+        (math.nan, 0.8, 9.0),
+        (1.0, math.nan, 9.0),
+        (1.0, 0.8, math.inf),
+        (0.0, 0.8, 9.0),
+        (1.0, 1.5, 9.0),
+    ]:
         assert core.island_geometry(*bad, variant.numbers, nodes[0]) == INVALID
         assert np.isnan(nodes[0]).all()
 
 
 def totals(hurst, zeta_1, compression, peak, rtol=1e-9):
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak)))
+    arrays = np.broadcast_arrays(
+        *(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak))
+    )
     numbers, count = [np.ascontiguousarray(array) for array in arrays], arrays[0].size
-    out, error, status = np.empty((count, 2, 2)), np.empty(count), np.empty(count, np.uint8)
+    out, error, status = (
+        np.empty((count, 2, 2)),
+        np.empty(count),
+        np.empty(count, np.uint8),
+    )
     own = REPORTED.numbers, *universal_model().cells
     bad = core.totals(*numbers, rtol, *own, out, error, status, np.empty(1, np.int64))
     assert bad == (status != OK).sum()
@@ -45,7 +66,9 @@ def totals(hurst, zeta_1, compression, peak, rtol=1e-9):
 
 
 def test_no_number_crashes_and_none_that_is_wrong_is_answered():
-    awful = np.array([math.nan, math.inf, -math.inf, 5e-324, -5e-324, 1e300, -1.0, 0.0, 1.0, 1e-160])
+    awful = np.array(
+        [math.nan, math.inf, -math.inf, 5e-324, -5e-324, 1e300, -1.0, 0.0, 1.0, 1e-160]
+    )
     good = (0.8, 216.0, 2.0, 3.0)
     for place in range(4):
         given = list(good)
@@ -74,14 +97,21 @@ def test_what_cannot_be_resolved_is_said(monkeypatch):
             status[3] = UNRESOLVED
 
     monkeypatch.setattr(sums, "core", Unresolved())
-    with pytest.raises(ConvergenceError, match="quadrature did not reach its tolerance") as caught:
+    with pytest.raises(
+        ConvergenceError, match="quadrature did not reach its tolerance"
+    ) as caught:
         contact(surface, separation=[0.0, 1.0], outside="nan")
     assert np.argwhere(caught.value.mask).tolist() == [[1, 1]]
 
 
 def test_bits_depend_neither_on_the_batch_nor_on_the_generation(generations):
     rng = np.random.default_rng(8)
-    given = rng.uniform(0.2, 1, 300), 10 ** rng.uniform(0.7, 4, 300), rng.uniform(0, 6, 300), rng.uniform(3, 5, 300)
+    given = (
+        rng.uniform(0.2, 1, 300),
+        10 ** rng.uniform(0.7, 4, 300),
+        rng.uniform(0, 6, 300),
+        rng.uniform(3, 5, 300),
+    )
     whole = totals(*given)[0]
     for k in range(0, 300, 37):
         assert totals(*(x[k] for x in given))[0].tobytes() == whole[k].tobytes()

@@ -38,7 +38,10 @@ def rough(seed=1, count=60, h_max=3.5, gap=True):
 
 
 @pytest.mark.parametrize("variant", [REPORTED, PRINTED, FITTED], ids=lambda r: r.name)
-@pytest.mark.parametrize(("hurst", "zeta_1"), [(0.8, 200.0), (0.5, 30.0), (1.0, 1000.0), (0.3, 64.0), (0.9, 6.0)])
+@pytest.mark.parametrize(
+    ("hurst", "zeta_1"),
+    [(0.8, 200.0), (0.5, 30.0), (1.0, 1000.0), (0.3, 64.0), (0.9, 6.0)],
+)
 def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, zeta_1):
     surface = five_numbers(hurst, zeta_1)
     d = surface.h_max * (1 - DEPTHS[1:])
@@ -48,9 +51,13 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, 
         found = theory.totals(sampled(surface, count), d, slopes=True)
         bound = float(np.max(plain.error + found.error))
         for name in ("pressure", "area"):
-            np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=bound)
+            np.testing.assert_allclose(
+                getattr(found, name), getattr(plain, name), rtol=bound
+            )
         for name in ("pressure_slope", "area_slope"):
-            np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=10 * bound)
+            np.testing.assert_allclose(
+                getattr(found, name), getattr(plain, name), rtol=10 * bound
+            )
 
 
 @settings(max_examples=15, deadline=None)
@@ -68,7 +75,8 @@ def test_errors_hold_and_slopes_are_slopes(seed, share):
 
 
 def test_slopes_hold_in_thin_panels():
-    # values of 5,000 samples round there to more than they change: against the integral and its upper limit in numpy
+    # values of 5,000 samples round there to more than they change: against the integral and
+    # its upper limit in numpy
     surface, model = rough(count=5000), get_model("universal", 1e-8, REPORTED)
     kept, source = profile(surface, model, REPORTED, 1e-10), source_of(surface, REPORTED)
     node, weight = np.polynomial.legendre.leggauss(8)
@@ -78,8 +86,19 @@ def test_slopes_hold_in_thin_panels():
         g = source.islands(x)
         phi = answer_islands(model, g)
         force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"]) * phi.phi_F
-        area = 2 * np.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2 * phi.phi_A
-        return np.stack([force, area]) * source.density(g, x) * source.h_rms, *source.heights(g, x)
+        area = (
+            2
+            * np.pi
+            * g["eta"]
+            * g["D"]
+            * g["R_u"]
+            * g["R_d"]
+            * g["sigma"] ** 2
+            * phi.phi_A
+        )
+        return np.stack([force, area]) * source.density(
+            g, x
+        ) * source.h_rms, *source.heights(g, x)
 
     for c in np.linspace(0.01, 0.99, 20) * kept.end:
         edges = np.concatenate([[0.0, c], np.geomspace(1e-9 * c, c, 400), source.breaks])
@@ -90,7 +109,9 @@ def test_slopes_hold_in_thin_panels():
         gaussian = np.exp(-(height**2) / 2) * (half * weight).ravel()
         last = own[:, 0] * np.exp(-((own_shift - own_rate * c)[0] ** 2) / 2)
         expected = *(weights @ gaussian), *(weights @ (gaussian * height * rate) + last)
-        assert kept.totals(np.array([c]), slopes=True)[:, 0] == pytest.approx(expected, rel=2e-10)
+        assert kept.totals(np.array([c]), slopes=True)[:, 0] == pytest.approx(
+            expected, rel=2e-10
+        )
 
 
 @pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
@@ -100,8 +121,14 @@ def test_a_law_is_the_contacts(count, h_max):
     d = d[d >= law.lowest]
     found = contact(surface, separation=d, theory="mbma")
     for name in ("pressure", "area"):
-        np.testing.assert_allclose(getattr(law, name)(separation=d), getattr(found, name), rtol=2 * law.error)
-    assert (law.theory, law.variant, law.island_model) == ("mbma", "reported", "universal")
+        np.testing.assert_allclose(
+            getattr(law, name)(separation=d), getattr(found, name), rtol=2 * law.error
+        )
+    assert (law.theory, law.variant, law.island_model) == (
+        "mbma",
+        "reported",
+        "universal",
+    )
 
 
 def test_a_law_ends_with_the_table():
@@ -111,11 +138,15 @@ def test_a_law_ends_with_the_table():
     assert -surface.h_max < law.lowest < surface.h_max / 2
     d = law.lowest + np.array([1e-9, 0.1, 1.0])
     np.testing.assert_allclose(
-        law.pressure(separation=d), contact(surface, separation=d, theory="mbma").pressure, rtol=2 * law.error
+        law.pressure(separation=d),
+        contact(surface, separation=d, theory="mbma").pressure,
+        rtol=2 * law.error,
     )
     with pytest.raises(OutOfRangeError, match="where the theory ends"):
         law.pressure(separation=law.lowest - 0.1)
-    np.testing.assert_allclose(law.separation(pressure=law.pressure(separation=d)), d, rtol=1e-6)
+    np.testing.assert_allclose(
+        law.separation(pressure=law.pressure(separation=d)), d, rtol=1e-6
+    )
     # as far as there is a table, contacts are found by pressure and known to be valid or not
     found = contact(surface, pressure=law.pressure(separation=d), theory="mbma")
     np.testing.assert_allclose(found.separation, d, rtol=1e-6)
@@ -131,32 +162,48 @@ def test_islands():
     for field in dataclasses.fields(one):
         value = getattr(one, field.name)
         if isinstance(value, np.ndarray) and field.name != "error":
-            np.testing.assert_allclose(getattr(two, field.name), value, rtol=1e-12, err_msg=field.name)
+            np.testing.assert_allclose(
+                getattr(two, field.name), value, rtol=1e-12, err_msg=field.name
+            )
 
 
 def test_what_mbma_cannot_use_is_refused_with_the_mend():
     surface = rough()
-    with pytest.raises(InputError, match=r"use 'universal' or 'exact', or surface\.fit\(\)"):
+    with pytest.raises(
+        InputError, match=r"use 'universal' or 'exact', or surface\.fit\(\)"
+    ):
         contact(surface, separation=1.0, island_model="island4d")
     with pytest.raises(InputError, match=r"surface\.fit\(\)"):
         island(surface, 1.0, island_model="island4d")
     q = np.geomspace(1, 10, 30)
     blue = Surface.from_spectrum(q, q, h_max=3000.0)
-    with pytest.raises(OutOfRangeError, match="measure shorter wavelengths, or use another theory"):
+    with pytest.raises(
+        OutOfRangeError, match="measure shorter wavelengths, or use another theory"
+    ):
         contact(blue, separation=1.0, theory="mbma")
     assert contact(blue, mean_separation=500.0, theory="calibrated").pressure > 0
-    steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
-    deep = contact(steep, separation=-29.0, island_model="universal", outside="nan", theory="mbma").pressure
+    steep = Surface.from_spectrum(
+        np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0
+    )
+    deep = contact(
+        steep, separation=-29.0, island_model="universal", outside="nan", theory="mbma"
+    ).pressure
     assert deep > 0 or np.isnan(deep)
 
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_area_at_a_force_of_boundary_elements(number):
-    hurst, waves, last, top = ((0.8, 8, 128, 0.041954782), (0.6, 4, 64, 0.037331897))[number]
+    hurst, waves, last, top = ((0.8, 8, 128, 0.041954782), (0.6, 4, 64, 0.037331897))[
+        number
+    ]
     q = 2 * np.pi * np.geomspace(1, last, 300)
     C = np.minimum(1, (q / (2 * np.pi * waves)) ** (-2 - 2 * hurst))
-    surface = Surface.from_spectrum(q, 1e-4 * C / Surface.from_spectrum(q, C, h_max=1.0).m0, h_max=top)
-    force, area = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",", usecols=(0, 1), unpack=True)
+    surface = Surface.from_spectrum(
+        q, 1e-4 * C / Surface.from_spectrum(q, C, h_max=1.0).m0, h_max=top
+    )
+    force, area = np.loadtxt(
+        DATA / f"rolloff_{number}.csv", delimiter=",", usecols=(0, 1), unpack=True
+    )
     tested = (area > 0.002) & (area < 0.25)
     ratio = contact(surface, pressure=force[tested], theory="mbma").area / area[tested]
     assert ((ratio > 0.85) & (ratio < 1.1)).all()

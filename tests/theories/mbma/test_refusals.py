@@ -11,8 +11,19 @@ from helpers import spoilt
 from small_tables import copied, edited, seal, small_table, unseal
 
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.common.netcdf import MAX_BYTES, SEAL_LENGTH, attributes_digest, read_table
-from mbma_tables.common.table_schema import FORMAT_VERSIONS, ISLAND4D, KINDS, UNIVERSAL, check_content
+from mbma_tables.common.netcdf import (
+    MAX_BYTES,
+    SEAL_LENGTH,
+    attributes_digest,
+    read_table,
+)
+from mbma_tables.common.table_schema import (
+    FORMAT_VERSIONS,
+    ISLAND4D,
+    KINDS,
+    UNIVERSAL,
+    check_content,
+)
 
 
 def refused(path, kind=None):
@@ -29,8 +40,13 @@ def refused(path, kind=None):
 def test_damaged_bytes_never_reach_the_library(kind, sources, tmp_path):
     content, rng = sources[kind], np.random.default_rng(8)
     path = tmp_path / f"{kind}.nc"
-    in_the_seal = (content[:k] + bytes([content[k] ^ 1 << k % 8]) + content[k + 1 :] for k in range(-SEAL_LENGTH, -1))
-    for damaged in itertools.chain(in_the_seal, (spoilt(content, rng) for _ in range(200))):
+    in_the_seal = (
+        content[:k] + bytes([content[k] ^ 1 << k % 8]) + content[k + 1 :]
+        for k in range(-SEAL_LENGTH, -1)
+    )
+    for damaged in itertools.chain(
+        in_the_seal, (spoilt(content, rng) for _ in range(200))
+    ):
         if damaged != content:
             path.write_bytes(damaged)
             message = refused(path, kind)
@@ -41,7 +57,9 @@ def edits(content):
     """Edits of one thing as netCDF tools make them: values, names and attributes, some of each."""
     with netCDF4.Dataset("table", memory=unseal(content)) as dataset:
         owners = {"": dataset, **dataset.variables}
-        attributes = [(name, key) for name, owner in owners.items() for key in owner.ncattrs()]
+        attributes = [
+            (name, key) for name, owner in owners.items() for key in owner.ncattrs()
+        ]
 
     def change(dataset, name, place):
         at = (place,) * dataset[name].ndim
@@ -54,8 +72,14 @@ def edits(content):
     def edit(dataset, name, key, way):
         owner = dataset[name] if name else dataset
         value = owner.getncattr(key)
-        change = owner.setncattr, owner.renameAttribute, lambda key, _: owner.delncattr(key)
-        change[way](key, "other" if way else value + "x" if isinstance(value, str) else [1.5, 2.5])
+        change = (
+            owner.setncattr,
+            owner.renameAttribute,
+            lambda key, _: owner.delncattr(key),
+        )
+        change[way](
+            key, "other" if way else value + "x" if isinstance(value, str) else [1.5, 2.5]
+        )
 
     for name in list(owners)[1:]:
         yield from (partial(change, name=name, place=place) for place in (0, -1))
@@ -67,7 +91,9 @@ def edits(content):
     yield lambda d: d.setncattr("other", 1)
     yield lambda d: d["error_F"].setncattr("scale_factor", 2.0)
     yield lambda d: d.createVariable("other", "f8", ("X",))
-    yield lambda d: d.setncattr("mbma_kind", UNIVERSAL if d.mbma_kind == ISLAND4D else ISLAND4D)
+    yield lambda d: d.setncattr(
+        "mbma_kind", UNIVERSAL if d.mbma_kind == ISLAND4D else ISLAND4D
+    )
 
 
 def test_edits_under_a_right_checksum(sources, tmp_path):
@@ -86,7 +112,10 @@ def test_variables_left_out_or_in_another_type(sources, tmp_path):
         names = list(dataset.variables)
     for number, name in enumerate(names):
         refused(copied(path, sources[kind], leave_out=name), kind)
-        refused(copied(path, sources[kind], change_type=(name, ("f4", "i4")[number % 2])), kind)
+        refused(
+            copied(path, sources[kind], change_type=(name, ("f4", "i4")[number % 2])),
+            kind,
+        )
 
 
 def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
@@ -101,16 +130,27 @@ def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
 
 @pytest.mark.parametrize("version", ["1.0", "1.9", "2.1", 2.0, ""])
 def test_another_format(version, sources, tmp_path):
-    path = edited(tmp_path / "a.nc", sources[UNIVERSAL], lambda d: d.setncattr("format_version", version))
+    path = edited(
+        tmp_path / "a.nc",
+        sources[UNIVERSAL],
+        lambda d: d.setncattr("format_version", version),
+    )
     message = refused(path)
-    assert f"has format {version}, this library reads {FORMAT_VERSIONS[UNIVERSAL]}" in message
+    assert (
+        f"has format {version}, this library reads {FORMAT_VERSIONS[UNIVERSAL]}"
+        in message
+    )
 
 
 def test_no_table_at_all(sources, tmp_path):
     assert "No such file" in refused(tmp_path / "missing.nc")
     assert "No such file" in refused(tmp_path / "no" / "folder.nc")
     assert "not a regular file" in refused(tmp_path)
-    for name, content in (("empty.nc", b""), ("text.nc", b"X,mu,phi_F\n1,2,3\n" * 50), ("zeros.nc", bytes(5000))):
+    for name, content in (
+        ("empty.nc", b""),
+        ("text.nc", b"X,mu,phi_F\n1,2,3\n" * 50),
+        ("zeros.nc", bytes(5000)),
+    ):
         (tmp_path / name).write_bytes(content)
         assert "is not a table file" in refused(tmp_path / name)
     for length in (1, SEAL_LENGTH - 1, SEAL_LENGTH, SEAL_LENGTH + 1):
@@ -128,7 +168,13 @@ def test_a_netcdf_file_of_another_purpose(format, tmp_path):
     assert "no checksum at its end" in refused(path)
     path.write_bytes(seal(path.read_bytes()))
     assert "holds a table of kind None" in refused(path)
-    for body in (b"", b"no netCDF", bytes(3000), b"\x89HDF\r\n\x1a\n", b"CDF\x01" + bytes(60)):
+    for body in (
+        b"",
+        b"no netCDF",
+        bytes(3000),
+        b"\x89HDF\r\n\x1a\n",
+        b"CDF\x01" + bytes(60),
+    ):
         path.write_bytes(seal(body))
         refused(path)
 
@@ -167,15 +213,21 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize(("name", "value"), [(name, value) for name in WRONG for value in WRONG[name]])
-def test_an_attribute_of_another_type_or_missing_is_refused_by_its_name(name, value, sources, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "value"), [(name, value) for name in WRONG for value in WRONG[name]]
+)
+def test_an_attribute_of_another_type_or_missing_is_refused_by_its_name(
+    name, value, sources, tmp_path
+):
     def edit(dataset):
         owner, _, key = name.rpartition(":")
         place = dataset[owner] if owner else dataset
         place.delncattr(key) if value is MISSING else place.setncattr(key, value)
 
     path = rehashed(tmp_path / "table.nc", sources[UNIVERSAL], edit)
-    assert (f"lacks attribute {name}" if value is MISSING else f"has attribute {name} = ") in refused(path)
+    assert (
+        f"lacks attribute {name}" if value is MISSING else f"has attribute {name} = "
+    ) in refused(path)
 
 
 def with_axis(content, number, **changes):
@@ -207,33 +259,98 @@ def with_axis_and_edges(content, change):
 
 CHANGES = {
     "axes": (KINDS, lambda c: with_axis(c, 0, name="Y"), "has axes"),
-    "order of axes": (KINDS, lambda c: dataclasses.replace(c, axes=c.axes[::-1]), "has axes"),
+    "order of axes": (
+        KINDS,
+        lambda c: dataclasses.replace(c, axes=c.axes[::-1]),
+        "has axes",
+    ),
     "transform": ([ISLAND4D], lambda c: with_axis(c, 0, transform="linear"), "has axes"),
     "falling": (KINDS, lambda c: with_axis(c, 0, low=c.axes[0].high), "axis X from"),
     "no logarithm": (KINDS, lambda c: with_axis(c, 1, low=-1.0), "axis (mu|spread) from"),
-    "infinite": (KINDS, lambda c: with_axis(c, 0, high=np.inf), "axis X|one after the other"),
+    "infinite": (
+        KINDS,
+        lambda c: with_axis(c, 0, high=np.inf),
+        "axis X|one after the other",
+    ),
     "offset": (KINDS, lambda c: with_axis(c, 1, offset=1.0), "offset 1"),
     "no Hurst exponent": ([ISLAND4D], lambda c: with_axis(c, 3, high=1.1), "axis hurst"),
-    "nodes": ([ISLAND4D], lambda c: with_axis(c, 0, nodes=c.axes[0].nodes + 1), "not over its axes"),
-    "coefficients": (KINDS, lambda c: changed(c, "coefficients", lambda v: v[1:]), "not over its (axes|cells)"),
-    "errors": (KINDS, lambda c: changed(c, "local_error", lambda v: v[:0]), "error bounds that are not over"),
-    "cells": ([UNIVERSAL], lambda c: with_edges(c, X_low=lambda v: v[1:]), "not over its cells"),
-    "a gap": ([UNIVERSAL], lambda c: with_edges(c, mu_low=lambda v: v * 1.125), "one after the other"),
-    "an overlap": ([UNIVERSAL], lambda c: with_edges(c, X_high=lambda v: v + 1), "one after the other"),
-    "an open end": ([UNIVERSAL], lambda c: with_axis(c, 1, high=200.0), "one after the other"),
-    "an empty cell": ([UNIVERSAL], lambda c: with_edges(c, X_high=lambda v: v * np.nan), "one after the other"),
-    "odd strips": ([UNIVERSAL], lambda c: with_axis_and_edges(c, lambda v: v + 1e-3 * (v > -2)), "by arithmetic"),
-    "odd cells": (
+    "nodes": (
+        [ISLAND4D],
+        lambda c: with_axis(c, 0, nodes=c.axes[0].nodes + 1),
+        "not over its axes",
+    ),
+    "coefficients": (
+        KINDS,
+        lambda c: changed(c, "coefficients", lambda v: v[1:]),
+        "not over its (axes|cells)",
+    ),
+    "errors": (
+        KINDS,
+        lambda c: changed(c, "local_error", lambda v: v[:0]),
+        "error bounds that are not over",
+    ),
+    "cells": (
         [UNIVERSAL],
-        lambda c: with_edges(c, **dict.fromkeys(("mu_low", "mu_high"), lambda v: v * np.where(v < 100, 1 + 1e-9, 1))),
+        lambda c: with_edges(c, X_low=lambda v: v[1:]),
+        "not over its cells",
+    ),
+    "a gap": (
+        [UNIVERSAL],
+        lambda c: with_edges(c, mu_low=lambda v: v * 1.125),
+        "one after the other",
+    ),
+    "an overlap": (
+        [UNIVERSAL],
+        lambda c: with_edges(c, X_high=lambda v: v + 1),
+        "one after the other",
+    ),
+    "an open end": (
+        [UNIVERSAL],
+        lambda c: with_axis(c, 1, high=200.0),
+        "one after the other",
+    ),
+    "an empty cell": (
+        [UNIVERSAL],
+        lambda c: with_edges(c, X_high=lambda v: v * np.nan),
+        "one after the other",
+    ),
+    "odd strips": (
+        [UNIVERSAL],
+        lambda c: with_axis_and_edges(c, lambda v: v + 1e-3 * (v > -2)),
         "by arithmetic",
     ),
-    "negative error": (KINDS, lambda c: changed(c, "local_error", np.negative), "error bound below 0"),
+    "odd cells": (
+        [UNIVERSAL],
+        lambda c: with_edges(
+            c,
+            **dict.fromkeys(
+                ("mu_low", "mu_high"), lambda v: v * np.where(v < 100, 1 + 1e-9, 1)
+            ),
+        ),
+        "by arithmetic",
+    ),
+    "negative error": (
+        KINDS,
+        lambda c: changed(c, "local_error", np.negative),
+        "error bound below 0",
+    ),
     "no points": (KINDS, lambda c: dataclasses.replace(c, conformance={}), "incomplete"),
     "fewer points": (KINDS, lambda c: with_points(c, tolerance=np.ones(3)), "incomplete"),
-    "negative answer": (KINDS, lambda c: with_points(c, table_F=0 * c.conformance["table_F"]), "not positive"),
-    "not a ratio": ([ISLAND4D], lambda c: changed(c, "coefficients", lambda v: v + 200), "not logarithms"),
-    "NaN": (KINDS, lambda c: changed(c, "coefficients", lambda v: v * np.nan), "(chebyshev|spline)_F, which is"),
+    "negative answer": (
+        KINDS,
+        lambda c: with_points(c, table_F=0 * c.conformance["table_F"]),
+        "not positive",
+    ),
+    "not a ratio": (
+        [ISLAND4D],
+        lambda c: changed(c, "coefficients", lambda v: v + 200),
+        "not logarithms",
+    ),
+    "NaN": (
+        KINDS,
+        lambda c: changed(c, "coefficients", lambda v: v * np.nan),
+        "(chebyshev|spline)_F, which is",
+    ),
 }
 
 

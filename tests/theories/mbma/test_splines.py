@@ -26,7 +26,9 @@ def node_values(shape, seed=1):
 def by_scipy(values, degree, axes):
     knots = []
     for axis in range(axes):
-        one = make_interp_spline(np.arange(values.shape[axis]), values, k=degree, axis=axis)
+        one = make_interp_spline(
+            np.arange(values.shape[axis]), values, k=degree, axis=axis
+        )
         knots.append(one.t)
         values = np.moveaxis(one.c, 0, axis) if one.c.shape != values.shape else one.c
     return NdBSpline(tuple(knots), values, degree)
@@ -34,10 +36,15 @@ def by_scipy(values, degree, axes):
 
 def random_positions(shape, count, seed=2):
     rng = np.random.default_rng(seed)
-    corners = np.stack(np.meshgrid(*([0.0, n - 1.0] for n in shape), indexing="ij"), -1).reshape(-1, len(shape))
+    corners = np.stack(
+        np.meshgrid(*([0.0, n - 1.0] for n in shape), indexing="ij"), -1
+    ).reshape(-1, len(shape))
     inside = rng.uniform(0, 1, (count, len(shape))) * (np.array(shape) - 1)
     on_nodes = np.floor(rng.uniform(0, 1, (count, len(shape))) * np.array(shape))
-    return [np.ascontiguousarray(column) for column in np.concatenate([corners, inside, on_nodes]).T]
+    return [
+        np.ascontiguousarray(column)
+        for column in np.concatenate([corners, inside, on_nodes]).T
+    ]
 
 
 def test_tensor_splines_are_those_of_scipy():
@@ -46,7 +53,12 @@ def test_tensor_splines_are_those_of_scipy():
     assert coefs.shape == (*(n + 2 for n in SHAPE), 2)
     positions = random_positions(SHAPE, 500)
     points = np.stack(positions, axis=-1)
-    np.testing.assert_allclose(spline_of(coefs)(points), spline(points), rtol=1e-11, atol=1e-11 * np.abs(values).max())
+    np.testing.assert_allclose(
+        spline_of(coefs)(points),
+        spline(points),
+        rtol=1e-11,
+        atol=1e-11 * np.abs(values).max(),
+    )
 
 
 @pytest.mark.parametrize("degree", [3, 5])
@@ -64,7 +76,9 @@ def test_one_axis_against_scipy_and_more_components(degree, nodes):
     assert len(knots) - degree - 1 == len(coefs) == nodes + 2 * pad
     places = np.linspace(0, nodes - 1, 977)
     expected = make_interp_spline(np.arange(nodes), values, k=degree)(places)
-    np.testing.assert_allclose(BSpline(knots, coefs, degree)(places), expected, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(
+        BSpline(knots, coefs, degree)(places), expected, rtol=1e-11, atol=1e-11
+    )
 
 
 @st.composite
@@ -78,15 +92,23 @@ def axes(draw):
     else:
         low = draw(st.floats(-50, 50))
         high = low + 10 ** draw(st.floats(-2, 4))
-    return Axis("x", "a coordinate", transform, offset, low, high, draw(st.integers(2, 400)))
+    return Axis(
+        "x", "a coordinate", transform, offset, low, high, draw(st.integers(2, 400))
+    )
 
 
 @given(axes(), st.floats(0, 1))
 def test_positions_and_coordinates_are_inverse_and_as_the_formula_says(axis, share):
     last = axis.nodes - 1
     # rounding of t, and of x, counted in steps
-    rounding = max(abs(axis.start), abs(axis.start + last * axis.step)) / axis.step + axis.nodes
-    assert (axis.coordinate(0), axis.coordinate(last)) == (axis.values[0], axis.values[-1]) == (axis.low, axis.high)
+    rounding = (
+        max(abs(axis.start), abs(axis.start + last * axis.step)) / axis.step + axis.nodes
+    )
+    assert (
+        (axis.coordinate(0), axis.coordinate(last))
+        == (axis.values[0], axis.values[-1])
+        == (axis.low, axis.high)
+    )
     assert axis.values.shape == (axis.nodes,)
     assert (np.diff(axis.values) > 0).all()
     assert axis.position(axis.low) == 0

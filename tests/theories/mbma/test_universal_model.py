@@ -25,7 +25,9 @@ def small():
 
 
 def largest(found, solved):
-    return np.maximum(np.abs(found.phi_F / solved.phi_F - 1), np.abs(found.phi_A / solved.phi_A - 1))
+    return np.maximum(
+        np.abs(found.phi_F / solved.phi_F - 1), np.abs(found.phi_A / solved.phi_A - 1)
+    )
 
 
 def error_and_bound(model, X, mu):
@@ -41,7 +43,10 @@ def test_the_smallest_mu_and_the_rigid_limit():
     mu = 10 ** rng.uniform(-30, -8, 300)
     error, bound = error_and_bound(model, X, mu)
     assert (error <= bound).all()
-    rigid, found = greenwood_tripp.rigid_sphere(X, np.full(300, 1e-200)), model.answer(X, np.full(300, 1e-200))
+    rigid, found = (
+        greenwood_tripp.rigid_sphere(X, np.full(300, 1e-200)),
+        model.answer(X, np.full(300, 1e-200)),
+    )
     assert (np.abs(np.stack(found[:2]) / rigid - 1) <= found.error).all()
     np.testing.assert_array_equal(model.answer(X, np.zeros(300)).phi_F, 0)
 
@@ -57,7 +62,10 @@ def test_edges_to_the_last_bit(small):
         with pytest.raises(OutOfRangeError, match=r"X must be in \[-2, 6\]"):
             small.answer(np.array([x]), inside)
     top = small.answer(inside, np.array([mu_axis.high]))
-    assert abs(top.phi_F[0] / greenwood_tripp.solve(1.0, mu_axis.high).phi_F - 1) <= top.error[0]
+    assert (
+        abs(top.phi_F[0] / greenwood_tripp.solve(1.0, mu_axis.high).phi_F - 1)
+        <= top.error[0]
+    )
     with pytest.raises(OutOfRangeError, match=r"mu must be in \[0, 100\]"):
         small.answer(inside, np.array([np.nextafter(mu_axis.high, np.inf)]))
 
@@ -72,11 +80,15 @@ def test_every_cell_answers_with_its_own_series_and_error(small):
             X, mu = X_low + share * (X_high - X_low), mu_low + share * (mu_high - mu_low)
             ratio = 2 * mu / mu_high - 1
             if mu_low > 0:
-                slope = (np.sqrt(mu_high) + np.sqrt(mu_low)) / (np.sqrt(mu_high) - np.sqrt(mu_low))
+                slope = (np.sqrt(mu_high) + np.sqrt(mu_low)) / (
+                    np.sqrt(mu_high) - np.sqrt(mu_low)
+                )
                 ratio = slope * (mu - middle) / (mu + middle)
             by_hand = chebval2d(2 * share - 1, ratio, content.coefficients[cell])
             found = small.answer(X, mu)
-            np.testing.assert_allclose([found.phi_F, found.phi_A], by_hand * [mu, 1], rtol=1e-13)
+            np.testing.assert_allclose(
+                [found.phi_F, found.phi_A], by_hand * [mu, 1], rtol=1e-13
+            )
             assert found.error == content.local_error[cell].max()
 
 
@@ -87,7 +99,12 @@ def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
     assert model.name == "island4d"
     # an opened table does not follow its file, and a replaced one is opened again
     content = small_table(ISLAND4D)
-    write_table(path, dataclasses.replace(content, attributes=content.attributes | {"history": "another"}))
+    write_table(
+        path,
+        dataclasses.replace(
+            content, attributes=content.attributes | {"history": "another"}
+        ),
+    )
     assert model.content.attributes["history"] != "another"
     assert open_table(path).content.attributes["history"] == "another"
 
@@ -133,7 +150,9 @@ def test_arguments_outside_are_marked():
     answer = universal_model().answer
     with pytest.raises(InputError, match="mu must be finite"):
         answer(0.0, math.nan)
-    with pytest.raises(OutOfRangeError, match=r"X must be in \[-6\.25, 41\], got 50 at \(1,\)"):
+    with pytest.raises(
+        OutOfRangeError, match=r"X must be in \[-6\.25, 41\], got 50 at \(1,\)"
+    ):
         answer([0.0, 50.0], 1.0)
     with pytest.raises(InputError, match="do not broadcast"):
         answer([0.0, 1.0], [1.0, 2.0, 3.0])
@@ -155,9 +174,16 @@ def test_shipped_tables_are_small_and_state_what_was_measured(kind):
     assert attributes["certificate_points"] >= 5000
     assert (table.local_error > 0).all()
     for number, function in enumerate("FA"):
-        typical, rare, largest = (attributes[f"{what}_error_{function}"] for what in ("median", "p99", "largest"))
+        typical, rare, largest = (
+            attributes[f"{what}_error_{function}"]
+            for what in ("median", "p99", "largest")
+        )
         assert 0 < typical <= rare <= largest <= LARGEST_ERROR[kind]
-        assert attributes[f"visited_largest_error_{function}"] <= largest <= table.local_error[..., number].max()
+        assert (
+            attributes[f"visited_largest_error_{function}"]
+            <= largest
+            <= table.local_error[..., number].max()
+        )
         assert kind == UNIVERSAL or attributes[f"visited_p99_error_{function}"] <= 3e-4
     # by the installed solver too
     assert (verdict.points, verdict.solver_error < 1e-11) == (64, True)

@@ -50,7 +50,9 @@ def test_content_that_does_not_fit_leaves_nothing(tmp_path):
     content = small_table(UNIVERSAL)
     conformance = content.conformance | {"tolerance": np.ones(5)}
     with pytest.raises(ValueError, match="incomplete conformance points"):
-        write_table(tmp_path / "table.nc", dataclasses.replace(content, conformance=conformance))
+        write_table(
+            tmp_path / "table.nc", dataclasses.replace(content, conformance=conformance)
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -59,9 +61,15 @@ PACKAGE = pathlib.Path(mbma_tables.__file__).parent
 
 def test_the_source_digest_is_that_of_the_files():
     assert set(MODULES[UNIVERSAL]) < set(MODULES[ISLAND4D])
-    python, c = ([name for name in MODULES[ISLAND4D] if ("/" in name) == is_c] for is_c in (False, True))
+    python, c = (
+        [name for name in MODULES[ISLAND4D] if ("/" in name) == is_c]
+        for is_c in (False, True)
+    )
     assert (*c, *python) == MODULES[ISLAND4D]
-    files = [PACKAGE.parent / path for path in (*c, *(f"{name.replace('.', '/')}.py" for name in python))]
+    files = [
+        PACKAGE.parent / path
+        for path in (*c, *(f"{name.replace('.', '/')}.py" for name in python))
+    ]
     joined = b"".join(file.read_bytes() for file in files)
     assert source_digest(MODULES[ISLAND4D]) == hashlib.sha256(joined).hexdigest()
     with pytest.raises(ModuleNotFoundError, match=r"mbma_tables\.nowhere"):
@@ -92,7 +100,12 @@ def test_the_difference_of_another_solver_is_measured(written, monkeypatch):
 
 @pytest.mark.parametrize(
     ("name", "who"),
-    [("table_F", "the table"), ("table_A", "the table"), ("exact_F", "exact solver"), ("exact_A", "exact solver")],
+    [
+        ("table_F", "the table"),
+        ("table_A", "the table"),
+        ("exact_F", "exact solver"),
+        ("exact_A", "exact solver"),
+    ],
 )
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_answer_beyond_its_tolerance_is_refused(kind, name, who, tmp_path):
@@ -103,7 +116,10 @@ def test_an_answer_beyond_its_tolerance_is_refused(kind, name, who, tmp_path):
 
     verify(write_table(tmp_path / "a.nc", with_points(kind, **{name: beyond(0.9)})))
     write_table(tmp_path / "a.nc", with_points(kind, **{name: beyond(1.2)}))
-    with pytest.raises(TableFileError, match=rf"a\.nc: the answers of .*{who} .*`python -m generate tables {kind}`"):
+    with pytest.raises(
+        TableFileError,
+        match=rf"a\.nc: the answers of .*{who} .*`python -m generate tables {kind}`",
+    ):
         verify(tmp_path / "a.nc")
 
 

@@ -22,7 +22,9 @@ def surface_of(family, number):
 
 @pytest.mark.parametrize("number", [2, 3])
 def test_gaussian_maps_are_valid(number):
-    found = contact(surface_of("gaussian", number), area=[0.01, 0.1, 0.5], theory="calibrated")
+    found = contact(
+        surface_of("gaussian", number), area=[0.01, 0.1, 0.5], theory="calibrated"
+    )
     assert found.valid.all()
     assert ((found.scatter > 0.02) & (found.scatter < 0.06)).all()
     assert ((found.area_scatter > 0.01) & (found.area_scatter < 0.03)).all()
@@ -30,14 +32,22 @@ def test_gaussian_maps_are_valid(number):
 
 @pytest.mark.parametrize(
     ("family", "number", "statistic"),
-    [("honed", 1, "skewness of heights"), ("ground", 1, "anisotropy"), ("milled", 3, "kurtosis of slopes")],
+    [
+        ("honed", 1, "skewness of heights"),
+        ("ground", 1, "anisotropy"),
+        ("milled", 3, "kurtosis of slopes"),
+    ],
 )
 def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
-    found = contact(surface_of(family, number), area=[0.01, 0.1, 0.5], theory="calibrated")
+    found = contact(
+        surface_of(family, number), area=[0.01, 0.1, 0.5], theory="calibrated"
+    )
     assert not found.valid.any()
     (reason,) = (text for text in found.reasons if text.startswith(statistic))
     assert reason.endswith("theory='simulated' simulates the map")
-    coarse = Surface.from_map(surface_of(family, number).map.heights[::2, ::2], 2.0, periodic=True)
+    coarse = Surface.from_map(
+        surface_of(family, number).map.heights[::2, ::2], 2.0, periodic=True
+    )
     remedy = "the map of Surface.from_map(..., short_cutoff=8.008)"
     assert any(text.endswith(remedy) for text in coarse.departures(by_map=True))
     assert (found.scatter > 0.13).all()
@@ -47,28 +57,48 @@ def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
 
 def test_nothing_is_stated_of_maps_unlike_all_that_were_pressed():
     ridges = np.repeat(heights(Part("gaussian", 0, 128))[:1], 128, axis=0)
-    found = contact(Surface.from_map(ridges, 1.0, periodic=True), area=0.1, theory="calibrated")
+    found = contact(
+        Surface.from_map(ridges, 1.0, periodic=True), area=0.1, theory="calibrated"
+    )
     assert not found.valid
     assert np.isnan([found.scatter, found.area_scatter, found.stiffness_scatter]).all()
 
 
 class TestCorrected:
-    @pytest.fixture(scope="class", params=[("pitted", 1, 128), ("ground", 0, 128)], ids=["pitted", "ground"])
+    @pytest.fixture(
+        scope="class",
+        params=[("pitted", 1, 128), ("ground", 0, 128)],
+        ids=["pitted", "ground"],
+    )
     @staticmethod
     def part(request):
         pytest.importorskip("tamaas")
         values = heights(Part(*request.param))
         surface = Surface.from_map(values, 1.0, periodic=True, unit="um")
-        engine, pressure = Contact(values, (128.0, 128.0)), law_loads(surface, (0.07, 0.14, 0.35, 0.55))
+        engine, pressure = (
+            Contact(values, (128.0, 128.0)),
+            law_loads(surface, (0.07, 0.14, 0.35, 0.55)),
+        )
         rows = [engine.press(float(each)) for each in pressure]
-        return surface, pressure, *np.array([(row["area"], row["mean_separation"]) for row in rows]).T
+        return (
+            surface,
+            pressure,
+            *np.array([(row["area"], row["mean_separation"]) for row in rows]).T,
+        )
 
     def test_it_is_nearer_than_the_law_and_within_its_scatter(self, part):
         surface, pressure, area, u = part
-        found, law = (contact(surface, pressure=pressure, theory=theory) for theory in ("corrected", "calibrated"))
+        found, law = (
+            contact(surface, pressure=pressure, theory=theory)
+            for theory in ("corrected", "calibrated")
+        )
         assert found.theory == "corrected"
         own, other = (
-            (np.log(one.area / area), (one.mean_separation - u) * found.stiffness / pressure) for one in (found, law)
+            (
+                np.log(one.area / area),
+                (one.mean_separation - u) * found.stiffness / pressure,
+            )
+            for one in (found, law)
         )
         assert np.square(own).mean() < np.square(other).mean()
         assert (np.abs(own) < 3 * np.array([found.area_scatter, found.scatter])).all()
@@ -80,7 +110,11 @@ class TestDefaultTheory:
 
     @staticmethod
     def surface(points=128, **options):
-        return Surface.from_map(heights(Part("milled", 1, points)), 1.0, **{"periodic": True, "unit": "um"} | options)
+        return Surface.from_map(
+            heights(Part("milled", 1, points)),
+            1.0,
+            **{"periodic": True, "unit": "um"} | options,
+        )
 
     def test_a_map_is_corrected(self):
         surface = self.surface()
@@ -96,11 +130,23 @@ class TestDefaultTheory:
         assert theory_name(surface, None, variant="printed") == "mbma"
 
     def test_small_unresolved_and_large_ones_and_spectra_are_calibrated(self):
-        values = np.random.default_rng(1).standard_normal((64, 64)), np.tile(heights(Part("milled", 1, 128)), (6, 6))
-        others = [self.surface(48), Surface.from_spectrum([0.1, 1.0], [1.0, 1e-3], h_max=3.0)]
-        for surface in others + [Surface.from_map(each, 1.0, periodic=True) for each in values]:
+        values = (
+            np.random.default_rng(1).standard_normal((64, 64)),
+            np.tile(heights(Part("milled", 1, 128)), (6, 6)),
+        )
+        others = [
+            self.surface(48),
+            Surface.from_spectrum([0.1, 1.0], [1.0, 1e-3], h_max=3.0),
+        ]
+        for surface in others + [
+            Surface.from_map(each, 1.0, periodic=True) for each in values
+        ]:
             assert contact(surface, area=0.1).theory == "calibrated"
-        noise = contact(Surface.from_map(0.1 * values[0], 1.0, periodic=True), area=0.1, theory="corrected")
+        noise = contact(
+            Surface.from_map(0.1 * values[0], 1.0, periodic=True),
+            area=0.1,
+            theory="corrected",
+        )
         assert not noise.valid
         assert any("sampling steps, fewer than 4" in reason for reason in noise.reasons)
 
@@ -109,7 +155,11 @@ class TestDefaultTheory:
         law = contact_law(wafer, E_star="70 GPa", hardness="12 GPa")
         pressure = np.array([0.01, 0.1, 0.5, 2.0, 8.0])
         truth = contact(wafer, pressure=pressure, E_star="70 GPa", hardness="12 GPa")
-        np.testing.assert_allclose(law.pressure(truth.mean_separation), pressure, rtol=law.error + truth.error.max())
+        np.testing.assert_allclose(
+            law.pressure(truth.mean_separation),
+            pressure,
+            rtol=law.error + truth.error.max(),
+        )
         assert law.error < 5e-5
 
 
@@ -122,18 +172,25 @@ def test_laws_of_maps_from_files(name):
     path, (force, area, u, _) = maps.path_of(name), read_rows()[name]
     if path is None:
         pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
-    by_force, by_gap = np.subtract(ratios(Calibrated(), Surface.from_map(path, **BARS[name]), force, area, u), 1)
+    by_force, by_gap = np.subtract(
+        ratios(Calibrated(), Surface.from_map(path, **BARS[name]), force, area, u), 1
+    )
     assert np.abs(by_gap[area >= 0.1]).max() < 0.10
     assert np.abs(by_gap[area >= 0.01]).max() < 0.30
     # of the force microscope's map 12% is not met below 0.9% contact
-    assert np.abs(by_force[area >= (0.002 if name == "al3d-1.al3d" else 0.009)]).max() < 0.12
+    assert (
+        np.abs(by_force[area >= (0.002 if name == "al3d-1.al3d" else 0.009)]).max() < 0.12
+    )
     assert np.abs(by_force[area >= 0.002]).max() < 0.21
     surface = Surface.from_map(path)
     for theory in ("calibrated", "mbma"):
         found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)
         assert found.pressure > 0
         assert found.area > 0
-    assert any("area depends on resolution" in entry.get("told", "") for entry in surface.provenance)
+    assert any(
+        "area depends on resolution" in entry.get("told", "")
+        for entry in surface.provenance
+    )
 
 
 @pytest.mark.slow
@@ -146,14 +203,20 @@ def test_held_out_maps_that_are_stretched_or_not_gaussian():
         if name.startswith("stretched"):
             assert np.abs(by_gap - 1).max() < 0.15, name
             # others with a lay as strong are off by more
-            assert not contact(surface, mean_separation=u, theory="calibrated").valid.any()
+            assert not contact(
+                surface, mean_separation=u, theory="calibrated"
+            ).valid.any()
         seen.add(name)
     assert len(seen) >= 18
 
 
 def test_no_answer_beyond_where_the_tops_and_valleys_of_a_map_leave_no_gap():
     surface = Surface.from_map("docs/data/maps/top-1.top", short_cutoff="9.4 nm")
-    for wanted in ({"area": [0.01, 0.3]}, {"mean_separation": [1.0, 0.0]}, {"pressure": [1e-3, 0.02]}):
+    for wanted in (
+        {"area": [0.01, 0.3]},
+        {"mean_separation": [1.0, 0.0]},
+        {"pressure": [1e-3, 0.02]},
+    ):
         with pytest.raises(OutOfRangeError) as refused:
             contact(surface, **wanted, theory="calibrated")
         assert refused.value.mask.tolist() == [False, True]
@@ -164,10 +227,16 @@ def test_no_answer_beyond_where_the_tops_and_valleys_of_a_map_leave_no_gap():
 
 
 def test_one_stiffness_over_a_range_of_forces_is_told():
-    surface = Surface.from_map("docs/data/maps/frt-2.frt", fill="harmonic", outliers=10, short_cutoff="0.8 mm")
+    surface = Surface.from_map(
+        "docs/data/maps/frt-2.frt", fill="harmonic", outliers=10, short_cutoff="0.8 mm"
+    )
     found = contact(surface, area=[0.01, 0.3, 0.6], theory="calibrated")
     assert found.stiffness[1] == pytest.approx(found.stiffness[2])
-    masks = [mask.tolist() for reason, mask in found.reasons.items() if "stiffness is constant" in reason]
+    masks = [
+        mask.tolist()
+        for reason, mask in found.reasons.items()
+        if "stiffness is constant" in reason
+    ]
     assert masks == [[False, True, True]]
     with pytest.raises(OutOfRangeError, match="separation vanishes"):
         contact(surface, pressure=0.1, theory="calibrated")
@@ -181,7 +250,9 @@ def spoilt(heights, seed):
     """The same blurred, with noise, tilted, with holes and a bad pixel; no longer periodic."""
     rng = np.random.default_rng(1000 + seed)
     x = np.arange(POINTS) / POINTS
-    found = gaussian_filter(heights, 0.6, mode="wrap") + 0.01 * rng.standard_normal(heights.shape)
+    found = gaussian_filter(heights, 0.6, mode="wrap") + 0.01 * rng.standard_normal(
+        heights.shape
+    )
     found += np.add.outer(rng.uniform(-20, 20) * x, rng.uniform(-20, 20) * x)
     found[rng.random(heights.shape) < 0.01] = np.nan
     for i, j in rng.integers(20, POINTS - 20, (3, 2)):
@@ -196,7 +267,11 @@ def spoilt(heights, seed):
 def test_a_spoilt_map_answers_as_the_clean_one(seed):
     # a periodic map with a roll-off at four waves a side, eight points along its shortest wave
     k = np.hypot(np.fft.fftfreq(POINTS, 1 / POINTS)[:, None], np.arange(POINTS // 2 + 1))
-    amplitude = np.where((k > 0) & (k <= 32), np.maximum(k, 4) ** (-1 - (0.5, 0.8, 0.6, 0.9, 0.7)[seed % 5]), 0)
+    amplitude = np.where(
+        (k > 0) & (k <= 32),
+        np.maximum(k, 4) ** (-1 - (0.5, 0.8, 0.6, 0.9, 0.7)[seed % 5]),
+        0,
+    )
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((POINTS, POINTS)))
     heights = np.fft.irfft2(amplitude * noise)
     heights /= heights.std()
@@ -206,6 +281,14 @@ def test_a_spoilt_map_answers_as_the_clean_one(seed):
     )
     assert 0.0195 < area[0] < 0.03
     assert area[-1] > 0.57
-    surface = Surface.from_map(spoilt(heights, seed), STEP, outliers=10, short_cutoff=8 * STEP * (1 - 1e-9))
-    np.testing.assert_allclose(contact(surface, pressure=force, theory="calibrated").area, area, rtol=0.10)
-    np.testing.assert_allclose(contact(surface, mean_separation=u, theory="calibrated").pressure, force, rtol=0.20)
+    surface = Surface.from_map(
+        spoilt(heights, seed), STEP, outliers=10, short_cutoff=8 * STEP * (1 - 1e-9)
+    )
+    np.testing.assert_allclose(
+        contact(surface, pressure=force, theory="calibrated").area, area, rtol=0.10
+    )
+    np.testing.assert_allclose(
+        contact(surface, mean_separation=u, theory="calibrated").pressure,
+        force,
+        rtol=0.20,
+    )

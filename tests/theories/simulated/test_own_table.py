@@ -44,14 +44,28 @@ def test_it_opens_without_the_map(surface, own):
     assert own.map is None
     for theory in (None, "calibrated"):
         found = contact(own, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory)
-        known = contact(surface, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory or "simulated")
+        known = contact(
+            surface, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory or "simulated"
+        )
         assert found.theory == known.theory
-        for name in ("pressure", "mean_separation", "stiffness", "energy", "scatter", "error", "valid"):
+        for name in (
+            "pressure",
+            "mean_separation",
+            "stiffness",
+            "energy",
+            "scatter",
+            "error",
+            "valid",
+        ):
             np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
-        np.testing.assert_array_equal([found.leakage.x, found.leakage.y], [known.leakage.x, known.leakage.y])
+        np.testing.assert_array_equal(
+            [found.leakage.x, found.leakage.y], [known.leakage.x, known.leakage.y]
+        )
     hard = {"pressure": 0.005, "hardness": 0.05}
     # a law of hardness without the map, simulated with it
-    assert contact(own, **hard).yielded == pytest.approx(contact(surface, **hard, theory="simulated").yielded, abs=0.1)
+    assert contact(own, **hard).yielded == pytest.approx(
+        contact(surface, **hard, theory="simulated").yielded, abs=0.1
+    )
     assert own.provenance[0]["points"] == [64, 64]
     with pytest.raises(InputError, match="this surface has none"):
         contact(own, area=0.1, theory="corrected")
@@ -66,21 +80,40 @@ def test_laws_scenes_and_other_units(surface, own):
     one = contact(own, pressure=0.01)
     assert moved.mean_separation == pytest.approx(1e-3 * one.mean_separation)
     np.testing.assert_allclose(moved.leakage.K, 1e-9 * one.leakage.K)
-    # all lengths twice as large, along the plane and across: nothing changes but these; heights alone: slopes
+    # all lengths twice as large, along the plane and across: nothing changes but these;
+    # heights alone: slopes
     steep = contact(own.resized(2.0, 1.0), pressure=0.02)
-    assert (steep.area, steep.energy) == (pytest.approx(one.area), pytest.approx(4 * one.energy))
-    assert contact(own.between(float(own.q0), float(own.q1) / 1.5), pressure=0.01).theory == "calibrated"
+    assert (steep.area, steep.energy) == (
+        pytest.approx(one.area),
+        pytest.approx(4 * one.energy),
+    )
+    assert (
+        contact(own.between(float(own.q0), float(own.q1) / 1.5), pressure=0.01).theory
+        == "calibrated"
+    )
     assert sensitivity(own, pressure=0.01).slopes["heights"]["area"] < -0.5
 
 
 def test_damaged_edited_and_other_files_are_refused(file, tmp_path):
     content, bad = file.read_bytes(), tmp_path / "bad.nc"
-    for broken in (content[:-10], content[:2000], content[:3000] + b"x" + content[3001:], b""):
+    for broken in (
+        content[:-10],
+        content[:2000],
+        content[:3000] + b"x" + content[3001:],
+        b"",
+    ):
         bad.write_bytes(broken)
         with pytest.raises(TableFileError, match="mbma fit MAP --simulate --out"):
             BoundaryElements.from_netcdf(bad)
-    sealed = edited(tmp_path / "edited.nc", content, lambda dataset: dataset["pressure"].__setitem__(0, 1e-9))
-    for path, match in ((sealed, "do not match their hash"), ("tables/universal.nc", "not a simulated_map")):
+    sealed = edited(
+        tmp_path / "edited.nc",
+        content,
+        lambda dataset: dataset["pressure"].__setitem__(0, 1e-9),
+    )
+    for path, match in (
+        (sealed, "do not match their hash"),
+        ("tables/universal.nc", "not a simulated_map"),
+    ):
         with pytest.raises(TableFileError, match=match):
             BoundaryElements.from_netcdf(path)
 
@@ -88,7 +121,10 @@ def test_damaged_edited_and_other_files_are_refused(file, tmp_path):
 def test_info_and_verify(file, tmp_path):
     with netCDF4.Dataset(file) as dataset:
         assert "SHA-256" in dataset.source
-        assert all(variable.long_name and variable.units for variable in dataset.variables.values())
+        assert all(
+            variable.long_name and variable.units
+            for variable in dataset.variables.values()
+        )
         assert (dataset["mean_separation"].units, dataset["C"].units) == ("um", "um^4")
     table = json.loads(run("tables", "info", file, "--json"))
     assert table["attributes"]["mbma_kind"] == "simulated_map"
@@ -117,8 +153,12 @@ def test_exports_have_the_leakage_along_an_axis(file, own, tmp_path):
     rows = rows[np.isfinite(rows).all(axis=1)]
     known = contact(own, pressure=rows[5, 0], E_star=1.0).leakage.along(30.0)
     assert rows[5, 1] == pytest.approx(known, rel=0.02)
-    assert "must be 'x', 'y' or degrees" in refused("export", "csv", *words, "z", "--out", tmp_path / "no.csv")
-    assert "add --leakage" in refused("export", "csv", *words[:4], "--direction", "x", "--out", tmp_path / "no.csv")
+    assert "must be 'x', 'y' or degrees" in refused(
+        "export", "csv", *words, "z", "--out", tmp_path / "no.csv"
+    )
+    assert "add --leakage" in refused(
+        "export", "csv", *words[:4], "--direction", "x", "--out", tmp_path / "no.csv"
+    )
 
 
 def test_on_the_command_line(tmp_path):
@@ -127,12 +167,18 @@ def test_on_the_command_line(tmp_path):
     words = ("--dx", "1um", "--periodic", "--E-star", "1GPa", "--simulate")
     said = run("fit", tmp_path / "map.npy", *words, "--out", table)
     assert f"{table} has the simulation" in said
-    found = json.loads(run("contact", "--map", table, "--E-star", "1GPa", "-p", "5MPa", "--json"))
+    found = json.loads(
+        run("contact", "--map", table, "--E-star", "1GPa", "-p", "5MPa", "--json")
+    )
     assert found["theory"] == "simulated"
     own = BoundaryElements.from_netcdf(table).surface
-    assert found["columns"]["area"] == pytest.approx(contact(own, pressure="5 MPa", E_star="1 GPa").area)
+    assert found["columns"]["area"] == pytest.approx(
+        contact(own, pressure="5 MPa", E_star="1 GPa").area
+    )
     assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
-    assert "leave dx out" in refused("contact", "--map", table, "--dx", "1um", "-a", "0.1")
+    assert "leave dx out" in refused(
+        "contact", "--map", table, "--dx", "1um", "-a", "0.1"
+    )
     assert "not the map" in refused("fit", table)
 
 
@@ -153,8 +199,13 @@ class TestBeyondTheLoads:
         assert np.isnan(found.scatter).tolist() == [True, False, True]
         assert (np.diff(found.area) > 0).all()
         # in proportion
-        assert found.area[0] / found.pressure[0] == pytest.approx(contact(own, pressure=1e-9).area / 1e-9, rel=1e-6)
-        for given, match in (({"pressure": 1e3}, "less: the mean separation vanishes"), ({"area": 1.0}, "less than 1")):
+        assert found.area[0] / found.pressure[0] == pytest.approx(
+            contact(own, pressure=1e-9).area / 1e-9, rel=1e-6
+        )
+        for given, match in (
+            ({"pressure": 1e3}, "less: the mean separation vanishes"),
+            ({"area": 1.0}, "less than 1"),
+        ):
             with pytest.raises(InputError, match=match):
                 contact(own, **given)
 
@@ -171,13 +222,21 @@ class TestBeyondTheLoads:
         np.testing.assert_allclose(curve.stiffness(x), 0.3 * (2 - light) ** 2, rtol=3e-3)
         np.testing.assert_allclose(curve.energy(x), 0.1 * (2 - light) ** 4 / 4, rtol=3e-3)
         for heavy in (np.log([0.3, 1.0]), x):
-            np.testing.assert_allclose(curve.area(heavy), erf(0.2 * np.exp(heavy)), rtol=1e-6)
-            np.testing.assert_allclose(curve.log_force_at(curve.area(heavy)), heavy, atol=1e-9)
-            np.testing.assert_allclose(curve.log_force(curve.separation(heavy)), heavy, atol=1e-9)
+            np.testing.assert_allclose(
+                curve.area(heavy), erf(0.2 * np.exp(heavy)), rtol=1e-6
+            )
+            np.testing.assert_allclose(
+                curve.log_force_at(curve.area(heavy)), heavy, atol=1e-9
+            )
+            np.testing.assert_allclose(
+                curve.log_force(curve.separation(heavy)), heavy, atol=1e-9
+            )
         # -du/dF and the work of pressing on, by differences
         step = np.log(0.3) + np.array([-1e-5, 1e-5])
         u, energy = curve.separation(step), curve.energy(step)
-        assert curve.stiffness(np.log(0.3)) == pytest.approx(np.diff(np.exp(step))[0] / -np.diff(u)[0], rel=1e-6)
+        assert curve.stiffness(np.log(0.3)) == pytest.approx(
+            np.diff(np.exp(step))[0] / -np.diff(u)[0], rel=1e-6
+        )
         assert np.diff(energy)[0] == pytest.approx(-0.3 * np.diff(u)[0], rel=1e-6)
 
 
@@ -190,7 +249,9 @@ class TestCache:
     @staticmethod
     def pressed(times=1.0, unit="um"):
         values = times * heights(Part("milled", 1, 64))
-        return BoundaryElements.of(Surface.from_map(values, times, periodic=True, unit=unit))
+        return BoundaryElements.of(
+            Surface.from_map(values, times, periodic=True, unit=unit)
+        )
 
     def test_a_second_process_simulates_nothing(self, place, monkeypatch):
         first = self.pressed()
@@ -200,7 +261,9 @@ class TestCache:
         for again in (self.pressed(), self.pressed(1e-3, "mm")):
             np.testing.assert_allclose(again.rows[:2], first.rows[:2], rtol=1e-9)
         np.testing.assert_array_equal(self.pressed().flows[1], flows[1])
-        np.testing.assert_allclose(self.pressed(1e-3, "mm").flows[1], 1e-9 * flows[1], rtol=1e-6)
+        np.testing.assert_allclose(
+            self.pressed(1e-3, "mm").flows[1], 1e-9 * flows[1], rtol=1e-6
+        )
 
     def test_it_goes_on_where_it_was_interrupted(self, place, monkeypatch):
         real, calls = pressing.Contact, []
@@ -238,7 +301,15 @@ class TestCache:
 
     def test_files_of_others_in_its_folder_are_neither_counted_nor_removed(self, place):
         place.mkdir()
-        of_others = [place / name for name in ("measurement.npz", f"{'0' * 64}.npz", "notes.txt", "cache.npz.draft")]
+        of_others = [
+            place / name
+            for name in (
+                "measurement.npz",
+                f"{'0' * 64}.npz",
+                "notes.txt",
+                "cache.npz.draft",
+            )
+        ]
         for path in of_others:
             path.write_bytes(b"of a user")
         cache.keep("own", values=np.zeros(10))
@@ -265,7 +336,9 @@ class TestCache:
         np.testing.assert_array_equal(cache.load("own", row=(7,))["row"], np.arange(7.0))
         assert cache.load("own", other=(7,)) is None
 
-    def test_the_command_and_it_may_be_off_or_impossible(self, place, monkeypatch, tmp_path):
+    def test_the_command_and_it_may_be_off_or_impossible(
+        self, place, monkeypatch, tmp_path
+    ):
         cache.keep("one", values=np.zeros(10))
         assert f"{place}: 1 files" in run("cache")
         cleared = {"folder": str(place), "files": 0, "bytes": 0, "removed": 1}
@@ -287,7 +360,9 @@ class TestLargeMaps:
         monkeypatch.setattr(own_map, "MOST_POINTS", 32 * 32)
 
     def test_finely_sampled_ones_lose_nothing(self):
-        part = Part("gaussian", 2, 64)  # eight sampling steps along the shortest wavelength
+        part = Part(
+            "gaussian", 2, 64
+        )  # eight sampling steps along the shortest wavelength
         own = BoundaryElements.of(Surface.from_map(heights(part), 1.0, periodic=True))
         assert own.pressed.heights.shape == (32, 32)
         assert own.points == pytest.approx(4.0, rel=0.05)
@@ -295,19 +370,28 @@ class TestLargeMaps:
         assert found.valid
         own_map.MOST_POINTS = 64 * 64
         full = BoundaryElements.of(own.surface)
-        assert found.pressure == pytest.approx(contact(own.surface, area=0.2, theory=full).pressure, rel=0.05)
+        assert found.pressure == pytest.approx(
+            contact(own.surface, area=0.2, theory=full).pressure, rel=0.05
+        )
 
     def test_others_are_cut_and_say_so(self, tmp_path):
-        surface = Surface.from_map(0.5 * heights(Part("gaussian", 0, 64)), 0.5, periodic=True, unit="um")
+        surface = Surface.from_map(
+            0.5 * heights(Part("gaussian", 0, 64)), 0.5, periodic=True, unit="um"
+        )
         own = BoundaryElements.of(surface)
         assert own.pressed.left_out == 4.0
         found = contact(surface, area=0.2, theory=own)
         assert not found.valid
-        assert next(iter(found.reasons)) == "wavelengths below 4 were left out, since the map has too many points"
+        assert (
+            next(iter(found.reasons))
+            == "wavelengths below 4 were left out, since the map has too many points"
+        )
         own.to_netcdf(tmp_path / "own.nc")
         again = BoundaryElements.from_netcdf(tmp_path / "own.nc")
         assert again.pressed.left_out == 4.0
-        assert BoundaryElements.of(again.surface.to("nm")).pressed.left_out == pytest.approx(4000.0)
+        assert BoundaryElements.of(
+            again.surface.to("nm")
+        ).pressed.left_out == pytest.approx(4000.0)
 
 
 def test_a_solver_that_fails_is_no_crash(monkeypatch):

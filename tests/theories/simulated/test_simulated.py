@@ -49,7 +49,9 @@ def test_force_is_the_energys_slope(truth, name):
     force = contact(truth.surface, mean_separation=fine, theory=name).pressure
     assert (np.diff(force) < 0).all()
     work = np.sum((force[1:] + force[:-1]) / 2 * np.diff(fine))
-    assert work == pytest.approx(energy[-1] - energy[0], rel=0.01 if name == "simulated" else 0.02)
+    assert work == pytest.approx(
+        energy[-1] - energy[0], rel=0.01 if name == "simulated" else 0.02
+    )
     np.testing.assert_allclose(theory.energy(truth.surface, u), energy, rtol=1e-9)
     assert contact(truth.surface, area=0.1, theory=name).leakage.x > 0
 
@@ -60,15 +62,25 @@ def test_what_was_not_simulated_is_refused(truth):
         (plain, 1.0, truth, "is for that map only"),
         (plain, 1.0, "simulated", r"make it by Surface\.from_map"),
     ):
-        with pytest.raises(OutOfRangeError if theory is truth else InputError, match=match):
+        with pytest.raises(
+            OutOfRangeError if theory is truth else InputError, match=match
+        ):
             contact(surface, mean_separation=u, theory=theory)
 
 
 @pytest.mark.parametrize(
-    ("row", "changed"), [(1, [0.0, 0.1, 0.2, 0.3]), (1, [0.2, 0.1, 0.2, 0.3]), (2, [4.0, 3.0, 3.0, 1.0])]
+    ("row", "changed"),
+    [(1, [0.0, 0.1, 0.2, 0.3]), (1, [0.2, 0.1, 0.2, 0.3]), (2, [4.0, 3.0, 3.0, 1.0])],
 )
 def test_rows_that_make_no_law(truth, row, changed):
-    rows = np.array([[1e-3, 0.01, 0.02, 0.1], [0.01, 0.02, 0.1, 0.2], [0.04, 0.03, 0.02, 0.01], [1.0, 2.0, 3.0, 4.0]])
+    rows = np.array(
+        [
+            [1e-3, 0.01, 0.02, 0.1],
+            [0.01, 0.02, 0.1, 0.2],
+            [0.04, 0.03, 0.02, 0.01],
+            [1.0, 2.0, 3.0, 4.0],
+        ]
+    )
     rows[2] *= truth.surface.h_max
     BoundaryElements(truth.surface, rows, 4.0, truth.pressed, "")
     rows[row] = changed
@@ -77,12 +89,18 @@ def test_rows_that_make_no_law(truth, row, changed):
 
 
 class TestOfASurface:
-    @pytest.fixture(scope="class", params=[("honed", 0), ("milled", 2)], ids=["honed", "milled"])
+    @pytest.fixture(
+        scope="class", params=[("honed", 0), ("milled", 2)], ids=["honed", "milled"]
+    )
     @staticmethod
     def part(request):
         part = Part(*request.param, 128)
         values = makers.heights(part)
-        return values, Surface.from_map(values, 1.0, periodic=True, unit="um"), part.shortest
+        return (
+            values,
+            Surface.from_map(values, 1.0, periodic=True, unit="um"),
+            part.shortest,
+        )
 
     @pytest.fixture(scope="class")
     @staticmethod
@@ -93,7 +111,9 @@ class TestOfASurface:
             found = engine.press(float(force))
             flows.append(flow_conductance(engine.gap, (128.0, 128.0)))
             further = engine.press(float(1.03 * force))["mean_separation"]
-            rows.append((force, found["area"], found["mean_separation"], 0.03 * force, further))
+            rows.append(
+                (force, found["area"], found["mean_separation"], 0.03 * force, further)
+            )
         return np.array(rows).T, np.array(flows).T
 
     def test_it_is_the_full_simulation_between_its_loads(self, part, exact):
@@ -101,9 +121,13 @@ class TestOfASurface:
         found = contact(part[1], pressure=force, theory="simulated")
         np.testing.assert_allclose(found.area, area, rtol=0.03)
         steep = more / (u - further)
-        np.testing.assert_array_less(np.abs(found.mean_separation - u) * steep / force, 0.02)
+        np.testing.assert_array_less(
+            np.abs(found.mean_separation - u) * steep / force, 0.02
+        )
         beside = contact(part[1], pressure=force + more, theory="simulated")
-        np.testing.assert_allclose(more / (found.mean_separation - beside.mean_separation), steep, rtol=0.05)
+        np.testing.assert_allclose(
+            more / (found.mean_separation - beside.mean_separation), steep, rtol=0.05
+        )
         assert found.valid.all()
         assert found.theory == "simulated"
         for scatter in (found.scatter, found.area_scatter, found.stiffness_scatter):
@@ -133,13 +157,21 @@ class TestOfASurface:
             own, direct = law.leakage.along(axis), getattr(point.leakage, axis)
             assert own(pressure="5 MPa") == pytest.approx(direct, rel=0.02)
             u = np.linspace(0.02, 1, 300) * law.h_max
-            true = getattr(contact(surface, mean_separation=u, theory="simulated").leakage, axis)
-            np.testing.assert_allclose(own(u), true, rtol=2 * own.error, atol=1e-6 * true.max())
+            true = getattr(
+                contact(surface, mean_separation=u, theory="simulated").leakage, axis
+            )
+            np.testing.assert_allclose(
+                own(u), true, rtol=2 * own.error, atol=1e-6 * true.max()
+            )
             assert (own(u)[u < own.blocked_at] == 0).all()
-        assert law.leakage.along(30.0)(pressure="5 MPa") == pytest.approx(point.leakage.along(30.0), rel=0.02)
+        assert law.leakage.along(30.0)(pressure="5 MPa") == pytest.approx(
+            point.leakage.along(30.0), rel=0.02
+        )
         assert law.leakage(pressure="5 MPa") == pytest.approx(point.leakage.K, rel=0.02)
         other = contact(surface.to("mm"), pressure=0.005, theory="simulated")
-        assert other.mean_separation == pytest.approx(1e-3 * point.mean_separation, rel=1e-3)
+        assert other.mean_separation == pytest.approx(
+            1e-3 * point.mean_separation, rel=1e-3
+        )
         with pytest.raises(InputError, match="this surface has none"):
             contact(surface.combined(surface), pressure=0.01, theory="simulated")
 
@@ -152,21 +184,32 @@ def test_the_energy_gives_a_knot_between_two_loads():
     cubic = np.polynomial.Polynomial([0.4, -0.25, 0.03, 0.001])
     rows[2] = cubic(x)
     # the integral of u dF from zero is exp(x) (u - u' + u'' - u''')
-    work = np.exp(x) * sum((-1) ** n * cubic.deriv(n)(x) if n else cubic(x) for n in range(4))
+    work = np.exp(x) * sum(
+        (-1) ** n * cubic.deriv(n)(x) if n else cubic(x) for n in range(4)
+    )
     rows[3] = work - rows[0] * rows[2]
     curve = LoadCurve(rows, 2 * rows[2, 0])
     between = np.linspace(x[0], x[-1], 50)
     np.testing.assert_allclose(curve.separation(between), cubic(between), rtol=1e-9)
-    np.testing.assert_allclose(curve.stiffness(between), -np.exp(between) / cubic.deriv()(between), rtol=1e-8)
+    np.testing.assert_allclose(
+        curve.stiffness(between), -np.exp(between) / cubic.deriv()(between), rtol=1e-8
+    )
     np.testing.assert_allclose(curve.area(between), erf(np.exp(between) * 1.3), rtol=1e-9)
     np.testing.assert_allclose(curve.log_force(cubic(between)), between, atol=1e-10)
-    exact = np.exp(between) * sum((-1) ** n * cubic.deriv(n)(between) if n else 0 for n in range(4))
+    exact = np.exp(between) * sum(
+        (-1) ** n * cubic.deriv(n)(between) if n else 0 for n in range(4)
+    )
     np.testing.assert_allclose(curve.energy(between), exact, rtol=1e-9)
 
 
 def test_loads_far_apart_keep_the_curves_monotone():
     rows = np.array(
-        [[1e-4, 0.01, 0.5, 1.0], [0.001, 0.5, 0.51, 0.99], [3.0, 0.02, 0.019, 0.001], [1e-5, 0.01, 0.02, 1.0]]
+        [
+            [1e-4, 0.01, 0.5, 1.0],
+            [0.001, 0.5, 0.51, 0.99],
+            [3.0, 0.02, 0.019, 0.001],
+            [1e-5, 0.01, 0.02, 1.0],
+        ]
     )
     curve = LoadCurve(rows, 4.0)
     x = np.linspace(*np.log(rows[0, [0, -1]]), 500)
@@ -186,7 +229,11 @@ def worn_track(points=64):
 
 
 @pytest.mark.parametrize("name", ["simulated", "corrected"])
-@pytest.mark.parametrize("values", [worn_track(), makers.heights(Part("etched", 1, 64))], ids=["track", "etched"])
+@pytest.mark.parametrize(
+    "values",
+    [worn_track(), makers.heights(Part("etched", 1, 64))],
+    ids=["track", "etched"],
+)
 def test_areas_of_neighbouring_loads_differ_little(name, values):
     surface = Surface.from_map(values, 1.0, periodic=True)
     theory = of_map(name, surface)
@@ -194,7 +241,9 @@ def test_areas_of_neighbouring_loads_differ_little(name, values):
     tested = (area[1:] > 1e-3) & (area[:-1] < 0.9) & (np.diff(np.log(force)) > 0.2)
     assert (area[1:] / area[:-1])[tested].max() <= 2.5
     # and between them the scatter covers
-    between = np.exp((np.log(force[1:]) + np.log(force[:-1])) / 2)[(area[1:] > 0.02) & (area[:-1] < 0.6)]
+    between = np.exp((np.log(force[1:]) + np.log(force[:-1])) / 2)[
+        (area[1:] > 0.02) & (area[:-1] < 0.6)
+    ]
     engine = OwnContact(values, values.shape, 1e-6)
     simulated = np.array([engine.press(load)["area"] for load in between.tolist()])
     found = contact(surface, pressure=between, theory=name)
@@ -204,7 +253,10 @@ def test_areas_of_neighbouring_loads_differ_little(name, values):
 
 def test_the_grids_own_error_is_in_the_scatter_of_the_area():
     part = Part("gaussian", 0, 64)
-    coarse, fine = (Surface.from_map(makers.heights(Part("gaussian", k, 64)), 1.0, periodic=True) for k in (0, 2))
+    coarse, fine = (
+        Surface.from_map(makers.heights(Part("gaussian", k, 64)), 1.0, periodic=True)
+        for k in (0, 2)
+    )
     for surface, points in ((coarse, part.shortest), (fine, 8.0)):
         found = contact(surface, area=0.4, theory="simulated")
         assert found.area_scatter > 0.012 * (4 / points) ** 2 * 0.9
@@ -214,7 +266,10 @@ def test_the_grids_own_error_is_in_the_scatter_of_the_area():
 def test_leakage_of_the_quick_simulation_is_that_of_the_full_one(family):
     surface = Surface.from_map(makers.heights(Part(family, 1, 64)), 1.0, periodic=True)
     pressure = contact(surface, area=[0.008, 0.015, 0.05], theory="simulated").pressure
-    quick, full = (contact(surface, pressure=pressure, theory=name).leakage for name in ("corrected", "simulated"))
+    quick, full = (
+        contact(surface, pressure=pressure, theory=name).leakage
+        for name in ("corrected", "simulated")
+    )
     np.testing.assert_allclose(quick.x, full.x, rtol=5e-3)
     np.testing.assert_allclose(quick.y, full.y, rtol=5e-3)
     np.testing.assert_array_equal(quick.valid, full.valid)
@@ -223,7 +278,12 @@ def test_leakage_of_the_quick_simulation_is_that_of_the_full_one(family):
 def test_a_curve_that_is_level_at_its_end_goes_on():
     # the monotone cubic through these loads is level at the last one
     rows = np.array(
-        [[1e-4, 0.01, 0.5, 1.0], [0.001, 0.5, 0.51, 0.99], [3.0, 0.02, 0.019, 0.0189], [1e-5, 0.01, 0.02, 1.0]]
+        [
+            [1e-4, 0.01, 0.5, 1.0],
+            [0.001, 0.5, 0.51, 0.99],
+            [3.0, 0.02, 0.019, 0.0189],
+            [1e-5, 0.01, 0.02, 1.0],
+        ]
     )
     curve = LoadCurve(rows, 4.0)
     u = np.array([3.0, 0.02, 0.0189, 0.01, 1e-4])
@@ -238,18 +298,34 @@ def test_a_hardness_is_simulated(eta):
     engine, rows = OwnContact(values, (128.0, 128.0), hardness=cap), []
     for force in pressure.tolist():
         row = engine.press(force)
-        rows.append((row["area"], row["mean_separation"], row["area_yielded"] / row["area"], engine.frozen_stiffness()))
+        rows.append(
+            (
+                row["area"],
+                row["mean_separation"],
+                row["area_yielded"] / row["area"],
+                engine.frozen_stiffness(),
+            )
+        )
     area, u, yielded, frozen = np.array(rows).T
-    found = contact(surface, pressure=[*pressure, pressure[1]], hardness=[cap, cap, cap, np.inf], theory="simulated")
+    found = contact(
+        surface,
+        pressure=[*pressure, pressure[1]],
+        hardness=[cap, cap, cap, np.inf],
+        theory="simulated",
+    )
     np.testing.assert_allclose(found.area[:3], area, rtol=0.03)
     np.testing.assert_allclose(found.mean_separation[:3], u, rtol=0.03)
     np.testing.assert_allclose(found.yielded[:3], yielded, atol=0.03)
     np.testing.assert_allclose(found.unloading_stiffness[:3], frozen, rtol=0.1)
     elastic = contact(surface, pressure=pressure[1], theory="simulated")
     assert (found.area[3], found.yielded[3]) == (pytest.approx(elastic.area), 0.0)
-    assert (found.leakage.K[0] < elastic.leakage.K) == (found.mean_separation[0] < elastic.mean_separation)
+    assert (found.leakage.K[0] < elastic.leakage.K) == (
+        found.mean_separation[0] < elastic.mean_separation
+    )
     # towards the hardness everywhere
-    heavy = contact(surface, pressure=cap * np.array([0.95, 0.999]), hardness=cap, theory="simulated")
+    heavy = contact(
+        surface, pressure=cap * np.array([0.95, 0.999]), hardness=cap, theory="simulated"
+    )
     assert (np.diff(heavy.area) > 0).all()
     assert heavy.area[1] == pytest.approx(1, abs=2e-3)
     law = contact_law(surface, theory="simulated", hardness=cap)
@@ -263,7 +339,9 @@ pytest.importorskip("tamaas")
 
 @pytest.fixture(scope="module")
 def honed():
-    return Surface.from_map(makers.heights(Part("honed", 1, 64)), 0.5, 1.0, periodic=True, unit="um")
+    return Surface.from_map(
+        makers.heights(Part("honed", 1, 64)), 0.5, 1.0, periodic=True, unit="um"
+    )
 
 
 def test_pressures_gaps_and_contact_fit_each_other(honed):
@@ -288,7 +366,9 @@ def test_a_map_that_is_not_periodic_is_cut_out_of_its_mirror_images():
     own = Surface.from_map(half, 1.0, detrend="mean")
     images = np.block([[half, half[:, ::-1]], [half[::-1], half[::-1, ::-1]]])
     whole = Surface.from_map(images, 1.0, periodic=True)
-    one, other = (contact(s, pressure=0.01, theory="simulated").map() for s in (own, whole))
+    one, other = (
+        contact(s, pressure=0.01, theory="simulated").map() for s in (own, whole)
+    )
     assert one.gap.shape == (40, 48)
     np.testing.assert_allclose(one.gap, other.gap[:40, :48], atol=1e-3 * one.gap.max())
 

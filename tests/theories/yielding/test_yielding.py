@@ -32,10 +32,16 @@ def test_each_stiffness_has_its_own_uncertainty(theory):
     """With a hardness the simulated stiffness is that of unloading; the slope of loading has no stated uncertainty."""
     numbers = {"area": 0.05, "E_star": MODULUS, "theory": theory}
     elastic = contact(SURFACE, **numbers)
-    assert elastic.unloading_stiffness_scatter == pytest.approx(elastic.stiffness_scatter, nan_ok=True)
+    assert elastic.unloading_stiffness_scatter == pytest.approx(
+        elastic.stiffness_scatter, nan_ok=True
+    )
     both = contact(SURFACE, **numbers, hardness=[np.inf, HARDNESS])
-    np.testing.assert_allclose(both.stiffness_scatter, [elastic.stiffness_scatter, np.nan], rtol=1e-12)
-    assert both.unloading_stiffness_scatter[0] == pytest.approx(elastic.stiffness_scatter, nan_ok=True)
+    np.testing.assert_allclose(
+        both.stiffness_scatter, [elastic.stiffness_scatter, np.nan], rtol=1e-12
+    )
+    assert both.unloading_stiffness_scatter[0] == pytest.approx(
+        elastic.stiffness_scatter, nan_ok=True
+    )
     if theory == "calibrated":
         # what the file of simulations states for the frozen contact
         own = contact(SURFACE, **numbers, hardness=HARDNESS)
@@ -49,7 +55,10 @@ def test_the_text_of_contacts_that_yield_names_first_loading():
     found = contact(SURFACE, **falling, hardness=HARDNESS)
     assert "loading first; each pressure is reached from no contact" in repr(found)
     assert (
-        found.mean_separation[1] == contact(SURFACE, **falling | {"pressure": 25.0}, hardness=HARDNESS).mean_separation
+        found.mean_separation[1]
+        == contact(
+            SURFACE, **falling | {"pressure": 25.0}, hardness=HARDNESS
+        ).mean_separation
     )
     assert "each pressure is reached" not in repr(contact(SURFACE, **falling))
 
@@ -59,25 +68,43 @@ def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
     u = [0.5, 1.9, 2.9]
     elastic = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory)
     for cap in (np.inf, [np.inf, np.inf, HARDNESS]):
-        found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
+        found = contact(
+            SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap
+        )
         for name in ("pressure", "area", "stiffness", "error", "unloading_stiffness"):
-            rel = (1e-8 if name == "error" else 1e-14) if theory == "mbma" and np.ndim(cap) else 0
-            assert getattr(found, name)[:2] == pytest.approx(getattr(elastic, name)[:2], rel=rel, abs=0), name
+            rel = (
+                (1e-8 if name == "error" else 1e-14)
+                if theory == "mbma" and np.ndim(cap)
+                else 0
+            )
+            assert getattr(found, name)[:2] == pytest.approx(
+                getattr(elastic, name)[:2], rel=rel, abs=0
+            ), name
         assert (found.yielded[:2] == 0).all()
         assert (np.broadcast_to(found.psi, 3)[:2] == 0).all()
 
 
 @each
 def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
-    pressure, known = np.array([1e-3, 1.0, 30.0, 300.0]), {"E_star": MODULUS, "theory": theory, "hardness": HARDNESS}
+    pressure, known = (
+        np.array([1e-3, 1.0, 30.0, 300.0]),
+        {"E_star": MODULUS, "theory": theory, "hardness": HARDNESS},
+    )
     found = contact(SURFACE, pressure=pressure, **known)
     assert found.pressure == pytest.approx(pressure, rel=1e-10)
     assert (found.area >= pressure / HARDNESS * (1 - 1e-10)).all()
     assert (found.mean_pressure <= HARDNESS * (1 + 1e-12)).all()
     step = 1e-5
-    near = [contact(SURFACE, mean_separation=found.mean_separation + way * step, **known).pressure for way in (-1, 1)]
+    near = [
+        contact(
+            SURFACE, mean_separation=found.mean_separation + way * step, **known
+        ).pressure
+        for way in (-1, 1)
+    ]
     kept = found.mean_separation < 3.0 - 100 * step
-    assert found.stiffness[kept] == pytest.approx(((near[0] - near[1]) / (2 * step))[kept], rel=1e-5)
+    assert found.stiffness[kept] == pytest.approx(
+        ((near[0] - near[1]) / (2 * step))[kept], rel=1e-5
+    )
     assert (found.unloading_stiffness > found.stiffness).all()
     assert (found.plane_separation <= found.mean_separation).all()
     with pytest.raises(InputError, match="gives back is not known"):
@@ -94,13 +121,21 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
     ],
 )
 def test_a_law_with_a_hardness_is_a_law(theory, rtol, surface, shares):
-    asked = {"theory": theory, "E_star": MODULUS, "hardness": HARDNESS if theory != "mbma" else 0.5 * MODULUS}
+    asked = {
+        "theory": theory,
+        "E_star": MODULUS,
+        "hardness": HARDNESS if theory != "mbma" else 0.5 * MODULUS,
+    }
     law, u = contact_law(surface, rtol=rtol, **asked), shares * surface.h_max
     found = contact(surface, mean_separation=u, **asked)
     for name in ("pressure", "area"):
-        np.testing.assert_allclose(getattr(law, name)(u), getattr(found, name), rtol=max(rtol, law.error))
+        np.testing.assert_allclose(
+            getattr(law, name)(u), getattr(found, name), rtol=max(rtol, law.error)
+        )
     # the first one may be where the law ends, beyond whose pressure rounding leads
-    assert law.at_pressure(found.pressure[1:]).mean_separation == pytest.approx(u[1:], rel=10 * law.error)
+    assert law.at_pressure(found.pressure[1:]).mean_separation == pytest.approx(
+        u[1:], rel=10 * law.error
+    )
     assert pickle.loads(pickle.dumps(law)).pressure(1.0) == law.pressure(1.0)
     if theory == "mbma":
         assert law.lowest == pytest.approx((2e-6 - 1) * surface.h_max)
@@ -111,7 +146,9 @@ def test_a_law_with_a_hardness_is_a_law(theory, rtol, surface, shares):
 @each
 @pytest.mark.parametrize("cap", [0.005, 0.05, 5.0])
 def test_many_pressures_on_one_surface(theory, cap):
-    share = 10 ** np.random.default_rng(4).uniform(-6, np.log10(min(0.5, 0.005 / cap)), MANY)
+    share = 10 ** np.random.default_rng(4).uniform(
+        -6, np.log10(min(0.5, 0.005 / cap)), MANY
+    )
     if theory == "calibrated":
         # beyond the gaps from which others start
         share = np.append(share, [1e-12, min(0.99, 0.1 / cap)])
@@ -128,7 +165,9 @@ def test_ten_thousand_contacts_keep_bounds_and_order():
     n = 10_000
     zeta = 10 ** rng.uniform(0.6, 4, n)
     surface = Surface(rng.uniform(0.1, 1, n), 1.0, zeta, 10 ** rng.uniform(-3, 0, n), 1.0)
-    surface = Surface(surface.hurst, 1.0, zeta, surface.h_rms, surface.h_rms * rng.uniform(2.5, 5.5, n))
+    surface = Surface(
+        surface.hurst, 1.0, zeta, surface.h_rms, surface.h_rms * rng.uniform(2.5, 5.5, n)
+    )
     eta = 10 ** rng.uniform(-4, 2, n) * surface.rms_gradient
     u = surface.h_max * rng.uniform(1e-3, 0.999, n)
     theory = get_theory("calibrated")
@@ -149,28 +188,49 @@ def test_ten_thousand_contacts_keep_bounds_and_order():
     elastic = theory.area_at(surface, answer.pressure)
     force, cap = answer.pressure / surface.rms_gradient, eta / surface.rms_gradient
     more = theory.area_at(surface, 1.01 * answer.pressure)
-    assert (hardness.area(np.minimum(1.01 * force, cap), more, cap) >= answer.area * (1 - 1e-12)).all()
+    assert (
+        hardness.area(np.minimum(1.01 * force, cap), more, cap)
+        >= answer.area * (1 - 1e-12)
+    ).all()
     harder = hardness.area(force, elastic, 1.05 * cap)
     assert (harder <= answer.area * (1 + 1e-12)).all()
-    assert (hardness.area(force, elastic, 1.05 * cap, yielded=True) <= yielded * (1 + 1e-12) + 1e-300).all()
+    assert (
+        hardness.area(force, elastic, 1.05 * cap, yielded=True)
+        <= yielded * (1 + 1e-12) + 1e-300
+    ).all()
 
 
 def test_batches_labels_and_units():
     caps = np.array([500.0, 1500.0, np.inf])
-    plain = contact(SURFACE, pressure=[[1.0], [30.0]], E_star=MODULUS, hardness=caps, theory="calibrated")
+    plain = contact(
+        SURFACE,
+        pressure=[[1.0], [30.0]],
+        E_star=MODULUS,
+        hardness=caps,
+        theory="calibrated",
+    )
     assert plain.area.shape == (2, 3)
-    one = contact(SURFACE, pressure=30.0, E_star=MODULUS, hardness=1500.0, theory="calibrated")
+    one = contact(
+        SURFACE, pressure=30.0, E_star=MODULUS, hardness=1500.0, theory="calibrated"
+    )
     assert plain.area[1, 1] == pytest.approx(one.area, rel=1e-12)
-    named = {"pressure": xr.DataArray([1.0, 30.0], dims="load"), "hardness": xr.DataArray(caps, dims="metal")}
+    named = {
+        "pressure": xr.DataArray([1.0, 30.0], dims="load"),
+        "hardness": xr.DataArray(caps, dims="metal"),
+    }
     labelled = contact(SURFACE, **named, E_star=MODULUS, theory="calibrated")
     for name in ("area", "yielded", "unloading_stiffness", "scatter", "psi", "valid"):
         own = getattr(labelled, name)
         assert set(own.dims) <= {"load", "metal"}
         expected = np.broadcast_to(getattr(plain, name), own.shape)
         # lighter contacts than those compared with simulations have no scatter
-        assert own.values == pytest.approx(expected, rel=1e-12, nan_ok=name == "scatter"), name
+        assert own.values == pytest.approx(
+            expected, rel=1e-12, nan_ok=name == "scatter"
+        ), name
     given = {"pressure": "30 MPa", "E_star": "100 GPa", "hardness": "1500 MPa"}
-    named = contact(Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um"), **given, theory="calibrated")
+    named = contact(
+        Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um"), **given, theory="calibrated"
+    )
     assert named.area == pytest.approx(one.area, rel=1e-12)
     assert named.units["unloading_stiffness"] == "GPa/um"
 
@@ -183,31 +243,55 @@ def test_a_map_yields_by_its_own_heights():
     u = np.maximum(level - (heights - heights.mean()), 0).mean()
     found = contact(surface, mean_separation=u, theory="calibrated", hardness=soft)
     assert found.area == pytest.approx(0.2, rel=0.03)
-    assert found.scatter < shipped_deviations().standard_deviation("calibrated", "pressure", found.area)
-    law = contact_law(surface, theory="calibrated", hardness=0.3 * float(surface.rms_gradient), rtol=1e-3)
+    assert found.scatter < shipped_deviations().standard_deviation(
+        "calibrated", "pressure", found.area
+    )
+    law = contact_law(
+        surface,
+        theory="calibrated",
+        hardness=0.3 * float(surface.rms_gradient),
+        rtol=1e-3,
+    )
     assert law.turning_point is None
 
 
 test_what_cannot_be_asked = refusals(
-    lambda asked: contact(SURFACE, **({"E_star": MODULUS, "hardness": HARDNESS, "theory": "calibrated"} | asked)),
+    lambda asked: contact(
+        SURFACE,
+        **({"E_star": MODULUS, "hardness": HARDNESS, "theory": "calibrated"} | asked),
+    ),
     ({"pressure": 2000.0}, "pressure must be at most the hardness, 1500, got 2000"),
-    ({"pressure": "2 GPa", "E_star": "100 GPa", "hardness": "1.5 GPa"}, r"pressure \[GPa\] .* 1.5, got 2"),
+    (
+        {"pressure": "2 GPa", "E_star": "100 GPa", "hardness": "1.5 GPa"},
+        r"pressure \[GPa\] .* 1.5, got 2",
+    ),
     ({"pressure": 1.0, "hardness": 0.0}, "hardness must be positive, or infinite"),
     ({"pressure": 1.0, "hardness": np.nan}, "hardness must be finite"),
     ({"pressure": 1.0, "hardness": "hard"}, "hardness must be a number"),
-    ({"pressure": 1.0, "hardness": [1.0, 2.0, 3.0], "E_star": [1.0, 2.0]}, "do not broadcast"),
+    (
+        {"pressure": 1.0, "hardness": [1.0, 2.0, 3.0], "E_star": [1.0, 2.0]},
+        "do not broadcast",
+    ),
 )
 
 
 def test_scatter_of_any_theory():
     area, soft = np.array([0.02, 0.2]), 0.05 * float(SURFACE.rms_gradient)
     for theory in map(get_theory, ("mbma", "persson", "greenwood_williamson")):
-        each = theory, Yielding(theory, soft), Yielding(get_theory("calibrated"), soft), Yielding(theory, 50 * soft)
+        each = (
+            theory,
+            Yielding(theory, soft),
+            Yielding(get_theory("calibrated"), soft),
+            Yielding(theory, 50 * soft),
+        )
         known, found, own, hard = (
-            np.array([one.scatter(SURFACE, what, area) for what in ("pressure", "area")]) for one in each
+            np.array([one.scatter(SURFACE, what, area) for what in ("pressure", "area")])
+            for one in each
         )
         assert (np.isfinite(found) == np.isfinite(known)).all()
-        assert (found < known)[np.isfinite(known)].all()  # the area of a soft contact is F/p_m by any theory
+        assert (found < known)[
+            np.isfinite(known)
+        ].all()  # the area of a soft contact is F/p_m by any theory
         assert (found[1] < 2 * own[1])[np.isfinite(known[1])].all()
         np.testing.assert_array_equal(hard, known)
 
@@ -215,23 +299,33 @@ def test_scatter_of_any_theory():
 def test_reasons_and_what_elastic_answers_say():
     known = {"E_star": MODULUS, "theory": "calibrated"}
     found = contact(SURFACE, pressure=[1.0, 2.0], hardness=[30.0, 3000.0], **known)
-    masks = [mask.tolist() for reason, mask in found.reasons.items() if "hardness over E*" in reason]
+    masks = [
+        mask.tolist()
+        for reason, mask in found.reasons.items()
+        if "hardness over E*" in reason
+    ]
     assert masks == [[True, False]]
     elastic = contact(SURFACE, pressure=30.0, **known)
-    limit = contact(SURFACE, pressure=30.0, hardness=float(elastic.elastic_hardness), **known)
+    limit = contact(
+        SURFACE, pressure=30.0, hardness=float(elastic.elastic_hardness), **known
+    )
     assert limit.area == pytest.approx(elastic.area, rel=0.05)
     assert limit.psi == pytest.approx(1.1)
     # rms gradient 0.054: E* g/2 is 2.7 GPa
     for pressure, told in ((2.0, False), (4.0, True)):
         found = contact(SURFACE, pressure=pressure, E_star="100 GPa", theory="calibrated")
         assert ("above E* g/2 = 2.7" in repr(found)) is told
-    found = contact(SURFACE, area=[0.1, 0.3, 0.5], hardness=[HARDNESS, np.inf, 50.0], **known)
+    found = contact(
+        SURFACE, area=[0.1, 0.3, 0.5], hardness=[HARDNESS, np.inf, 50.0], **known
+    )
     assert found.area == pytest.approx([0.1, 0.3, 0.5], rel=1e-10)
     # asperities that lie on one another have areas above one
     asked = {"mean_separation": 0.01, "theory": "greenwood_williamson"}
     elastic = contact(SURFACE, **asked)
     assert elastic.area > 1
-    assert contact(SURFACE, hardness=[1e3, 1e200], **asked).area == pytest.approx([elastic.area] * 2, rel=1e-12)
+    assert contact(SURFACE, hardness=[1e3, 1e200], **asked).area == pytest.approx(
+        [elastic.area] * 2, rel=1e-12
+    )
     found = contact(SURFACE, separation=0.5, variant="printed", hardness=0.02)
     assert (found.variant, found.island_model) == ("printed", "universal")
 
@@ -242,7 +336,9 @@ def test_hardnesses_of_any_size(theory, cap):
     # of next to none the bearing curve, of a huge one the elastic contact
     u = np.array([0.3, 1.0, 1.5, 2.9 if cap > 1e-310 else 2.0])
     elastic = contact(SURFACE, mean_separation=u, theory=theory)
-    share = hardness.bearing_share(u, 3.0 if get_theory(theory).ends_at_h_max else None)[0]
+    share = hardness.bearing_share(u, 3.0 if get_theory(theory).ends_at_h_max else None)[
+        0
+    ]
     pressure, area = (cap * share, share) if cap < 1 else (elastic.pressure, elastic.area)
     for asked in ({"pressure": pressure}, {"mean_separation": u}, {"area": area}):
         found = contact(SURFACE, **asked, theory=theory, hardness=cap)
@@ -252,19 +348,33 @@ def test_hardnesses_of_any_size(theory, cap):
             assert found.area == pytest.approx(found.pressure / cap, rel=rel)
             assert found.yielded == pytest.approx(np.ones(4), rel=rel)
         else:
-            for name in ("mean_separation", "pressure", "area", "stiffness", "unloading_stiffness"):
-                assert getattr(found, name) == pytest.approx(getattr(elastic, name), rel=1e-10), name
+            for name in (
+                "mean_separation",
+                "pressure",
+                "area",
+                "stiffness",
+                "unloading_stiffness",
+            ):
+                assert getattr(found, name) == pytest.approx(
+                    getattr(elastic, name), rel=1e-10
+                ), name
             assert (found.yielded == 0).all()
 
 
-@pytest.mark.parametrize(("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)])
+@pytest.mark.parametrize(
+    ("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)]
+)
 def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
     kind, asked = type(get_theory(theory)), []
     original = kind.answer
-    monkeypatch.setattr(kind, "answer", lambda self, *given: asked.append(given) or original(self, *given))
+    monkeypatch.setattr(
+        kind, "answer", lambda self, *given: asked.append(given) or original(self, *given)
+    )
     for pressure in (0.1, 3.0, 30.0, 500.0):
         asked.clear()
-        contact(SURFACE, pressure=pressure, E_star=MODULUS, theory=theory, hardness=HARDNESS)
+        contact(
+            SURFACE, pressure=pressure, E_star=MODULUS, theory=theory, hardness=HARDNESS
+        )
         assert len(asked) <= most
 
 
@@ -287,7 +397,9 @@ def test_the_lightest_pressures_are_held():
     cap = 0.3 * float(surface.rms_gradient)
     for depth in np.geomspace(1e-5, 1e-3, 9):
         force = contact(surface, mean_separation=0.3 * (1 - depth), hardness=cap).pressure
-        assert contact(surface, pressure=force, hardness=cap).pressure == pytest.approx(force, rel=1e-9)
+        assert contact(surface, pressure=force, hardness=cap).pressure == pytest.approx(
+            force, rel=1e-9
+        )
 
 
 def between_walls(x, tau):
@@ -296,10 +408,13 @@ def between_walls(x, tau):
         x, width = mpmath.mpf(float(x)), 2 * mpmath.sqrt(mpmath.mpf(float(tau)))
         reach = range(int(12 * width) + 3)
         touching = mpmath.erf(x / width) + mpmath.fsum(
-            mpmath.erfc((2 * k - x) / width) - mpmath.erfc((2 * k + x) / width) for k in reach if k
+            mpmath.erfc((2 * k - x) / width) - mpmath.erfc((2 * k + x) / width)
+            for k in reach
+            if k
         )
         yielded = mpmath.fsum(
-            mpmath.erfc((2 * k + 1 - x) / width) - mpmath.erfc((2 * k + 1 + x) / width) for k in reach
+            mpmath.erfc((2 * k + 1 - x) / width) - mpmath.erfc((2 * k + 1 + x) / width)
+            for k in reach
         )
         return float(touching), float(yielded)
 
@@ -310,11 +425,16 @@ def test_areas_are_those_of_a_diffusion_between_walls():
     x = 10 ** rng.uniform(-12, 0, 62)
     exact = np.array([between_walls(*point) for point in zip(x, tau, strict=True)])
     for column, (sign, rel) in enumerate(((1.0, 1e-12), (-1.0, 1e-11))):
-        assert hardness.diffused(x, tau, sign) == pytest.approx(exact[:, column], rel=rel, abs=1e-250)
+        assert hardness.diffused(x, tau, sign) == pytest.approx(
+            exact[:, column], rel=rel, abs=1e-250
+        )
 
 
 def test_levels_of_mean_gaps():
-    u = np.append(10 ** np.random.default_rng(2).uniform(-290, 1, 40), [3.8e-4, np.nextafter(3.8e-4, 0), 3.0, 8.3])
+    u = np.append(
+        10 ** np.random.default_rng(2).uniform(-290, 1, 40),
+        [3.8e-4, np.nextafter(3.8e-4, 0), 3.0, 8.3],
+    )
     u = np.append(u, np.geomspace(1e-6, 8, 60))
     found = hardness._levels(u)
     with mpmath.workdps(40):
@@ -330,7 +450,9 @@ def test_levels_of_mean_gaps():
 def test_bearing_curve_of_a_map_is_that_of_its_heights():
     surface = heights(Recipe("worn", 0.8, 8, 4, 3, 128, 0.5))
     known = bearing(surface, (1.0, 1.0))
-    curve = hardness.BearingCurve(known.mean_height / known.h_rms, known.h_max / known.h_rms)
+    curve = hardness.BearingCurve(
+        known.mean_height / known.h_rms, known.h_max / known.h_rms
+    )
     levels = np.quantile(surface, [0.02, 0.1, 0.5, 0.9, 0.99])
     u = np.array([np.maximum(level - surface, 0).mean() for level in levels])
     assert curve(u)[0] == pytest.approx([0.98, 0.9, 0.5, 0.1, 0.01], rel=0.03)
@@ -350,19 +472,26 @@ def test_a_flat_with_a_pit_has_no_bearing_curve():
 def test_projection_is_the_nearest_allowed_field():
     p = np.random.default_rng(1).normal(size=(16, 16))
     found = project(p, 0.3, 0.8)
-    assert (found.mean(), found.min(), found.max()) == (pytest.approx(0.3, rel=1e-12), 0, 0.8)
+    assert (found.mean(), found.min(), found.max()) == (
+        pytest.approx(0.3, rel=1e-12),
+        0,
+        0.8,
+    )
     shift = (p - found)[(found > 0) & (found < 0.8)]
     assert np.ptp(shift) < 1e-12  # so it is the Euclidean projection
 
 
 @pytest.mark.parametrize(
-    "recipe", [Recipe("self_affine", 0.8, 8, 2, 1, 64), Recipe("stretched", 0.8, 8, 2, 1, 64, 4.0)]
+    "recipe",
+    [Recipe("self_affine", 0.8, 8, 2, 1, 64), Recipe("stretched", 0.8, 8, 2, 1, 64, 4.0)],
 )
 def test_capped_boundary_elements(recipe):
     pytest.importorskip("tamaas")
     unscaled = heights(recipe)
     surface = unscaled / bearing(unscaled, recipe.sizes).gradient
-    elastic, capped = (Contact(surface, recipe.sizes, hardness=cap) for cap in (np.inf, 0.2))
+    elastic, capped = (
+        Contact(surface, recipe.sizes, hardness=cap) for cap in (np.inf, 0.2)
+    )
     for force in (0.01, 0.1):
         free, held = elastic.press(force), capped.press(force)
         other = Elastic(surface, recipe.sizes).press(force)
@@ -373,21 +502,31 @@ def test_capped_boundary_elements(recipe):
         assert held["mean_separation"] < free["mean_separation"]
         # -dF/du of the elastic contact, whose area changes only to second order
         step = 1e-3 * force
-        above, below = (elastic.press(force + way * step)["mean_separation"] for way in (1, -1))
+        above, below = (
+            elastic.press(force + way * step)["mean_separation"] for way in (1, -1)
+        )
         elastic.press(force)
-        assert elastic.frozen_stiffness() == pytest.approx(2 * step / (below - above), rel=0.05)
+        assert elastic.frozen_stiffness() == pytest.approx(
+            2 * step / (below - above), rel=0.05
+        )
 
 
 def test_held_out_surfaces_are_within_the_stated_bars():
     variables, attributes = shipped_part("hardness")
-    assert all(attributes[f"law_{name}"] == value for name, value in vars(hardness.CONSTANTS).items())
+    assert all(
+        attributes[f"law_{name}"] == value
+        for name, value in vars(hardness.CONSTANTS).items()
+    )
     sets, quantities = attributes["sets"].split(), attributes["quantities"].split()
     numbers = dict(zip(sets, variables["accuracy"], strict=True))
     held = np.stack([numbers[name] for name in ("held_out_surface", "held_out_spectrum")])
     share = (held[..., 2] * held[..., 4]).sum(axis=0) / held[..., 4].sum(axis=0)
     with_h_max, with_heights = (dict(zip(quantities, row, strict=True)) for row in share)
     assert with_h_max["area"] > 0.97
-    assert min(with_h_max["yielded"], with_h_max["stiffness"], with_heights["stiffness"]) > 0.95
+    assert (
+        min(with_h_max["yielded"], with_h_max["stiffness"], with_heights["stiffness"])
+        > 0.95
+    )
     # of surfaces with two longest waves a side h_max says little of the highest heights
     assert numbers["three_waves"][0, quantities.index("force"), 2] > 0.97
     stretched = dict(zip(quantities, numbers["stretched"][1, :, 2], strict=True))
@@ -398,14 +537,23 @@ def test_held_out_surfaces_are_within_the_stated_bars():
 def test_surfaces_of_another_code():
     errors = blind()
     assert errors["area"].size > 1000
-    for quantity, least in {"area": 0.97, "yielded": 0.95, "force": 0.97, "stiffness": 0.95}.items():
+    for quantity, least in {
+        "area": 0.97,
+        "yielded": 0.95,
+        "force": 0.97,
+        "stiffness": 0.95,
+    }.items():
         assert np.mean(np.abs(errors[quantity]) < BARS[quantity]) > least, quantity
 
 
 def test_stated_scatter_is_what_held_out_errors_have():
     _, attributes = shipped_part("hardness")
     covered = json.loads(attributes["coverage"])
-    assert set(covered) == {f"{name} {q}" for name in (*FORMS, *OTHERS) for q in ("area", "force", "stiffness")}
+    assert set(covered) == {
+        f"{name} {q}"
+        for name in (*FORMS, *OTHERS)
+        for q in ("area", "force", "stiffness")
+    }
     for name, (one, two) in covered.items():
         assert 0.55 < one < 0.8, name
         # MBMA's stiffness is off by a bias more than by chance
