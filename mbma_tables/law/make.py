@@ -1,11 +1,14 @@
-"""`contact_law`: pressure and area of one surface by any theory, fitted by polynomials of the gap (`law.block`)."""
+"""`contact_law`: pressure and area of one surface by any theory, as functions of its gap.
+
+They are fitted by the polynomials of `law.block`.
+"""
 
 import contextlib
 import functools
 import math
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,17 +31,23 @@ from mbma_tables.theories.mbma.theory import Mbma
 from mbma_tables.theories.mbma.variants import Variant
 
 MIN_LAW_RTOL = 1e-9
-RESOLVED = 1e-3  # for polynomials this accurate the last coefficients estimate the error
-POWERS = (3.5, 10 / 3)  # leading powers of h_max - d of MBMA's force and area
-LAYER_SHARE = 0.5  # of the boundary layer, up to which these powers dominate
-FIRST_OCTAVES = 20  # below which a theory that ends at h_max is a power of h_max - u
+# for polynomials this accurate the last coefficients estimate the error
+RESOLVED = 1e-3
+# leading powers of h_max - d of MBMA's force and area
+POWERS = (3.5, 10 / 3)
+# of the boundary layer, up to which these powers dominate
+LAYER_SHARE = 0.5
+# octaves of x, below which a theory that ends at h_max is a power of h_max - u
+FIRST_OCTAVES = 20
 MOST_OCTAVES = 60
-MAX_SPAN = 10.0  # u/h_max up to which a theory without last contact is covered
-LOWEST = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # u/h_max from which a theory may answer
-LOOKED_AT = 24  # points at which a theory's own error is evaluated
-SHARE = (
-    0.1  # of the median of a theory's own errors: sufficient accuracy of the polynomials
-)
+# u/h_max up to which a theory without last contact is covered
+MAX_SPAN = 10.0
+# u/h_max from which a theory may answer
+LOWEST = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+# points at which a theory's own error is evaluated
+SAMPLED_ANSWERS = 24
+# of the median of a theory's own errors: sufficient accuracy of the polynomials
+SHARE = 0.1
 
 
 @hinted
@@ -53,7 +62,7 @@ def contact_law(
     hardness: float | str | None = None,
     materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> ContactLaw:
-    """Pressure and area of one surface as functions of its gap, for many gaps and for inverses.
+    """Pressure and area of one surface as functions of its gap, for many gaps and inverses.
 
     Parameters
     ----------
@@ -97,29 +106,27 @@ def contact_law(
     '0.0001832, 2.276'
     """
     E_star, hardness, pair = bodies(materials, E_star, hardness)
-    given, units = modulus_and_units(E_star, surface)
-    modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
+    E_star_number, units = modulus_and_units(E_star, surface)
+    modulus = number_in("E_star", E_star_number, sys.float_info.min, sys.float_info.max)
     chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant)
-    yields: dict[str, Any] = {}
-    cap = checked_hardness(hardness_in(units, math.inf if hardness is None else hardness))
+    hardness_number = hardness_in(units, math.inf if hardness is None else hardness)
+    cap = checked_hardness(hardness_number)
     if cap.ndim:
         raise InputError(
             f"hardness must be one number, got shape {cap.shape}: a law is of one surface"
         )
+    yields: dict[str, Any] = {}
     if cap < math.inf:
+        # what follows unloading is calculated from the law without the hardness, on demand
         elastic = functools.partial(
             contact_law, surface, chosen, rtol=rtol, E_star=modulus
         )
         yields = {"hardness": float(cap), "elastic": elastic}
         chosen = chosen.with_hardness(float(cap), modulus)
-    one = surface
-    if one.labelled:
-        one = one.with_numbers(
-            *(np.asarray(getattr(one, name)) for name in one.parameters)
-        )
+    one = _without_labels(surface)
     if one.shape != ():
         raise InputError(f"a law needs one surface, got a batch of shape {one.shape}")
-    asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
+    tolerance = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     facts = {
         "surface": one,
         "E_star": modulus,
@@ -129,191 +136,273 @@ def contact_law(
         **yields,
     }
     if isinstance(chosen, Mbma):
-        return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
+        return _mbma_law(one, chosen.island_model, chosen.variant, tolerance, facts)
     try:
-        return theory_law(one, chosen, asked, facts)
+        return theory_law(one, chosen, tolerance, facts)
     except ConvergenceError as fault:
         raise ConvergenceError(
             f"theory {chosen.name!r}: {fault}; use a larger rtol", fault.mask
         ) from None
 
 
+def _without_labels(surface: AnySurface) -> AnySurface:
+    """The surface with plain arrays in place of labelled ones."""
+    if not surface.labelled:
+        return surface
+    numbers = [np.asarray(getattr(surface, name)) for name in surface.parameters]
+    return surface.with_numbers(*numbers)
+
+
+class _Fitting(NamedTuple):
+    """What is fitted, and what a law needs to know of it beside the polynomials."""
+
+    scale: float  # of x = scale (h_max + s d) on a side of sign s
+    sides: list[fit.Side]
+    first: fit.First  # the record below where x begins
+    limits: tuple[float, float]  # least and largest gap d
+    energy_beyond: float  # energy over E* of gaps above the largest
+    answer_errors: list[
+        FloatArray
+    ]  # the theory's, of all answers until the end of the fit
+    leverage: float  # error of slopes over F/x per error of answers
+
+
 def _mbma_law(
     surface: AnySurface,
-    island_model: Any,
+    island_model: str | AnyModel,
     variant: Variant,
     rtol: float,
     facts: dict[str, Any],
 ) -> ContactLaw:
-    """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer."""
-    inner, h_max, h_rms = (
-        max(0.1 * rtol, MIN_RTOL),
-        float(surface.h_max),
-        float(surface.h_rms),
-    )
-    model, stress = get_model(island_model, inner, variant), 1.0
+    """A law of the MBMA model: x rises from 0 at first contact, d = h_max, to 1 at the end.
+
+    Below half of the boundary layer force and area are powers of x times polynomials.
+    """
+    h_max = float(surface.h_max)
+    h_rms = float(surface.h_rms)
+    # the sums over islands are to be ten times as accurate as the polynomials
+    rtol_of_sums = max(0.1 * rtol, MIN_RTOL)
+    model = get_model(island_model, rtol_of_sums, variant)
+    stress = 1.0
     shape: Any = surface
     if isinstance(surface, Surface):
         check_band(surface, variant)
+        # totals of a self-affine surface are over q0 s, too
         stress = float(surface.q0 * surface.s)
         shape = float(surface.hurst), float(surface.zeta_1), h_max / h_rms
-    kept = profile(shape, model, variant, inner)
+    totals = profile(shape, model, variant, rtol_of_sums)
     # the law ends with the island model's table; rounding may pass full compression
-    end, source = min(float(kept.edges[-1]) * h_rms, 2 * h_max), kept.source
+    end = min(float(totals.edges[-1]) * h_rms, 2 * h_max)
 
-    def values(x: FloatArray) -> FloatArray:
-        found = kept.totals(x * end / h_rms)
-        if not found.all():
+    def force_and_area(x: FloatArray) -> FloatArray:
+        sums = totals.totals(x * end / h_rms)
+        if not sums.all():
             raise OutOfRangeError(
                 f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow"
             )
-        found[0] *= stress
-        found[1] = variant.area_of(found[1])
-        return found
+        sums[0] *= stress
+        sums[1] = variant.area_of(sums[1])
+        return sums
 
-    kinks, layer = (
-        (source.breaks[-2:] * h_rms / end).tolist(),
-        LAYER_SHARE * source.layer * h_rms / end,
-    )
-    tolerance, octaves = (
-        min(rtol, RESOLVED),
-        range(math.ceil(-math.log2(min(layer, *kinks))), 1100),
-    )
-    start, first = fit.first_record(
-        lambda start: fit.power_record(values, start, POWERS), octaves, tolerance
-    )
+    kinks = (totals.source.breaks[-2:] * h_rms / end).tolist()
+    layer = LAYER_SHARE * totals.source.layer * h_rms / end
+    tolerance = min(rtol, RESOLVED)
+
+    def record_below(start: float) -> fit.First:
+        return fit.power_record(force_and_area, start, POWERS)
+
+    # a power of 1/2 within the layer, and down to the smallest double at most
+    octaves = range(math.ceil(-math.log2(min(layer, *kinks))), 1100)
+    start, first = fit.first_record(record_below, octaves, tolerance)
     facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
-    side, limits = fit.Side(-1, start, values, tuple(kinks)), (h_max - end, math.inf)
-    return _finish(
-        1 / end,
-        [side],
-        tolerance,
-        first,
-        limits,
-        0.0,
-        [np.array([kept.error])],
-        kept.leverage,
-        facts,
+    fitting = _Fitting(
+        scale=1 / end,
+        sides=[fit.Side(-1, start, force_and_area, tuple(kinks))],
+        first=first,
+        limits=(h_max - end, math.inf),
+        energy_beyond=0.0,
+        answer_errors=[np.array([totals.error])],
+        leverage=totals.leverage,
     )
+    return _fitted_law(fitting, tolerance, facts)
 
 
 def theory_law(
     surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]
 ) -> ContactLaw:
-    """A law fitted to a theory's answers: x from first contact, from u = 0, or from both where force has no bound."""
-    h_max, ends = float(surface.h_max), theory.ends_at_h_max
-    # below the elastic theory's end, and with a hardness towards u = 0, force depends on
-    # the logarithm of u
-    lowest = _lowest(
-        surface, theory.elastic, LOWEST if theory.elastic is theory else LOWEST[1:]
-    )
-    highest = h_max if ends else min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
-    errors: list[FloatArray] = []  # of the answers, which are asked until the end
+    """A law fitted to a theory's answers at mean separations u.
 
-    def answer(u: FloatArray) -> FloatArray:
+    x rises from first contact, from u = 0, or from both where the force at u = 0 has no
+    bound.
+    """
+    h_max = float(surface.h_max)
+    lowest, highest = _covered(surface, theory)
+    answer_errors: list[FloatArray] = []
+
+    def force_and_area(u: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
-            found = theory.answer(surface, u)
-        if not (
-            (found.pressure > 0) & (found.area > 0) & np.isfinite(found.pressure)
-        ).all():
+            answers = theory.answer(surface, u)
+        pressure = answers.pressure
+        if not ((pressure > 0) & (answers.area > 0) & np.isfinite(pressure)).all():
             raise OutOfRangeError(
-                f"theory {theory.name!r} has no positive force and area on all of this surface's gaps"
+                f"theory {theory.name!r} has no positive force and area on all of this "
+                "surface's gaps"
             )
-        errors.append(np.nan_to_num(found.error))
-        return np.stack([found.pressure, found.area])
+        answer_errors.append(np.nan_to_num(answers.error))
+        return np.stack([pressure, answers.area])
 
-    answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
-    # far larger errors at some gaps, as at the lightest contact of a small map, are ignored
-    own = float(np.median(errors[0]))
-    tolerance = max(min(rtol, RESOLVED), SHARE * own)
-    bends = np.asarray(theory.bends(surface), dtype=float)
+    # polynomials need not be far more accurate than the theory's answers, nor can be where
+    # these are not smooth; far larger errors at some gaps, as at the lightest contact of a
+    # small map, are ignored
+    shares = (np.arange(SAMPLED_ANSWERS) + 0.5) / SAMPLED_ANSWERS
+    force_and_area(lowest + (highest - lowest) * shares)
+    error_of_answers = float(np.median(answer_errors[0]))
+    tolerance = max(min(rtol, RESOLVED), SHARE * error_of_answers)
 
-    width = highest if not ends else h_max / 2 if lowest else h_max
-    above = fit.Side(1, lowest / width, lambda x: answer(width * x), tuple(bends / width))
-    if ends:
-        start = 2.0**-FIRST_OCTAVES
-        below = fit.Side(
-            -1, start, lambda x: answer(h_max - width * x), tuple((h_max - bends) / width)
-        )
-        sides, first = (
-            [below, above] if lowest else [below],
-            fit.straight_record(below.values, start),
-        )
-    elif lowest > 0:
-        sides, first = [above], (np.zeros(fit.RECORD), np.zeros(2), (0.0, 0.0))
+    width, sides, first = _sides(
+        surface, theory, force_and_area, (lowest, highest), tolerance
+    )
+    if theory.ends_at_h_max:
+        largest_gap = math.inf
+        energy_beyond = 0.0
     else:
-        octaves = range(3, MOST_OCTAVES)
-        start, first = fit.first_record(
-            lambda start: fit.power_record(above.values, start, (0.0, 0.0)),
-            octaves,
-            tolerance,
-        )
-        sides = [above._replace(start=start)]
-    beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
-    limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
+        largest_gap = 2 * highest - h_max
+        energy_beyond = 2 * float(theory.energy(surface, np.array(highest)))
     facts |= {"theory": theory.name, "variant": "", "island_model": ""}
-    finish = functools.partial(_finish, 1 / (2 * width), sides)
+    fitting = _Fitting(
+        scale=1 / (2 * width),
+        sides=sides,
+        first=first,
+        limits=(2 * lowest - h_max, largest_gap),
+        energy_beyond=energy_beyond,
+        answer_errors=answer_errors,
+        leverage=0.0,
+    )
     try:
-        return finish(tolerance, first, limits, beyond, errors, 0.0, facts)
+        return _fitted_law(fitting, tolerance, facts)
     except ConvergenceError:
         # answers need not be smooth below their own error
-        if own <= tolerance:
+        if error_of_answers <= tolerance:
             raise
-        return finish(own, first, limits, beyond, errors, 0.0, facts)
+        return _fitted_law(fitting, error_of_answers, facts)
 
 
-def _finish(
-    scale: float, sides: list[fit.Side], tolerance: float, first: fit.First, limits: tuple[float, float], beyond: float,
-    own_errors: list[FloatArray], leverage: float, facts: dict[str, Any],
-) -> ContactLaw:  # fmt: skip
+def _covered(surface: AnySurface, theory: Theory) -> tuple[float, float]:
+    """Least and largest mean separation of a law."""
+    # below the elastic theory's end, and with a hardness towards u = 0, force depends on
+    # the logarithm of u
+    shares = LOWEST if theory.elastic is theory else LOWEST[1:]
+    lowest = _lowest(surface, theory.elastic, shares)
+    h_max = float(surface.h_max)
+    if theory.ends_at_h_max:
+        return lowest, h_max
+    return lowest, min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
+
+
+def _sides(
+    surface: AnySurface,
+    theory: Theory,
+    force_and_area: fit.Values,
+    covered: tuple[float, float],
+    tolerance: float,
+) -> tuple[float, list[fit.Side], fit.First]:
+    """Mean separation over which x rises to 1; the sides of a law; the record where x begins."""
+    h_max = float(surface.h_max)
+    lowest, highest = covered
+    bends = np.asarray(theory.bends(surface), dtype=float)
+    if not theory.ends_at_h_max:
+        width = highest
+    elif lowest:
+        # two sides, which meet in the middle
+        width = h_max / 2
+    else:
+        width = h_max
+
+    def towards_full_compression(x: FloatArray) -> FloatArray:
+        return force_and_area(width * x)
+
+    def towards_first_contact(x: FloatArray) -> FloatArray:
+        return force_and_area(h_max - width * x)
+
+    above = fit.Side(1, lowest / width, towards_full_compression, tuple(bends / width))
+    if theory.ends_at_h_max:
+        start = 2.0**-FIRST_OCTAVES
+        kinks = tuple((h_max - bends) / width)
+        below = fit.Side(-1, start, towards_first_contact, kinks)
+        first = fit.straight_record(below.values, start)
+        return width, [below, above] if lowest else [below], first
+    if lowest > 0:
+        # x begins at a gap that is answered: no record lies below it
+        return width, [above], (np.zeros(fit.RECORD), np.zeros(2), (0.0, 0.0))
+
+    def record_below(start: float) -> fit.First:
+        return fit.power_record(above.values, start, (0.0, 0.0))
+
+    # eighths of x at first
+    octaves = range(3, MOST_OCTAVES)
+    start, first = fit.first_record(record_below, octaves, tolerance)
+    return width, [above._replace(start=start)], first
+
+
+def _fitted_law(fitting: _Fitting, tolerance: float, facts: dict[str, Any]) -> ContactLaw:
     """Fit the sides, put the block together, and look for turning points."""
-    h_max, (lowest, highest) = float(facts["surface"].h_max), limits
-    sides = [
-        side._replace(kinks=tuple(kink for kink in side.kinks if side.start < kink < 1))
-        for side in sides
-    ]
-    pieces: list[fit.Pieces] = [fit.side_pieces(side, tolerance) for side in sides]
+    h_max = float(facts["surface"].h_max)
+    scale = fitting.scale
+    lowest, highest = fitting.limits
+    sides: list[fit.Side] = []
+    for side in fitting.sides:
+        kinks = tuple(kink for kink in side.kinks if side.start < kink < 1)
+        sides.append(side._replace(kinks=kinks))
+    pieces = [fit.side_pieces(side, tolerance) for side in sides]
+    # gaps that differ from the ends by rounding are answered, full compression excepted
     ends = (
         lowest if lowest == -h_max else lowest - ROUNDING * h_max,
         sys.float_info.max if highest == math.inf else highest * (1 + ROUNDING),
     )
-    block, records, errors = fit.assemble(h_max, scale, sides, pieces, first, ends)
+    block, records, errors = fit.assemble(
+        h_max, scale, sides, pieces, fitting.first, ends
+    )
     # records after the first in order of falling d, and the sign of d of each
     counts = [len(piece.records) for piece in pieces]
-    signs, order = (
-        np.repeat([float(side.sign) for side in sides], counts),
-        np.arange(1, len(records)),
-    )
+    signs = np.repeat([float(side.sign) for side in sides], counts)
+    order = np.arange(1, len(records))
     if sides[-1].sign > 0:
         order[-counts[-1] :] = order[-counts[-1] :][::-1].copy()
-    fit.fill_energies(records, order, signs, scale, first[2][0], beyond)
-    turns = [
-        None if x is None else s * (x / scale - h_max)
-        for x, s in fit.first_falls(records[order], signs)
-    ]
+    power_of_force = fitting.first[2][0]
+    fit.fill_energies(records, order, signs, scale, power_of_force, fitting.energy_beyond)
+    turns: list[float | None] = []
+    for x, sign in fit.first_falls(records[order], signs):
+        turns.append(None if x is None else sign * (x / scale - h_max))
     # forces carry the modulus
     records[:, fit.FORCE_AT : fit.AREA_AT] *= facts["E_star"]
     records[:, fit.ENERGY_AT] *= facts["E_star"]
-    error, own = float(errors[:, 0].max()), float(np.concatenate(own_errors).max())
-    ends_at: dict[str, Any] = {
-        "h_max": h_max,
-        "lowest": lowest,
-        "highest": highest,
-        "error": error + own,
-    }
-    ends_at |= {"turning_point": turns[0], "area_turning_point": turns[1]}
-    errors = errors + np.array([0.0, leverage * own])
-    return ContactLaw(**facts, **ends_at, block=frozen(block), errors=frozen(errors))
+    error_of_fit = float(errors[:, 0].max())
+    error_of_answers = float(np.concatenate(fitting.answer_errors).max())
+    errors = errors + np.array([0.0, fitting.leverage * error_of_answers])
+    return ContactLaw(
+        **facts,
+        h_max=h_max,
+        lowest=lowest,
+        highest=highest,
+        error=error_of_fit + error_of_answers,
+        turning_point=turns[0],
+        area_turning_point=turns[1],
+        block=frozen(block),
+        errors=frozen(errors),
+    )
 
 
 def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> float:
-    """Mean separation from which a theory has finite force: the least of `shares`, or where its answers begin."""
-    for u in (
-        *(share * float(surface.h_max) for share in shares),
-        float(theory.interval(surface)[0]),
-    ):
+    """Mean separation from which a theory has finite force.
+
+    It is the least of these shares of h_max, or where the theory's answers begin.
+    """
+    separations = [share * float(surface.h_max) for share in shares]
+    separations.append(float(theory.interval(surface)[0]))
+    for u in separations:
         with np.errstate(all="ignore"), contextlib.suppress(InputError):
-            if 0 < float(theory.answer(surface, np.array(u)).pressure) < math.inf:
+            pressure = float(theory.answer(surface, np.array(u)).pressure)
+            if 0 < pressure < math.inf:
                 return u
     raise OutOfRangeError(
         f"theory {theory.name!r} has no finite force on this surface up to u = {u:.6g}"
