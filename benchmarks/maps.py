@@ -12,10 +12,13 @@ from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.cache import VARIABLE
 from mbma_tables.export.law_rows import describe_law
+from mbma_tables.theories import Simulated
 
 SEEDS = 5
+QUICK = Simulated(grid="quick")
+FULL = Simulated(grid="full")
 # points a side, largest magnification (8 points a shortest wavelength), whether periodic,
-# bars of both theories [s]
+# bars of both grids [s]
 MAPS = (
     (256, 8.0, True, 0.7, 6.0),
     (256, 8.0, False, 0.7, 6.0),
@@ -29,24 +32,24 @@ def maps(rng: np.random.Generator) -> None:
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = "off"
     try:
-        for points, zeta_1, periodic, corrected, simulated in MAPS:
+        for points, zeta_1, periodic, most_quick, most_full in MAPS:
             z = heights(
                 Recipe(
                     "self_affine", 0.8, zeta_1, 4, int(rng.integers(1000, 9999)), points
                 )
             )
-            for theory, most in (("corrected", corrected), ("simulated", simulated)):
+            for theory, most in ((QUICK, most_quick), (FULL, most_full)):
                 start = time.process_time()
                 surface = Surface.from_map(z, 1.0, periodic=periodic)
                 contact(surface, area=0.1, theory=theory)
-                if theory == "simulated":
+                if theory is FULL:
                     contact(surface, area=0.1, theory=theory).leakage.x  # noqa: B018
                 shape = (
                     f"{points} x {points}, {'periodic' if periodic else 'not periodic'}"
                 )
-                flow = ", with flow" if theory == "simulated" else ""
+                flow = ", with flow" if theory is FULL else ""
                 report(
-                    f"a map of {shape}: {theory}{flow}",
+                    f"a map of {shape}: simulated, {theory.grid} grid{flow}",
                     time.process_time() - start,
                     "s",
                     at_most=most,
@@ -55,7 +58,7 @@ def maps(rng: np.random.Generator) -> None:
         os.environ.pop(VARIABLE) if before is None else os.environ.update(
             {VARIABLE: before}
         )
-    law = contact_law(surface, theory="simulated")
+    law = contact_law(surface, theory=FULL)
     u, out = rng.uniform(0.2, 2.0, 100_000) * float(surface.h_rms), []
     for _ in range(SEEDS):
         hurst, shortest = rng.uniform(0.5, 0.9), rng.uniform(1.0, 4.0)

@@ -52,7 +52,7 @@ def heights():
     return 0.5 * values / np.std(values)
 
 
-SURFACES = {"calibrated": (of_numbers, of_spectrum), "corrected": (of_map,)}
+SURFACES = {"calibrated": (of_numbers, of_spectrum), "simulated": (of_map,)}
 KINDS = [(expected, make) for expected, makes in SURFACES.items() for make in makes]
 
 
@@ -135,7 +135,7 @@ def test_a_joint(expected, make):
     [
         ("calibrated", ("--file", "numbers.toml"), ()),
         (
-            "corrected",
+            "simulated",
             ("--map", "map.npy", "--dx", "1um", "--periodic", "--length-unit", "um"),
             (),
         ),
@@ -176,12 +176,12 @@ def test_a_map_and_its_fit_by_one_theory(tmp_path, monkeypatch):
     table = json.loads(
         run("fit", "map.npy", "--dx", "1", "--periodic", "--length-unit", "um", "--json")
     )
-    assert table["theory"] == "corrected"
+    assert table["theory"] == "simulated"
     areas = ",".join(map(str, table["columns"]["area"]))
     found = json.loads(
         run("contact", "--map", "map.npy", *options, "--area", areas, "--json")
     )
-    assert found["theory"] == "corrected"
+    assert found["theory"] == "simulated"
     np.testing.assert_allclose(
         found["columns"]["pressure"], table["columns"]["pressure"], rtol=1e-9
     )
@@ -224,7 +224,7 @@ def test_the_sensitivity_of_a_map_is_that_of_its_simulation():
     slopes = sensitivity(surface, pressure=PRESSURE, E_star=E_STAR).slopes
     step = 1e-3
     loads = PRESSURE * np.exp([-step, step])
-    areas = contact(surface, pressure=loads, E_star=E_STAR, theory="corrected").area
+    areas = contact(surface, pressure=loads, E_star=E_STAR, theory="simulated").area
     by_pressure = np.diff(np.log(areas))[0] / (2 * step)
     assert slopes["pressure"]["area"] == pytest.approx(by_pressure, abs=1e-3)
     # dimensional analysis: area depends on p/(E* slope) alone

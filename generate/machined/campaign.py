@@ -1,8 +1,8 @@
 """`python -m generate machined`: maps as machines make them, pressed by boundary elements.
 
-The truth is contact on the full grid, at loads between those of `theory="simulated"`, and flow both
-ways; of some maps also contact with a hardness, at a tolerance of 1e-6. Beside it is what theories
-answer. Stiffness is -dF/du by a step of 3% of the pressure of both.
+The truth is contact on the full grid, at loads between those of `Simulated(grid="full")`, and flow
+both ways; of some maps also contact with a hardness, at a tolerance of 1e-6. Beside it is what
+theories answer. Stiffness is -dF/du by a step of 3% of the pressure of both.
 """
 
 import functools
@@ -24,17 +24,23 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.data import FILE
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories import Calibrated, Simulated
 from mbma_tables.theories.simulated import boundary_elements
 from mbma_tables.theories.simulated.own_map import law_loads
 from mbma_tables.theories.simulated.reynolds import flow_conductance
-from mbma_tables.theories.simulated.yielded import of_map
 from mbma_tables.theories.yielding.theory import Yielding
 
 NUMBERS = 10  # parts of each family
 LARGE = 512  # points a side of one more of each family
 SMOOTHEST = 2  # its number: of the longest shortest wavelength
 EVERY = 3  # part that is pressed with a hardness, too
-FORMS = ("calibrated", "corrected", "simulated")
+FULL = Simulated(grid="full")
+# theories, by what their columns of the file begin with
+FORMS: dict[str, Calibrated | Simulated] = {
+    "calibrated": Calibrated(),
+    "corrected": Simulated(grid="quick"),
+    "simulated": FULL,
+}
 TEXTS = campaigns.TEXTS["groups"]["machined"]
 AREAS = (
     0.003,
@@ -119,7 +125,9 @@ def solved(part: Part) -> dict[str, Any]:
     return columns
 
 
-def answered(part: Part, theory: str, folder: pathlib.Path) -> dict[str, FloatArray]:
+def answered(
+    part: Part, theory: Calibrated | Simulated, folder: pathlib.Path
+) -> dict[str, FloatArray]:
     """A theory's answers at the loads of a part that is solved, with its stated scatter.
 
     NaN where it refuses.
@@ -141,8 +149,9 @@ def answered(part: Part, theory: str, folder: pathlib.Path) -> dict[str, FloatAr
         leakage = answer.leakage
         # the calibrated law solves no map, so it has no sensitivity to the grid
         sensitivity: float | FloatArray = np.nan
-        if theory != "calibrated":
-            sensitivity = of_map(theory, surface).sensitivity_at(np.asarray(answer.area))
+        if isinstance(theory, Simulated):
+            simulation = theory.of(surface)
+            sensitivity = simulation.sensitivity_at(np.asarray(answer.area))
         # in the order of `ANSWERS`
         rows[:, k] = (
             answer.area,
@@ -189,13 +198,11 @@ def yielded(part: Part) -> dict[str, FloatArray]:
                 stiffness,
             )
         # the map simulated by the library
-        simulated = contact(
-            surface, pressure=force[k], hardness=hardness, theory="simulated"
-        )
+        simulated = contact(surface, pressure=force[k], hardness=hardness, theory=FULL)
         answers[1, :, k] = [getattr(simulated, name) for name in QUANTITIES]
         slope[k] = simulated.stiffness
         # the law of hardness
-        law = Yielding(of_map("simulated", surface), hardness)
+        law = Yielding(FULL.of(surface), hardness)
         u, lighter = law.pressed(surface, force[k])
         loaded = law.loaded(surface, u, lighter)
         answers[2, :, k] = (
@@ -300,9 +307,8 @@ def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
     their own: remove these to ask a changed library again.
     """
     solvers: dict[str, Solve] = {"hardness": yielded, "": solved}
-    solvers |= {
-        form: functools.partial(answered, theory=form, folder=folder) for form in FORMS
-    }
+    for form, theory in FORMS.items():
+        solvers[form] = functools.partial(answered, theory=theory, folder=folder)
     for name, solve in solvers.items():
         chosen = yielding_parts() if solve is yielded else parts()
         # a campaign asks of a recipe no more than its name

@@ -2,10 +2,10 @@
 
 Each form states a standard deviation with a few constants, the same for all maps::
 
-    simulated, corrected   one for each contact area of the truth, times a power of the map's
-                           sensitivity
-    calibrated             root of s^2 + c^2, s that of Gaussian maps, one c for maps that are
-                           valid and one for others
+    simulated    one for each contact area of the truth and grid, times a power of the map's
+                 sensitivity
+    calibrated   root of s^2 + c^2, s that of Gaussian maps, one c for maps that are valid and
+                 one for others
 
 They cover 70% of errors once and 97.5% twice. `left_out` states for each family what the others
 give.
@@ -22,8 +22,14 @@ from generate.machined.makers import FAMILIES
 from generate.page import table
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.theories.calibrated.theory import MAP_SCATTER
-from mbma_tables.theories.simulated.theory import POWER, TYPICAL
+from mbma_tables.theories.simulated.one_map import POWER, TYPICAL
 
+# names of theories, by what their columns of the file begin with
+TITLES = {
+    "calibrated": "calibrated",
+    "corrected": "simulated, quick grid",
+    "simulated": "simulated, full grid",
+}
 QUANTITIES = ("area", "pressure", "stiffness", "flow")
 # A/A0 between which errors count
 RANGES = {"calibrated": (0.01, 0.6), "corrected": (0.01, 0.6), "simulated": (0.01, 0.9)}
@@ -235,7 +241,7 @@ def covered(data: xr.Dataset) -> str:
     """Shares of errors within one and two stated standard deviations, and numbers of errors."""
     rows = []
     for form, of_valid in itertools.product(RANGES, (True, False)):
-        cells = [form, "valid" if of_valid else "not valid"]
+        cells = [TITLES[form], "valid" if of_valid else "not valid"]
         for quantity in QUANTITIES:
             once, twice, number = coverage(data, form, quantity, of_valid)
             cells.append(f"{once:.2f}, {twice:.2f} ({number})" if number else "")

@@ -10,6 +10,7 @@ import pandas as pd
 from generate.calibrated_file import rms
 from generate.distances import DEEP, HUES, LOW, THEORIES
 from generate.files import ROOT, dataset, read_csv
+from generate.machined.evaluation import TITLES
 from generate.page import Measured, panels, printed
 from mbma_tables.scenes.plan import shipped_costs
 
@@ -18,11 +19,12 @@ GAUGES = {
     "area_light": "contact area at a given pressure",
     "force_light": "pressure at a given gap",
 }
-OWN = ("corrected", "simulated")  # theories of a map, timed in docs/lookup.md
+# simulations of a map, timed in docs/lookup.md, by what their columns of the data set begin with
+OWN = ("corrected", "simulated")
 COLOURS = (
     dict(zip(THEORIES, HUES, strict=True))
     | {"boundary elements": "C5"}
-    | dict.fromkeys(OWN, "C8")
+    | {TITLES[form]: "C8" for form in OWN}
 )
 
 
@@ -94,22 +96,22 @@ def gauge_rows(distances: pd.DataFrame) -> pd.DataFrame:
         dataset("machined"),
         (ROOT / "docs" / "lookup.md").read_text(encoding="utf-8"),
     )
-    for theory in OWN:
+    for form in OWN:
         timed = re.search(
-            rf"256 x 256, periodic: {theory}.* \| ([\d.]+) s \|", benchmarks
+            rf"256 x 256, periodic: {TITLES[form]}.* \| ([\d.]+) s \|", benchmarks
         )
         assert timed is not None
         seen = (
-            (data.area >= LOW) & (data.area <= DEEP) & (data[f"{theory}_valid"] > 0)
+            (data.area >= LOW) & (data.area <= DEEP) & (data[f"{form}_valid"] > 0)
         ).values
         off = (
-            (data[f"{theory}_mean_separation"] - data.mean_separation)
+            (data[f"{form}_mean_separation"] - data.mean_separation)
             * data.stiffness
             / data.pressure
         )
-        errors = np.log(data[f"{theory}_area"] / data.area).values[seen], off.values[seen]
+        errors = np.log(data[f"{form}_area"] / data.area).values[seen], off.values[seen]
         rows.loc[len(rows), ["theory", "us", *GAUGES]] = [
-            theory,
+            TITLES[form],
             1e6 * float(timed[1]),
             *map(rms, errors),
         ]

@@ -25,7 +25,7 @@ from mbma_tables.contacts.measurement import curves, draw
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
-from mbma_tables.theories import BoundaryElements, get_theory
+from mbma_tables.theories import BoundaryElements, Simulated, get_theory
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.simulated.boundary_elements import LOADS
@@ -274,9 +274,9 @@ def draw_families() -> Any:
 
 def machined() -> Measured:
     data = dataset("machined")
-    parts = {form: by_family(data, form) for form in FORMS} | {
-        "yielding": yielding(data),
-        "coverage": covered(data),
-    }
-    parts |= {f"left_out_{form}": families_left_out(data, form) for form in FORMS}
+    parts = {"yielding": yielding(data), "coverage": covered(data)}
+    for form, theory in FORMS.items():
+        section = theory.grid if isinstance(theory, Simulated) else theory.name
+        parts[str(section)] = by_family(data, form)
+        parts[f"left_out_{section}"] = families_left_out(data, form)
     return parts, {"docs/figures/machined.svg": draw_families()}

@@ -201,9 +201,7 @@ def sensitivity_command(
     model = model.of(
         specimen.surface, one_known(**dict.fromkeys(options.LOADS) | loads)[0]
     )
-    found = sensitivity(
-        specimen.surface, **loads, E_star=specimen.modulus, **model._asdict()
-    )
+    found = sensitivity(specimen.surface, **loads, **model.keywords(specimen))
     units = {
         name: shown_unit(name, found.units)
         for name in (*found.parameters, *found.answers)
@@ -318,7 +316,7 @@ def fit_command(
     )
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
-    from mbma_tables.theories import BoundaryElements, theory_name
+    from mbma_tables.theories import Simulated, theory_name
 
     modulus, stress_unit = effective_modulus_of(
         {} if E_star is None else {"E_star": E_star}
@@ -326,10 +324,11 @@ def fit_command(
     scans = [measured(path, treatment) for path in measurements]
     surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
-    theory = "simulated" if simulate else theory_name(surface, None, "area")
-    columns, told = table_of_loads(surface, scale, theory)
+    full = Simulated(grid="full")
+    theory = full.name if simulate else theory_name(surface, None, "area")
+    columns, told = table_of_loads(surface, scale, full if simulate else theory)
     if simulate and output.out is not None and output.out.suffix == ".nc":
-        BoundaryElements.of(surface).to_netcdf(output.out)
+        full.of(surface).to_netcdf(output.out)
         told, output = (
             [*told, f"{output.out} has the simulation"],
             output._replace(out=None),

@@ -22,6 +22,7 @@ from mbma_tables.surfaces.self_affine import CASES
 from mbma_tables.theories import OF_MAPS, THEORIES
 from mbma_tables.theories.mbma.island_models import ISLAND_MODELS
 from mbma_tables.theories.mbma.variants import NAMED
+from mbma_tables.theories.simulated.grids import GRIDS
 
 LOADS = ("separation", "mean_separation", "pressure", "area")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -39,6 +40,7 @@ class Model(NamedTuple):
     rtol: float
     theory: Any = None  # a name; by the surface where none is given
     hardness: float | str | None = None
+    grid: str | None = None  # of theory "simulated"
 
     @property
     def yields(self) -> bool:
@@ -50,11 +52,25 @@ class Model(NamedTuple):
         from mbma_tables.theories import theory_name
 
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
-        return self._replace(theory=theory_name(surface, self.theory, by, **own))
+        by_option = None if self.grid is None else "simulated"
+        name = theory_name(surface, self.theory or by_option, by, **own)
+        if by_option not in (None, name):
+            raise InputError(
+                f"--grid is of theory 'simulated', not of {name!r}: leave it out"
+            )
+        return self._replace(theory=name)
+
+    def theory_with_options(self) -> Any:
+        """The theory as the library takes it: its name, or an object with its grid."""
+        from mbma_tables.theories import Simulated
+
+        return self.theory if self.grid is None else Simulated(self.grid)
 
     def keywords(self, specimen: Specimen) -> dict[str, Any]:
         """Keywords for `contact`."""
         asked = self._asdict() | {"E_star": specimen.modulus}
+        asked["theory"] = self.theory_with_options()
+        del asked["grid"]
         cap = asked.pop("hardness")
         return (
             asked
@@ -342,8 +358,14 @@ _MODEL_OPTIONS = (
 theory_option = _option(
     "theory",
     "Theory; only mbma has an island model, variant and rtol. Default: mbma for these and at a --separation, else "
-    "corrected for a map, calibrated for other surfaces.",
+    "simulated for a map, calibrated for other surfaces.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
+)
+grid_option = _option(
+    "grid",
+    "Points and loads of theory simulated: quick, the default; full, more accurate, from 0.1% to "
+    "90% contact; half, full on half of the points along each side.",
+    type=click.Choice([*GRIDS]),
 )
 # for islands, which only MBMA has
 model_options = option_group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
@@ -358,6 +380,7 @@ theory_options = option_group(
     "model",
     lambda given: Model(**given_values(given)),
     theory_option,
+    grid_option,
     *_MODEL_OPTIONS,
     hardness_option,
 )
@@ -407,7 +430,7 @@ _SECTIONS = {
         "length_unit",
         "stress_unit",
     ),
-    "Theory": ("theory", "variant", "island_model", "rtol"),
+    "Theory": ("theory", "grid", "variant", "island_model", "rtol"),
     "Options": (),
 }
 

@@ -80,7 +80,7 @@ def contact(
         `mbma_tables.theories`, or any with a `name` and ``answer(surface, u)``. Default,
         here and wherever a theory can be given: "mbma" at a `separation`, its coordinate,
         or where an option of MBMA is given (`island_model`, `variant`, `rtol`, `outside`);
-        otherwise "corrected" for a resolved map of at most 2^18 points, and "calibrated"
+        otherwise "simulated" for a resolved map of at most 2^18 points, and "calibrated"
         for any other surface.
     hardness : array_like or str, optional
         Largest pressure p_m that the softer body supports, in the unit of `E_star` (over E*

@@ -144,8 +144,7 @@ def flow_factors(
     those of the leakage law (`mbma_tables.quantities.lay`). The mean gap u is that of the
     deformed faces: Patir and Cheng's h_T, not their h.
 
-    With "simulated" or "corrected", the default of a map, they are those of the surface's
-    own map: Reynolds' equation is solved on its gaps, in contact those of a BEM simulation,
+    With "simulated", the default of a map, they are those of the surface's own map: Reynolds' equation is solved on its gaps, in contact those of a BEM simulation,
     at several mean gaps (half a minute for 256 x 256 points; ``theory="calibrated"`` takes
     none of it).
 

@@ -13,6 +13,7 @@ from mbma_tables.surfaces.roughness import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
+from mbma_tables.theories.base import UserTheory
 from mbma_tables.theories.users import answer_where_finite
 
 DRAWN = ("calibrated", "mbma")
@@ -263,7 +264,7 @@ def _by_pressure(
 
 
 def table_of_loads(
-    surface: MeasuredSurface, E_star: float = 1.0, theory: str | None = None
+    surface: MeasuredSurface, E_star: float = 1.0, theory: str | UserTheory | None = None
 ) -> tuple[dict[str, Any], list[str]]:
     """Columns of a theory's results at a few contact areas, and text lines on those omitted or not valid."""
     from mbma_tables.contacts.contact import chosen_theory, contact

@@ -248,7 +248,7 @@ class Problem:
         if isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
         else:
-            get_theory(self.theory)
+            get_theory(self.theory, self.surface)
         for name in self.theories:
             require_name("theory", name, THEORIES)
         if self.theory_name in self.theories:

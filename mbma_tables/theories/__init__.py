@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
     from mbma_tables.theories.mbma.theory import Mbma
     from mbma_tables.theories.persson import Method, Persson
-    from mbma_tables.theories.simulated.yielded import (
-        BoundaryElements as BoundaryElements,
-    )
+    from mbma_tables.theories.simulated.one_map import BoundaryElements
+    from mbma_tables.theories.simulated.theory import Simulated
 
 __all__ = [
     "THEORIES",
@@ -28,6 +27,7 @@ __all__ = [
     "Mbma",
     "Method",
     "Persson",
+    "Simulated",
     "Theory",
     "TheoryAnswer",
     "UserTheory",
@@ -37,9 +37,13 @@ __all__ = [
 ]
 
 THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")
-_NAMED = dict(
-    zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True)
-)
+_NAMED = {
+    "mbma": "Mbma",
+    "calibrated": "Calibrated",
+    "persson": "Persson",
+    "greenwood_williamson": "GreenwoodWilliamson",
+    "simulated": "Simulated",
+}
 # a theory's module is imported when first needed
 _HOMES = {
     "Mbma": "mbma.theory",
@@ -47,12 +51,13 @@ _HOMES = {
     "Persson": "persson",
     "Method": "persson",
     "GreenwoodWilliamson": "greenwood_williamson",
-    "BoundaryElements": "simulated.yielded",
+    "BoundaryElements": "simulated.one_map",
+    "Simulated": "simulated.theory",
     "Theory": "base",
     "TheoryAnswer": "base",
     "UserTheory": "base",
 }
-OF_MAPS = ("corrected", "simulated")  # theories of one map, made by simulating it
+OF_MAPS = ("simulated",)  # theories of one map, made by simulating it
 # of MBMA
 OPTIONS = {
     "island_model": "universal",
@@ -71,8 +76,8 @@ def __getattr__(name: str) -> Any:
 def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory:
     """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
 
-    "simulated" and "corrected" are theories of one `surface`, made from a map:
-    `BoundaryElements.of` and `Corrected.of` that surface, kept for the last eight of them.
+    "simulated" and `Simulated` are theories of one `surface`, made from a map: the simulation
+    of that map, kept for the last eight of them.
 
     Raises
     ------
@@ -89,19 +94,18 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     from mbma_tables.theories.base import Theory, UserTheory
     from mbma_tables.theories.users import Wrapped
 
-    if isinstance(theory, str) and theory in OF_MAPS:
-        from mbma_tables.theories.simulated.yielded import of_map
+    chosen: Any = theory
+    if isinstance(theory, str) and theory in _NAMED:
+        chosen = __getattr__(_NAMED[theory])()
+    if isinstance(chosen, Theory):
+        return chosen
 
-        return of_map(theory, surface)
-    found: Any = (
-        __getattr__(_NAMED[theory])()
-        if isinstance(theory, str) and theory in _NAMED
-        else theory
-    )
-    if isinstance(found, Theory):
-        return found
-    if isinstance(found, UserTheory) and not isinstance(found, type):
-        return Wrapped(found)
+    from mbma_tables.theories.simulated.theory import Simulated
+
+    if isinstance(chosen, Simulated):
+        return chosen.of(surface)
+    if isinstance(chosen, UserTheory) and not isinstance(chosen, type):
+        return Wrapped(chosen)
     raise InputError(
         f"theory must be one of {(*THEORIES, *OF_MAPS)} or an object with a name and answer(surface, u), "
         f"got {reprlib.repr(theory)}"
@@ -140,8 +144,8 @@ def theory_name(
     str or theory
         By default "mbma" at a given separation d, which is MBMA's coordinate, or where an
         option of MBMA differs from its default; else "simulated" for a surface opened from
-        the table of its simulation, "corrected" for a map that is resolved and of at most
-        2^18 points, and "calibrated" for every other surface.
+        the table of its simulation, and for a map that is resolved and of at most 2^18
+        points, and "calibrated" for every other surface.
 
     Examples
     --------
@@ -161,6 +165,6 @@ def theory_name(
         return "simulated"
     if getattr(surface, "map", None) is None:
         return "calibrated"
-    from mbma_tables.theories.simulated.yielded import applies
+    from mbma_tables.theories.simulated.theory import is_default
 
-    return "corrected" if applies(surface) else "calibrated"
+    return "simulated" if is_default(surface) else "calibrated"

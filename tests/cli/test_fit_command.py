@@ -59,7 +59,7 @@ def test_it_tells_what_was_found_and_done(map_file, tmp_path):
     assert "area depends on resolution" in said
     assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     found = json.loads(run("fit", MAP, "--short-cutoff", "9.4nm", "--json"))
-    assert found["theory"] == "corrected"
+    assert found["theory"] == "simulated"
     assert found["columns"]["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1, 0.3, 0.6])
     assert found["columns"]["valid"] == ["no", *5 * ["yes"]]
     assert any(

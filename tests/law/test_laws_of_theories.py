@@ -450,8 +450,8 @@ def test_a_quick_simulation_with_a_hardness_has_a_law(hardness):
     """Its area bends where the force is that of the lightest simulated load, not at that load's separation."""
     heights = random_map(64, 0.03, 0.25, seed=0)
     surface = Surface.from_map(0.5 * heights / np.std(heights), 1.0, periodic=True)
-    law = contact_law(surface, "corrected", hardness=hardness)
+    law = contact_law(surface, "simulated", hardness=hardness)
     u = np.linspace(0.02, 0.99, 300) * surface.h_max
-    found = contact(surface, mean_separation=u, theory="corrected", hardness=hardness)
+    found = contact(surface, mean_separation=u, theory="simulated", hardness=hardness)
     assert np.abs(law.pressure(u) / found.pressure - 1).max() <= law.error
     assert np.abs(law.area(u) / found.area - 1).max() <= law.error

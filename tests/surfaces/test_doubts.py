@@ -9,6 +9,7 @@ from helpers import topographies
 from generate.machined.makers import FAMILIES, Part, heights
 from mbma_tables import OutOfRangeError, Surface, contact
 from mbma_tables.surfaces.averages import average
+from mbma_tables.theories import Simulated
 
 topographies()
 
@@ -16,7 +17,7 @@ PART = Part("eroded", 1, 64)
 MAP = heights(PART)
 
 
-def asked(surface, theory="corrected", area=0.1):
+def asked(surface, theory="simulated", area=0.1):
     return contact(surface, area=area, theory=theory)
 
 
@@ -41,7 +42,7 @@ def test_machined_surfaces_raise_no_doubt(family):
 
 class TestSpikes:
     @pytest.mark.parametrize("share", [0.0, 0.001, 0.006, 0.02])
-    @pytest.mark.parametrize("theory", ["corrected", "calibrated"])
+    @pytest.mark.parametrize("theory", ["simulated", "calibrated"])
     def test_results_are_not_valid_until_they_are_removed(self, share, theory):
         spoilt, _ = with_spikes(share)
         found = asked(of(spoilt), theory)
@@ -138,13 +139,13 @@ class TestSampling:
 
     @pytest.mark.parametrize("unit", [None, "um"])
     @pytest.mark.parametrize("step", [1.0, 0.123456])
-    @pytest.mark.parametrize("theory", ["simulated", "corrected"])
-    def test_the_stated_cutoff_makes_it_valid(self, unit, step, theory):
+    @pytest.mark.parametrize("grid", ["quick", "full"])
+    def test_the_stated_cutoff_makes_it_valid(self, unit, step, grid):
         noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(
             MAP.shape
         )
         given = {"heights": step * noise, "dx": step, "periodic": True, "unit": unit}
-        found = asked(Surface.from_map(**given), theory)
+        found = asked(Surface.from_map(**given), Simulated(grid))
         assert not found.valid
         remedy = re.search(
             r"Surface\.from_map\(\.\.\., (.*)\)$", next(iter(found.reasons))
@@ -153,7 +154,7 @@ class TestSampling:
             f"Surface.from_map(**given, {remedy[1]})",
             {"Surface": Surface, "given": given},
         )
-        assert asked(mended, theory).valid
+        assert asked(mended, Simulated(grid)).valid
 
     def test_the_calibrated_law_names_the_same(self):
         noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(
@@ -173,12 +174,12 @@ class TestSampling:
         assert asked(rounded).valid
         assert asked(rounded).pressure == pytest.approx(asked(of(MAP)).pressure, rel=1e-3)
 
-    def test_light_contacts_name_the_theory_that_reaches_them(self):
-        found = contact(of(MAP), area=0.002, theory="corrected")
+    def test_light_contacts_name_the_grid_that_reaches_them(self):
+        found = contact(of(MAP), area=0.002, theory="simulated")
         assert list(found.reasons) == [
-            "A/A0 is below 0.003: theory='simulated' was tested from 0.001 on"
+            "A/A0 is below 0.003: theory=Simulated(grid='full') was tested from 0.001 on"
         ]
-        assert contact(of(MAP), area=0.002, theory="simulated").valid
+        assert contact(of(MAP), area=0.002, theory=Simulated(grid="full")).valid
 
     def test_an_average_names_a_scan(self):
         both = average([of(MAP), of(MAP[::-1])])

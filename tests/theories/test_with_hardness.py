@@ -8,7 +8,7 @@ import xarray as xr
 from helpers import fresh, random_map
 
 from mbma_tables import Surface, contact
-from mbma_tables.theories import THEORIES, BoundaryElements, get_theory
+from mbma_tables.theories import THEORIES, BoundaryElements, Simulated, get_theory
 from mbma_tables.theories.yielding.theory import Yielding
 
 MAP = 0.1 * random_map(64, 0.05, 0.25, power=0)
@@ -40,10 +40,8 @@ def pairs(tmp_path_factory):
     BoundaryElements.of(measured).to_netcdf(path)
     opened = BoundaryElements.from_netcdf(path)
     pairs = {name: (get_theory(name), rough) for name in THEORIES}
-    pairs |= {
-        name: (get_theory(name, measured), measured)
-        for name in ("simulated", "corrected")
-    }
+    for grid in ("full", "quick"):
+        pairs[grid] = Simulated(grid).of(measured), measured
     return pairs | {"table": (opened, opened.surface)}
 
 
@@ -51,8 +49,8 @@ def pairs(tmp_path_factory):
 @pytest.mark.parametrize(
     "names",
     [
-        ("simulated",),
-        pytest.param((*THEORIES, "corrected", "table"), marks=pytest.mark.slow),
+        ("full",),
+        pytest.param((*THEORIES, "quick", "table"), marks=pytest.mark.slow),
     ],
 )
 def test_every_theory_has_the_same_bits_in_a_new_process(pairs, tmp_path, names):
@@ -73,7 +71,7 @@ def test_every_theory_has_the_same_bits_in_a_new_process(pairs, tmp_path, names)
 
 @pytest.mark.slow
 def test_workers_of_dask_have_the_same_bits(pairs):
-    theory, surface = pairs["simulated"]
+    theory, surface = pairs["full"]
     pressures = xr.DataArray(PRESSURES, dims="load")
     here = contact(surface, pressure=pressures, theory=theory, hardness=HARDNESS).area
     chunks = contact(

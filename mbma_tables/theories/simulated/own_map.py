@@ -22,8 +22,6 @@ from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.simulated.pressing import coarser
 
-# A/A0 by the law of the map, at which it is simulated
-AREAS = (7e-4, 0.0015, 0.006, 0.012, 0.05, 0.09, 0.22, 0.3, 0.52, 0.65, 0.88, 0.95)
 MOST_POINTS = 2**20  # points of the largest map that is simulated without change
 REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
 
@@ -59,11 +57,15 @@ def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
 
 
 def reduced(
-    values: FloatArray, points: float, mirrored: bool
+    values: FloatArray, points: float, mirrored: bool, halvings: int = 0
 ) -> tuple[FloatArray, float, float]:
-    """A map of few enough points, sampling steps along its shortest wavelength, and the cut-off in own steps."""
-    step, cut = 1.0, 0.0
-    while values.size > MOST_POINTS:
+    """A map halved so often, and until it has few enough points.
+
+    With sampling steps along its shortest wavelength, and the cut-off in steps of the whole map.
+    """
+    step, cut, halved = 1.0, 0.0, 0
+    while halved < halvings or values.size > MOST_POINTS:
+        halved += 1
         step *= 2
         fine = points >= 2 * MIN_POINTS * (1 - ROUNDING)
         values = coarser(values, 0.0 if fine else MIN_POINTS, mirrored)
@@ -86,7 +88,7 @@ def map_of(surface: AnySurface) -> Treated:
     whole = surface.map if isinstance(surface, MeasuredSurface) else None
     if whole is None or whole.heights.ndim != 2:
         raise InputError(
-            "theories 'simulated' and 'corrected' need a height map, and this surface has none: make it by "
+            "theory 'simulated' needs a height map, and this surface has none: make it by "
             "Surface.from_map, neither combined nor extrapolated nor fitted"
         )
     return whole

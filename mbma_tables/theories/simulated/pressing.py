@@ -23,10 +23,11 @@ from mbma_tables.theories.simulated.boundary_elements import (
     wavenumbers,
     waves,
 )
+from mbma_tables.theories.simulated.grids import FULL
 from mbma_tables.theories.simulated.reynolds import flow_tensor
 
-TOLERANCE = 1e-5
-LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
+TOLERANCE = FULL.tolerance
+LOWEST, HIGHEST = FULL.tested  # A/A0 that the loads reach at least
 MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
 # loads added where the areas of two neighbours differ by more than this factor, at most so
 # many; where an area jumps, as when a plateau is reached, no two loads closer than this in

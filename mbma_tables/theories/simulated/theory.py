@@ -1,133 +1,68 @@
-"""BEM simulation of one map, and of the flow through its gaps, as a theory of that map alone: `theory="simulated"`."""
+"""Boundary elements on a surface's own map as a theory: `theory="simulated"`, or `Simulated(grid=...)`."""
 
 from __future__ import annotations
 
-import hashlib
-import importlib
-import os
-from typing import Any, ClassVar
+import dataclasses
+from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
-
-from mbma_tables.common.arguments import FloatArray, require
-from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.common.shared import shared_property
+from mbma_tables.common.arguments import FloatArray, require_name
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.map_simulation import (
-    MIN_POINTS,
-    ROUNDING,
-    MapSimulation,
-    resolving,
-)
+from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.base import Theory, TheoryAnswer
-from mbma_tables.theories.calibrated.curves import own_law
-from mbma_tables.theories.calibrated.theory import Calibrated
-from mbma_tables.theories.simulated import own_map
-from mbma_tables.theories.simulated.energy_spline import LoadCurve
-from mbma_tables.theories.simulated.pressing import (
-    AREA_OF_FLOW,
-    HIGHEST,
-    LOWEST,
-    TOLERANCE,
-    Press,
-)
+from mbma_tables.theories.simulated.grids import FULL, GRIDS, QUICK
 
-# A/A0 of the 142 maps of `python -m generate machined` at which scatter was measured
-TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
-# scatter increases by this power of a map's `sensitivity_at` over that of most maps, found
-# between these A/A0
-POWER, TYPICAL, SENSITIVE = 0.75, 0.0025, (0.003, 0.95)
-# of ln A by the map's own grid at `MIN_POINTS` steps a wavelength: on a grid four times
-# finer areas are 0.8 to 1.5% larger; of the second order in the step
-GRID = 0.012
-EVALUATED = 1e-5  # error of the curves through the loads; laws need not be more accurate
-STEEPEST = 8.0  # largest power of u - u1 by which an axis closes
-MATCHED = 1e-6  # relative, of the surface that is asked about
+if TYPE_CHECKING:
+    from mbma_tables.theories.simulated.one_map import BoundaryElements
+
+# of maps that are simulated by default, which then takes seconds
+LEAST_SIDE = 64
+MOST_POINTS = 2**18
 
 
-class BoundaryElements(Theory):
-    """BEM results of one map at a row of loads, made by `of` or `from_netcdf`, and curves between them.
+@dataclasses.dataclass(frozen=True)
+class Simulated:
+    """Contact by boundary elements on a surface's own map.
 
-    Attributes
+    Parameters
     ----------
-    surface : MeasuredSurface
-        The map; other surfaces raise an error.
-    rows : ndarray, shape (4, n)
-        Pressure over E*, A/A0, u [length] and elastic energy over A0 E* [length] of the loads.
-    points : float
-        Sampling steps per shortest wavelength; below four, areas are too large and results
-        are not `valid`.
+    grid : {"quick", "full", "half"}, optional
+        Points and loads of the simulation. "quick" has all points of the map, nine loads and a
+        tolerance of 3e-4; contacts of 0.3% to 80% are valid. "full" has twelve loads and a
+        tolerance of 1e-5, about twice the time; contacts of 0.1% to 90% are valid, and a hardness
+        is simulated too. "half" is "full" on half of the points along each side, for maps of at
+        least eight sampling steps along the shortest wavelength. Each adds loads where contact
+        areas of two neighbours differ much. Default: "quick", or for a surface opened from the
+        table of its simulation that table, which is of the full grid.
 
-    Notes
-    -----
-    The curves are those of `energy_spline`; beyond the loads no answer is `valid`. They are the
-    theory: `error` is that of evaluating them, and how far they are from contact simulated at a load between is the
-    `scatter`, which was measured on 142 maps.
+    Raises
+    ------
+    InputError
+        For an unknown grid.
 
     Examples
     --------
     >>> import numpy as np
     >>> from mbma_tables import Surface, contact
-    >>> from mbma_tables.theories import BoundaryElements
+    >>> from mbma_tables.theories import Simulated
     >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
     >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
     >>> heights = np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
-    >>> truth = BoundaryElements.of(Surface.from_map(heights, 1.0, periodic=True))
-    >>> found = contact(truth.surface, area=0.2, theory=truth)
-    >>> f"u = {found.mean_separation / truth.surface.h_rms:.2f} h_rms"
-    'u = 0.71 h_rms'
+    >>> surface = Surface.from_map(heights, dx=1.0, periodic=True)
+    >>> pressed = contact(surface, area=0.002, theory=Simulated(grid="full"))
+    >>> f"{float(pressed.pressure):.2e} E*, valid: {pressed.valid}"
+    '3.66e-04 E*, valid: True'
     """
 
-    name = "simulated"
-    bends_in_area = True
-    of_yielded_gaps = False  # whether its flow is that of gaps that yielded
-    areas: tuple[float, ...] = own_map.AREAS  # by the law of the map, at its loads
-    tolerance, tested = TOLERANCE, (LOWEST, HIGHEST)  # of boundary elements; A/A0
-    remedies = "", ""  # for lighter and for heavier contacts
-    # standard deviations against contact on the full grid at tolerance 1e-6, at
-    # `TESTED_AREAS`, which lie between the loads, of a map of typical sensitivity: the
-    # larger of the 70% and half of the 97.5% quantile of the errors
-    scatters: ClassVar[dict[str, tuple[float, ...]]] = {
-        "area": (0.0649, 0.0233, 0.0105, 0.00936, 0.00987, 0.00321, 0.00615),
-        "pressure": (0.00529, 0.00286, 0.00041, 0.000948, 0.000686, 0.00022, 0.00187),
-        "stiffness": (0.0402, 0.0165, 0.0112, 0.00981, 0.00805, 0.00436, 0.0105),
-        "flow": (0.00729, 0.0153, 0.0185, 0.0327, 0.0327, 0.0327, 0.0327),
-    }
+    grid: str | None = None
+    name: ClassVar[str] = "simulated"
 
-    def __init__(
-        self,
-        surface: MeasuredSurface,
-        rows: FloatArray,
-        points: float,
-        pressed: Press | MapSimulation,
-        origin: str,
-    ) -> None:
-        self.surface, self.rows, self.points, self.pressed, self.origin = (
-            surface,
-            rows,
-            points,
-            pressed,
-            origin,
-        )
-        top, steps = float(surface.h_max), np.diff(rows)
-        if not (
-            (rows > 0).all()
-            and (steps[:2] >= 0).all()
-            and (steps[2] < 0).all()
-            and rows[2, 0] < top
-        ):
-            raise OutOfRangeError(
-                f"the simulation of this map is no law up to h_max = {top:.4g}: at rising loads, areas {rows[1]} must "
-                f"rise, and mean separations {rows[2]} fall from below h_max"
-            )
-        self.fit = LoadCurve(rows, top)
+    def __post_init__(self) -> None:
+        if self.grid is not None:
+            require_name("grid", self.grid, GRIDS)
 
-    @classmethod
-    def of(cls, surface: AnySurface) -> BoundaryElements:
-        """Simulate the map of a surface from `Surface.from_map`; loads in `common.cache` or in its `table` are reused.
+    def of(self, surface: AnySurface) -> BoundaryElements:
+        """The simulation of a surface's map, kept for the last eight of them.
 
         Raises
         ------
@@ -136,246 +71,38 @@ class BoundaryElements(Theory):
         ConvergenceError
             Where boundary elements do not converge.
         """
-        table = (
-            surface.table
-            if isinstance(surface, MeasuredSurface) and cls is BoundaryElements
-            else None
-        )
-        if table is not None:
-            return cls(surface, table.rows, table.points, table, table.origin)  # type: ignore[arg-type]
-        whole = own_map.map_of(surface)
-        assert isinstance(surface, MeasuredSurface)
-        steps, mirrored = own_map.steps_along(surface, whole), not whole.periodic
-        values, points, cut = own_map.reduced(
-            whole.heights - whole.heights.mean(), steps, mirrored
-        )
-        press = Press(
-            values,
-            own_map.sides(whole),
-            own_law(surface).gradient,
-            cls.tolerance,
-            mirrored,
-            left_out=cut * max(whole.steps),
-        )
-        force, rows = press.loads(own_map.law_loads(surface, cls.areas), True)
-        digest = hashlib.sha256(
-            np.ascontiguousarray(whole.heights, "<f8").tobytes()
-        ).hexdigest()[:16]
-        own = f"of the map of {' x '.join(map(str, whole.heights.shape))} points with SHA-256 {digest}"
-        origin = f"boundary elements, tolerance {cls.tolerance:g}, {own}"
-        return cls(surface, np.array([force, *rows]), points, press, origin)
+        # imports scipy, which takes long
+        from mbma_tables.theories.simulated.one_map import simulation_of
 
-    def to_netcdf(self, path: os.PathLike[str] | str) -> None:
-        """Write a table that opens without the map; a file that cannot be written is a `TableFileError`."""
-        own_map.write_table(self, path)
+        if self.grid is not None:
+            return simulation_of(surface, self.grid)
+        has_table = getattr(surface, "table", None) is not None
+        return simulation_of(surface, FULL.name if has_table else QUICK.name)
 
-    @classmethod
-    def from_netcdf(cls, path: os.PathLike[str] | str) -> BoundaryElements:
-        """Open such a table (`TableFileError` if damaged or edited); for its `.surface` "simulated" is the default."""
-        return cls.of(own_map.read_surface(path))
+    def answer(
+        self, surface: AnySurface, mean_separation: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """F/(A0 E*) and A/A0 of the simulation at mean separations u [length]."""
+        simulation = self.of(surface)
+        answer = simulation.answer(surface, mean_separation)
+        return answer.pressure, answer.area
 
-    def with_hardness(self, hardness: ArrayLike, E_star: ArrayLike = 1.0) -> Theory:
-        """The map simulated anew with the hardness; a table without its map by the law of hardness."""
-        yielding: Any = super().with_hardness(hardness, E_star)
-        if not isinstance(self.pressed, Press):
-            return yielding  # type: ignore[no-any-return]
-        # it imports this module
-        saturated = importlib.import_module("mbma_tables.theories.simulated.yielded")
-        return saturated.Saturated(self, yielding.hardness)  # type: ignore[no-any-return]
 
-    def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """What is doubtful about the measurement; the theory is of this map, whatever its statistics."""
-        return surface.doubts
+def is_default(surface: AnySurface) -> bool:
+    """Whether simulation is the default: of a map that is resolved and pressed within seconds."""
+    from mbma_tables.theories.simulated.own_map import steps_along
 
-    def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separations [length] of the first and the last load."""
-        return self.rows[2, [-1, 0]]
-
-    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force, area and stiffness at mean separations u [length]; an error for surfaces other than this map."""
-        x = self.fit.log_force(self._within(surface, mean_separation))
-        return TheoryAnswer(
-            np.exp(x),
-            self.fit.area(x),
-            self.fit.stiffness(x),
-            np.full(np.shape(x), EVALUATED),
-        )
-
-    def inverted(
-        self, surface: AnySurface, quantity: str, wanted: FloatArray
-    ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        if quantity == "area":
-            require(quantity, wanted, wanted < 1, "less than 1")
-        with np.errstate(divide="ignore"):
-            x = (
-                np.log(wanted)
-                if quantity == "pressure"
-                else self.fit.log_force_at(wanted)
-            )
-        u = self.fit.separation(x)
-        require(
-            quantity,
-            wanted,
-            u > np.finfo(float).eps * self.rows[2, 0],
-            "less: the mean separation vanishes",
-        )
-        return u, np.zeros(np.shape(wanted), bool)
-
-    def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        return self.fit.energy(self.fit.log_force(self._within(surface, mean_separation)))
-
-    def heights(self, surface: AnySurface) -> Any:
-        """The map's own bearing curve, for a hardness."""
-        return Calibrated().heights(surface)
-
-    def reasons(
-        self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
-    ) -> dict[str, Any]:
-        area, left_out = answer.area, self.pressed.left_out
-        coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
-        whole = self.surface.map
-        if whole is None:
-            coarse += f": simulate it again with a short_cutoff of {MIN_POINTS:g} steps"
-        else:
-            cutoff = resolving(
-                self.points * max(whole.steps), max(whole.steps), self.surface.unit
-            )
-            coarse += f": give Surface.from_map(..., {cutoff})"
-        cut = f"wavelengths below {left_out:.4g} were left out, since the map has too many points"
-        return {
-            coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
-            cut: np.full(area.shape, left_out > 0),
-            f"A/A0 is below {self.tested[0]:g}{self.remedies[0]}": (area < self.tested[0])
-            & (area > 0),
-            f"A/A0 is above {self.tested[1]:g}{self.remedies[1]}": area > self.tested[1],
-        }
-
-    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
-        """Standard deviation against the full grid at tolerance 1e-6, of areas a finer one; NaN beyond the loads."""
-        with np.errstate(divide="ignore"):
-            usual = np.interp(np.log(area), np.log(TESTED_AREAS), self.scatters[quantity])
-        stated = usual * (self.sensitivity_at(area) / TYPICAL) ** POWER
-        if quantity == "area":
-            stated = np.hypot(stated, GRID * (MIN_POINTS / self.points) ** 2)
-        low, high = self.rows[1, [0, -1]]
-        return np.where(
-            (area < low * (1 - ROUNDING)) | (area > high * (1 + ROUNDING)), np.nan, stated
-        )
-
-    @shared_property
-    def changes(self) -> FloatArray:
-        """Change of ln F at the gap of each load when it is left out of the curves; NaN where that is not tried."""
-        low, high = SENSITIVE
-        area = self.rows[1, 1:-1]
-        changes = np.full(self.rows.shape[1], np.nan)
-        for load in np.flatnonzero((area > low) & (area < high)) + 1:
-            others = LoadCurve(np.delete(self.rows, load, axis=1), self.fit.top)
-            changes[load] = abs(others.log_force(self.rows[2, load]) - self.fit.x[load])
-        return changes
-
-    @property
-    def sensitivity(self) -> float:
-        """Mean of `changes`."""
-        return float(np.nanmean(self.changes))
-
-    def sensitivity_at(self, area: FloatArray) -> FloatArray:
-        """The mean of `changes`, or the larger one at both ends of the interval between loads if that is larger."""
-        changes = np.nan_to_num(self.changes)
-        intervals = np.maximum(changes[1:], changes[:-1])
-        number = np.searchsorted(self.rows[1], area, side="right") - 1
-        local = intervals[np.clip(number, 0, intervals.size - 1)]
-        return np.asarray(np.maximum(local, self.sensitivity))
-
-    def gaps(self) -> Any:
-        return self
-
-    @shared_property
-    def flows(self) -> tuple[FloatArray, FloatArray]:
-        """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
-        return self.pressed.flows(self.fit.x, self.fit.separation)
-
-    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Flow coefficients xx, yy and xy [length^3], by the gaps; 0 from the load on at which an axis is blocked."""
-        # ln K is a monotone cubic of ln(u - u1) where an axis closes at u1; xy is sqrt(xx
-        # yy) times what is linear in u bodies apart are farther apart than the theory needs
-        u = np.maximum(self._within(surface, mean_separation), mean_separation)
-        gaps, known = self.flows
-        found = np.zeros((3, *u.shape))
-        for axis, (last, end, _) in enumerate(self.closing):
-            passing = (gaps >= last) & (known[:, axis] > 0)
-            if passing.any():
-                x, y = (
-                    np.log(gaps[passing][::-1] - end),
-                    np.log(known[passing, axis][::-1]),
-                )
-                if x.size == 1:
-                    x, y = np.append(x - 1, x), np.append(y - 3, y)
-                curve = PchipInterpolator(x, y)
-                with np.errstate(divide="ignore"):
-                    own = np.log(np.maximum(np.minimum(u, gaps[0]) - end, 0.0))
-                below = max(float(curve(x[0], 1)), 1.0) * np.minimum(own - x[0], 0.0)
-                found[axis] = np.exp(curve(np.maximum(own, x[0])) + below)
-                # towards parallel planes, which pass the cube of their distance
-                wide = u**3 - (gaps[0] ** 3 - known[0, axis]) * u / gaps[0]
-                found[axis] = np.where(u > gaps[0], wide, found[axis])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.nan_to_num(known[:, 2] / np.sqrt(known[:, 0] * known[:, 1]))
-        found[2] = np.sqrt(found[0] * found[1]) * np.interp(-u, -gaps, turn)
-        return found
-
-    @shared_property
-    def closing(self) -> list[tuple[float, float, float]]:
-        """Of both axes, u of the last open load, u1 at which it closes, and u of the first blocked load [length]."""
-        gaps, known = self.flows
-        u, found = np.append(gaps, 0.0), []
-        for axis, count in enumerate(np.cumprod(known[:, :2] > 0, axis=0).sum(axis=0)):
-            end = blocked = float(u[count])
-            if count > 1:
-                # between the last two open loads the power of u - u1 is at most STEEPEST
-                ratio = (known[count - 2, axis] / known[count - 1, axis]) ** (
-                    1 / STEEPEST
-                )
-                end = (
-                    max(end, float((ratio * u[count - 1] - u[count - 2]) / (ratio - 1)))
-                    if ratio > 1
-                    else end
-                )
-            found.append((float(u[max(count - 1, 0)]), end, blocked))
-        return found
-
-    def flow_trust(
-        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        """Standard deviation of ln of that flow on tested maps, and a mask where an axis may be blocked."""
-        near = [
-            (mean_separation < last) & (mean_separation > blocked)
-            for last, _, blocked in self.closing
-        ]
-        reasons = {
-            "leakage: the map may be blocked, as it is at the next simulated load": np.logical_or(
-                *near
-            ),
-            f"leakage: A/A0 is above {AREA_OF_FLOW:g}": area > AREA_OF_FLOW,
-        }
-        return self.scatter(surface, "flow", area), reasons
-
-    def _within(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Mean separations of this map; bodies that are apart are at first contact."""
-        for name in ("h_rms", "h_max"):
-            own, given = (
-                float(getattr(self.surface, name)),
-                np.asarray(getattr(surface, name)),
-            )
-            good = np.abs(given - own) <= MATCHED * own
-            require(
-                name,
-                given,
-                good,
-                f"{own:.9g}: a simulation of one map is for that map only, its .surface",
-            )
-        u = np.broadcast_to(
-            np.asarray(mean_separation, float),
-            np.broadcast_shapes(np.shape(mean_separation), surface.shape),
-        )
-        require("mean_separation", u, u >= 0, "at least 0")
-        return np.asarray(np.minimum(u, self.surface.h_max))
+    if not isinstance(surface, MeasuredSurface):
+        return False
+    treated = surface.map
+    if treated is None or surface.bands is None or treated.heights.ndim != 2:
+        return False
+    if treated.heights.size > MOST_POINTS or min(treated.heights.shape) < LEAST_SIDE:
+        return False
+    if steps_along(surface, treated) < MIN_POINTS * (1 - ROUNDING):
+        return False
+    try:
+        Simulated().of(surface)
+    except (ConvergenceError, OutOfRangeError):
+        return False
+    return True

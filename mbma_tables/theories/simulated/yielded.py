@@ -1,29 +1,25 @@
-"""Simulated maps with a hardness, for each hardness anew, and quicker simulations, the default theory of maps."""
+"""Simulated maps with a hardness, for each hardness anew."""
 
 from __future__ import annotations
 
 import collections
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.common.shared import shared, shared_property
+from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING
-from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.simulated import own_map
+from mbma_tables.theories.simulated.grids import AREAS
+from mbma_tables.theories.simulated.one_map import BoundaryElements
 from mbma_tables.theories.simulated.pressing import TOLERANCE, Press
-from mbma_tables.theories.simulated.theory import BoundaryElements as BoundaryElements
 from mbma_tables.theories.yielding.theory import Yielding, elastic_scatter
 
-# points along a side, and of the map, between which "corrected" is the default
-LEAST_SIDE, MOST_POINTS = 64, 2**18
 KEPT = 8  # hardnesses of maps whose simulations are kept
 # standard deviations of ln of a quantity, by `python -m generate machined`
 SCATTER = {"area": 0.010, "pressure": 0.011, "unloading_stiffness": 0.033}
@@ -41,8 +37,8 @@ class Plastic(BoundaryElements):
     def __init__(self, theory: BoundaryElements, cap: float) -> None:
         known, surface = theory.pressed, theory.surface
         assert isinstance(known, Press)
-        elastic = own_map.law_loads(surface, own_map.AREAS)
-        loads = ((cap * np.array(own_map.AREAS)) ** -2 + elastic**-2) ** -0.5
+        elastic = own_map.law_loads(surface, AREAS)
+        loads = ((cap * np.array(AREAS)) ** -2 + elastic**-2) ** -0.5
         press = Press(
             known.heights,
             known.sizes,
@@ -65,6 +61,7 @@ class Plastic(BoundaryElements):
             theory.points,
             press,
             theory.origin,
+            theory.grid,
         )
         # yielded share, ln of the frozen stiffness and u less the gap of the mean planes, by ln F
         self._more = PchipInterpolator(
@@ -234,62 +231,3 @@ class Saturated(Yielding):
             elastic, SCATTER.get(quantity, np.nan if quantity == "stiffness" else 0.0)
         )
         return np.where(np.isinf(self.hardness), elastic, measured)
-
-
-class Corrected(BoundaryElements):
-    """The map pressed at fewer loads, with a larger tolerance; its flow is that of "simulated" at equal pressure."""
-
-    name = "corrected"
-    # with the law of hardness, since a simulation for each hardness takes longer than its own
-    with_hardness = Theory.with_hardness
-    areas = tuple(area for area in own_map.AREAS if area not in (7e-4, 0.3, 0.95))
-    tolerance = 3e-4
-    tested = 3e-3, 0.8
-    remedies = (
-        f": theory='simulated' was tested from {BoundaryElements.tested[0]:g} on",
-        f": theory='simulated' was tested up to {BoundaryElements.tested[1]:g}",
-    )
-    scatters: ClassVar[dict[str, tuple[float, ...]]] = {
-        "area": (0.0494, 0.0176, 0.00947, 0.0104, 0.0102, 0.00223, 0.00622),
-        "pressure": (0.00485, 0.00251, 0.00115, 0.00116, 0.00155, 0.00161, 0.00239),
-        "stiffness": (0.0361, 0.0135, 0.00813, 0.00772, 0.0076, 0.0054, 0.0131),
-        "flow": (0.00729, 0.0153, 0.0185, 0.0327, 0.0327, 0.0327, 0.0327),
-    }
-
-    @shared_property
-    def flows(self) -> tuple[FloatArray, FloatArray]:
-        """Of the full simulation, at the gaps that this one has under the same loads."""
-        full = of_map(BoundaryElements.name, self.surface)
-        gaps, flow = full.flows
-        return self.fit.separation(full.fit.log_force(gaps)), flow
-
-
-def applies(surface: AnySurface) -> bool:
-    """Whether it is the default for a surface: of a map that is resolved, and pressed within seconds."""
-    if (
-        not isinstance(surface, MeasuredSurface)
-        or surface.map is None
-        or surface.bands is None
-    ):
-        return False
-    whole = surface.map
-    if whole.heights.ndim != 2:
-        return False
-    resolved = own_map.steps_along(surface, whole) >= MIN_POINTS * (1 - ROUNDING)
-    if (
-        whole.heights.size > MOST_POINTS
-        or min(whole.heights.shape) < LEAST_SIDE
-        or not resolved
-    ):
-        return False
-    try:
-        of_map(Corrected.name, surface)
-    except (ConvergenceError, OutOfRangeError):
-        return False
-    return True
-
-
-@shared(8)
-def of_map(name: str, surface: AnySurface) -> BoundaryElements:
-    """The theory of that name for a surface's map, cached."""
-    return {kind.name: kind for kind in (BoundaryElements, Corrected)}[name].of(surface)

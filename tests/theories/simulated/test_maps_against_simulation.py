@@ -11,7 +11,7 @@ from generate.pages import maps
 from generate.pages.maps import BARS, ratios, read_rows
 from mbma_tables import Scene, Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.theories import Calibrated, theory_name
+from mbma_tables.theories import Calibrated, Simulated, theory_name
 from mbma_tables.theories.simulated.own_map import law_loads
 from mbma_tables.theories.simulated.pressing import Press
 
@@ -64,7 +64,7 @@ def test_nothing_is_stated_of_maps_unlike_all_that_were_pressed():
     assert np.isnan([found.scatter, found.area_scatter, found.stiffness_scatter]).all()
 
 
-class TestCorrected:
+class TestQuickGrid:
     @pytest.fixture(
         scope="class",
         params=[("pitted", 1, 128), ("ground", 0, 128)],
@@ -90,9 +90,9 @@ class TestCorrected:
         surface, pressure, area, u = part
         found, law = (
             contact(surface, pressure=pressure, theory=theory)
-            for theory in ("corrected", "calibrated")
+            for theory in (Simulated(grid="quick"), "calibrated")
         )
-        assert found.theory == "corrected"
+        assert found.theory == "simulated"
         own, other = (
             (
                 np.log(one.area / area),
@@ -106,7 +106,7 @@ class TestCorrected:
 
 
 class TestDefaultTheory:
-    """Of a map: corrected, where that is possible within seconds."""
+    """Of a map: simulated, where that is possible within seconds."""
 
     @staticmethod
     def surface(points=128, **options):
@@ -116,11 +116,11 @@ class TestDefaultTheory:
             **{"periodic": True, "unit": "um"} | options,
         )
 
-    def test_a_map_is_corrected(self):
+    def test_a_map_is_simulated(self):
         surface = self.surface()
         found = contact(surface, pressure=[0.0, 1e-6, 0.01, 0.03, 0.2])
-        assert found.theory == contact_law(surface).theory == "corrected"
-        assert Scene(surface, pressures=[0.01], effects=["area"]).theory == "corrected"
+        assert found.theory == contact_law(surface).theory == "simulated"
+        assert Scene(surface, pressures=[0.01], effects=["area"]).theory == "simulated"
         # any pressure is answered, and where none was tested is told
         assert (np.diff(found.area) > 0).all()
         assert found.area[0] == 0
@@ -145,7 +145,7 @@ class TestDefaultTheory:
         noise = contact(
             Surface.from_map(0.1 * values[0], 1.0, periodic=True),
             area=0.1,
-            theory="corrected",
+            theory="simulated",
         )
         assert not noise.valid
         assert any("sampling steps, fewer than 4" in reason for reason in noise.reasons)

@@ -15,12 +15,13 @@ from generate.machined.makers import Part, heights
 from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
 from mbma_tables.common import cache
 from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
-from mbma_tables.theories import BoundaryElements
+from mbma_tables.theories import BoundaryElements, Simulated
 from mbma_tables.theories.simulated import boundary_elements, own_map, pressing
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
-from mbma_tables.theories.simulated.yielded import of_map
 
 pytest.importorskip("tamaas")
+
+FULL = Simulated(grid="full")
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def test_it_opens_without_the_map(surface, own):
     for theory in (None, "calibrated"):
         found = contact(own, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory)
         known = contact(
-            surface, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory or "simulated"
+            surface, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory or FULL
         )
         assert found.theory == known.theory
         for name in (
@@ -64,15 +65,15 @@ def test_it_opens_without_the_map(surface, own):
     hard = {"pressure": 0.005, "hardness": 0.05}
     # a law of hardness without the map, simulated with it
     assert contact(own, **hard).yielded == pytest.approx(
-        contact(surface, **hard, theory="simulated").yielded, abs=0.1
+        contact(surface, **hard, theory=FULL).yielded, abs=0.1
     )
     assert own.provenance[0]["points"] == [64, 64]
     with pytest.raises(InputError, match="this surface has none"):
-        contact(own, area=0.1, theory="corrected")
+        contact(own, area=0.1, theory=Simulated(grid="quick"))
 
 
 def test_laws_scenes_and_other_units(surface, own):
-    law, known = contact_law(own), contact_law(surface, theory="simulated")
+    law, known = contact_law(own), contact_law(surface, theory=FULL)
     np.testing.assert_array_equal(law.block, known.block)
     found = Scene(own, pressures=[0.01, 0.02], effects=["pressure", "area"]).run()
     np.testing.assert_allclose(found.area, contact(own, pressure=[0.01, 0.02]).area)
@@ -184,7 +185,7 @@ def test_on_the_command_line(tmp_path):
 
 class TestBeyondTheLoads:
     def test_force_and_stiffness_go_on(self, own):
-        theory = of_map("simulated", own)
+        theory = Simulated().of(own)
         for u in theory.rows[2, [0, -1]]:
             beside = contact(own, mean_separation=u * (1 + np.array([-1e-9, 1e-9])))
             for name in ("pressure", "stiffness", "area", "energy"):
@@ -384,7 +385,7 @@ class TestLargeMaps:
         assert not found.valid
         assert (
             next(iter(found.reasons))
-            == "wavelengths below 4 were left out, since the map has too many points"
+            == "wavelengths below 4 were left out, since the grid has fewer points than the map"
         )
         own.to_netcdf(tmp_path / "own.nc")
         again = BoundaryElements.from_netcdf(tmp_path / "own.nc")

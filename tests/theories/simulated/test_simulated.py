@@ -11,14 +11,15 @@ from generate.boundary_elements.solve import Contact
 from generate.machined import makers
 from generate.machined.makers import Part
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.theories import BoundaryElements
+from mbma_tables.theories import BoundaryElements, Simulated
 from mbma_tables.theories.simulated.boundary_elements import Contact as OwnContact
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
 from mbma_tables.theories.simulated.own_map import law_loads
 from mbma_tables.theories.simulated.reynolds import flow_conductance
-from mbma_tables.theories.simulated.yielded import of_map
 
 pytest.importorskip("tamaas")
+
+FULL = Simulated(grid="full")
 
 
 def heights(points=64, seed=3):
@@ -41,19 +42,19 @@ def test_it_answers_what_was_simulated(truth):
     assert found.theory == "simulated"
 
 
-@pytest.mark.parametrize("name", ["simulated", "corrected"])
-def test_force_is_the_energys_slope(truth, name):
-    theory = of_map(name, truth.surface)
+@pytest.mark.parametrize("grid", ["full", "quick"])
+def test_force_is_the_energys_slope(truth, grid):
+    theory = Simulated(grid).of(truth.surface)
     _, _, u, energy = theory.rows
     fine = np.geomspace(u[-1], u[0], 4001)
-    force = contact(truth.surface, mean_separation=fine, theory=name).pressure
+    force = contact(truth.surface, mean_separation=fine, theory=theory).pressure
     assert (np.diff(force) < 0).all()
     work = np.sum((force[1:] + force[:-1]) / 2 * np.diff(fine))
     assert work == pytest.approx(
-        energy[-1] - energy[0], rel=0.01 if name == "simulated" else 0.02
+        energy[-1] - energy[0], rel=0.01 if grid == "full" else 0.02
     )
     np.testing.assert_allclose(theory.energy(truth.surface, u), energy, rtol=1e-9)
-    assert contact(truth.surface, area=0.1, theory=name).leakage.x > 0
+    assert contact(truth.surface, area=0.1, theory=theory).leakage.x > 0
 
 
 def test_what_was_not_simulated_is_refused(truth):
@@ -118,13 +119,13 @@ class TestOfASurface:
 
     def test_it_is_the_full_simulation_between_its_loads(self, part, exact):
         (force, area, u, more, further), _ = exact
-        found = contact(part[1], pressure=force, theory="simulated")
+        found = contact(part[1], pressure=force, theory=FULL)
         np.testing.assert_allclose(found.area, area, rtol=0.03)
         steep = more / (u - further)
         np.testing.assert_array_less(
             np.abs(found.mean_separation - u) * steep / force, 0.02
         )
-        beside = contact(part[1], pressure=force + more, theory="simulated")
+        beside = contact(part[1], pressure=force + more, theory=FULL)
         np.testing.assert_allclose(
             more / (found.mean_separation - beside.mean_separation), steep, rtol=0.05
         )
@@ -135,7 +136,7 @@ class TestOfASurface:
 
     def test_flow_along_both_axes(self, part, exact):
         (force, *_), flows = exact
-        leakage = contact(part[1], pressure=force, theory="simulated").leakage
+        leakage = contact(part[1], pressure=force, theory=FULL).leakage
         for own, true in zip((leakage.x, leakage.y), flows, strict=True):
             # at 14% contact the map is close to where it is blocked
             np.testing.assert_allclose(np.log(own[0] / true[0]), 0, atol=0.15)
@@ -149,17 +150,15 @@ class TestOfASurface:
 
     def test_laws_and_other_units(self, part):
         surface = part[1]
-        law = contact_law(surface, theory="simulated", E_star="1 GPa")
-        point = contact(surface, pressure="5 MPa", theory="simulated", E_star="1 GPa")
+        law = contact_law(surface, theory=FULL, E_star="1 GPa")
+        point = contact(surface, pressure="5 MPa", theory=FULL, E_star="1 GPa")
         assert law.at_pressure("5 MPa").area == pytest.approx(point.area, rel=0.01)
         assert law.theory == "simulated"
         for axis in ("x", "y"):
             own, direct = law.leakage.along(axis), getattr(point.leakage, axis)
             assert own(pressure="5 MPa") == pytest.approx(direct, rel=0.02)
             u = np.linspace(0.02, 1, 300) * law.h_max
-            true = getattr(
-                contact(surface, mean_separation=u, theory="simulated").leakage, axis
-            )
+            true = getattr(contact(surface, mean_separation=u, theory=FULL).leakage, axis)
             np.testing.assert_allclose(
                 own(u), true, rtol=2 * own.error, atol=1e-6 * true.max()
             )
@@ -168,12 +167,12 @@ class TestOfASurface:
             point.leakage.along(30.0), rel=0.02
         )
         assert law.leakage(pressure="5 MPa") == pytest.approx(point.leakage.K, rel=0.02)
-        other = contact(surface.to("mm"), pressure=0.005, theory="simulated")
+        other = contact(surface.to("mm"), pressure=0.005, theory=FULL)
         assert other.mean_separation == pytest.approx(
             1e-3 * point.mean_separation, rel=1e-3
         )
         with pytest.raises(InputError, match="this surface has none"):
-            contact(surface.combined(surface), pressure=0.01, theory="simulated")
+            contact(surface.combined(surface), pressure=0.01, theory=FULL)
 
 
 def test_the_energy_gives_a_knot_between_two_loads():
@@ -228,15 +227,15 @@ def worn_track(points=64):
     return makers.finished(ground * share + flat * (1 - share), 5.0)
 
 
-@pytest.mark.parametrize("name", ["simulated", "corrected"])
+@pytest.mark.parametrize("grid", ["full", "quick"])
 @pytest.mark.parametrize(
     "values",
     [worn_track(), makers.heights(Part("etched", 1, 64))],
     ids=["track", "etched"],
 )
-def test_areas_of_neighbouring_loads_differ_little(name, values):
+def test_areas_of_neighbouring_loads_differ_little(grid, values):
     surface = Surface.from_map(values, 1.0, periodic=True)
-    theory = of_map(name, surface)
+    theory = Simulated(grid).of(surface)
     force, area = theory.rows[:2]
     tested = (area[1:] > 1e-3) & (area[:-1] < 0.9) & (np.diff(np.log(force)) > 0.2)
     assert (area[1:] / area[:-1])[tested].max() <= 2.5
@@ -246,7 +245,7 @@ def test_areas_of_neighbouring_loads_differ_little(name, values):
     ]
     engine = OwnContact(values, values.shape, 1e-6)
     simulated = np.array([engine.press(load)["area"] for load in between.tolist()])
-    found = contact(surface, pressure=between, theory=name)
+    found = contact(surface, pressure=between, theory=theory)
     deviations = np.abs(np.log(found.area / simulated)) / found.area_scatter
     assert (deviations < 3).all()
 
@@ -258,17 +257,17 @@ def test_the_grids_own_error_is_in_the_scatter_of_the_area():
         for k in (0, 2)
     )
     for surface, points in ((coarse, part.shortest), (fine, 8.0)):
-        found = contact(surface, area=0.4, theory="simulated")
+        found = contact(surface, area=0.4, theory=FULL)
         assert found.area_scatter > 0.012 * (4 / points) ** 2 * 0.9
 
 
 @pytest.mark.parametrize("family", ["turned", "ground"])
 def test_leakage_of_the_quick_simulation_is_that_of_the_full_one(family):
     surface = Surface.from_map(makers.heights(Part(family, 1, 64)), 1.0, periodic=True)
-    pressure = contact(surface, area=[0.008, 0.015, 0.05], theory="simulated").pressure
+    pressure = contact(surface, area=[0.008, 0.015, 0.05], theory=FULL).pressure
     quick, full = (
-        contact(surface, pressure=pressure, theory=name).leakage
-        for name in ("corrected", "simulated")
+        contact(surface, pressure=pressure, theory=Simulated(grid)).leakage
+        for grid in ("quick", "full")
     )
     np.testing.assert_allclose(quick.x, full.x, rtol=5e-3)
     np.testing.assert_allclose(quick.y, full.y, rtol=5e-3)
@@ -311,27 +310,27 @@ def test_a_hardness_is_simulated(eta):
         surface,
         pressure=[*pressure, pressure[1]],
         hardness=[cap, cap, cap, np.inf],
-        theory="simulated",
+        theory=FULL,
     )
     np.testing.assert_allclose(found.area[:3], area, rtol=0.03)
     np.testing.assert_allclose(found.mean_separation[:3], u, rtol=0.03)
     np.testing.assert_allclose(found.yielded[:3], yielded, atol=0.03)
     np.testing.assert_allclose(found.unloading_stiffness[:3], frozen, rtol=0.1)
-    elastic = contact(surface, pressure=pressure[1], theory="simulated")
+    elastic = contact(surface, pressure=pressure[1], theory=FULL)
     assert (found.area[3], found.yielded[3]) == (pytest.approx(elastic.area), 0.0)
     assert (found.leakage.K[0] < elastic.leakage.K) == (
         found.mean_separation[0] < elastic.mean_separation
     )
     # towards the hardness everywhere
     heavy = contact(
-        surface, pressure=cap * np.array([0.95, 0.999]), hardness=cap, theory="simulated"
+        surface, pressure=cap * np.array([0.95, 0.999]), hardness=cap, theory=FULL
     )
     assert (np.diff(heavy.area) > 0).all()
     assert heavy.area[1] == pytest.approx(1, abs=2e-3)
-    law = contact_law(surface, theory="simulated", hardness=cap)
+    law = contact_law(surface, theory=FULL, hardness=cap)
     assert law.at_pressure(pressure[1]).area == pytest.approx(found.area[1], rel=1e-3)
     with pytest.raises(OutOfRangeError, match="at most the hardness"):
-        contact(surface, pressure=1.1 * cap, hardness=cap, theory="simulated")
+        contact(surface, pressure=1.1 * cap, hardness=cap, theory=FULL)
 
 
 pytest.importorskip("tamaas")
@@ -345,7 +344,7 @@ def honed():
 
 
 def test_pressures_gaps_and_contact_fit_each_other(honed):
-    found = contact(honed, pressure="20 MPa", E_star="2 GPa", theory="simulated")
+    found = contact(honed, pressure="20 MPa", E_star="2 GPa", theory=FULL)
     pressed = found.map()
     data = pressed.to_dataset()
     assert data.pressure.mean() == pytest.approx(0.02, rel=1e-3)
@@ -366,9 +365,7 @@ def test_a_map_that_is_not_periodic_is_cut_out_of_its_mirror_images():
     own = Surface.from_map(half, 1.0, detrend="mean")
     images = np.block([[half, half[:, ::-1]], [half[::-1], half[::-1, ::-1]]])
     whole = Surface.from_map(images, 1.0, periodic=True)
-    one, other = (
-        contact(s, pressure=0.01, theory="simulated").map() for s in (own, whole)
-    )
+    one, other = (contact(s, pressure=0.01, theory=FULL).map() for s in (own, whole))
     assert one.gap.shape == (40, 48)
     np.testing.assert_allclose(one.gap, other.gap[:40, :48], atol=1e-3 * one.gap.max())
 
