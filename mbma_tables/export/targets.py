@@ -29,6 +29,9 @@ GROUPS = {
     "CODE": "c_code",
 }
 SI = ("m", "Pa")
+STAY_WITHIN_ROWS = (
+    "Stay within the rows: the solver's behaviour beyond them was not tested."
+)
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
 # by quantity: options for it alone, and the abscissa of its rows
 OPTIONS = {

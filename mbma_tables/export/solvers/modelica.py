@@ -1,0 +1,21 @@
+"""Contact laws as matrices for the tables of Modelica's standard library, `CombiTable1Ds`."""
+
+from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.solvers.comsol import columns
+from mbma_tables.export.targets import AGAINST, Grammar
+
+
+def _matrix(law: LawTable, name: str) -> str:
+    return f"double {name}({law.x.size},{len(law.columns)})\n{columns(law)}"
+
+
+modelica = Grammar(
+    program="Modelica",
+    mark="#",
+    body=dict.fromkeys(AGAINST, _matrix),
+    beyond=(
+        "smoothness = Modelica.Blocks.Types.Smoothness.LinearSegments; no extrapolation"
+    ),
+    named="law",
+    first="#1\n",
+)
