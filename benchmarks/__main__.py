@@ -34,9 +34,9 @@ from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from generate import page
 from generate.files import ROOT
-from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
+from mbma_tables import Bodies, Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.common.files import shipped_file
-from mbma_tables.theories import Calibrated
+from mbma_tables.theories import Calibrated, Mbma
 from mbma_tables.theories.calibrated.formulas import Law, Spectrum
 
 POINTS = 20_000
@@ -139,12 +139,14 @@ def totals(rng: np.random.Generator) -> None:
     surfaces, gaps = held_out(SURFACES, rng)
     taken = rounds(
         {
-            "exact": lambda: contact(surfaces, separation=gaps, island_model="exact"),
+            "exact": lambda: contact(
+                surfaces, separation=gaps, theory=Mbma(island_model="exact")
+            ),
             "value": lambda: contact(surfaces, separation=gaps),
         },
         3,
     )
-    exact = contact(surfaces, separation=gaps, island_model="exact").islands
+    exact = contact(surfaces, separation=gaps, theory=Mbma(island_model="exact")).islands
     looked_up = contact(surfaces, separation=gaps).islands
     click.echo(f"\ncontact at 1e-8, one gap on each of {SURFACES} surfaces")
     report("time a total", microseconds(taken["value"], SURFACES), "us", at_most=7)
@@ -182,7 +184,7 @@ def totals(rng: np.random.Generator) -> None:
 def laws(rng: np.random.Generator) -> None:
     """A frozen surface against numpy and scipy."""
     surface = Surface.named("asphalt")
-    law = contact_law(surface, "mbma")
+    law = contact_law(surface, theory="mbma")
     gaps = rng.uniform(0, 0.99995 * surface.h_max, MANY_GAPS)
     nodes = np.linspace(0, surface.h_max, 1000)
     values = law.pressure(nodes)
@@ -204,7 +206,7 @@ def laws(rng: np.random.Generator) -> None:
                 dataclasses.replace(
                     surface, h_max=surface.h_max * (1 + 1e-9 * next(fresh))
                 ),
-                "mbma",
+                theory="mbma",
             ),
             "numpy": lambda: np.interp(gaps, nodes, values),
             "scalar law": lambda: [law.pressure(one) for _ in range(CALLS)],
@@ -212,7 +214,7 @@ def laws(rng: np.random.Generator) -> None:
         }
     )
     some = gaps[:2000]
-    truth = contact(surface, mean_separation=some, rtol=1e-10, theory="mbma").pressure
+    truth = contact(surface, mean_separation=some, theory=Mbma(rtol=1e-10)).pressure
     click.echo("\ncontact_law of one surface, asphalt")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
     report(
@@ -294,11 +296,8 @@ def kernels(rng: np.random.Generator) -> None:
 def few_numbers(rng: np.random.Generator) -> None:
     """Calls of single numbers and of ten."""
     surface = Surface.named("asphalt")
-    law, ten, yielding = (
-        contact_law(surface, "mbma"),
-        np.linspace(0.1, 1.0, 10),
-        {"theory": "calibrated", "hardness": 0.1},
-    )
+    law = contact_law(surface, theory="mbma")
+    ten = np.linspace(0.1, 1.0, 10)
     u = np.linspace(0.05, 0.9, 100) * surface.h_max
     law.at_pressure(1e-4)
     calls: dict[str, tuple[Callable[[], Any], int, float]] = {
@@ -310,7 +309,9 @@ def few_numbers(rng: np.random.Generator) -> None:
         ),
         "law.pressure of ten numbers": (lambda: law.pressure(ten), CALLS, 1.0),
         "contact at a pressure with a hardness": (
-            lambda: contact(surface, pressure=1e-3, **yielding),
+            lambda: contact(
+                surface, Bodies(hardness=0.1), pressure=1e-3, theory="calibrated"
+            ),
             50,
             500.0,
         ),
@@ -321,7 +322,7 @@ def few_numbers(rng: np.random.Generator) -> None:
         ),
         "Persson's law": (lambda: contact_law(surface, theory="persson"), 3, 50e3),
         "Persson's law with a hardness": (
-            lambda: contact_law(surface, theory="persson", hardness=0.1),
+            lambda: contact_law(surface, Bodies(hardness=0.1), theory="persson"),
             1,
             150e3,
         ),

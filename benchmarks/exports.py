@@ -13,6 +13,7 @@ from benchmarks.kernels import held_out
 from benchmarks.rows import microseconds, report, rounds, times_faster
 from mbma_tables import contact, open_table
 from mbma_tables.export.c_code import FLAGS, SOURCES, write_code
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
 
 POINTS, SURFACES = 20_000, 2000
@@ -69,7 +70,7 @@ def exported(rng: np.random.Generator) -> None:
             "C islands": lambda: library.mbma_phi(
                 size, at(X), at(mu), table, at(islands), None
             ),
-            "totals": lambda: contact(surfaces, separation=apart, rtol=RTOL),
+            "totals": lambda: contact(surfaces, separation=apart, theory=Mbma(rtol=RTOL)),
             "C totals": lambda: library.mbma_totals(
                 many,
                 *map(at, known),
@@ -83,7 +84,10 @@ def exported(rng: np.random.Generator) -> None:
             ),
         }
     )
-    phi, total = model.answer(X, mu), contact(surfaces, separation=apart, rtol=RTOL)
+    phi, total = (
+        model.answer(X, mu),
+        contact(surfaces, separation=apart, theory=Mbma(rtol=RTOL)),
+    )
     unit = surfaces.q0 * surfaces.s
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (

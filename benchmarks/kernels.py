@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.special import erf
 
-from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
+from mbma_tables import Bodies, Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.theories.mbma.geometry import geometry
 from mbma_tables.theories.mbma.variants import get_variant
 
@@ -75,7 +75,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         # one that nothing is kept of
         return dataclasses.replace(one, h_max=one.h_max * (1 + 1e-9 * next(fresh)))
 
-    law = contact_law(one, "mbma")
+    law = contact_law(one, theory="mbma")
     place = float((one.h_max + many[0]) / 2)
     flat, u = Surface(0.8, 1.0, 64.0, 1.0, 3.3), rng.uniform(0.01, 3.3, MANY)
     mean = (gaps + surfaces.h_max) / 2
@@ -127,7 +127,9 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
             SURFACES,
         ),
         "calibrated law with a hardness": (
-            lambda: contact(flat, mean_separation=u, theory="calibrated", hardness=2.0),
+            lambda: contact(
+                flat, Bodies(hardness=2.0), mean_separation=u, theory="calibrated"
+            ),
             MANY,
         ),
         "leakage, a new surface each": (

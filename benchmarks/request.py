@@ -12,7 +12,7 @@ from types import FrameType
 from typing import Any
 
 import mbma_tables
-from mbma_tables import Surface, contact, contact_law
+from mbma_tables import Bodies, Surface, contact, contact_law
 
 # with the separator at its end; the folder around it, or an environment in that, may have
 # the library's name too
@@ -42,20 +42,17 @@ def traced(request: Callable[[], Any]) -> tuple[int, int, Counter[str]]:
 def main() -> None:
     """A line for each request; with `-v` the functions that are called most."""
     joint = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-    law = contact_law(joint, "mbma", E_star="100 GPa")
+    law = contact_law(joint, "100 GPa", theory="mbma")
     requests: dict[str, Callable[[], Any]] = {
         "mbma by pressure": lambda: contact(
-            joint, pressure="10 MPa", E_star="100 GPa", theory="mbma"
+            joint, "100 GPa", pressure="10 MPa", theory="mbma"
         ),
-        "mbma by gap": lambda: contact(
-            joint, mean_separation=1.9, E_star=1e5, theory="mbma"
-        ),
+        "mbma by gap": lambda: contact(joint, 1e5, mean_separation=1.9, theory="mbma"),
         "calibrated with hardness": lambda: contact(
             joint,
+            Bodies("100 GPa", hardness="1.5 GPa"),
             pressure="10 MPa",
-            E_star="100 GPa",
             theory="calibrated",
-            hardness="1.5 GPa",
         ),
         "law.at_pressure": lambda: law.at_pressure(0.01),
     }

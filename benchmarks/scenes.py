@@ -9,6 +9,7 @@ from scipy.integrate import quad_vec
 
 from benchmarks.rows import report
 from mbma_tables import InputError, Scene, Surface, contact
+from mbma_tables.theories import Mbma
 
 SCENES, GAPS = 200, 4
 WARMED = 20  # scenes before times count: modules are loaded and tables opened by then
@@ -28,11 +29,18 @@ def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
     if name in ("pressure", "area"):
         return np.asarray(
             getattr(
-                contact(surface, separation=gaps, island_model="exact", rtol=1e-10), name
+                contact(
+                    surface,
+                    separation=gaps,
+                    theory=Mbma(island_model="exact", rtol=1e-10),
+                ),
+                name,
             )
         )
     if name == "stiffness":
-        return np.asarray(contact(surface, separation=gaps, rtol=1e-10).stiffness)
+        return np.asarray(
+            contact(surface, separation=gaps, theory=Mbma(rtol=1e-10)).stiffness
+        )
     span = surface.h_max - gaps
 
     def integrand(t: float) -> np.ndarray:
@@ -41,7 +49,7 @@ def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
             t
             * span
             * contact(
-                surface, separation=surface.h_max - span * t**2, rtol=1e-10
+                surface, separation=surface.h_max - span * t**2, theory=Mbma(rtol=1e-10)
             ).pressure
         )
 

@@ -23,9 +23,10 @@ import click
 import numpy as np
 from matplotlib.figure import Figure
 
-from mbma_tables import Surface, contact, materials
+from mbma_tables import Bodies, Surface, contact, materials
+from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.plots import to_picture
-from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
+from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
 
 # both faces' roughness in one
 JOINT = Surface(
@@ -64,10 +65,9 @@ def conductance_curve(points: int = 200) -> Curve:
     joints = {
         hardness: contact(
             JOINT,
+            Bodies(E_STAR, hardness=hardness),
             pressure=pressure,
-            E_star=E_STAR,
             theory="calibrated",
-            hardness=hardness,
         )
         for hardness in (SOFT, middle, HARD, np.inf)
     }

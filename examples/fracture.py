@@ -70,7 +70,7 @@ def drawn(table: LawTable, at_well: float, stiff: bool = False) -> float:
 def command(out: pathlib.Path | None) -> None:
     """Permeability of a rock fracture against stress."""
     table = aperture_table()
-    found = contact(FRACTURE, pressure=STRESSES, E_star=E_STAR, theory="calibrated")
+    found = contact(FRACTURE, E_STAR, pressure=STRESSES, theory="calibrated")
     w = np.interp(STRESSES, table.x, table.y)
     scatter = found.leakage.scatter * 2 / 3  # of ln w^2, K = w^3
     click.echo(

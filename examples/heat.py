@@ -16,10 +16,10 @@ from matplotlib.figure import Figure
 from scipy.sparse import block_diag, coo_matrix
 from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, condense, solve
 
-from mbma_tables import Surface, contact, materials
+from mbma_tables import Bodies, Surface, contact, materials
+from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.plots import to_picture
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.quantities.conductance import mean_conductivity
 
 HOLE, CONE, RIM, THICK = (
     4e-3,
@@ -127,7 +127,7 @@ def command(out: pathlib.Path | None) -> None:
     h = np.interp(p, *table)
     scatter = float(
         contact(
-            JOINT, pressure=2e7, E_star=E_STAR, theory="calibrated", hardness=HARDNESS
+            JOINT, Bodies(E_STAR, hardness=HARDNESS), pressure=2e7, theory="calibrated"
         ).unloading_stiffness_scatter
     )
     click.echo(

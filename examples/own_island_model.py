@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island, open_table
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.island_models import IslandAnswer
 from mbma_tables.theories.mbma.tables import shipped
 
@@ -49,11 +50,13 @@ def main(table_file: pathlib.Path) -> None:
     """Compare one's own model and one's own table with the shipped ones."""
     surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
     gaps = np.array([2.8, 2.0, 1.0])  # um
-    exact = contact(surface, separation=gaps, island_model="exact")
+    exact = contact(surface, separation=gaps, theory=Mbma(island_model="exact"))
     models = {"first order": FirstOrder(), "my table": open_table(table_file)}
     for name, model in models.items():
-        found = contact(surface, separation=gaps, island_model=model, rtol=1e-6)
-        law = contact_law(surface, island_model=model, rtol=1e-6)
+        found = contact(
+            surface, separation=gaps, theory=Mbma(island_model=model, rtol=1e-6)
+        )
+        law = contact_law(surface, rtol=1e-6, theory=Mbma(island_model=model))
         one = island(surface, 0.01, island_model=model)
         off = ", ".join(f"{ratio:.1e}" for ratio in found.pressure / exact.pressure - 1)
         bounds = ", ".join(f"{bound:.1e}" for bound in found.error)

@@ -18,6 +18,7 @@ from scipy.special import ndtr, ndtri
 
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import to_picture
+from mbma_tables.theories import Mbma
 
 BLOCK = 10_000
 SEED = 20260101
@@ -69,7 +70,7 @@ def sample_surfaces(count: int) -> Surface:
 def spread_of_force(count: int) -> Spread:
     """Forces of the samples at GAP and their quantiles."""
     force = (
-        contact(sample_surfaces(count), separation=GAP, rtol=1e-6)
+        contact(sample_surfaces(count), separation=GAP, theory=Mbma(rtol=1e-6))
         .pressure.compute(scheduler="threads")
         .values
     )

@@ -60,8 +60,8 @@ def answer(points: np.ndarray) -> Contact:
     surfaces = Surface(hurst, Q0, np.exp(q1), np.exp(h_rms), h_max, unit="um")
     return contact(
         surfaces,
+        f"{E_STAR} MPa",
         mean_separation=share * h_max + [0.0, DEPTH],
-        E_star=f"{E_STAR} MPa",
         theory="calibrated",
     )
 

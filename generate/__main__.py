@@ -25,6 +25,7 @@ COMMANDS = {
     "edges": "generate.machined.edges",
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",
+    "quantities": "generate.quantities",
     "rough_spheres": "generate.rough_spheres",
     "score": "generate.distances",
     "tables": "generate.tables.commands",

@@ -22,6 +22,7 @@ from generate.files import ROOT
 from generate.page import table
 from generate.page import write as write_page
 from mbma_tables import (
+    Bodies,
     Joint,
     MbmaError,
     Surface,
@@ -31,7 +32,7 @@ from mbma_tables import (
     island,
     sensitivity,
 )
-from mbma_tables.theories import THEORIES
+from mbma_tables.theories import THEORIES, Mbma
 from mbma_tables.theories.calibrated.formulas import self_affine_law
 
 LONGEST = 10.0  # seconds of one request
@@ -78,9 +79,9 @@ def miss(found: Any, reference: Any, allowed: Any) -> np.ndarray:
 
 def mbma(surface: Surface, u: np.ndarray, rtol: float) -> np.ndarray:
     """MBMA by its table against every island solved."""
-    found = contact(surface, mean_separation=u, rtol=rtol, theory="mbma")
+    found = contact(surface, mean_separation=u, theory=Mbma(rtol=rtol))
     exact = contact(
-        surface, mean_separation=u, rtol=1e-10, theory="mbma", island_model="exact"
+        surface, mean_separation=u, theory=Mbma(island_model="exact", rtol=1e-10)
     )
     return miss(
         (found.pressure, found.area),
@@ -104,12 +105,16 @@ def law(
     surface: Surface, u: np.ndarray, rtol: float, theory: str, hardness: float = np.inf
 ) -> np.ndarray:
     """A law against the theory that it was made of."""
-    made = contact_law(surface, theory, rtol=max(rtol, 1e-8), hardness=hardness)
+    made = contact_law(
+        surface, Bodies(hardness=hardness), theory=theory, rtol=max(rtol, 1e-8)
+    )
     gaps = u[
         (u > (made.lowest + surface.h_max) / 2)
         & (surface.h_max - u > 1e-6 * surface.h_max)
     ]
-    found = contact(surface, mean_separation=gaps, theory=theory, hardness=hardness)
+    found = contact(
+        surface, Bodies(hardness=hardness), mean_separation=gaps, theory=theory
+    )
     return miss(
         (made.pressure(gaps), made.area(gaps)),
         (found.pressure, found.area),
@@ -117,12 +122,17 @@ def law(
     )
 
 
-def inverse(surface: Surface, u: np.ndarray, rtol: float, **given: Any) -> np.ndarray:
+def inverse(
+    surface: Surface, u: np.ndarray, rtol: float, theory: str, hardness: float = np.inf
+) -> np.ndarray:
     """A pressure through the separation at which it acts; what rounding of that separation changes is allowed."""
-    asked = np.asarray(contact(surface, mean_separation=u, **given).pressure)
+    bodies = Bodies(hardness=hardness)
+    at_gaps = contact(surface, bodies, mean_separation=u, theory=theory)
+    asked = np.asarray(at_gaps.pressure)
     asked = asked[(asked > SMALLEST) & np.isfinite(asked)]
-    back = contact(surface, pressure=asked, **given)
-    again = contact(surface, mean_separation=back.mean_separation, **given)
+    back = contact(surface, bodies, pressure=asked, theory=theory)
+    u_back = back.mean_separation
+    again = contact(surface, bodies, mean_separation=u_back, theory=theory)
     rounding = ROUNDED * (1 + back.mean_separation * np.abs(again.stiffness) / asked)
     return miss((again.pressure,), (asked,), back.error + again.error + rounding)
 
@@ -285,17 +295,44 @@ METHODS = (
     "pressure_and_stiffness",
     "slope_error",
 )
+
+
+def configured(options: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Arguments of `Bodies`, and the theory with its options and whatever else is given."""
+    numbers = {name: options.pop(name) for name in OF_BODIES if name in options}
+    if "materials" in options:
+        numbers["metals"] = options.pop("materials")
+    of_mbma = {name: options.pop(name) for name in OF_MBMA if name in options}
+    if of_mbma:
+        options["theory"] = Mbma(**of_mbma)
+    return numbers, options
+
+
+def contact_call(surface: Any, **options: Any) -> Any:
+    """`contact` with constants of the bodies and options of MBMA by name."""
+    numbers, others = configured(options)
+    return contact(surface, Bodies(**numbers), **others)
+
+
+def law_call(method: str, value: Any, surface: Any, theory: Any, **options: Any) -> Any:
+    """A method of a law."""
+    rtol = options.pop("rtol", 1e-8)
+    numbers, _ = configured(options)
+    law_made = contact_law(surface, Bodies(**numbers), theory=theory, rtol=rtol)
+    return getattr(law_made, method)(value)
+
+
+OF_BODIES = ("E_star", "hardness")
+OF_MBMA = ("island_model", "variant", "rtol", "outside")
 CALLS: dict[str, Callable[..., Any]] = {
-    "contact": contact,
-    "law": lambda method, value, *given, **options: getattr(
-        contact_law(*given, **options), method
-    )(value),
+    "contact": contact_call,
+    "law": law_call,
     "surface": Surface,
     "sensitivity": sensitivity,
     "flow_factors": flow_factors,
     "island": island,
     "joint": lambda asked, *parts, **options: (
-        Joint(*parts, **options).at_pressure(asked).conductance()
+        Joint(*parts, **options).at_pressure(asked).conductance
     ),
 }
 PART = {"Rq": "0.4 um", "longest": "100 um", "shortest": "2 um", "hurst": 0.8}
@@ -358,7 +395,7 @@ def requests(rng: np.random.Generator) -> Iterator[tuple[str, Callable[[], Any]]
             one(["10 MPa", number()]),
             part,
             PART,
-            materials=one(METALS),
+            bodies=one(METALS),
             nominal_area=area,
         )
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from click.testing import CliRunner
 
-from mbma_tables import ContactLaw, Joint, contact
+from mbma_tables import Bodies, ContactLaw, Joint, contact
 from mbma_tables.cli import main
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
@@ -56,16 +56,16 @@ class Question:
         self.theory = THEORIES[rng.integers(len(THEORIES))]
         self.joint = Joint(
             self.face,
-            materials=self.materials,
+            bodies=self.materials,
+            gas="vacuum",
             nominal_area=self.nominal_area,
             theory=self.theory,
-            gas="vacuum",
         )
         self.surface: Any = self.joint.surface
         # "57.5 GPa"
         self.E_star, self.hardness = (
-            str(self.joint.pair.E_star),
-            str(self.joint.pair.hardness),
+            str(self.joint.bodies.E_star),
+            str(self.joint.bodies.hardness),
         )
         flat = float(self.E_star.split()[0]) * float(self.surface.rms_gradient) / 4
         largest = min(flat, float(self.hardness.split()[0]))
@@ -79,7 +79,7 @@ class Question:
     def values_of(self, found: Any) -> dict[str, FloatArray]:
         """The quantities of a contact."""
         values = {name: np.asarray(getattr(found, name)) for name in QUANTITIES[:-1]}
-        values["conductance"] = np.asarray(found.conductance())
+        values["conductance"] = np.asarray(found.conductance)
         return values
 
     def misses(self, values: dict[str, Any]) -> list[FloatArray]:
@@ -95,8 +95,8 @@ def by_contact(question: Question) -> list[FloatArray]:
     """`contact` of the surface and the metals."""
     found = contact(
         question.surface,
+        tuple(question.materials),
         pressure=question.pressures,
-        materials=tuple(question.materials),
         theory=question.theory,
     )
     return question.misses(question.values_of(found))
@@ -108,9 +108,8 @@ def by_texts(question: Question) -> list[FloatArray]:
     for pressure in question.pressures.tolist():
         found = contact(
             question.surface,
+            Bodies(question.E_star, hardness=question.hardness),
             pressure=f"{pressure * 1e3!r} MPa",
-            E_star=question.E_star,
-            hardness=question.hardness,
             theory=question.theory,
         )
         for name, values in answers.items():
@@ -191,7 +190,7 @@ def law_misses(
     expected = question.values_of(question.answer) | {"pressure": question.pressures}
     gaps = np.asarray(question.answer.mean_separation)
     # conductances are unloading stiffnesses, which are slopes of the elastic law at the same gap
-    elastic, _ = law.unloading
+    elastic, _ = law.unloading()
     stated = {
         "stiffness": np.asarray(law.slope_error(gaps)),
         "conductance": np.asarray(elastic.slope_error(gaps)),

@@ -23,7 +23,7 @@ from generate.calibrated_file import (
     write_part,
 )
 from generate.files import read_csv
-from mbma_tables import Surface, contact
+from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.evidence import shipped_deviations
@@ -296,12 +296,14 @@ def blind() -> dict[str, FloatArray]:
     g = surface.rms_gradient
     pressure = simulated["force"] * g
     hardness = simulated["eta"] * g
-    at_force = contact(surface, pressure=pressure, theory="calibrated", hardness=hardness)
+    at_force = contact(
+        surface, Bodies(hardness=hardness), pressure=pressure, theory="calibrated"
+    )
     at_gap = contact(
         surface,
+        Bodies(hardness=hardness),
         mean_separation=simulated["u_gap"],
         theory="calibrated",
-        hardness=hardness,
     )
     yielded = at_force.yielded - simulated["area_yielded"] / simulated["area"]
     return {

@@ -31,6 +31,7 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.core import core
 from mbma_tables.scenes.plan import UNIT, Row
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma import greenwood_tripp
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
 from mbma_tables.theories.mbma.geometry import geometry
@@ -86,7 +87,7 @@ MANY = 20_000  # gaps, about as many as a law begins to pay for
 FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); "
     "t = time.process_time(); "
-    "mbma_tables.contact(s, separation=0.1, island_model={!r}, rtol=1e-2); "
+    "mbma_tables.contact(s, separation=0.1, theory=mbma_tables.theories.Mbma({!r}, rtol=1e-2)); "
     "print(time.process_time() - t)"
 )
 HEAD = """\
@@ -205,12 +206,13 @@ def fresh(surface: Surface) -> Surface:
     )
 
 
-def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
+def gap_batch(count: int, every: int = 1, *, island_model: str, rtol: float) -> list[Any]:
     """Totals at `count` gaps of each surface, or at some of them, one call a surface."""
     answers = []
     for surface in SURFACES:
         gaps = gaps_of(surface, count)[::every]
-        answers.append(contact(fresh(surface), separation=gaps, **options))
+        theory = Mbma(island_model, rtol=rtol)
+        answers.append(contact(fresh(surface), separation=gaps, theory=theory))
     return answers
 
 
@@ -244,7 +246,7 @@ def scene_rows() -> Iterator[Row]:
         ).run()
 
     def its_step() -> Any:
-        return contact(fresh(surface), separation=gap, rtol=1e-4)
+        return contact(fresh(surface), separation=gap, theory=Mbma(rtol=1e-4))
 
     whole, _ = measure(run_scene)
     step, _ = measure(its_step)
@@ -284,8 +286,8 @@ def laws_of(
     surfaces: Sequence[Surface] = SURFACES,
 ) -> list[Any]:
     """A law of each surface, of which nothing is cached."""
-    make = functools.partial(contact_law, rtol=rtol, island_model=island_model)
-    return [make(fresh(surface), "mbma") for surface in surfaces]
+    theory = Mbma(island_model)
+    return [contact_law(fresh(surface), theory=theory, rtol=rtol) for surface in surfaces]
 
 
 def answers_of_laws(laws: Sequence[Any]) -> list[dict[str, FloatArray]]:
@@ -309,7 +311,7 @@ def law_rows() -> Iterator[Row]:
             error = largest_error(answers)
             yield Row(island_model, at("law", rtol), "both", error, cost / len(timed))
 
-    law = contact_law(SURFACES[3], "mbma")
+    law = contact_law(SURFACES[3], theory="mbma")
     gaps = gaps_of(SURFACES[3], 10_000)
     loads = law.pressure(separation=gaps)
 
@@ -342,7 +344,7 @@ def theory_rows() -> Iterator[Row]:
         return answer(theory, mean_separation=u).energy
 
     def law_of(theory: str, rtol: float) -> Any:
-        return contact_law(fresh(surface), theory, rtol=rtol)
+        return contact_law(fresh(surface), theory=theory, rtol=rtol)
 
     for name in theories.THEORIES[1:]:
         pressure = answer(name, mean_separation=u).pressure

@@ -24,7 +24,7 @@ from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.scenes.plan import Distance
-from mbma_tables.theories import Persson
+from mbma_tables.theories import Mbma, Persson, Theory
 from mbma_tables.theories.calibrated.formulas import Law, Spectrum, area
 
 SIMULATED = "boundary elements"
@@ -40,29 +40,25 @@ TIMED = (
 )
 MAP = Recipe("self_affine", 0.8, 16.0, 4, 1, 256)
 LAW_RTOL = 1e-6
-MBMA: dict[str, Any] = {"rtol": LAW_RTOL}
-# theory, way, and options of `contact`, or of `contact_law` where the way is a law
-WAYS: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("calibrated", "table", {"theory": "calibrated"}),
-    ("calibrated", "law", {"theory": "calibrated"}),
-    ("Persson", "inverse of (19)", {"theory": "persson"}),
-    ("Persson", "law", {"theory": "persson"}),
-    ("Persson simplified", "inverse of (20)", {"theory": Persson("simplified")}),
-    ("G-W", "quadrature", {"theory": "greenwood_williamson"}),
-    ("G-W", "law", {"theory": "greenwood_williamson"}),
-    ("MBMA reported", "universal", MBMA | {"island_model": "universal"}),
-    ("MBMA reported", "exact", MBMA | {"island_model": "exact"}),
-    ("MBMA reported", "island4d", MBMA | {"island_model": "island4d"}),
+# theory, way, and the theory as `contact` and `contact_law` take it
+WAYS: tuple[tuple[str, str, str | Theory], ...] = (
+    ("calibrated", "table", "calibrated"),
+    ("calibrated", "law", "calibrated"),
+    ("Persson", "inverse of (19)", "persson"),
+    ("Persson", "law", "persson"),
+    ("Persson simplified", "inverse of (20)", Persson("simplified")),
+    ("G-W", "quadrature", "greenwood_williamson"),
+    ("G-W", "law", "greenwood_williamson"),
+    ("MBMA reported", "universal", Mbma("universal", rtol=LAW_RTOL)),
+    ("MBMA reported", "exact", Mbma("exact", rtol=LAW_RTOL)),
+    ("MBMA reported", "island4d", Mbma("island4d", rtol=LAW_RTOL)),
+    *(("MBMA reported", name, Mbma(name, rtol=1e-4)) for name in ISLAND_MODELS),
+    ("MBMA reported", "law", "mbma"),
     *(
-        ("MBMA reported", name, {"rtol": 1e-4, "island_model": name})
-        for name in ISLAND_MODELS
-    ),
-    ("MBMA reported", "law", {"theory": "mbma"}),
-    *(
-        (f"MBMA {name}", "universal", MBMA | {"variant": name})
+        (f"MBMA {name}", "universal", Mbma(variant=name, rtol=LAW_RTOL))
         for name in ("printed", "fitted")
     ),
-    ("MBMA cover", "universal", MBMA | {"variant": COVER}),
+    ("MBMA cover", "universal", Mbma(variant=COVER, rtol=LAW_RTOL)),
 )
 HEAD = """\
 # Distance of theories from boundary elements on held-out surfaces, and processor time, by python -m generate cost;
@@ -110,12 +106,13 @@ def by_map() -> tuple[float, float]:
     return cost / POINTS, cost_of_making
 
 
-def by_law(options: dict[str, Any]) -> tuple[float, float]:
+def by_law(theory: str | Theory) -> tuple[float, float]:
     """Costs of a point of a law, and of making it."""
 
     def make() -> dict[Surface, Any]:
         return {
-            surface: contact_law(surface, rtol=LAW_RTOL, **options) for surface in TIMED
+            surface: contact_law(surface, theory=theory, rtol=LAW_RTOL)
+            for surface in TIMED
         }
 
     laws = make()
@@ -128,8 +125,8 @@ def by_law(options: dict[str, Any]) -> tuple[float, float]:
     return cost, cost_of_making / len(laws)
 
 
-def by_contact(options: dict[str, Any], surface: Surface, u: FloatArray) -> Any:
-    return contact(surface, mean_separation=u, **options)
+def by_contact(theory: str | Theory, surface: Surface, u: FloatArray) -> Any:
+    return contact(surface, mean_separation=u, theory=theory)
 
 
 def closed_form_area(surface: Surface, force: FloatArray) -> Any:
@@ -142,14 +139,14 @@ def ways() -> Iterator[tuple[str, str, str, float, float]]:
     yield "calibrated", "closed form, area of a force", "area alone", area_alone, 0.0
     yield "calibrated", "quadrature", "calibrated", timed(quadrature), 0.0
     yield "calibrated, map", "map of 256 x 256", "calibrated, map", *by_map()
-    for theory, way, options in WAYS:
+    for theory, way, asked in WAYS:
         # models of islands deviate by themselves
         name = way if way in ISLAND_MODELS else theory
         if way == "law":
-            yield theory, way, name, *by_law(options)
+            yield theory, way, name, *by_law(asked)
         else:
             count = SLOW_POINTS if way in SLOW else POINTS
-            cost = timed(functools.partial(by_contact, options), count)
+            cost = timed(functools.partial(by_contact, asked), count)
             yield theory, way, name, cost, 0.0
 
 

@@ -34,10 +34,10 @@ from generate.calibrated_file import (
 from generate.splines import coefficients
 from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.contacts.leakage import GROUP
 from mbma_tables.data import FILE
 from mbma_tables.quantities import effective_medium as leakage
 from mbma_tables.quantities.effective_medium import FlowConstants
+from mbma_tables.quantities.leakage import GROUP
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.calibrated.formulas import (
     Constants,

@@ -15,6 +15,7 @@ from mbma_tables.common.errors import TableFileError as TableFileError
 
 if TYPE_CHECKING:
     from mbma_tables import theories as theories
+    from mbma_tables.bodies import Bodies as Bodies
     from mbma_tables.contacts.contact import contact as contact
     from mbma_tables.contacts.film import FlowFactors as FlowFactors
     from mbma_tables.contacts.film import flow_factors as flow_factors
@@ -23,36 +24,33 @@ if TYPE_CHECKING:
     from mbma_tables.joint import Joint as Joint
     from mbma_tables.law.law import ContactLaw as ContactLaw
     from mbma_tables.law.make import contact_law as contact_law
+    from mbma_tables.quantities.interface import Gas as Gas
     from mbma_tables.rough_body.rough_contact import RoughContact as RoughContact
     from mbma_tables.rough_body.rough_contact import rough_contact as rough_contact
     from mbma_tables.scenes.scene import Scene as Scene
     from mbma_tables.surfaces.surface import Surface as Surface
     from mbma_tables.theories.mbma import greenwood_tripp as greenwood_tripp
-    from mbma_tables.theories.mbma.greenwood_tripp import (
-        height_integral as height_integral,
-    )
     from mbma_tables.theories.mbma.island import Island as Island
     from mbma_tables.theories.mbma.island import island as island
     from mbma_tables.theories.mbma.tables import open_table as open_table
-    from mbma_tables.theories.mbma.variants import Variant as Variant
 
 __version__ = "0.2.0"
 
 _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
+    "Bodies": "mbma_tables.bodies",
     "Contact": "mbma_tables.contacts.result",
     "FlowFactors": "mbma_tables.contacts.film",
+    "Gas": "mbma_tables.quantities.interface",
     "Island": "mbma_tables.theories.mbma.island",
     "Joint": "mbma_tables.joint",
     "RoughContact": "mbma_tables.rough_body.rough_contact",
-    "Variant": "mbma_tables.theories.mbma.variants",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.law.law",
     "Scene": "mbma_tables.scenes.scene",
     "contact": "mbma_tables.contacts.contact",
     "contact_law": "mbma_tables.law.make",
     "flow_factors": "mbma_tables.contacts.film",
-    "height_integral": "mbma_tables.theories.mbma.greenwood_tripp",
     "island": "mbma_tables.theories.mbma.island",
     "open_table": "mbma_tables.theories.mbma.tables",
     "rough_contact": "mbma_tables.rough_body.rough_contact",

@@ -6,12 +6,13 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import (
     checked_hardness,
     hinted,
@@ -22,9 +23,14 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, dataset_of, saved
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
-from mbma_tables.common.units import Units, force_over_area
-from mbma_tables.contacts.contact import chosen_theory, contact
-from mbma_tables.contacts.interface import checked_direction, checked_friction, ratio_of
+from mbma_tables.common.units import (
+    HEAT_CONDUCTANCE,
+    UNKNOWN,
+    Units,
+    factor,
+    force_over_area,
+)
+from mbma_tables.contacts.contact import chosen_theory, contact_of
 from mbma_tables.contacts.result import Contact
 from mbma_tables.contacts.sensitivity import (
     OfOneMap,
@@ -34,9 +40,17 @@ from mbma_tables.contacts.sensitivity import (
     unknowns_of,
 )
 from mbma_tables.law.law import ContactLaw
-from mbma_tables.law.make import contact_law
-from mbma_tables.materials import Metal, Pair, effective_modulus, hardness_in, pair
+from mbma_tables.law.make import law_of
+from mbma_tables.materials import Pair, effective_modulus
+from mbma_tables.quantities import registry
 from mbma_tables.quantities.gas import checked_gas
+from mbma_tables.quantities.interface import Gas, Interface
+from mbma_tables.quantities.properties import JointQuantities
+from mbma_tables.quantities.tangential import (
+    checked_direction,
+    checked_friction,
+    ratio_on,
+)
 from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
@@ -51,9 +65,9 @@ if TYPE_CHECKING:
     from mbma_tables.export.of_joint import ExportedJoint
 
 Part = AnySurface | Mapping[str, Any]
-CONDUCTANCE = "W/(m^2 K)"
 FACES = ("part_a", "part_b")
 EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}'
+LAW_RTOL = 1e-8  # of the polynomials of the joint's law
 RANGE, POINTS = (
     (1e-5, 0.3),
     41,
@@ -75,8 +89,25 @@ def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
     return surface
 
 
+def _gas(gas: Any) -> Gas:
+    """A gas by its name, as it is, or of its arguments by name, as files have them."""
+    if isinstance(gas, Gas):
+        return gas
+    if isinstance(gas, Mapping):
+        return Gas(**gas)
+    return Gas(gas)
+
+
+def _relative_scatter(pressed: Contact, name: str) -> Any:
+    """Standard deviation of ln(quantity), as pictures draw it; None of quantities without one."""
+    if registry.get(name).uncertainty is None:
+        return None
+    scatter = pressed.scatter_of(name)
+    return scatter / pressed.mean_separation if name == "mean_separation" else scatter
+
+
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Joint(Displayed):
+class Joint(JointQuantities, Displayed):
     """Two rough metal parts pressed together: stiffness, real area, gap and conductance from one description.
 
     Parameters
@@ -86,25 +117,21 @@ class Joint(Displayed):
         numbers); the arguments of `Surface.from_roughness` without a highest point; or
         those of `Surface.from_map`, with the file under "map". Without `part_b` the other
         face is smooth.
-    materials : str, Metal, mapping, or pair of them
+    bodies : str, Metal, pair of them, or Bodies
         Metals of the parts, from `mbma_tables.materials.METALS`, or the arguments of
-        `materials.Metal` by name; one if both are the same.
+        `materials.Metal` by name; one if both are the same. Or `Bodies`, with the hardness
+        of the softer metal, as for `contact`: by default it is that of the metals, whose
+        temper must then be named.
     nominal_area : float or str, optional
         A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`);
         needed for parts that are mappings. Without it, surfaces keep their own highest
         point.
-    hardness : float or str, optional
-        Of the softer metal, as for `contact`; by default that of `materials`, whose temper
-        must then be named.
     friction : float, optional
         Coefficient of friction, for friction cards of solvers.
     direction : {"along", "across"}, optional
         Of the shear relative to the lay, for parts that have one.
-    gas : {"air", "helium", "nitrogen", "argon", "vacuum"}
-    temperature : float
-        Of the gas [K].
-    gas_pressure : float or str
-        Of the gas [Pa].
+    gas : {"air", "helium", "nitrogen", "argon", "vacuum"} or Gas
+        In the gaps, at 300 K and 1 atm, or ``Gas("helium", temperature=400)``.
     theory : str or Theory, optional
         As for `contact`.
 
@@ -112,8 +139,8 @@ class Joint(Displayed):
     ----------
     surface : AnySurface
         The equivalent surface of both parts.
-    pair : Pair
-        The metals.
+    pair : Pair or None
+        The metals, where they are named.
 
     Raises
     ------
@@ -128,9 +155,9 @@ class Joint(Displayed):
     >>> ground = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
     >>> milled = ground | {"Rq": "0.7 um"}
     >>> metals = ("steel 4140 hard", "aluminium 6061 hard")
-    >>> joint = Joint(ground, milled, materials=metals, nominal_area="4 cm^2")
+    >>> joint = Joint(ground, milled, bodies=metals, nominal_area="4 cm^2")
     >>> found = joint.at_pressure("10 MPa")
-    >>> f"{found.area:.2%}, {found.conductance():.3g} W/(m^2 K), {found.tangential().stiffness:.3g} GPa/um"
+    >>> f"{found.area:.2%}, {found.conductance:.3g} W/(m^2 K), {found.tangential_stiffness:.3g} GPa/um"
     '1.17%, 3.96e+04 W/(m^2 K), 0.0271 GPa/um'
     >>> table = joint.table(["10 MPa", "50 MPa"])
     >>> [f"{value:.3g}" for value in table["total_conductance"].values]
@@ -140,19 +167,14 @@ class Joint(Displayed):
     part_a: Part
     part_b: Part | None = None
     _: dataclasses.KW_ONLY
-    materials: (
-        str | Metal | Mapping[str, Any] | Pair | Sequence[str | Metal | Mapping[str, Any]]
-    )
+    bodies: Any  # `Bodies` once it is made
     nominal_area: float | str | None = None
-    hardness: float | str | None = None
     friction: float | None = None
     direction: str | None = None
-    gas: str = "air"
-    temperature: float = 300.0
-    gas_pressure: float | str = "1 atm"
+    gas: str | Gas | Mapping[str, Any] = "air"
     theory: str | Theory | None = None
     surface: AnySurface = dataclasses.field(init=False)
-    pair: Pair = dataclasses.field(init=False)
+    interface: Interface = dataclasses.field(init=False)
     _faces: dict[str, AnySurface] = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
@@ -171,8 +193,22 @@ class Joint(Displayed):
                 f"a joint is of one surface, got a batch of shape {surface.shape}"
             )
         object.__setattr__(self, "surface", surface)
-        object.__setattr__(self, "pair", pair(self.materials))
+        object.__setattr__(self, "bodies", Bodies.of(self.bodies))
+        interface = Interface(self.friction, self.direction, _gas(self.gas))
+        object.__setattr__(self, "interface", interface)
         self._check()
+
+    @property
+    def pair(self) -> Pair | None:
+        """The metals, where they are named."""
+        metals: Pair | None = self.bodies.metals
+        return metals
+
+    @property
+    def _in_units(self) -> BodiesInUnits:
+        """The bodies as numbers; stresses are in GPa where the modulus has no unit."""
+        in_units: BodiesInUnits = self.bodies.in_units(self.surface, "GPa")
+        return in_units
 
     def _face(self, name: str, part: Any) -> AnySurface:
         """The surface of a part."""
@@ -201,19 +237,17 @@ class Joint(Displayed):
 
     def _check(self) -> None:
         """Refuse at once what single results would refuse."""
-        checked_gas(
-            self.gas,
-            self.temperature,
-            Units(stress="Pa").number("gas_pressure", self.gas_pressure),
-        )
+        gas = self.interface.gas
+        assert gas is not None
+        pressure = Units(stress="Pa").number("gas_pressure", gas.pressure)
+        checked_gas(gas.name, gas.temperature, pressure)
         checked_friction(self.friction)
         checked_direction(self.direction, self.surface)
-        if self.hardness is not None:
-            number = checked_hardness(hardness_in(Units(stress="GPa"), self.hardness))
-            if number.ndim:
-                raise InputError(
-                    f"hardness of a joint is one number, got shape {number.shape}"
-                )
+        number = checked_hardness(self._in_units.hardness)
+        if number.ndim:
+            raise InputError(
+                f"hardness of a joint is one number, got shape {number.shape}"
+            )
         if isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
             surface: Any = self.surface
@@ -253,10 +287,6 @@ class Joint(Displayed):
         except TypeError as fault:
             raise InputError(f"{path}: {fault}") from None
 
-    @property
-    def _asked(self) -> dict[str, Any]:
-        return {"materials": self.pair, "hardness": self.hardness, "theory": self.theory}
-
     def pressure_of(self, force: float | str) -> str:
         """F/A0 of a force on the nominal area, with its unit, as every method with a pressure takes it.
 
@@ -274,7 +304,7 @@ class Joint(Displayed):
         --------
         >>> from mbma_tables import Joint
         >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
-        >>> joint = Joint(face, materials="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
         >>> joint.pressure_of("40 kN"), f"{joint.at_pressure(joint.pressure_of('40 kN')).pressure:.2f} GPa"
         ('100000000 Pa', '0.10 GPa')
         """
@@ -284,11 +314,13 @@ class Joint(Displayed):
 
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
         """The contact at pressures F/A0 ("10 MPa"; plain numbers in GPa), as of `contact`: each in first loading."""
-        return contact(self.surface, pressure=pressure, **self._asked)
+        return contact_of(
+            self.surface, self.bodies, "pressure", pressure, self.theory, self.interface
+        )
 
     def law(self) -> ContactLaw:
         """The joint's contact law, for many gaps or pressures, as of `contact_law`."""
-        return contact_law(self.surface, **self._asked)
+        return law_of(self.surface, self.bodies, self.theory, LAW_RTOL, self.interface)
 
     def sensitivity(self, pressure: float | str) -> Sensitivity:
         """d ln(result)/d ln(number) at a pressure, for the numbers that the joint was described by.
@@ -316,32 +348,37 @@ class Joint(Displayed):
         >>> from mbma_tables import Joint
         >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
         >>> metal = "copper C11000 hard"
-        >>> joint = Joint(face, materials=metal, nominal_area="4 cm^2", theory="calibrated")
+        >>> joint = Joint(face, bodies=metal, nominal_area="4 cm^2", theory="calibrated")
         >>> slopes = joint.sensitivity("10 MPa").slopes
         >>> f"conductance goes like Rq^{slopes['part_a.Rq']['conductance']:.2f}"
         'conductance goes like Rq^-0.67'
         """
-        units = Units(self.surface.unit, "GPa")
+        in_units = self._in_units
         chosen = chosen_theory(self.surface, self.theory)
-        bodies = self.pair.metals
-        hardness = self.hardness or self.pair.hardness or np.inf
-
-        def modulus_of(*moduli: Any) -> Any:
-            (E_a, E_b), (nu_a, nu_b) = moduli, (metal.nu for metal in bodies)
-            return effective_modulus(E_a, nu_a, E_b, nu_b)
-
+        moduli, modulus_of = self._moduli(in_units)
         return relative_derivatives(
             self._unknowns(chosen),
             chosen,
-            units,
-            moduli={
-                f"{name}.E": metal.E for name, metal in zip(FACES, bodies, strict=True)
-            },
+            in_units.units,
+            moduli=moduli,
             modulus_of=modulus_of,
             by="pressure",
-            value=units.number("pressure", pressure),
-            hardness=hardness_in(units, hardness),
+            value=in_units.units.number("pressure", pressure),
+            hardness=in_units.hardness,
         )
+
+    def _moduli(
+        self, in_units: BodiesInUnits
+    ) -> tuple[dict[str, Any], Callable[..., Any]]:
+        """Young's moduli of named metals, or the effective modulus, and E* as their function."""
+        if self.pair is None:
+            return {"E_star": in_units.E_star}, lambda E_star: E_star
+        metal_a, metal_b = self.pair.metals
+
+        def modulus_of(E_a: Any, E_b: Any) -> Any:
+            return effective_modulus(E_a, metal_a.nu, E_b, metal_b.nu)
+
+        return {"part_a.E": metal_a.E, "part_b.E": metal_b.E}, modulus_of
 
     def _unknowns(self, theory: Theory) -> Unknowns:
         """The numbers of the faces, each with the name of its part before it, and the nominal area."""
@@ -478,7 +515,7 @@ class Joint(Displayed):
         >>> from mbma_tables import Joint
         >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
         >>> copper = "copper C11000 hard"
-        >>> joint = Joint(face, materials=copper, nominal_area="4 cm^2", theory="calibrated")
+        >>> joint = Joint(face, bodies=copper, nominal_area="4 cm^2", theory="calibrated")
         >>> card = joint.export("calculix", ("0.1 MPa", "50 MPa"), name="JOINT")
         >>> [line for line in card.splitlines() if line.startswith("*") and line[1] != "*"][:2]
         ['*SURFACE INTERACTION, NAME=JOINT', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL']
@@ -516,87 +553,44 @@ class Joint(Displayed):
         """What an export needs of the joint."""
         from mbma_tables.export.of_joint import ExportedJoint
 
-        k1, k2 = (float(text.split()[0]) for text in self.pair.conductivities)  # W/(m K)
+        in_units = self._in_units
+        gas = self.interface.gas
+        assert gas is not None
+        conductivity = None
+        if in_units.conductivity_is_given:
+            per_length, unit = in_units.conductivity
+            if unit == HEAT_CONDUCTANCE.unit(in_units.units):
+                # k_s over the surface's unit of length, to W/(m K)
+                conductivity = float(per_length) / factor("m", str(self.surface.unit))
         isotropic = self.direction is None
         return ExportedJoint(
             surface=self.surface,
-            E_star=self.pair.E_star,
+            E_star=self.bodies.E_star,
             theory=self.theory,
-            hardness=self.hardness or self.pair.hardness or np.inf,
-            conductivity=2 * k1 * k2 / (k1 + k2),
+            hardness=np.inf if self.bodies.hardness is None else self.bodies.hardness,
+            conductivity=conductivity,
             kappa=self._kappa,
             kappa_varies=not isotropic,
             friction=self.friction,
-            gas=self.gas,
-            temperature=self.temperature,
-            gas_pressure=self.gas_pressure,
+            gas=gas,
         )
 
     def _kappa(self, area: Any) -> Any:
         """Normal over tangential stiffness at a contact area, which only matters to surfaces with a lay."""
-        return ratio_of(None, None, self.pair, self.direction, self.surface, area)
+        return ratio_on(self.surface, self.bodies, self.direction, area)
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
-        """Every quantity of the joint at pressures, as an xarray Dataset with units and one standard deviation."""
-        held = self.quantities(
-            self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist())
-        )
-        return dataset_of(
-            {name: each._replace(dims=("pressure",)) for name, each in held.items()},
-            self.facts(),
-        )
+        """Every quantity of the joint at pressures, as an xarray Dataset with units and model uncertainties."""
+        pressed = self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist())
+        variables = {}
+        for name, variable in self.quantities(pressed).items():
+            dims = ("pressure",) if np.ndim(variable.values) else ()
+            variables[name] = variable._replace(dims=dims)
+        return dataset_of(variables, self.facts())
 
-    def quantities(self, found: Contact) -> dict[str, Variable]:
+    def quantities(self, pressed: Contact) -> dict[str, Variable]:
         """Values, units, meanings and model uncertainties of a contact of this joint, by name."""
-        units = found.units
-        stiff, gap = units["stiffness"], units["mean_separation"]
-        sheared, solid = (
-            found.tangential(self.friction, direction=self.direction),
-            found.conductance(),
-        )
-        gas = found.gap_conductance(self.gas, self.temperature, self.gas_pressure)
-        sd = "model uncertainty (1 sd) of ln"
-        return {
-            "pressure": Variable(
-                found.pressure, units["pressure"], "force over nominal area"
-            ),
-            "area": Variable(found.area, "1", "real over nominal contact area"),
-            "area_scatter": Variable(found.area_scatter, "1", f"{sd} area"),
-            "mean_separation": Variable(found.mean_separation, gap, "mean gap"),
-            "separation_scatter": Variable(
-                found.separation_scatter, gap, "model uncertainty (1 sd) of the mean gap"
-            ),
-            "stiffness": Variable(found.stiffness, stiff, "-dp/du of loading"),
-            "stiffness_scatter": Variable(
-                found.stiffness_scatter, "1", f"{sd} stiffness; not known where it yields"
-            ),
-            "unloading_stiffness": Variable(
-                found.unloading_stiffness, stiff, "-dp/du of a small unloading"
-            ),
-            "tangential_stiffness": Variable(
-                sheared.stiffness, stiff, "shear stress over displacement before slip"
-            ),
-            "unloading_stiffness_scatter": Variable(
-                found.unloading_stiffness_scatter,
-                "1",
-                f"{sd} unloading and tangential stiffness and of the solid's conductance",
-            ),
-            "conductance": Variable(solid, CONDUCTANCE, "thermal, of the solid spots"),
-            "gas_conductance": Variable(
-                gas, CONDUCTANCE, f"thermal, of {self.gas} in the gaps"
-            ),
-            "total_conductance": Variable(
-                solid + gas, CONDUCTANCE, "thermal, of both in parallel"
-            ),
-            "yielded": Variable(
-                found.yielded, "1", "share of the contact area at the hardness"
-            ),
-            "valid": Variable(
-                found.valid,
-                "1",
-                "whether contacts of this kind were compared with simulations",
-            ),
-        }
+        return pressed.variables()
 
     def plot(
         self,
@@ -641,33 +635,32 @@ class Joint(Displayed):
 
     def _range(self) -> Contact:
         """The contact at pressures from 1e-5 to 0.3 of the softer metal's hardness."""
-        hardness = (
-            self.hardness or self.pair.hardness or f"{self.pair.softer.hardness[0]} GPa"
-        )
-        return self.at_pressure(
-            np.geomspace(*RANGE, POINTS)
-            * float(hardness_in(Units(stress="GPa"), hardness))
-        )
+        in_units = self._in_units
+        largest = float(np.asarray(in_units.hardness))
+        if np.isinf(largest):
+            # of metals without a temper the softest, else the mean pressure in light contact
+            largest = float(in_units.E_star * self.surface.rms_gradient) / 2
+            if self.pair is not None:
+                largest = Units(stress=in_units.units.stress).number(
+                    "pressure", f"{self.pair.softer.hardness[0]} GPa"
+                )
+        return self.at_pressure(np.geomspace(*RANGE, POINTS) * largest)
 
     def facts(self) -> dict[str, str]:
         """The arguments of the joint, by name, and what its faces assume beyond them."""
-        a, b = self.pair.metals
-        hardness = (
-            self.hardness
-            or self.pair.hardness
-            or f"not known: name the temper of {self.pair.softer.name}"
-        )
-        theory = chosen_theory(self.surface, self.theory).name
-        facts = {
-            "metals": f"{a.name} on {b.name}",
-            "E_star": f"{float(self.pair.E_star.split()[0]):.4g} GPa",
-        }
-        facts |= {
-            "hardness": str(hardness),
-            "theory": theory,
-            "gas": self.gas,
-            "surface": repr(self.surface),
-        }
+        facts = {}
+        hardness = self.bodies.hardness
+        if self.pair is not None:
+            metal_a, metal_b = self.pair.metals
+            facts["metals"] = f"{metal_a.name} on {metal_b.name}"
+            if hardness is None:
+                hardness = f"not known: name the temper of {self.pair.softer.name}"
+        in_units = self._in_units
+        facts["E_star"] = f"{float(in_units.E_star):.4g} {in_units.units.stress}"
+        facts["hardness"] = "infinite" if hardness is None else str(hardness)
+        facts["theory"] = chosen_theory(self.surface, self.theory).name
+        facts["gas"] = _gas(self.gas).name
+        facts["surface"] = repr(self.surface)
         assumed = assumptions(self.surface)
         if assumed:
             facts["assumed"] = "; ".join(assumed)
@@ -682,40 +675,36 @@ class Joint(Displayed):
         return self._drawn(self._range())
 
     def _drawn(self, pressed: Contact) -> Figure:
-        held = self.quantities(pressed)
-        x, values = held["pressure"], {name: one.values for name, one in held.items()}
-        scatter = dict.fromkeys(
-            ("unloading_stiffness", "tangential_stiffness", "conductance"),
-            values["unloading_stiffness_scatter"],
-        )
-        scatter |= {
-            "area": values["area_scatter"],
-            "stiffness": values["stiffness_scatter"],
-        }
-        scatter |= {
-            "mean_separation": values["separation_scatter"] / values["mean_separation"]
-        }
+        variables = self.quantities(pressed)
+        x = variables["pressure"]
+        stiffness, gap = variables["stiffness"], variables["mean_separation"]
         panels = {
             "real contact area  A/A0": ("area",),
-            f"mean gap [{held['mean_separation'].unit}]": ("mean_separation",),
-            f"stiffness [{held['stiffness'].unit}]": (
+            f"mean gap [{gap.unit}]": ("mean_separation",),
+            f"stiffness [{stiffness.unit}]": (
                 "unloading_stiffness",
                 "tangential_stiffness",
                 "stiffness",
             ),
-            f"thermal conductance [{CONDUCTANCE}]": (
+            f"thermal conductance [{HEAT_CONDUCTANCE.unit(UNKNOWN)}]": (
                 "total_conductance",
                 "conductance",
                 "gas_conductance",
             ),
         }
-        lines = {
-            label: [
-                (name.replace("_", " "), values[name], scatter.get(name))
-                for name in names
-            ]
-            for label, names in panels.items()
-        }
+        lines = {}
+        for label, names in panels.items():
+            # quantities whose needs were given
+            drawn = [name for name in names if name in variables]
+            if drawn:
+                lines[label] = [
+                    (
+                        name.replace("_", " "),
+                        variables[name].values,
+                        _relative_scatter(pressed, name),
+                    )
+                    for name in drawn
+                ]
         return draw_panels(x.values, lines, f"pressure F/A0 [{x.unit}]")
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from mbma_tables import InputError
+from mbma_tables import Bodies, InputError, contact, contact_law, sensitivity
+from mbma_tables.theories import Mbma
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))  # multiplies the counts of random tests
 
@@ -187,3 +188,40 @@ def compiled_law(source, *options, name="road"):
 
     answer.library = law
     return answer
+
+
+OF_BODIES = ("E_star", "hardness", "metals", "conductivity", "nu", "E")
+OF_MBMA = ("island_model", "variant", "rtol", "outside")
+
+
+def sorted_arguments(bodies, arguments, of_theory=OF_MBMA):
+    """Bodies and a theory from arguments by their names, and the arguments of neither."""
+    others = dict(arguments)
+    of_bodies = {name: others.pop(name) for name in OF_BODIES if name in others}
+    if bodies is not None:
+        fields = {name: getattr(Bodies.of(bodies), name) for name in OF_BODIES}
+        stated = {name: value for name, value in fields.items() if value is not None}
+        of_bodies = stated | of_bodies
+    options = {name: others.pop(name) for name in of_theory if name in others}
+    if options:
+        assert others.get("theory", "mbma") == "mbma"
+        others["theory"] = Mbma(**options)
+    return Bodies(**of_bodies), others
+
+
+def contact_of(surface, bodies=None, **arguments):
+    """`contact`, with the constants of its bodies and the options of MBMA by their names."""
+    bodies, others = sorted_arguments(bodies, arguments)
+    return contact(surface, bodies, **others)
+
+
+def law_of_names(surface, bodies=None, **arguments):
+    """`contact_law`, with the same arguments; the tolerance is that of the law."""
+    bodies, others = sorted_arguments(bodies, arguments, ("island_model", "variant"))
+    return contact_law(surface, bodies, **others)
+
+
+def sensitivity_of(surface, bodies=None, **arguments):
+    """`sensitivity`, with the same arguments."""
+    bodies, others = sorted_arguments(bodies, arguments)
+    return sensitivity(surface, bodies, **others)

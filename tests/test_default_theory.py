@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers import random_map, run
+from helpers import contact_of, random_map, run, sensitivity_of
 
 from mbma_tables import (
     InputError,
@@ -22,7 +22,7 @@ from mbma_tables.cli import main
 from mbma_tables.export.explorer import explorer_page
 from mbma_tables.export.exported_law import exported_law
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.theories import theory_name
+from mbma_tables.theories import Mbma, theory_name
 
 NUMBERS = {"hurst": 0.8, "q0": 0.05, "q1": 1.5, "h_rms": 0.5, "h_max": 1.75}
 E_STAR = "100 GPa"
@@ -62,11 +62,10 @@ def test_the_rule(expected, make):
     for by in (None, "mean_separation", "pressure", "area"):
         assert theory_name(surface, None, by) == expected
         assert theory_name(surface, "persson", by) == "persson"
-        assert theory_name(surface, None, by, variant="printed") == "mbma"
-        assert (
-            theory_name(surface, None, by, island_model="exact", variant="reported")
-            == "mbma"
-        )
+        printed = Mbma(variant="printed")
+        assert theory_name(surface, printed, by) is printed
+        exact = Mbma(island_model="exact", variant="reported")
+        assert theory_name(surface, exact, by) is exact
     assert theory_name(surface, None, "separation") == "mbma"
     assert theory_name(surface, "calibrated", "separation") == "calibrated"
 
@@ -76,9 +75,9 @@ def test_the_rule(expected, make):
 def test_contact_sensitivity_and_scene_of_one_question(expected, make, by):
     surface, expected = make(), "mbma" if by == "separation" else expected
     place = {by: PLACES[by]}
-    found = contact(surface, **place, E_star=E_STAR)
+    found = contact_of(surface, E_STAR, **place)
     assert found.theory == expected
-    named = contact(surface, **place, E_star=E_STAR, theory=expected)
+    named = contact_of(surface, E_STAR, **place, theory=expected)
     assert (found.area, found.pressure) == (named.area, named.pressure)
 
     scene = Scene(
@@ -91,24 +90,24 @@ def test_contact_sensitivity_and_scene_of_one_question(expected, make, by):
     assert content.attrs["theory"] == expected
     np.testing.assert_allclose(content["stiffness"].values, found.stiffness, rtol=1e-6)
 
-    slopes = sensitivity(surface, **place, E_star=E_STAR)
+    slopes = sensitivity_of(surface, E_STAR, **place)
     assert slopes.answers["stiffness"] == pytest.approx(float(found.stiffness), rel=1e-6)
 
 
 @pytest.mark.parametrize(("expected", "make"), KINDS)
 def test_laws_exports_flow_factors_and_rough_bodies(expected, make):
     surface = make()
-    found = contact(surface, pressure=PRESSURE, E_star=E_STAR)
-    law = contact_law(surface, E_star=E_STAR)
+    found = contact(surface, E_STAR, pressure=PRESSURE)
+    law = contact_law(surface, E_STAR)
     assert law.theory == expected
     assert law.at_pressure(PRESSURE).area == pytest.approx(float(found.area), rel=1e-6)
     exported = exported_law(surface, E_STAR)
     assert (exported.theory.name, exported.law.theory) == (expected, expected)
     rows = describe_law(surface, E_STAR, pressures=("0.1 GPa", "0.5 GPa"))
     assert any(f"theory {expected!r}" in line for line in rows.comments)
-    film = flow_factors(surface, found.mean_separation, E_star=E_STAR)
+    film = flow_factors(surface, found.mean_separation, E_STAR)
     assert film.area[0] == pytest.approx(float(found.area), rel=1e-9)
-    ball = rough_contact(surface, "50 mm", force="100 N", E_star=E_STAR)
+    ball = rough_contact(surface, "50 mm", E_STAR, force="100 N")
     assert ball.layer.theory == expected
 
 
@@ -116,15 +115,11 @@ def test_laws_exports_flow_factors_and_rough_bodies(expected, make):
 def test_a_joint(expected, make):
     surface = make()
     metals = "steel 4140 hard"
-    joint = Joint(surface, materials=metals)
+    joint = Joint(surface, bodies=metals)
     found = joint.at_pressure(PRESSURE)
     assert (found.theory, joint.facts()["theory"]) == (expected, expected)
-    assert (
-        found.area
-        == contact(
-            surface, pressure=PRESSURE, materials=metals, hardness=joint.hardness
-        ).area
-    )
+    assert found.area == contact(surface, joint.bodies, pressure=PRESSURE).area
+    assert found.area == contact(surface, metals, pressure=PRESSURE).area
     assert joint.table([PRESSURE]).attrs["theory"] == expected
     card = joint.export("csv", pressures=("100 MPa", "500 MPa"), heat=False)
     assert f"theory {expected!r}" in card
@@ -221,10 +216,10 @@ def test_the_page_starts_with_the_law_of_the_surface_and_does_not_simulate():
 def test_the_sensitivity_of_a_map_is_that_of_its_simulation():
     """Heights and lengths scale exactly, so that slopes follow from those by the pressure."""
     surface = of_map()
-    slopes = sensitivity(surface, pressure=PRESSURE, E_star=E_STAR).slopes
+    slopes = sensitivity(surface, E_STAR, pressure=PRESSURE).slopes
     step = 1e-3
     loads = PRESSURE * np.exp([-step, step])
-    areas = contact(surface, pressure=loads, E_star=E_STAR, theory="simulated").area
+    areas = contact(surface, E_STAR, pressure=loads, theory="simulated").area
     by_pressure = np.diff(np.log(areas))[0] / (2 * step)
     assert slopes["pressure"]["area"] == pytest.approx(by_pressure, abs=1e-3)
     # dimensional analysis: area depends on p/(E* slope) alone

@@ -32,9 +32,9 @@ SPECTRUM = Surface.from_spectrum(
 DISPLAYED = (
     lambda: ROAD,
     lambda: SPECTRUM,
-    lambda: contact(ROAD, separation=np.linspace(1, -1, 9), E_star="13.3 MPa"),
+    lambda: contact(ROAD, "13.3 MPa", separation=np.linspace(1, -1, 9)),
     lambda: contact(SPECTRUM, pressure=[0.001, 0.01], theory="calibrated"),
-    lambda: contact_law(ROAD, E_star="13.3 MPa"),
+    lambda: contact_law(ROAD, "13.3 MPa"),
     lambda: contact_law(ROAD, theory="calibrated"),
     lambda: describe_law(ROAD, "13.3 MPa", rows=20),
 )
@@ -92,7 +92,7 @@ def test_every_variable_has_its_unit(thing):
 
 
 def test_a_dataset_holds_the_answers():
-    answer = contact(ROAD, separation=[[0.8, 0.2], [0.1, 0.0]], E_star="13.3 MPa")
+    answer = contact(ROAD, "13.3 MPa", separation=[[0.8, 0.2], [0.1, 0.0]])
     found = answer.to_dataset()
     for name in (
         "separation",
@@ -109,8 +109,8 @@ def test_a_dataset_holds_the_answers():
     assert found["stiffness"].dims == ("dim_0", "dim_1")
     assert (found["stiffness"].units, found["pressure"].units) == ("MPa/mm", "MPa")
     assert found.attrs["surface"] == repr(ROAD)
-    law = contact_law(ROAD, "mbma", E_star=13.3).to_dataset()
-    direct = contact(ROAD, separation=law["separation"].values, E_star=13.3)
+    law = contact_law(ROAD, 13.3, theory="mbma").to_dataset()
+    direct = contact(ROAD, 13.3, separation=law["separation"].values)
     np.testing.assert_allclose(law["pressure"], direct.pressure, rtol=1e-8)
     np.testing.assert_allclose(law["stiffness"], direct.stiffness, rtol=1e-6)
     np.testing.assert_array_equal(SPECTRUM.to_dataset()["C"], SPECTRUM.C)

@@ -9,10 +9,10 @@ import urllib.parse
 
 import numpy as np
 import pytest
-from helpers import compiled_law, random_map, refused, run
+from helpers import compiled_law, contact_of, random_map, refused, run
 
 from generate.explorer import c_sources, digest_of, law_sources
-from mbma_tables import InputError, Surface, contact
+from mbma_tables import Bodies, InputError, Surface, contact
 from mbma_tables.export.explorer import MODULE, explorer_page
 from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import page_file
@@ -133,7 +133,7 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
             "E_star": state["E_star"],
             "theory": theory,
         }
-        expected = contact(
+        expected = contact_of(
             surface,
             **options,
             **({"variant": state["variant"]} if theory == "mbma" else {}),
@@ -316,10 +316,9 @@ def test_a_hardness_is_that_of_the_library(visit, against, hardness):
     assert seen.sum() > 20
     known = contact(
         road,
+        Bodies(13.3, hardness=hardness, nu=0.3),
         mean_separation=gap[seen],
-        E_star=13.3,
         theory="calibrated",
-        hardness=hardness,
     )
     expected = {
         "pressure": known.pressure,
@@ -327,7 +326,7 @@ def test_a_hardness_is_that_of_the_library(visit, against, hardness):
         "stiffness": known.stiffness,
     }
     expected |= {"conductance": 50 / 1e-3 / 13.3 * known.unloading_stiffness}
-    expected |= {"tangential": known.tangential(nu=0.3).stiffness}
+    expected |= {"tangential": known.tangential_stiffness}
     for name, values in expected.items():
         np.testing.assert_allclose(
             found[f"calibrated {name}"][seen], values, rtol=1e-5, err_msg=name
@@ -359,7 +358,7 @@ def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
     found, surface = columns(tab), Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1)
     for theory in ("calibrated", "persson"):
         expected = contact(
-            surface, mean_separation=found[f"{theory} gap"], E_star=13.3, theory=theory
+            surface, 13.3, mean_separation=found[f"{theory} gap"], theory=theory
         )
         for name, attribute in QUANTITIES.items():
             # the library's own law of a spectrum is within 1e-7
@@ -412,9 +411,7 @@ def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tm
     c = float(surface.h_max) * np.exp(
         np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 300)
     )
-    known = contact(
-        surface, mean_separation=surface.h_max - c, E_star=13.3, theory=theory
-    )
+    known = contact(surface, 13.3, mean_separation=surface.h_max - c, theory=theory)
     np.testing.assert_allclose(law("pressure", c), known.pressure, rtol=3e-8)
     np.testing.assert_allclose(law("area", c), known.area, rtol=3e-8)
     np.testing.assert_allclose(law("tangent", c), known.stiffness, rtol=3e-6)
@@ -441,7 +438,7 @@ def test_numbers_under_the_cursor_by_keyboard(visit):
     assert rows.count() == 3
     assert rows.nth(0).inner_text().startswith("u = 1.078 mm")
     known = contact(
-        Surface.named("concrete"), mean_separation=1.078, E_star=13.3, theory="calibrated"
+        Surface.named("concrete"), 13.3, mean_separation=1.078, theory="calibrated"
     )
     shown = float(rows.nth(1).locator("td").first.inner_text().split(" ±")[0])
     assert shown == pytest.approx(known.pressure, rel=1e-4)

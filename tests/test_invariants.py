@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from catalogue import LEVEL, OWN
-from helpers import SCALE
+from helpers import SCALE, contact_of
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -121,8 +121,8 @@ def test_units_that_are_powers_of_two_change_no_bit(
         )
     for island_model in ("universal", "rigid"):
         asked = {"island_model": island_model, "variant": variant}
-        one = contact(surface, separation=gap, **asked)
-        found = contact(other, separation=gap * unit, E_star=modulus, **asked)
+        one = contact_of(surface, separation=gap, **asked)
+        found = contact_of(other, modulus, separation=gap * unit, **asked)
         assert (found.pressure, found.area, found.error) == (
             one.pressure * modulus,
             one.area,
@@ -135,7 +135,7 @@ def test_units_that_are_powers_of_two_change_no_bit(
 def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(
     surface, variant
 ):
-    law = contact_law(surface, rtol=1e-6, variant=variant)
+    law = contact_law(surface, rtol=1e-6, theory=Mbma(variant=variant))
     gaps = gaps_of(
         surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:])
     )
@@ -148,8 +148,8 @@ def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(
     )
     for elastic, rigid, load in (
         (
-            contact(surface, separation=some, variant=variant),
-            contact(surface, separation=some, **asked),
+            contact(surface, separation=some, theory=Mbma(variant=variant)),
+            contact_of(surface, separation=some, **asked),
             "pressure",
         ),
         (
@@ -189,7 +189,7 @@ def test_first_contact_is_a_power_law(surface, variant):
         * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
     )
     depth = surface.h_max - gaps
-    found = contact(surface, separation=gaps, variant=variant, rtol=1e-11)
+    found = contact(surface, separation=gaps, theory=Mbma(variant=variant, rtol=1e-11))
     for values, exponent in ((found.pressure, 3.5), (found.area, 10 / 3)):
         slope = np.diff(np.log(values))[::2] / np.diff(np.log(depth))[::2]
         assert abs(slope[0] - exponent) < 1e-2
@@ -207,7 +207,7 @@ def test_first_contact_is_a_power_law(surface, variant):
     digits=st.integers(2, 9),
 )
 def test_a_law_and_its_inverse(surface, shares, variant, digits):
-    law = contact_law(surface, rtol=10.0**-digits, variant=variant)
+    law = contact_law(surface, rtol=10.0**-digits, theory=Mbma(variant=variant))
     for name, value, slope, turn in (
         (
             "pressure",
@@ -250,10 +250,10 @@ def test_no_entry_knows_the_others(island_model, seed):
     asked = {"island_model": island_model, "rtol": 1e-4}
 
     def totals(chosen):
-        return contact(
+        return contact_of(
             Surface(*some_of(numbers, chosen)),
+            E_star[chosen],
             separation=gaps[chosen],
-            E_star=E_star[chosen],
             **asked,
         )
 

@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 from helpers import random_map, run
 
-from mbma_tables import InputError, Joint, Surface, contact, contact_law, materials
+from mbma_tables import (
+    Bodies,
+    Gas,
+    InputError,
+    Joint,
+    Surface,
+    contact,
+    contact_law,
+    materials,
+)
 from mbma_tables.cli import main
 from mbma_tables.export import targets
 from mbma_tables.export.law_code import law_text
@@ -29,11 +38,7 @@ EXAMPLE = pathlib.Path(__file__).parents[1] / "examples" / "joint.toml"
 @pytest.fixture(scope="module")
 def joint():
     return Joint(
-        FACE,
-        FACE | {"Rq": "0.7 um"},
-        materials=METALS,
-        nominal_area="4 cm^2",
-        friction=0.2,
+        FACE, FACE | {"Rq": "0.7 um"}, bodies=METALS, nominal_area="4 cm^2", friction=0.2
     )
 
 
@@ -43,16 +48,13 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
         for Rq in ("0.4 um", "0.7 um")
     )
     known = contact(
-        a.combined(b, "4 cm^2"),
-        pressure=["1 MPa", "50 MPa"],
-        materials=METALS,
-        theory="calibrated",
+        a.combined(b, "4 cm^2"), METALS, pressure=["1 MPa", "50 MPa"], theory="calibrated"
     )
     table = joint.table(["1 MPa", "50 MPa"])
     np.testing.assert_array_equal(table["area"], known.area)
-    np.testing.assert_array_equal(table["conductance"], known.conductance())
+    np.testing.assert_array_equal(table["conductance"], known.conductance)
     np.testing.assert_array_equal(
-        table["total_conductance"], known.conductance() + known.gap_conductance("air")
+        table["total_conductance"], known.conductance + known.gap_conductance("air")
     )
     np.testing.assert_array_equal(
         table["tangential_stiffness"], known.tangential().stiffness
@@ -73,7 +75,7 @@ def test_its_law_and_sensitivity(joint):
     # takes height away
     faces = [{**FACE, "Rq": Rq, "longest": "501 um"} for Rq in ("0.4 um", "0.7 um")]
     longer = Joint(
-        *faces, materials=METALS, nominal_area="4 cm^2", theory=joint.theory
+        *faces, bodies=METALS, nominal_area="4 cm^2", theory=joint.theory
     ).at_pressure("10 MPa")
     by_both = sum(
         slopes[f"{part}.longest"]["mean_separation"] for part in ("part_a", "part_b")
@@ -108,17 +110,14 @@ def pressed_again(factors, theory, unit, size, answers):
     ]
     described = Joint(
         *faces,
-        materials=metals,
+        bodies=Bodies(metals=metals, hardness=0.95 * factor["hardness"]),
         nominal_area=f"{4 * factor['nominal_area']!r} cm^2",
-        hardness=0.95 * factor["hardness"],
         theory=theory,
     )
     if not answers:
         return described
     pressed = described.at_pressure(0.05 * factor["pressure"])
-    values = {name: getattr(pressed, name) for name in answers if name != "conductance"}
-    values["conductance"] = pressed.conductance()
-    return np.log([float(values[name]) for name in answers])
+    return np.log([float(getattr(pressed, name)) for name in answers])
 
 
 @pytest.mark.parametrize(
@@ -150,32 +149,30 @@ def test_sensitivities_are_differences_of_joints_described_anew(theory, unit, si
 
 
 def test_a_smooth_other_face_and_other_metals():
-    copper = Joint(
-        FACE, materials="copper C11000 hard", nominal_area="1 cm^2", gas="vacuum"
-    )
+    copper = Joint(FACE, bodies="copper C11000 hard", gas="vacuum", nominal_area="1 cm^2")
     table = copper.table("10 MPa")
     assert float(table["gas_conductance"][0]) == 0
     assert copper.surface.h_rms == 0.4
     own = Surface.from_roughness(**FACE, nominal_area="1 cm^2")
-    assert Joint(own, materials="copper C11000 hard").surface is own
-    larger = Joint(own, materials="copper C11000 hard", nominal_area="100 cm^2")
+    assert Joint(own, bodies="copper C11000 hard").surface is own
+    larger = Joint(own, bodies="copper C11000 hard", nominal_area="100 cm^2")
     assert larger.surface.h_max > own.h_max
 
 
 def test_what_is_missing_is_named(tmp_path):
     with pytest.raises(InputError, match="nominal_area"):
-        Joint(FACE, materials=METALS)
-    with pytest.raises(TypeError, match="hardness"):
-        Joint(FACE, materials=METALS, hardnes="1 GPa")
+        Joint(FACE, bodies=METALS)
+    with pytest.raises(TypeError, match="direction"):
+        Joint(FACE, bodies=METALS, directon="along")
     path = tmp_path / "joint.toml"
-    path.write_text("materials = 'steel 4140 hard'\nnominal_are = 1\n")
+    path.write_text("bodies = 'steel 4140 hard'\nnominal_are = 1\n")
     with pytest.raises(InputError, match="nominal_area"):
         Joint.from_toml(path)
 
 
 def test_untempered_metals_are_not_valid():
     found = Joint(
-        FACE, materials=("steel 4140", "aluminium 6061"), nominal_area="4 cm^2"
+        FACE, bodies=("steel 4140", "aluminium 6061"), nominal_area="4 cm^2"
     ).at_pressure("50 MPa")
     assert not found.valid
     assert any("hardness=" in reason for reason in found.reasons)
@@ -187,7 +184,7 @@ def test_parts_may_be_maps(tmp_path):
     )
     part = '{map = "face.npy", dx = 1.0, periodic = true, unit = "um"}'
     (tmp_path / "joint.toml").write_text(
-        f'materials = "steel 1020"\nhardness = "1.5 GPa"\npart_a = {part}\n'
+        f'bodies = {{metals = "steel 1020", hardness = "1.5 GPa"}}\npart_a = {part}\n'
     )
     mapped = Joint.from_toml(tmp_path / "joint.toml")
     assert mapped.surface.bearing is not None
@@ -226,7 +223,7 @@ def test_cards_hold_the_joint(joint):
     # mW/(mm^2 K) is 1000 W/(m^2 K)
     found = joint.at_pressure((p[1:] / 1000).tolist())
     # of the solid spots and of the air in the gaps
-    both = found.conductance() + found.gap_conductance("air")
+    both = found.conductance + found.gap_conductance("air")
     np.testing.assert_allclose(1000 * k[1:], both, rtol=2e-3)  # of the rows
     assert "hardness = 950.0 MPa" in card
     closure = joint.export("abaqus", ("1 MPa", "50 MPa"), heat=False)
@@ -283,7 +280,7 @@ def test_functions_of_yielded_joints(joint, tmp_path):
         "pressure": 10.0,
         "tangent": 1e6 * found.stiffness,
         "tangential_stiffness": 1e6 * found.tangential().stiffness,
-        "conductance": 1e-3 * found.conductance(),
+        "conductance": 1e-3 * found.conductance,
     }.items():
         function = bolt[f"bolt_{what}"]
         function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
@@ -313,10 +310,13 @@ def test_parts_with_a_lay_have_a_direction():
         np.where((q > 0.03) & (q < 0.3), np.fft.fft2(rng.normal(size=(64, 64))), 0)
     ).real
     ground = Surface.from_map(heights / heights.std(), 1.0, periodic=True, unit="um")
-    given = {"materials": "steel 1020", "hardness": "1.5 GPa", "friction": 0.2}
+    bodies = Bodies(metals="steel 1020", hardness="1.5 GPa")
     with pytest.raises(InputError, match="give direction"):
-        Joint(ground, **given).table("60 MPa")
-    along, across = (Joint(ground, **given, direction=way) for way in ("along", "across"))
+        Joint(ground, bodies=bodies, friction=0.2).table("60 MPa")
+    along, across = (
+        Joint(ground, bodies=bodies, friction=0.2, direction=way)
+        for way in ("along", "across")
+    )
     stiff = [
         float(one.table("60 MPa")["tangential_stiffness"][0]) for one in (along, across)
     ]
@@ -347,7 +347,7 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     monkeypatch.setattr(
         Calibrated, "answer", lambda *given: calls.append(1) or answer(*given)
     )
-    contact(joint.surface, pressure="10 MPa", materials=METALS, theory="calibrated")
+    contact(joint.surface, METALS, pressure="10 MPa", theory="calibrated")
     plain = len(calls)
     found = joint.at_pressure("10 MPa")
     assert len(calls) == 2 * plain
@@ -356,10 +356,8 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     assert len(calls) - 2 * plain <= 3
     # a law as code makes the elastic one for an unloading stiffness alone
     made = []
-    law = contact_law(joint.surface, E_star=1.0, theory="calibrated", hardness=0.05)
-    monkeypatch.setattr(
-        "mbma_tables.export.exported_law.contact_law", lambda *given, **options: law
-    )
+    law = contact_law(joint.surface, Bodies(1.0, hardness=0.05), theory="calibrated")
+    monkeypatch.setattr("mbma_tables.export.exported_law.law_of", lambda *given: law)
     law = dataclasses.replace(
         law,
         elastic=lambda: made.append(1) or contact_law(joint.surface, theory="calibrated"),
@@ -381,17 +379,17 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     [
         ({"gas": "nitrogn"}, "did you mean 'nitrogen'"),
         ({"gas": 5}, "no gas is named 5"),
-        ({"temperature": 3000}, "temperature must be from 200 to 600 K"),
-        ({"gas_pressure": "-1 atm"}, "gas_pressure must be positive"),
+        ({"gas": Gas(temperature=3000)}, "temperature must be from 200 to 600 K"),
+        ({"gas": Gas(pressure="-1 atm")}, "gas_pressure must be positive"),
         ({"theory": "calibratd"}, "did you mean 'calibrated'"),
         ({"theory": "simulated"}, "is of one map"),
         ({"theory": 5}, "theory must be one of"),
         ({"friction": -0.2}, "friction must be a number"),
-        ({"hardness": "60 HRB"}, "from 71.2 to 99.5"),
-        ({"hardness": -1.0}, "hardness must be positive"),
+        ({"bodies": Bodies(metals=METALS, hardness="60 HRB")}, "from 71.2 to 99.5"),
+        ({"bodies": Bodies(metals=METALS, hardness=-1.0)}, "hardness must be positive"),
         ({"direction": "alon"}, "direction must be one of"),
         ({"direction": "along"}, "direction needs a surface"),
-        ({"materials": "steel 4141"}, "steel 4140"),
+        ({"bodies": "steel 4141"}, "steel 4140"),
         ({"nominal_area": "-4 cm^2"}, "nominal_area must be positive"),
         ({"part_b": "face.sur"}, "part_b is a surface, or its numbers by name"),
         (
@@ -407,7 +405,7 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
 def test_a_joint_is_checked_when_it_is_described(changed, match):
     described = {
         "part_a": FACE,
-        "materials": METALS,
+        "bodies": METALS,
         "nominal_area": "4 cm^2",
         "theory": "calibrated",
     }
@@ -419,7 +417,7 @@ def test_all_numbers_that_a_face_lacks_are_named_at_once():
     with pytest.raises(
         InputError, match=r"hurst.*two of longest.*one of h_max, Sp, nominal_area"
     ):
-        Joint({"Ra": "1.6 um"}, materials=METALS)
+        Joint({"Ra": "1.6 um"}, bodies=METALS)
 
 
 def test_a_nominal_area_is_of_a_map_too():
@@ -427,7 +425,7 @@ def test_a_nominal_area_is_of_a_map_too():
     heights = random_map(64, 0.03, 0.2)
     named = {"map": heights / heights.std(), "dx": 1.0, "periodic": True, "unit": "um"}
     made = Surface.from_map(named["map"], 1.0, periodic=True, unit="um")
-    given = {"materials": "steel 1020", "nominal_area": "4 cm^2", "theory": "calibrated"}
+    given = {"bodies": "steel 1020", "nominal_area": "4 cm^2", "theory": "calibrated"}
     one, other = Joint(named, **given), Joint(made, **given)
     assert one.surface.h_max == other.surface.h_max > made.h_max
 
@@ -457,14 +455,18 @@ def test_a_joint_names_what_its_faces_assume(joint):
 
 def test_results_without_units_are_displayed():
     plain = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5)
-    joint = Joint(plain, materials="steel 1020", theory="calibrated")
+    joint = Joint(plain, bodies="steel 1020", theory="calibrated")
     assert "steel 1020" in repr(joint)
     pressed = joint.at_pressure([0.01, 0.02])
     assert "conductance needs the surface's unit" in repr(pressed)
     assert "conductance" not in pressed.to_dataset()
     assert "theory" in pressed._repr_html_()
-    with pytest.raises(InputError, match="give the surface its unit"):
-        joint.table(0.01)
+    assert "conductance needs the surface's unit" in repr(joint.at_pressure(0.01))
+    for name in ("conductance", "gas_conductance", "total_conductance"):
+        assert name not in joint.table(0.01)
+        with pytest.raises(InputError, match="give the surface its unit"):
+            getattr(pressed, name)
+    assert joint.plot().axes
     with pytest.raises(InputError, match="nominal_area"):
         joint.pressure_of("40 kN")
 
@@ -540,7 +542,7 @@ def test_gases_against_kinetic_theory(gas, molar_mass):
 def test_a_subroutine_without_friction_says_so():
     face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
     given = {
-        "materials": "copper C11000 hard",
+        "bodies": "copper C11000 hard",
         "nominal_area": "4 cm^2",
         "theory": "calibrated",
     }

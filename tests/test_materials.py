@@ -3,11 +3,19 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import refusals, run
+from helpers import contact_of, refusals, run
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbma_tables import Scene, Surface, contact, contact_law, materials, sensitivity
+from mbma_tables import (
+    Bodies,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    materials,
+    sensitivity,
+)
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.materials import effective_modulus
@@ -36,11 +44,11 @@ def test_bodies_may_be_exchanged_and_compliances_add(E1, nu1, E2, nu2):
 def test_texts_give_a_text_that_contact_takes():
     found = effective_modulus("210 GPa", 0.3, "7e4 MPa", 0.33)
     assert found == f"{effective_modulus(210.0, 0.3, 70.0, 0.33)} GPa"
-    pressed = contact(Surface.named("challenge"), pressure="1 MPa", E_star=found)
+    pressed = contact(Surface.named("challenge"), found, pressure="1 MPa")
     assert pressed.units["pressure"] == "GPa"
     with pytest.raises(InputError, match="E2 without a unit beside numbers in GPa"):
         effective_modulus("210 GPa", 0.3, 70.0, 0.33)
-    with pytest.raises(TypeError, match=r"E_star=materials\.effective_modulus"):
+    with pytest.raises(TypeError, match=r"materials\.effective_modulus"):
         contact(Surface.named("challenge"), pressure="1 MPa", E1="210 GPa")
 
 
@@ -260,7 +268,7 @@ def test_hardnesses_that_are_refused():
         ("3 um", "unit of stress"),
     ):
         with pytest.raises(InputError, match=message):
-            contact(FACE, pressure="1 MPa", E_star="100 GPa", hardness=text)
+            contact(FACE, Bodies("100 GPa", hardness=text), pressure="1 MPa")
     for names in ((), ("silver",) * 3, 5, ("silver", 5), {"a": 1}):
         with pytest.raises(
             InputError, match=r"one or two|no metal is named|a metal has name"
@@ -275,39 +283,46 @@ FACE = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
 
 def test_metals_named_answer_as_their_numbers_do():
     asked = {"pressure": ["10 MPa", "100 MPa"], "theory": "calibrated"}
-    named = contact(FACE, materials=("steel 4140 hard", "aluminium 6061 hard"), **asked)
+    named = contact_of(FACE, ("steel 4140 hard", "aluminium 6061 hard"), **asked)
     modulus = effective_modulus(205.0, 0.29, 69.0, 0.33)
-    plain = contact(FACE, E_star=f"{modulus} GPa", hardness=["950 MPa"], **asked)
+    plain = contact_of(
+        FACE,
+        Bodies(
+            f"{modulus} GPa",
+            hardness=["950 MPa"],
+            conductivity=("42.7 W/(m K)", f"{(154 * 180) ** 0.5} W/(m K)"),
+        ),
+        **asked,
+    )
     for name in ("area", "mean_separation", "stiffness", "unloading_stiffness"):
         np.testing.assert_allclose(getattr(named, name), getattr(plain, name), rtol=1e-12)
-    steel, aluminium = "42.7 W/(m K)", f"{(154 * 180) ** 0.5} W/(m K)"
-    np.testing.assert_allclose(
-        named.conductance(), plain.conductance(steel, aluminium), rtol=1e-5
-    )
+    np.testing.assert_allclose(named.conductance, plain.conductance, rtol=1e-5)
     law = contact_law(
-        FACE, materials=("steel 4140 hard", "aluminium 6061 hard"), theory="calibrated"
+        FACE, ("steel 4140 hard", "aluminium 6061 hard"), theory="calibrated"
     )
     np.testing.assert_allclose(law.at_pressure("100 MPa").area, named.area[1], rtol=1e-4)
-    with pytest.raises(InputError, match="E_star and materials"):
-        contact(FACE, materials="silver", E_star="100 GPa", **asked)
-    with pytest.raises(InputError, match="no materials are named"):
-        plain.conductance()
+    with pytest.raises(InputError, match="E_star and metals"):
+        contact_of(FACE, Bodies("100 GPa", metals="silver"), **asked)
+    without = contact_of(FACE, f"{modulus} GPa", **asked)
+    with pytest.raises(InputError, match=r"conductance needs conductivity.*named metals"):
+        _ = without.conductance
 
 
 def test_metals_that_yield_are_not_valid_without_a_hardness():
-    def at(surface=FACE, **given):
-        return contact(surface, **{"pressure": "50 MPa", "theory": "calibrated"} | given)
+    def at(bodies, surface=FACE, pressure="50 MPa"):
+        return contact(surface, bodies, pressure=pressure, theory="calibrated")
 
-    assert at(materials="steel 1020").valid  # one temper: it yields by default
-    assert at(materials="steel 1020").yielded > 0.9
-    (reason,) = at(materials="steel 4140").reasons
+    assert at("steel 1020").valid  # one temper: it yields by default
+    assert at("steel 1020").yielded > 0.9
+    (reason,) = at("steel 4140").reasons
     assert (
         reason
         == "steel 4140 yields here: give hardness= of its temper, '2.06 GPa' to '5.76 GPa'"
     )
-    assert at(materials="steel 4140", hardness="200 HV").valid
-    assert not at(materials=("steel 52100", "silver"), hardness=np.inf).valid
-    (reason,) = at(materials=("steel 52100", "silver"), hardness=np.inf).reasons
+    assert at(Bodies(metals="steel 4140", hardness="200 HV")).valid
+    elastic_pair = Bodies(metals=("steel 52100", "silver"), hardness=np.inf)
+    assert not at(elastic_pair).valid
+    (reason,) = at(elastic_pair).reasons
     assert reason == "silver yields here: give hardness='0.26 GPa'"
     # elastic up to gradients of 0.073, docs/yield.md
     polished = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5).scaled(1.0, "um")
@@ -316,15 +331,16 @@ def test_metals_that_yield_are_not_valid_without_a_hardness():
         face = Surface(
             hurst=0.8, q0=0.06, q1=3.0, h_rms=height, h_max=3.5 * height, unit="um"
         )
-        assert at(face, materials="steel 52100", hardness=np.inf).valid == elastic
+        steel = Bodies(metals="steel 52100", hardness=np.inf)
+        assert at(steel, face).valid == elastic
     # no material named: above what any of them bears
-    assert not at(E_star="115 GPa").valid
-    assert at(E_star="115 GPa", hardness=np.inf).valid
-    assert at(E_star="50 GPa").valid
+    assert not at("115 GPa").valid
+    assert at(Bodies("115 GPa", hardness=np.inf)).valid
+    assert at("50 GPa").valid
     assert contact(
         FACE, pressure=1e-3, theory="calibrated"
     ).valid  # over E*: no stress is known
-    labelled = at(materials="steel 4140", pressure=xr.DataArray([0.05, 0.1], dims="load"))
+    labelled = at("steel 4140", pressure=xr.DataArray([0.05, 0.1], dims="load"))
     assert not labelled.valid.values.any()
     assert [text[:17] for text in labelled.reasons] == ["steel 4140 yields"]
 
@@ -333,13 +349,14 @@ def test_metals_that_yield_are_not_valid_without_a_hardness():
 def test_sensitivities_hold_the_hardness(theory):
     numbers = {"pressure": 0.1, "E_star": 115.0, "hardness": 3.0}
     found = sensitivity(
-        FACE, pressure="0.1 GPa", E_star="115 GPa", hardness="3 GPa", theory=theory
+        FACE, Bodies("115 GPa", hardness="3 GPa"), pressure="0.1 GPa", theory=theory
     )
     for name in numbers:
         both = []
         for factor in (0.999, 1.001):
             own = numbers | {name: numbers[name] * factor}
-            one = contact(FACE, **own | {"E_star": f"{own['E_star']} GPa"}, theory=theory)
+            bodies = Bodies(f"{own['E_star']} GPa", hardness=own["hardness"])
+            one = contact(FACE, bodies, pressure=own["pressure"], theory=theory)
             both.append(
                 [
                     one.area,
@@ -357,15 +374,17 @@ def test_sensitivities_hold_the_hardness(theory):
 
 
 def test_scenes_and_rows_take_every_hardness():
-    given = {"E_star": "115 GPa", "theory": "calibrated"}
+    pressures = ["10 MPa", "50 MPa"]
     scene = Scene(
         surface=FACE,
-        pressures=["10 MPa", "50 MPa"],
+        pressures=pressures,
         effects={"pressure", "area", "yield"},
+        E_star="115 GPa",
         hardness="40 HRC",
-        **given,
+        theory="calibrated",
     )
-    known = contact(FACE, pressure=["10 MPa", "50 MPa"], hardness="392 HV", **given)
+    bodies = Bodies("115 GPa", hardness="392 HV")
+    known = contact(FACE, bodies, pressure=pressures, theory="calibrated")
     np.testing.assert_allclose(scene.run()["area"], known.area, rtol=1e-4)
     rows = describe_law(FACE, "115 GPa", theory="calibrated", hardness="silver", rows=20)
     assert any(line.startswith("hardness = 0.26 GPa") for line in rows.comments)
@@ -382,10 +401,8 @@ def test_a_hardness_in_the_shell():
         given = ["--hardness", text] if text else []
         answer = json.loads(run("contact", *asked.split(), "--json", *given))["columns"]
         assert answer["valid"] == [valid], text
-        cap = {} if text is None else {"hardness": np.inf if text == "inf" else text}
-        known = contact(
-            FACE, pressure="50 MPa", E_star="115 GPa", theory="calibrated", **cap
-        )
+        bodies = Bodies("115 GPa", hardness=np.inf if text == "inf" else text)
+        known = contact(FACE, bodies, pressure="50 MPa", theory="calibrated")
         assert answer["area"] == [pytest.approx(float(known.area), rel=1e-12)]
 
 

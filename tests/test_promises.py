@@ -15,9 +15,11 @@ import sys
 
 import numpy as np
 import pytest
+from helpers import contact_of
 
 import mbma_tables
 from mbma_tables import (
+    Bodies,
     Joint,
     Surface,
     contact,
@@ -48,7 +50,7 @@ def heights():
 
 
 def by_pressure(theory, **options):
-    found = contact(ROUGH, pressure=PRESSURES, E_star="100 GPa", theory=theory, **options)
+    found = contact_of(ROUGH, "100 GPa", pressure=PRESSURES, theory=theory, **options)
     return [
         found.mean_separation,
         found.area,
@@ -59,14 +61,12 @@ def by_pressure(theory, **options):
 
 
 def of_a_law():
-    law = contact_law(ROUGH, "calibrated", rtol=RTOL, E_star="100 GPa")
+    law = contact_law(ROUGH, "100 GPa", theory="calibrated", rtol=RTOL)
     return [law.pressure(1.5), law.area(1.5), law.at_pressure("10 MPa").mean_separation]
 
 
 def of_a_joint():
-    joint = Joint(
-        FACE, FACE, materials=METALS, nominal_area="4 cm^2", theory="calibrated"
-    )
+    joint = Joint(FACE, FACE, bodies=METALS, nominal_area="4 cm^2", theory="calibrated")
     found = joint.at_pressure(PRESSURES)
     return [found.area, found.mean_separation, found.stiffness, found.conductance()]
 
@@ -226,7 +226,9 @@ def asked_map(surface):
 
 def asked_theory(theory):
     elastic = contact(ROUGH, pressure=[0.001, 0.004], theory=theory)
-    yielded = contact(ROUGH, pressure=[0.001, 0.004], theory=theory, hardness=0.05)
+    yielded = contact(
+        ROUGH, Bodies(hardness=0.05), pressure=[0.001, 0.004], theory=theory
+    )
     return [elastic.area, elastic.mean_separation, yielded.area, yielded.mean_separation]
 
 
@@ -234,7 +236,10 @@ def asked_own_table(theory):
     surface = Surface.from_map(heights(), 1.0)
     elastic = contact(surface, area=[0.02, 0.2], theory=theory)
     yielded = contact(
-        surface, pressure=np.asarray(elastic.pressure), theory=theory, hardness=5.0
+        surface,
+        Bodies(hardness=5.0),
+        pressure=np.asarray(elastic.pressure),
+        theory=theory,
     )
     return [elastic.pressure, yielded.area]
 
@@ -261,17 +266,17 @@ def made_contact():
 
 
 def made_law():
-    return contact_law(ROUGH, "calibrated", rtol=RTOL, E_star="100 GPa")
+    return contact_law(ROUGH, "100 GPa", theory="calibrated", rtol=RTOL)
 
 
 def made_law_that_yields():
     return contact_law(
-        ROUGH, "calibrated", rtol=RTOL, E_star="100 GPa", hardness="1.5 GPa"
+        ROUGH, Bodies("100 GPa", hardness="1.5 GPa"), theory="calibrated", rtol=RTOL
     )
 
 
 def made_joint():
-    return Joint(FACE, FACE, materials=METALS, nominal_area="4 cm^2", theory="calibrated")
+    return Joint(FACE, FACE, bodies=METALS, nominal_area="4 cm^2", theory="calibrated")
 
 
 def made_own_table():
@@ -327,9 +332,9 @@ def test_a_worker_of_dask_has_the_bits_of_this_process(theory, hardness):
     """Workers are new processes, to which chunks of gaps and the question go by pickle."""
     dask, xr = pytest.importorskip("dask"), pytest.importorskip("xarray")
     gaps = xr.DataArray(np.linspace(0.5, 3.0, 24), dims="gap")
-    eager = contact(ROUGH, mean_separation=gaps, theory=theory, hardness=hardness)
+    eager = contact(ROUGH, Bodies(hardness=hardness), mean_separation=gaps, theory=theory)
     lazy = contact(
-        ROUGH, mean_separation=gaps.chunk(gap=8), theory=theory, hardness=hardness
+        ROUGH, Bodies(hardness=hardness), mean_separation=gaps.chunk(gap=8), theory=theory
     )
     with dask.config.set(scheduler="processes", num_workers=2):
         found = dask.compute(lazy.pressure, lazy.area)
@@ -359,12 +364,17 @@ def test_numbers_lists_arrays_and_labels_have_the_same_bits(theory, given, hardn
     """Each kind of argument, alone and among others, of any shape."""
     xr = pytest.importorskip("xarray")
     first = contact(
-        ROUGH, mean_separation=np.linspace(0.4, 3.0, 12), theory=theory, hardness=hardness
+        ROUGH,
+        Bodies(hardness=hardness),
+        mean_separation=np.linspace(0.4, 3.0, 12),
+        theory=theory,
     )
     asked = np.asarray(getattr(first, given))
 
     def answers(values):
-        return contact(ROUGH, **{given: values}, theory=theory, hardness=hardness)
+        return contact_of(
+            ROUGH, Bodies(hardness=hardness), **{given: values}, theory=theory
+        )
 
     whole = answers(asked)
     kinds = {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mbma_tables
-from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
+from mbma_tables import Bodies, Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.common.shared import frozen, parts_of
 from mbma_tables.theories import THEORIES
 
@@ -68,9 +68,11 @@ def test_arrays_of_everything_that_is_kept_are_read_only():
     for theory in THEORIES:
         hardness = np.inf if theory == "greenwood_williamson" else 0.05
         found = contact(
-            SURFACE, mean_separation=[0.5, 1.0], theory=theory, hardness=hardness
+            SURFACE, Bodies(hardness=hardness), mean_separation=[0.5, 1.0], theory=theory
         )
-        contact(SURFACE, pressure=found.pressure, theory=theory, hardness=hardness)
+        contact(
+            SURFACE, Bodies(hardness=hardness), pressure=found.pressure, theory=theory
+        )
         assert (
             contact(SURFACE, mean_separation=[0.5, 1.0], theory=theory).leakage
             is not None

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import Surface, contact, contact_law
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.tables import universal_model
 
 THREADS = 16
@@ -16,7 +17,10 @@ ROUNDS = 4  # of every question by every thread: about a million lookups in all
 
 @pytest.fixture(scope="module")
 def questions():
-    model, law = universal_model(), contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), "mbma")
+    model, law = (
+        universal_model(),
+        contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), theory="mbma"),
+    )
     X_axis, mu_axis = model.content.axes
 
     def phi(seed):
@@ -46,7 +50,7 @@ def questions():
         many = Surface(
             rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0
         )
-        found = contact(many, separation=rng.uniform(-3, 3, 60), rtol=1e-6)
+        found = contact(many, separation=rng.uniform(-3, 3, 60), theory=Mbma(rtol=1e-6))
         return [found.pressure, found.area, found.stiffness, found.error]
 
     return [phi, laws, totals]
@@ -82,12 +86,12 @@ def test_sixteen_threads_give_the_bits_of_one(questions):
 
 def test_laws_made_by_many_threads_are_one_law():
     surfaces = [Surface(hurst, 0.2, 60.0, 1.0, 3.0) for hurst in (0.35, 0.6, 0.8, 1.0)]
-    alone = [contact_law(surface, "mbma", rtol=1e-7) for surface in surfaces]
+    alone = [contact_law(surface, theory="mbma", rtol=1e-7) for surface in surfaces]
     barrier = Barrier(THREADS)
 
     def make(thread):
         barrier.wait()
-        return contact_law(surfaces[thread % 4], "mbma", rtol=1e-7)
+        return contact_law(surfaces[thread % 4], theory="mbma", rtol=1e-7)
 
     with ThreadPoolExecutor(THREADS) as pool:
         made = list(pool.map(make, range(THREADS)))

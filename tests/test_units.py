@@ -321,12 +321,9 @@ def test_an_export_converts_what_knows_its_unit(source, tmp_path):
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
 def test_a_contact_keeps_its_units(theory):
-    plain = contact(CONCRETE, separation=[0.5, 0.2], E_star=13.3, theory=theory)
+    plain = contact(CONCRETE, 13.3, separation=[0.5, 0.2], theory=theory)
     found = contact(
-        CONCRETE.to("um"),
-        separation=["0.5 mm", "200 um"],
-        E_star="0.0133 GPa",
-        theory=theory,
+        CONCRETE.to("um"), "0.0133 GPa", separation=["0.5 mm", "200 um"], theory=theory
     )
     expected = {
         "separation": "um",
@@ -349,7 +346,7 @@ def test_a_contact_keeps_its_units(theory):
         np.testing.assert_allclose(
             getattr(found, name), size * getattr(plain, name), rtol=1e-7
         )
-    joint = contact(CONCRETE, pressure="10 kPa", E_star="13.3 MPa", theory=theory)
+    joint = contact(CONCRETE, "13.3 MPa", pressure="10 kPa", theory=theory)
     assert joint.pressure == pytest.approx(0.01, rel=1e-9)
     assert plain.units["pressure"] == "stress"
     assert contact(CONCRETE, separation=0.5, theory=theory).units["stiffness"] == "1/mm"
@@ -357,7 +354,7 @@ def test_a_contact_keeps_its_units(theory):
 
 @pytest.mark.parametrize("theory", ["mbma", "persson"])
 def test_a_law_keeps_its_units(theory):
-    law = contact_law(CONCRETE.to("um"), rtol=1e-5, E_star="13.3 MPa", theory=theory)
+    law = contact_law(CONCRETE.to("um"), "13.3 MPa", rtol=1e-5, theory=theory)
     assert law.units == Units("um", "MPa")
     assert law.pressure("0.7 mm") == law.pressure(700.0)
     assert law.separation(pressure="10 kPa") == law.separation(pressure=0.01)
@@ -376,10 +373,8 @@ def test_a_surface_that_is_its_own_spectrum_has_the_same_rule(theory):
     surface = Surface.from_spectrum(
         q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1, unit="um"
     )
-    plain = contact(surface, mean_separation=0.6, E_star="100 GPa", theory=theory)
-    moved = contact(
-        surface.to("mm"), mean_separation="600 nm", E_star="100 GPa", theory=theory
-    )
+    plain = contact(surface, "100 GPa", mean_separation=0.6, theory=theory)
+    moved = contact(surface.to("mm"), "100 GPa", mean_separation="600 nm", theory=theory)
     assert (plain.units["stiffness"], moved.units["stiffness"]) == ("GPa/um", "GPa/mm")
     for name, size in {
         "pressure": 1,

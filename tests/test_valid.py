@@ -8,7 +8,7 @@ docs/yield.md, docs/leakage.md and docs/machined.md.
 import numpy as np
 import pytest
 
-from mbma_tables import Joint, Surface, contact
+from mbma_tables import Bodies, Joint, Surface, contact
 from mbma_tables.data import boundary_elements
 
 HELD_OUT = ("held_out_surface", "held_out_spectrum")
@@ -89,8 +89,8 @@ def test_valid_contacts_that_yield(simulations):
                 continue
             pressed = contact(
                 surface,
+                Bodies(hardness=eta * gradient),
                 pressure=force[reached] * gradient,
-                hardness=eta * gradient,
                 theory="calibrated",
             )
             deviations.append(np.log(pressed.area / simulated[reached])[pressed.valid])
@@ -152,14 +152,12 @@ def test_a_joint_is_valid_where_the_contact_of_its_surface_is():
         joint = Joint(
             face,
             face | {"longest": "60 um"},
-            materials=metal,
+            bodies=metal,
             nominal_area="4 cm^2",
             theory="calibrated",
         )
         pressures = ["0.01 MPa", "1 MPa", "30 MPa", "300 MPa"]
         pressed = joint.at_pressure(pressures)
-        alone = contact(
-            joint.surface, pressure=pressures, materials=metal, theory="calibrated"
-        )
+        alone = contact(joint.surface, metal, pressure=pressures, theory="calibrated")
         np.testing.assert_array_equal(pressed.valid, alone.valid)
         assert pressed.reasons.keys() == alone.reasons.keys()

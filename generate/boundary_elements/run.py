@@ -42,7 +42,7 @@ from generate.boundary_elements.surfaces import (
 from generate.calibrated_file import Variable, attributes, rms, variable, write_part
 from generate.timing import seconds_of_work
 from generate.workers import results
-from mbma_tables import Surface, contact
+from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.files import write_file
@@ -508,7 +508,9 @@ def gap_errors(kind: str) -> pd.DataFrame:
                 "chain": np.full(JUMPS.size, np.nan),
             }
             if recipe.kind == PLAIN:
-                own = contact(like, pressure=load, theory="calibrated", hardness=eta)
+                own = contact(
+                    like, Bodies(hardness=eta), pressure=load, theory="calibrated"
+                )
                 laws["chain"] = mean_inverse(
                     float(own.mean_separation) / h_rms, float(own.area), JUMPS, 1.0, eta
                 )

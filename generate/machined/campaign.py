@@ -19,7 +19,7 @@ from generate.boundary_elements.solve import Contact, Solve
 from generate.boundary_elements.surfaces import Recipe, Task
 from generate.calibrated_file import Variable, attributes, variable, write_part
 from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
-from mbma_tables import Surface, contact
+from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.data import FILE
@@ -198,7 +198,9 @@ def yielded(part: Part) -> dict[str, FloatArray]:
                 stiffness,
             )
         # the map simulated by the library
-        simulated = contact(surface, pressure=force[k], hardness=hardness, theory=FULL)
+        simulated = contact(
+            surface, Bodies(hardness=hardness), pressure=force[k], theory="simulated"
+        )
         answers[1, :, k] = [getattr(simulated, name) for name in QUANTITIES]
         slope[k] = simulated.stiffness
         # the law of hardness

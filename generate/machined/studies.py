@@ -14,10 +14,10 @@ from generate.calibrated_file import rms, write_part
 from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables import Surface, flow_factors
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.contacts.leakage import shipped_flow
 from mbma_tables.data import FILE
 from mbma_tables.quantities.effective_medium import wide_gap
 from mbma_tables.quantities.lay import CONSTANTS, factors, stress_shares
+from mbma_tables.quantities.leakage import shipped_flow
 from mbma_tables.surfaces.bearing_curve import bearing
 from mbma_tables.theories.simulated.reynolds import flow_and_couette
 

@@ -25,11 +25,11 @@ from generate.leakage_law import (
     summary,
 )
 from generate.page import Measured, panels, spans, table
-from mbma_tables import Surface, contact, materials
+from mbma_tables import Bodies, Surface, contact, materials
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.contacts.leakage import GROUP, shipped_flow
+from mbma_tables.quantities.leakage import GROUP, shipped_flow
 from mbma_tables.theories.calibrated.formulas import CONSTANTS
 from mbma_tables.theories.calibrated.table import shipped
 from mbma_tables.theories.evidence import shipped_part
@@ -416,12 +416,16 @@ def frozen(seen: list[Capped]) -> str:
         parts = []  # area, deviation and stated scatter at each load
         for one in (one for one in seen if one.kind == "self_affine" and one.eta == eta):
             g, kept = float(one.surface.rms_gradient), one.area > YIELD_BINS[0]
-            options: dict[str, Any] = {"theory": theory, "hardness": eta * g}
+            bodies = Bodies(hardness=eta * g)
             try:
-                by = contact(one.surface, pressure=one.force[kept] * g, **options)
+                by = contact(
+                    one.surface, bodies, pressure=one.force[kept] * g, theory=theory
+                )
             except OutOfRangeError as fault:  # MBMA ends before
                 kept[kept] = ~np.asarray(fault.mask)
-                by = contact(one.surface, pressure=one.force[kept] * g, **options)
+                by = contact(
+                    one.surface, bodies, pressure=one.force[kept] * g, theory=theory
+                )
             error = np.log(by.unloading_stiffness / (one.frozen[kept] * g))
             parts.append(
                 np.stack([one.area[kept], error, by.unloading_stiffness_scatter])
@@ -461,9 +465,9 @@ def draw_yield(ratios: FloatArray) -> Any:
     """Area and force of elastic answers over the simulated ones against psi."""
     found = contact(
         SURFACE,
+        Bodies(hardness=float(SURFACE.rms_gradient) / INDICES),
         area=0.03,
         theory="calibrated",
-        hardness=float(SURFACE.rms_gradient) / INDICES,
     )
     elastic = contact(SURFACE, pressure=found.pressure, theory="calibrated")
     closer = contact(SURFACE, mean_separation=found.mean_separation, theory="calibrated")

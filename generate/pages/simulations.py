@@ -13,9 +13,10 @@ from generate.files import dataset
 from generate.page import Measured, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Joint, Surface, flow_factors, rough_contact
+from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import boundary_elements
-from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
+from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
 from mbma_tables.rough_body.rough_contact import mean_wavelength
 
 PAIRS = {
@@ -37,10 +38,11 @@ FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
 def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Conductance of the solid [W/(m^2 K)] at pressures [MPa], by the law and by the correlation."""
+    assert one.pair is not None
     k = mean_conductivity(*(float(text.split()[0]) for text in one.pair.conductivities))
     assert one.pair.hardness is not None
     hardness = 1e3 * float(one.pair.hardness.split()[0])
-    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance()
+    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance
     return np.asarray(law), 1e6 * np.asarray(
         cooper_mikic_yovanovich(one.surface, pressure, k, 1.0, hardness)
     )
@@ -74,7 +76,7 @@ def joints() -> Measured:
         joint = Joint(
             face | {"Rq": "1.6 um"},
             face | {"Rq": "0.8 um"},
-            materials=materials,
+            bodies=materials,
             nominal_area="4 cm^2",
         )
         pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
@@ -192,9 +194,7 @@ def rough_bodies() -> Measured:
     forms = "{} | {} | {:+.2f}, {:.2f}, {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f}"
     figure, (left, right) = panels(1, 2, (9, 4))
     forces = [f"{10.0**k} N" for k in (-1, 0, 1, 2)]
-    ball = rough_contact(
-        FACE, "5 mm", force=forces, E_star="110 GPa", theory="calibrated"
-    )
+    ball = rough_contact(FACE, "5 mm", "110 GPa", force=forces, theory="calibrated")
     for r, p, force in zip(
         ball.position, ball.pressure, np.asarray(ball.force), strict=True
     ):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import click
 import numpy as np
 
 from mbma_tables.cli import options
-from mbma_tables.cli.format import Report, report_answer, shown_unit, to_json
+from mbma_tables.cli.format import Report, columns_of, report_answer, shown_unit, to_json
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
@@ -69,27 +68,19 @@ def contact_command(
     model = model.of(specimen.surface, name)
     from mbma_tables.contacts.contact import contact
 
-    known: dict[str, Any] = {
-        name: finite_array(name, specimen.units.number(name, numbers))
-    }
-    answer = contact(specimen.surface, **known, **model.keywords(specimen))
-    yields = ("yielded", "unloading_stiffness") if model.yields else ()
-    values = {
-        column: getattr(answer, column)
-        for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])
-    }
-    values |= {"scatter": answer.scatter, "area_scatter": answer.area_scatter}
-    values["valid"] = np.where(answer.valid, "yes", "no")
-    values |= _leakage(answer) if leakage else {}
-    units = {}
-    if conductivity:
-        if len(conductivity) > 2:
-            raise InputError(
-                f"--conductivity is of both bodies, or of each: one or two, got {len(conductivity)}"
-            )
-        bodies, units["conductance"] = specimen.units.conductivities(*conductivity)
-        values["conductance"] = answer.conductance(*bodies)
-    report_answer("contact", specimen, model, answer, values, units).write(output)
+    load = {name: finite_array(name, specimen.units.number(name, numbers))}
+    if conductivity and len(conductivity) == 1:
+        conductivity = 2 * conductivity
+    pressed = contact(
+        specimen.surface,
+        model.bodies(specimen, conductivity),
+        theory=model.configured_theory(),
+        **load,
+    )
+    values, units = columns_of(pressed)
+    if leakage:
+        values |= _leakage(pressed)
+    report_answer("contact", specimen, model, pressed, values, units).write(output)
 
 
 def _leakage(answer: Contact) -> dict[str, Any]:
@@ -140,32 +131,30 @@ def curve_command(
     from mbma_tables.contacts.contact import contact
     from mbma_tables.scenes.run import other_theory
 
-    model, surface = model.of(specimen.surface), specimen.surface
-    asked, modulus = (
-        model.keywords(specimen),
-        1.0 if specimen.E_star is None else specimen.E_star,
-    )
+    model = model.of(specimen.surface)
+    surface = specimen.surface
+    bodies = model.bodies(specimen)
+    theory = model.configured_theory()
+    modulus = 1.0 if specimen.E_star is None else specimen.E_star
     gap = float(surface.h_max) * SEARCHED
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
-    area = np.asarray(contact(surface, separation=gap, **asked).area)
+    area = np.asarray(contact(surface, bodies, separation=gap, theory=theory).area)
     rising = slice(np.flatnonzero(area > 0)[0], int(area.argmax()) + 1)
     wanted = np.geomspace(
         max(LIGHTEST, 1.5 * area[rising][0]), area[rising][-1], points - 1
     )
     inner = np.interp(np.log(wanted[:-1]), np.log(area[rising]), gap[rising])
     gap = np.concatenate([[surface.h_max], inner, gap[-1:]])
-    answer = contact(surface, separation=gap, **asked)
+    answer = contact(surface, bodies, separation=gap, theory=theory)
     values = {name: getattr(answer, name) for name in COLUMNS} | (
         _leakage(answer) if leakage else {}
     )
     picture = b""
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
-        cap, others = (
-            asked.get("hardness", math.inf),
-            [name for name in DRAWN if name != model.theory],
-        )
+        cap = answer.bodies.hardness
+        others = [name for name in DRAWN if name != model.theory]
         curves = [
             answer.curve(leakage),
             *(other_theory(name, surface, gap, modulus, cap) for name in others),
@@ -195,13 +184,18 @@ def sensitivity_command(
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
-    from mbma_tables.contacts.contact import one_known
+    from mbma_tables.contacts.contact import one_given
     from mbma_tables.contacts.sensitivity import sensitivity
 
     model = model.of(
-        specimen.surface, one_known(**dict.fromkeys(options.LOADS) | loads)[0]
+        specimen.surface, one_given(**dict.fromkeys(options.LOADS) | loads)[0]
     )
-    found = sensitivity(specimen.surface, **loads, **model.keywords(specimen))
+    found = sensitivity(
+        specimen.surface,
+        model.bodies(specimen),
+        theory=model.configured_theory(),
+        **loads,
+    )
     units = {
         name: shown_unit(name, found.units)
         for name in (*found.parameters, *found.answers)
@@ -241,15 +235,13 @@ def island_command(
         raise InputError("approaches are needed: --delta")
     from mbma_tables.theories.mbma.island import island
 
-    asked = {
-        name: value
-        for name, value in model.keywords(specimen).items()
-        if name != "theory"
-    }
     answer = island(
         specimen.surface,
         finite_array("delta", specimen.units.number("delta", delta)),
-        **asked,
+        island_model=model.island_model,
+        variant=model.variant,
+        E_star=specimen.modulus,
+        rtol=model.rtol,
     )
     values = {
         name: getattr(answer, name)

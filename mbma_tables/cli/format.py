@@ -23,6 +23,7 @@ from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units, unit_of
 from mbma_tables.export.text import comment
 from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.quantities.registry import registry
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.surface import assumptions
 
@@ -160,7 +161,33 @@ def _rounded(value: Any) -> str:
 
 def shown_unit(name: str, units: Units) -> str:
     """The unit of a column; "-" where it has none."""
-    unit = "relative" if name == "error" else unit_of(name, units)
+    return column_unit("relative" if name == "error" else unit_of(name, units))
+
+
+def columns_of(
+    pressed: Contact, uncertainties: bool = False
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Values and units of the quantities that tables show of a contact, if asked with their uncertainties."""
+    shown_names = [
+        name
+        for name, quantity in registry().items()
+        if quantity.is_column and quantity.is_available(pressed)
+    ]
+    if uncertainties:
+        stated = {registry()[name].uncertainty for name in shown_names}
+        shown_names += [name for name in registry() if name in stated - {*shown_names}]
+    values = {}
+    units = {}
+    for name in shown_names:
+        values[name] = pressed.quantity(name)
+        units[name] = column_unit(registry()[name].unit(pressed))
+    values["valid"] = np.where(pressed.valid, "yes", "no")
+    units["error"] = "relative"
+    return values, units
+
+
+def column_unit(unit: str) -> str:
+    """A unit as it stands below the name of a column."""
     return "-" if unit == "1" else unit
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 
+from mbma_tables.bodies import Bodies
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
-from mbma_tables.materials import hardness_in
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -47,35 +47,52 @@ class Model(NamedTuple):
         """Whether there is a hardness, and not an infinite one."""
         return self.hardness not in (None, math.inf)
 
-    def of(self, surface: AnySurface, by: str | None = None) -> Model:
+    def of(self, surface: AnySurface, given_name: str | None = None) -> Model:
         """The same options, with the theory's name for a contact at a given quantity, None for a curve."""
         from mbma_tables.theories import theory_name
 
-        own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
+        if self.theory is None and self._options_of_mbma():
+            return self._replace(theory="mbma")
         by_option = None if self.grid is None else "simulated"
-        name = theory_name(surface, self.theory or by_option, by, **own)
+        name = theory_name(surface, self.theory or by_option, given_name)
         if by_option not in (None, name):
             raise InputError(
                 f"--grid is of theory 'simulated', not of {name!r}: leave it out"
             )
         return self._replace(theory=name)
 
-    def theory_with_options(self) -> Any:
-        """The theory as the library takes it: its name, or an object with its grid."""
-        from mbma_tables.theories import Simulated
+    def _options_of_mbma(self) -> list[str]:
+        """Names of the options of MBMA that differ from their defaults."""
+        defaults = {
+            "island_model": "universal",
+            "variant": "reported",
+            "rtol": DEFAULT_RTOL,
+        }
+        return [name for name in defaults if getattr(self, name) != defaults[name]]
 
-        return self.theory if self.grid is None else Simulated(self.grid)
+    def configured_theory(self) -> Any:
+        """The theory with its options, as the library takes it."""
+        from mbma_tables.theories import Mbma, Simulated
 
-    def keywords(self, specimen: Specimen) -> dict[str, Any]:
-        """Keywords for `contact`."""
-        asked = self._asdict() | {"E_star": specimen.modulus}
-        asked["theory"] = self.theory_with_options()
-        del asked["grid"]
-        cap = asked.pop("hardness")
-        return (
-            asked
-            if cap is None
-            else asked | {"hardness": hardness_in(specimen.units, cap)}
+        if self.grid is not None:
+            return Simulated(self.grid)
+        if self.theory == "mbma":
+            return Mbma(self.island_model, self.variant, self.rtol)
+        options = self._options_of_mbma()
+        if options:
+            raise InputError(
+                f"{', '.join(options)}: options of theory 'mbma' alone, given by its name"
+            )
+        return self.theory
+
+    def bodies(
+        self, specimen: Specimen, conductivity: Sequence[float | str] | None = None
+    ) -> Bodies:
+        """The bodies in contact, of the specimen's modulus."""
+        # an absent conductivity is not one of zero entries
+        conductivities = tuple(conductivity) if conductivity else None
+        return Bodies(
+            specimen.modulus, hardness=self.hardness, conductivity=conductivities
         )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from mbma_tables.cli.format import Report, assumption_notes, to_json
+from mbma_tables.cli.format import Report, assumption_notes, columns_of, to_json
 from mbma_tables.cli.options import (
     Output,
     check_plot,
@@ -223,7 +223,7 @@ def joint_command(
     output: Output,
     export: dict[str, Any],
 ) -> None:
-    """Interface laws of the joint in FILE (TOML: materials, nominal_area, part_a, part_b) at pressures.
+    """Interface laws of the joint in FILE (TOML: bodies, nominal_area, part_a, part_b) at pressures.
 
     With --export the joint is written for another program instead, with conductance of
     solid spots and gas: any target of `mbma export` that takes a law.
@@ -256,17 +256,14 @@ def joint_command(
 
     joint = Joint.from_toml(file)
     found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
-    held, facts = joint.quantities(found), joint.facts()
-    values = {name: kept.values for name, kept in held.items()} | {
-        "valid": np.where(found.valid, "yes", "no")
-    }
+    values, units = columns_of(found, uncertainties=True)
+    facts = joint.facts()
     # a line for each assumption, as of other commands
     assumed = assumptions(joint.surface)
     notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
     notes += assumption_notes(assumed)
     for reason, mask in found.reasons.items():
         notes.append(f"not valid at {int(np.sum(mask))} of {np.size(mask)}: {reason}")
-    units = {name: kept.unit for name, kept in held.items() if kept.unit != "1"}
     picture = b"" if plot is None else to_picture(joint.plot(), plot.suffix[1:])
     Report("joint", file.name, notes, {**facts, "assumed": assumed}, values, units).write(
         output, plot, picture

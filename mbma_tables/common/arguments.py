@@ -72,6 +72,27 @@ def require_name(kind: str, name: Any, known: Iterable[str]) -> None:
         raise InputError(f"no {kind} is named {name!r}; {nearest(str(name), names)}")
 
 
+# where constants of bodies and options of a theory are given
+MOVED = {
+    **dict.fromkeys(
+        ("E1", "nu1", "E2", "nu2"),
+        "bodies=materials.effective_modulus(E1, nu1, E2, nu2)",
+    ),
+    **{
+        name: f"it is of the bodies, bodies=Bodies(..., {name}=...)"
+        for name in ("E_star", "hardness", "conductivity", "nu")
+    },
+    "materials": "they are the bodies, bodies=('steel 1020', 'silver')",
+    **{
+        name: f"it is of one theory, theory=theories.Mbma({name}=...)"
+        for name in ("island_model", "variant", "rtol", "outside")
+    },
+    **dict.fromkeys(
+        ("temperature", "gas_pressure"), "it is of the gas, gas=Gas('air', ...)"
+    ),
+}
+
+
 def hinted(function: Callable[P, R]) -> Callable[P, R]:
     """Decorator: the error for an unknown argument names the nearest known one, or the meaning of a symbol."""
     parameters = inspect.signature(function).parameters
@@ -83,10 +104,8 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
         for name in named:
             if name in parameters:
                 continue
-            if name in ("E1", "nu1", "E2", "nu2") and "E_star" in names:
-                raise TypeError(
-                    f"{called} has no argument {name!r}: E_star=materials.effective_modulus(E1, nu1, E2, nu2)"
-                )
+            if name in MOVED and {"bodies", "theory"} & {*names}:
+                raise TypeError(f"{called} has no argument {name!r}: {MOVED[name]}")
             meant = SYMBOLS.get(name)
             hint = f"did you mean {meant!r}?" if meant in names else nearest(name, names)
             raise TypeError(f"{called} has no argument {name!r}: {hint}")
@@ -282,7 +301,8 @@ def number_in(name: str, value: Any, low: float, high: float) -> float:
     """`value` as a float within [low, high]."""
     number = finite_array(name, value)
     if number.ndim or not low <= number <= high:
-        raise InputError(f"{name} must be a number in [{low:g}, {high:g}], got {value!r}")
+        got = " ".join(repr(value).split())  # of an array, on one line
+        raise InputError(f"{name} must be a number in [{low:g}, {high:g}], got {got}")
     return float(number)
 
 

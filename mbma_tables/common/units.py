@@ -305,13 +305,60 @@ def modulus_and_units(
     return units.number("E_star", E_star), units
 
 
+@dataclasses.dataclass(frozen=True)
+class Dimension:
+    """Powers of length, stress, time, temperature and electric current; units follow from them."""
+
+    length: int = 0
+    stress: int = 0
+    time: int = 0
+    temperature: int = 0
+    current: int = 0
+
+    @property
+    def is_mechanical(self) -> bool:
+        """Whether it is of lengths and stresses alone."""
+        return not (self.time or self.temperature or self.current)
+
+    def unit(self, units: Units) -> str:
+        """Its unit beside lengths and stresses in `units`; "1" for numbers without one.
+
+        Units of heat and of currents are those of the SI, as conductivities are given in them.
+        """
+        if not self.is_mechanical:
+            return NAMED.get(self) or _product(
+                {"m": self.length, "Pa": self.stress, **self._of_time()}
+            )
+        return _product(
+            {units.stress or "stress": self.stress, units.length or "length": self.length}
+        )
+
+    def _of_time(self) -> dict[str, int]:
+        return {"s": self.time, "K": self.temperature, "A": self.current}
+
+
+#: per area and degree, power being stress length^3/time
+HEAT_CONDUCTANCE = Dimension(length=1, stress=1, time=-1, temperature=-1)
+#: per area, from current^2 = power/resistance
+ELECTRICAL_CONDUCTANCE = Dimension(length=-5, stress=-1, time=1, current=2)
+NAMED = {HEAT_CONDUCTANCE: "W/(m^2 K)", ELECTRICAL_CONDUCTANCE: "S/m^2"}
+
+
+def _product(powers: Mapping[str, int]) -> str:
+    """A unit such as "MPa/um" from the powers of its parts."""
+    parts = {unit: power for unit, power in powers.items() if power and unit != "1"}
+    above = [_power(unit, power) for unit, power in parts.items() if power > 0]
+    below = [_power(unit, -power) for unit, power in parts.items() if power < 0]
+    return (" ".join(above) or "1") + "".join(f"/{unit}" for unit in below)
+
+
+def _power(unit: str, power: int) -> str:
+    return unit if power == 1 else f"{unit}^{power}"
+
+
 def unit_of(name: str, units: Units) -> str:
-    """The unit of a quantity by its name, such as "MPa/um"; "1" for numbers without one."""
-    length, stress = DIMENSIONS.get(name, (0, 0))
-    powers = ((units.stress or "stress", stress), (units.length or "length", length))
-    parts = [(n, unit if abs(n) == 1 else f"{unit}^{abs(n)}") for unit, n in powers]
-    above = " ".join(part for n, part in parts if n > 0 and part != "1")
-    return (above or "1") + "".join(f"/{part}" for n, part in parts if n < 0)
+    """The unit of an argument or quantity by its name, such as "MPa/um"; "1" for numbers without one."""
+    return Dimension(*DIMENSIONS.get(name, (0, 0))).unit(units)
 
 
 def force_over_area(force: Any, area: Any, length: str | None) -> str:

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, require
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import unit_of
 from mbma_tables.contacts.contact import contact
-from mbma_tables.contacts.leakage import shipped_flow
-from mbma_tables.materials import Metal, Pair
 from mbma_tables.quantities.lay import LAY, OPEN, SHEAR, WIDEST_LAY, factors
+from mbma_tables.quantities.leakage import shipped_flow
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.treatment import mirrored
 from mbma_tables.theories import OF_MAPS
@@ -131,12 +130,10 @@ class FlowFactors(Displayed):
 def flow_factors(
     surface: AnySurface,
     mean_separation: ArrayLike,
+    bodies: Bodies | float | str = 1.0,
     *,
     peklenik: float | None = None,
     theory: str | Theory | None = None,
-    E_star: float | str = 1.0,
-    hardness: float | str | None = None,
-    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> FlowFactors:
     """Pressure and shear flow factors and asperity pressure at mean gaps, for average Reynolds equations.
 
@@ -154,11 +151,13 @@ def flow_factors(
         One surface, of both faces together (`combined`).
     mean_separation : array_like or str
         u [length], from 0.2 to 50 h_rms; above h_max there is no contact.
+    bodies : Bodies or float or str
+        As for `contact`.
     peklenik : float, optional
         Length of the roughness along x over that along y, from 1/8.5 to 8.5. Default: that
         of the map, x being its first axis, or of the spectrum, x being along the lay, else
         1 (isotropic). Not accepted for a simulated map.
-    theory, E_star, hardness, materials : optional
+    theory : str or theory, optional
         As for `contact`.
 
     Returns
@@ -175,12 +174,11 @@ def flow_factors(
     --------
     >>> from mbma_tables import Surface, flow_factors
     >>> bearing = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
-    >>> film = flow_factors(bearing, ["1 um", "1.5 um", "3 um"], peklenik=3, E_star="110 GPa")
+    >>> film = flow_factors(bearing, ["1 um", "1.5 um", "3 um"], "110 GPa", peklenik=3)
     >>> print(film.phi_x.round(2), film.phi_y.round(2), film.shear_y.round(2))
     [1.05 1.06 1.02] [0.5 0.7 0.9] [0.84 0.68 0.37]
     """
-    bodies = {"E_star": E_star, "hardness": hardness, "materials": materials}
-    found = contact(surface, mean_separation=mean_separation, theory=theory, **bodies)  # type: ignore[arg-type]
+    found = contact(surface, bodies, mean_separation=mean_separation, theory=theory)
     if surface.labelled or surface.shape != ():
         raise InputError("flow factors need one surface, not a batch")
     u, h_rms = np.ravel(found.mean_separation), float(surface.h_rms)
@@ -225,7 +223,7 @@ def flow_factors(
     }
     reasons |= {f"the model uncertainty of ln phi is above {USEFUL:g}": scatter > USEFUL}
     units = {name: found.units[name] for name in ("mean_separation", "pressure")}
-    units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found._source.units))
+    units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found.unit_system))
     kept = {text: mask for text, mask in reasons.items() if np.any(mask)}
     shear_scatter, valid = (
         np.full(u.shape, OWN_SHEAR if own else SHEAR),
@@ -245,8 +243,8 @@ def flow_factors(
 
 def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """phi and phi_s along both axes, shape (2, n), of the gaps of a map: simulated ones, and wider ones undeformed."""
-    source = found._source
-    surface, whole = source.surface, map_of(source.surface)
+    surface: Any = found.surface
+    whole, theory = map_of(surface), found.elastic_theory
     h_rms, heights = float(surface.h_rms), whole.heights - whole.heights.mean()
 
     def flow(gap: FloatArray) -> tuple[float, FloatArray, FloatArray]:
@@ -255,14 +253,12 @@ def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         K, carried = flow_and_couette(cell, sides)
         return float(cell.mean()), K / cell.mean() ** 3, (cell.mean() - carried) / h_rms
 
-    lightest = float(
-        contact(surface, area=LIGHTEST, theory=source.theory).mean_separation
-    )
+    lightest = float(contact(surface, area=LIGHTEST, theory=theory).mean_separation)
     knots = (
         np.geomspace(u.min(), lightest, KNOTS)[:-1] if u.min() < lightest else np.empty(0)
     )
     pressed = (
-        contact(surface, mean_separation=gap, theory=source.theory)
+        contact(surface, mean_separation=gap, theory=theory)
         for gap in (*knots.tolist(), lightest)
     )
     rows = [flow(one.map().gap) for one in pressed]

@@ -274,7 +274,7 @@ def table_of_loads(
 
     areas, told = AREAS, []
     try:
-        found = contact(surface, area=areas, theory=theory, E_star=E_star)
+        found = contact(surface, E_star, area=areas, theory=theory)
     except OutOfRangeError as fault:
         if fault.mask is None or np.all(fault.mask):
             raise
@@ -282,7 +282,7 @@ def table_of_loads(
             AREAS[~fault.mask],
             [f"{contacts(AREAS[fault.mask])} left out: {fault}"],
         )
-        found = contact(surface, area=areas, theory=theory, E_star=E_star)
+        found = contact(surface, E_star, area=areas, theory=theory)
     # curves of unusual maps skip some contact areas
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
     if not reached.all():

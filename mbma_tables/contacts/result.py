@@ -1,15 +1,24 @@
-"""The result of `contact`: pressure, area and quantities derived from them on access."""
+"""The result of `contact`: every quantity of the registry, computed when it is first asked for."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled
+from mbma_tables.bodies import BodiesInUnits
+from mbma_tables.common.arguments import (
+    FloatArray,
+    Numbers,
+    any_labelled,
+    broadcast_shape,
+    checked_hardness,
+    is_labelled,
+)
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import (
@@ -20,163 +29,413 @@ from mbma_tables.common.plots import (
     theory_label,
 )
 from mbma_tables.common.progress import shown as progress
-from mbma_tables.common.units import unit_of
-from mbma_tables.contacts.interface import Interface
-from mbma_tables.contacts.source import MEANINGS, Source, named, reasons_against
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.theories.base import TheoryAnswer
+from mbma_tables.quantities import registry
+from mbma_tables.quantities.interface import NOTHING_BETWEEN, Gas, Interface
+from mbma_tables.quantities.state import State
+from mbma_tables.quantities.tangential import Tangential, sheared
+from mbma_tables.quantities.validity import (
+    reasons_of_contact,
+    reasons_with_masks,
+    valid_where_none,
+)
+from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
+from mbma_tables.theories.base import Theory, TheoryAnswer
 
 if TYPE_CHECKING:
-    from mbma_tables.contacts.leakage import Leakage
+    from mbma_tables.quantities.leakage import Leakage
+    from mbma_tables.theories.yielding.theory import Loaded
 
-OF_HARDNESS = (
-    "yielded",
-    "unloading_stiffness",
-    "unloading_stiffness_scatter",
-    "plane_separation",
-)
 # what yields depends on the heaviest load before: none is assumed, also where pressures of
 # one request fall
 FIRST_LOADING = "first; each pressure is reached from no contact"
 MOST_SHOWN = 10_000  # entries up to which the text includes errors, scatter and validity
 
 
-def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers]:
-    """A quantity of a contact that is computed on first access and then kept."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class Setup:
+    """What is in contact: a surface, bodies, what is between them, and the theory of the elastic contact."""
 
-    @functools.wraps(method)
-    def found(contact: Contact) -> Numbers:
-        value: Numbers = named(method(contact), method.__name__, contact._source.units)
-        return value
+    surface: AnySurface
+    bodies: BodiesInUnits
+    theory: Theory
+    interface: Interface = NOTHING_BETWEEN
 
-    return functools.cached_property(found)
+    def theory_of(self, bodies: BodiesInUnits) -> Theory:
+        """The theory, with the bodies' hardness where they have one."""
+        if not self.bodies.yields:
+            return self.theory
+        broadcast_shape(E_star=bodies.E_star, hardness=bodies.hardness)
+        return self.theory.with_hardness(checked_hardness(bodies.hardness), bodies.E_star)
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Contact(Interface, Displayed):
-    """Result of a contact: pressure, area and derived quantities; arrays of the broadcast shape, or DataArrays."""
+class Contact(State, Displayed):
+    """A contact: its pressure and area, and every other quantity of the registry, by its name.
 
-    separation: Numbers  #: d, between the rigid plane and the mid-plane [length]
-    mean_separation: Numbers  #: u = (h_max + d)/2 (50) [length]
-    pressure: Numbers  #: F/A0 in the unit of E_star; F/(A0 E*) where that is 1
-    area: Numbers  #: A/A0; MBMA does not end at 1 under full compression, and this is not clamped
-    # : bound on the relative numerical error of both against the theory (for "mbma" against
-    # its island model), NaN where : not known; the deviation of the theory from simulation
-    # is `scatter`
-    error: Numbers
-    # : name of what computed them; variant and island model are empty unless the theory is
-    # MBMA
-    theory: str
-    variant: str
-    island_model: str
-    islands: (
-        int | None
-    )  #: number of islands evaluated; None if computed by dask or if the theory has none
-    _source: Source = dataclasses.field(repr=False, kw_only=True)
+    Quantities are numbers or arrays of the broadcast shape, or DataArrays with their units;
+    what is not asked for is not computed. `units` has the unit of each.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        values: Mapping[str, Numbers],
+        islands: int | None = None,
+        answer: TheoryAnswer | None = None,
+        loaded: Loaded | None = None,
+    ) -> None:
+        self._setup = setup
+        self._values: dict[str, Any] = dict(values)
+        self._answer = answer
+        self._loaded = loaded
+        #: number of islands evaluated; None if computed by dask or if the theory has none
+        self.islands = islands
+
+    @property
+    def surface(self) -> AnySurface:  # type: ignore[override]
+        """The surface, in the unit of lengths of the contact."""
+        return self._setup.surface
+
+    @property
+    def bodies(self) -> BodiesInUnits:  # type: ignore[override]
+        """The bodies, in the units of the contact."""
+        return self._setup.bodies
+
+    @property
+    def interface(self) -> Interface:  # type: ignore[override]
+        """Friction, gas and direction of shear, of the contact of a joint."""
+        return self._setup.interface
+
+    @property
+    def elastic_theory(self) -> Theory:  # type: ignore[override]
+        """The theory, without the hardness."""
+        return self._setup.theory
+
+    @property
+    def theory(self) -> str:
+        """Name of the theory."""
+        return self._setup.theory.name
+
+    @property
+    def variant(self) -> str:
+        """Name of MBMA's variant; empty for other theories."""
+        return self._setup.theory.variant_name
+
+    @property
+    def island_model(self) -> str:
+        """Name of MBMA's island model; empty for other theories."""
+        return self._setup.theory.island_model_name
 
     @property
     def units(self) -> dict[str, str]:
         """The unit of each quantity; "1" where it has none, and stresses are over E* where no modulus was given."""
-        names = {*MEANINGS, "elastic_hardness"} - {"valid"}
-        return {name: unit_of(name, self._source.units) for name in sorted(names)}
+        return {
+            name: declared.unit(self)
+            for name, declared in sorted(registry.registry().items())
+        }
+
+    def quantity(self, name: str) -> Any:
+        """A quantity of the registry by its name, computed when it is first asked for, and kept.
+
+        Raises
+        ------
+        InputError
+            For an unknown name, and where something that the quantity needs was not given.
+        """
+        if name not in self._values:
+            self._values[name] = self._described(name, registry.get(name).of(self))
+        return self._values[name]
+
+    def __getattr__(self, name: str) -> Any:
+        # quantities that are declared elsewhere than in this package have no typed property
+        if name.startswith("_") or name not in registry.registry():
+            raise AttributeError(
+                f"{type(self).__name__!r} object has no attribute {name!r}"
+            )
+        return self.quantity(name)
+
+    def describe(self, kept: Mapping[str, Any]) -> None:
+        """Give DataArrays their names, meanings and units, but to those that keep their own."""
+        for name, value in self._values.items():
+            self._values[name] = kept.get(name, self._described(name, value))
+
+    def _described(self, name: str, value: Any) -> Any:
+        """A quantity as it is; a DataArray gets its name, meaning and unit."""
+        if not is_labelled(value):
+            return value
+        declared = registry.get(name)
+        return value.rename(name).assign_attrs(
+            long_name=declared.meaning, units=declared.unit(self)
+        )
+
+    def scatter_of(self, name: str) -> Any:
+        """Model uncertainty of a quantity by its name; NaN where it is not known."""
+        uncertainty = registry.get(name).uncertainty
+        if uncertainty is None:
+            return np.nan * self.mean_separation
+        return self.quantity(uncertainty)
+
+    def available(self) -> list[str]:
+        """Names of the quantities for which everything needed was given."""
+        return [
+            name
+            for name, declared in registry.registry().items()
+            if declared.is_available(self)
+        ]
+
+    def theory_of(self, bodies: BodiesInUnits) -> Theory:
+        """The theory for bodies, with their hardness where they have one."""
+        return self._setup.theory_of(bodies)
+
+    def evaluate(
+        self,
+        function: Callable[..., tuple[Any, ...]],
+        outputs: int = 1,
+        more: Mapping[str, Any] | None = None,
+    ) -> tuple[Any, ...]:
+        """``function(theory, surface, mean_separation, E_star, *more)`` of the contact's entries, block by block."""
+        bodies = self.bodies
+        arrays = {
+            "mean_separation": self.mean_separation,
+            "E_star": bodies.E_star,
+            "hardness": bodies.hardness,
+            **(more or {}),
+        }
+
+        def block(
+            surface: AnySurface, u: Any, E_star: Any, hardness: Any, *others: Any
+        ) -> tuple[Any, ...]:
+            return function(
+                self.theory_of(bodies.at(E_star, hardness)), surface, u, E_star, *others
+            )
+
+        if any_labelled(self.surface, *arrays.values()):
+            labelled: tuple[Any, ...] = apply_to_surface(
+                block, self.surface, arrays, outputs
+            )
+            return labelled
+        plain = map(np.asarray, arrays.values())
+        return tuple(part[()] for part in block(self.surface, *plain))
+
+    @property
+    def answer(self) -> TheoryAnswer:
+        """The theory's result at these separations over E*, computed once."""
+        if self._answer is None:
+            fields: Any = self.evaluate(
+                lambda theory, surface, u, E_star: theory.answer(surface, u), 4
+            )
+            self._answer = TheoryAnswer(*fields)
+        return self._answer
+
+    def of_loading(self, name: str) -> Any:
+        """A field of the loaded contact that yields."""
+        if self._loaded is not None:
+            return getattr(self._loaded, name)[()]
+        return self.evaluate(
+            lambda theory, surface, u, E_star: (getattr(theory.loaded(surface, u), name),)
+        )[0]
+
+    def _moved(self, mean_separation: Any) -> Contact:
+        """The same surface and bodies at other mean separations."""
+        return Contact(self._setup, {"mean_separation": mean_separation})
+
+    def pressure_at(self, mean_separation: Any) -> Any:
+        """Pressure at other mean separations."""
+        moved = self._moved(mean_separation)
+        return moved.evaluate(
+            lambda theory, surface, u, E_star: (
+                E_star * theory.answer(surface, u).pressure,
+            )
+        )[0]
+
+    def energy_at(self, mean_separation: Any) -> Any:
+        """Elastic energy at other mean separations."""
+        moved = self._moved(mean_separation)
+        return moved.evaluate(
+            lambda theory, surface, u, E_star: (E_star * theory.energy(surface, u),)
+        )[0]
+
+    def separation_at(self, pressure: Any) -> Any:
+        """Mean separation at other pressures."""
+
+        def find(
+            theory: Any, surface: Any, u: Any, E_star: Any, wanted: Any
+        ) -> tuple[Any]:
+            return (theory.mean_separation_at(surface, "pressure", wanted / E_star),)
+
+        return self.evaluate(find, 1, {"pressure": pressure})[0]
+
+    @property
+    def last_contact(self) -> Any:
+        """Mean separation of last contact; infinite where the theory has none."""
+        return self.surface.h_max if self.elastic_theory.ends_at_h_max else np.inf
+
+    @functools.cached_property
+    def leakage(self) -> Leakage:
+        """Flow through the gaps of the contact; computed when first read."""
+        from mbma_tables.quantities.leakage import leakage_of
+
+        return leakage_of(self)
+
+    def tangential(
+        self, friction: float | None = None, direction: str | None = None
+    ) -> Tangential:
+        """The contact under shear: stiffness of full stick, partial and gross slip.
+
+        Parameters
+        ----------
+        friction : float, optional
+            Coefficient of friction, for slip; by default that of the joint. With a hardness
+            only full stick is known.
+        direction : {"along", "across"}, optional
+            Of the shear relative to the lay, for surfaces whose anisotropy is known and
+            above 1.4: full stick alone.
+
+        Examples
+        --------
+        >>> from mbma_tables import Bodies, Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> pressed = contact(face, Bodies("100 GPa", nu=0.3), pressure="10 MPa", theory="calibrated")
+        >>> sheared = pressed.tangential(friction=0.2)
+        >>> f"{sheared.stiffness:.3g} GPa/um, {sheared.shear('0.05 um'):.3g} GPa; slip from {sheared.gross_slip:.2g} um"
+        '0.0242 GPa/um, 0.000954 GPa; slip from 0.23 um'
+        """
+        return sheared(self, friction, direction)
+
+    def gap_conductance(
+        self,
+        gas: str = "air",
+        temperature: ArrayLike = 300.0,
+        gas_pressure: ArrayLike | str = "1 atm",
+        accommodation: ArrayLike | None = None,
+    ) -> Numbers:
+        """Conductance per nominal area of a gas in the gaps, parallel to `conductance` of the solid [W/(m^2 K)].
+
+        The law, data of gases and their accuracy are in `mbma_tables.quantities.gas`;
+        without radiation.
+
+        Parameters
+        ----------
+        gas : {"air", "helium", "nitrogen", "argon", "vacuum"}
+        temperature : array_like
+            Of the gas [K], from 200 to 600.
+        gas_pressure : array_like or str
+            [Pa], or with its unit.
+        accommodation : array_like, optional
+            Thermal accommodation coefficient of the faces; default: that of machined metals.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> pressed = contact(face, "steel 1020", pressure="1 MPa", theory="calibrated")
+        >>> f"{pressed.conductance:.0f} W/(m^2 K) and {pressed.gap_conductance('air'):.0f}"
+        '3345 W/(m^2 K) and 9921'
+        """
+        from mbma_tables.quantities.conductances import conductance_of_gas
+
+        in_gaps = Gas(gas, temperature, gas_pressure, accommodation)
+        conductance: Numbers = conductance_of_gas(self, in_gaps)
+        return conductance
+
+    @property
+    def _reasons_of_contact(self) -> tuple[Any, Mapping[str, Any]]:
+        """The reasons against a contact, and the further arrays that they depend on."""
+        return functools.partial(reasons_of_contact, self), self.answer._asdict()
+
+    def is_valid(self) -> Any:
+        """Where no reason against the contact applies."""
+        return valid_where_none(self, *self._reasons_of_contact)
+
+    @functools.cached_property
+    def reasons(self) -> dict[str, Any]:
+        """Reasons why entries are not `valid`, each with the mask of these entries as a plain array."""
+        return reasons_with_masks(self, *self._reasons_of_contact)
 
     def _facts(self) -> dict[str, str]:
-        units, source = self.units, self._source
-        chosen = f" ({self.variant}, {self.island_model})" if self.variant else ""
-        facts = {"theory": self.theory + chosen}
-        if source.surface.resolution:
-            facts["resolution"] = source.surface.resolution
+        of_mbma = f" ({self.variant}, {self.island_model})" if self.variant else ""
+        facts = {"theory": self.theory + of_mbma}
+        if self.surface.resolution:
+            facts["resolution"] = self.surface.resolution
         for name in ("mean_separation", "pressure", "area"):
-            facts[name] = shown(getattr(self, name), units[name])
+            facts[name] = self._shown(name)
         if (
-            any_labelled(source.surface, self.mean_separation)
+            any_labelled(self.surface, self.mean_separation)
             or np.size(self.error) > MOST_SHOWN
         ):
             return facts
         if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
-        facts["separation_scatter"] = shown(
-            self.separation_scatter, units["separation_scatter"]
-        )
-        facts |= {
-            name: shown(values, unit)
-            for name, (values, unit) in self._stiffness().items()
-        }
-        if source.materials is not None and source.units.length is None:
-            facts["conductance"] = "needs the surface's unit"
-        more = {
-            name: getattr(self, name)
-            for name in ("error", "scatter", "stiffness_scatter", "valid")
-        }
-        if source.yields:
-            more["unloading_stiffness_scatter"] = self.unloading_stiffness_scatter
-            more |= {"psi": self.psi, "yielded": self.yielded}
-            facts["loading"] = FIRST_LOADING
-        elif units["pressure"] != "1":
-            facts["elastic_hardness"] = shown(self.elastic_hardness, units["pressure"])
+        facts["separation_scatter"] = self._shown("separation_scatter")
+        for name in ("stiffness", "unloading_stiffness", "conductance"):
+            if registry.get(name).is_available(self):
+                facts[name] = self._shown(name)
+        if not self.yields and self.bodies.units.stress != "1":
+            facts["elastic_hardness"] = self._shown("elastic_hardness")
             # reveals a pressure in an unintended unit
             light = self.elastic_hardness * ELASTIC_PSI / 2
             if np.any(self.pressure > light):
-                limit = shown(light, units["pressure"])
+                limit = shown(light, self.units["pressure"])
                 facts["pressure"] += (
                     f" (above E* g/2 = {limit}, the mean pressure in light contact)"
                 )
-        if source.theory.advice:
-            facts["advice"] = source.theory.advice
-        return facts | {name: shown(value) for name, value in more.items()}
+        if self.elastic_theory.advice:
+            facts["advice"] = self.elastic_theory.advice
+        conductance = registry.get("conductance")
+        if self.bodies.conductivity_is_given and conductance.missing(self):
+            facts["conductance"] = "needs the surface's unit"
+        names = ["error", "scatter", "stiffness_scatter", "valid"]
+        if self.yields:
+            names += ["unloading_stiffness_scatter", "psi", "yielded"]
+            facts["loading"] = FIRST_LOADING
+        for name in names:
+            facts[name] = self._shown(name)
+        return facts
 
-    def _stiffness(self) -> dict[str, tuple[Any, str]]:
-        """Stiffnesses, and the conductance of named materials, with their units."""
-        found = {"stiffness": (self.stiffness, self.units["stiffness"])}
-        if self._source.yields:
-            found["unloading_stiffness"] = (
-                self.unloading_stiffness,
-                self.units["unloading_stiffness"],
-            )
-        if self._source.materials is not None and self._source.units.length is not None:
-            found["conductance"] = self.conductance(), "W/(m^2 K)"
-        return found
+    def _shown(self, name: str) -> str:
+        """A quantity as text, with its unit."""
+        return shown(self.quantity(name), registry.get(name).unit(self))
 
-    def _variables(self) -> dict[str, Variable]:
-        source = self._source
-        known = {
-            n: getattr(self, n)
-            for n in MEANINGS
-            if n not in (("energy",) if source.yields else OF_HARDNESS)
-        }
-        return {
-            n: Variable(v, unit_of(n, source.units), MEANINGS[n])
-            for n, v in known.items()
-            if v is not None
-        }
+    def variables(self) -> dict[str, Variable]:
+        """Every listed quantity that is available: values, unit and meaning."""
+        variables = {}
+        for name, declared in registry.registry().items():
+            if declared.is_listed and declared.is_available(self):
+                variables[name] = Variable(
+                    self.quantity(name), declared.unit(self), declared.meaning
+                )
+        return variables
+
+    _variables = variables
 
     def _origin(self) -> dict[str, str]:
-        source = self._source
         return {
-            "E_star": shown(source.E_star, unit_of("pressure", source.units)),
-            "surface": repr(source.surface),
+            "E_star": shown(self.E_star, self.units["pressure"]),
+            "surface": repr(self.surface),
         }
 
     def _figure(self) -> Any:
-        source, unit = self._source, self.units["pressure"]
-        title = f"hardness {shown(source.hardness, unit)}" if source.yields else ""
+        unit = self.units["pressure"]
+        title = f"hardness {shown(self.bodies.hardness, unit)}" if self.yields else ""
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
-        more: dict[str, dict[str, Any]] = {}
-        for name, (values, of_values) in self._stiffness().items():
-            label = f"{name.rpartition('_')[2]} [{of_values}]"
-            more.setdefault(label, {})[name.replace("_", " ")] = np.ravel(values)[order]
-        return draw_compression([self.curve()], title, pressure_label(unit), more=more)
+        lines: dict[str, dict[str, Any]] = {}
+        for name in ("stiffness", "unloading_stiffness", "conductance"):
+            declared = registry.get(name)
+            if declared.is_available(self):
+                label = f"{name.rpartition('_')[2]} [{declared.unit(self)}]"
+                values = np.ravel(self.quantity(name))[order]
+                lines.setdefault(label, {})[name.replace("_", " ")] = values
+        return draw_compression([self.curve()], title, pressure_label(unit), more=lines)
 
     def curve(self, leakage: bool = False) -> Curve:
         """The line that plots draw, for one surface at several separations; optionally with its leakage."""
-        surface = self._source.surface
-        if np.size(self.pressure) < 2 or surface.shape != ():
+        if np.size(self.pressure) < 2 or self.surface.shape != ():
             raise InputError(
                 "one surface's force and area at several separations make a curve, and this has none"
             )
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
         fields = [
-            self.mean_separation / surface.h_rms,
+            self.mean_separation / self.surface.h_rms,
             self.pressure,
             self.area,
             self.scatter,
@@ -203,7 +462,7 @@ class Contact(Interface, Displayed):
         >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
         >>> heights = 0.1 * np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
         >>> surface = Surface.from_map(heights, dx=1.0, periodic=True, unit="um")
-        >>> pressed = contact(surface, pressure="10 MPa", E_star="1 GPa").map()
+        >>> pressed = contact(surface, "1 GPa", pressure="10 MPa").map()
         >>> data = pressed.to_dataset()
         >>> f"{float(data.pressure.mean()):.3f} {data.pressure.units} on {float(data.contact.mean()):.0%} of the points"
         '0.010 GPa on 45% of the points'
@@ -211,180 +470,34 @@ class Contact(Interface, Displayed):
         from mbma_tables.theories.simulated import boundary_elements, pressing
         from mbma_tables.theories.simulated.own_map import map_of, sides
 
-        source, pressure = self._source, np.asarray(self.pressure, float)
-        if pressure.ndim or np.ndim(source.E_star) or np.ndim(source.hardness):
+        pressure = np.asarray(self.pressure, float)
+        if pressure.ndim or np.ndim(self.E_star) or np.ndim(self.bodies.hardness):
             raise InputError(
                 "a map is of one contact: give one pressure, one modulus and one hardness"
             )
-        surface: Any = source.surface
-        whole = map_of(surface)
-        modulus, force = float(source.E_star), float(pressure) / float(source.E_star)
+        surface: Any = self.surface
+        treated = map_of(surface)
+        modulus = float(self.E_star)
+        force = float(pressure) / modulus
         if not 0 < force < np.inf:
             raise InputError(f"a map needs a pressure above 0, got {float(pressure):g}")
-        values, sizes = whole.heights - whole.heights.mean(), sides(whole)
-        # of rms gradient one, heights of order one
-        scale, gradient = float(np.abs(values).max()), float(surface.bearing.gradient)
-        stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
-        cap = float(source.hardness) / modulus / gradient
+        heights = treated.heights - treated.heights.mean()
+        side_x, side_y = sides(treated)
+        # boundary elements take heights of order one and an rms gradient of one
+        scale = float(np.abs(heights).max())
+        gradient = float(surface.bearing.gradient)
+        stretched = side_x * gradient / scale, side_y * gradient / scale
+        cap = float(self.bodies.hardness) / modulus / gradient
+        is_mirrored = not treated.periodic
         engine = boundary_elements.Contact(
-            values / scale, stretched, pressing.TOLERANCE, cap, not whole.periodic
+            heights / scale, stretched, pressing.TOLERANCE, cap, is_mirrored
         )
         with progress("boundary elements"):
             engine.press(force / gradient)
-        units = {"pressure": self.units["pressure"]} | dict.fromkeys(
-            ("gap", "heights"), source.units.length or "1"
-        )
-        return ContactMap(
-            whole.steps,
-            units,
-            modulus * gradient * engine.traction,
-            scale * engine.gap,
-            values,
-        )
-
-    @functools.cached_property
-    def _answer(self) -> TheoryAnswer:
-        """The theory's result at these separations, computed once."""
-        source = self._source
-        if source.answer is not None:
-            return source.answer
-        found: Any = source.map(lambda theory, s, u, E: theory.answer(s, u), self, 4)
-        return TheoryAnswer(*found)
-
-    @described
-    def stiffness(self) -> Any:
-        """-d(F/A0)/du [stress/length] of loading, against the mean separation; computed when first read."""
-        return (self._source.E_star * self._answer.stiffness)[()]
-
-    @described
-    def energy(self) -> Any:
-        """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
-        if self._source.yields:
-            raise InputError(
-                "energy: the energy that a yielded contact gives back is not known, since its residual shape is not; "
-                "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness the "
-                "initial stiffness of unloading"
-            )
-        return self._source.map(
-            lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1
-        )[0]
-
-    def _of_loading(self, name: str, elastic: Any) -> Any:
-        """A field of `Loaded`, divided by E*; `elastic` where nothing yields."""
-        source = self._source
-        if not source.yields:
-            return elastic
-        if source.loaded is not None:
-            return getattr(source.loaded, name)[()]
-        return source.map(
-            lambda theory, s, u, E: (getattr(theory.loaded(s, u), name),), self, 1
-        )[0]
-
-    @described
-    def yielded(self) -> Any:
-        """Share of the contact area at the hardness, 0 to 1."""
-        return self._of_loading("yielded", 0.0 * self.mean_separation)
-
-    @described
-    def unloading_stiffness(self) -> Any:
-        """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields."""
-        if not self._source.yields:
-            return self.stiffness
-        return (self._source.E_star * self._of_loading("unloading_stiffness", None))[()]
-
-    @described
-    def plane_separation(self) -> Any:
-        """Gap between the mean planes [length]: u less the flattening of yielded points."""
-        return self._of_loading("plane_separation", self.mean_separation)
-
-    @property
-    def psi(self) -> Any:
-        """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
-        return (
-            self._source.E_star
-            * self._source.surface.rms_gradient
-            / self._source.hardness
-        )[()]
-
-    @property
-    def elastic_hardness(self) -> Any:
-        """Hardness above which the elastic area is within 5%, E* g/1.1 [stress]."""
-        return (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
-
-    @described
-    def mean_pressure(self) -> Any:
-        """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
-        with np.errstate(invalid="ignore"):
-            return self.pressure / self.area
-
-    @described
-    def scatter(self) -> Any:
-        """Model uncertainty, one standard deviation of ln F at this mean separation; NaN if unknown."""
-        return self._scatter("pressure")
-
-    @described
-    def area_scatter(self) -> Any:
-        """Model uncertainty, one standard deviation of ln A at this pressure."""
-        return self._scatter("area")
-
-    @described
-    def stiffness_scatter(self) -> Any:
-        """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
-
-        NaN where a hardness is given: the slope of the loading curve of contacts that yield
-        was not compared with simulations; `unloading_stiffness_scatter` is that of their
-        unloading stiffness and conductance.
-        """
-        return self._scatter("stiffness")
-
-    @described
-    def unloading_stiffness_scatter(self) -> Any:
-        """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
-
-        Also of the conductance and of the tangential stiffness, which are proportional to
-        it. Without a hardness both stiffnesses are the same, and so are their
-        uncertainties.
-        """
-        return self._scatter(
-            "unloading_stiffness" if self._source.yields else "stiffness"
-        )
-
-    @described
-    def separation_scatter(self) -> Any:
-        """Model uncertainty of the mean separation at this pressure [length], `scatter` times F/(-dF/du)."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
-
-    def _scatter(self, of: str) -> Numbers:
-        return self._source.map(
-            lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self.area}
-        )[0]
-
-    @functools.cached_property
-    def leakage(self) -> Leakage:
-        """Flow through the gaps of the contact; computed when first read."""
-        from mbma_tables.contacts.leakage import leakage_of
-
-        return leakage_of(self)
-
-    @property
-    def _against(self) -> tuple[Any, ...]:
-        """Arguments for `Source.valid` and `Source.reasons`."""
-        return (
-            self,
-            functools.partial(reasons_against, self._source),
-            self._answer._asdict(),
-        )
-
-    @described
-    def valid(self) -> Any:
-        """Whether the theory was tested for such contacts; if not, `reasons` gives where and why."""
-        return self._source.valid(*self._against)
-
-    @functools.cached_property
-    def reasons(self) -> dict[str, Any]:
-        """Reasons why entries are not `valid`, each with the mask of these entries as a plain array."""
-        return self._source.reasons(*self._against)
+        length = self.bodies.units.length or "1"
+        units = {"pressure": self.units["pressure"], "gap": length, "heights": length}
+        traction = modulus * gradient * engine.traction
+        return ContactMap(treated.steps, units, traction, scale * engine.gap, heights)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import DIMENSIONS, Units, factor, modulus_and_units, unit_of
-from mbma_tables.contacts.contact import chosen_theory, contact, one_known
-from mbma_tables.materials import Metal, Pair, bodies, hardness_in
+from mbma_tables.common.units import DIMENSIONS, Units, factor, unit_of
+from mbma_tables.contacts.contact import chosen_theory, contact, one_given
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.maps import extrapolated
@@ -23,8 +23,6 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import Theory, UserTheory
 from mbma_tables.theories.calibrated.theory import Calibrated
-from mbma_tables.theories.mbma.island_models import AnyModel
-from mbma_tables.theories.mbma.variants import Variant
 
 STEP = 0.02  # step of the logarithm of a parameter
 NEAR = 0.9  # share of a parameter's upper limit above which its steps go down
@@ -72,18 +70,13 @@ class Sensitivity:
 @hinted
 def sensitivity(
     surface: AnySurface,
+    bodies: Bodies | float | str = 1.0,
     *,
     separation: ArrayLike | None = None,
     mean_separation: ArrayLike | None = None,
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
-    E_star: float | str = 1.0,
     theory: str | Theory | UserTheory | None = None,
-    island_model: str | AnyModel = "universal",
-    variant: str | Variant = "reported",
-    rtol: float = 1e-8,
-    hardness: float | str | None = None,
-    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> Sensitivity:
     """Sensitivity of pressure, area, stiffness and conductance to each parameter of a surface, for any theory.
 
@@ -100,12 +93,11 @@ def sensitivity(
         they follow from the map.
     separation, mean_separation, pressure, area : float or str, one of them
         The quantity held fixed, as for `contact`.
-    E_star : float or str
-        Effective modulus, as for `contact`.
-    theory, island_model, variant, rtol, hardness, materials : optional
-        As for `contact`, with the same default theory; a hardness is one of the parameters.
-        The simulation of a map answers for its heights and lengths by similarity, without a
-        hardness.
+    bodies : Bodies or float or str
+        As for `contact`; the modulus and a hardness are among the parameters.
+    theory : str or theory, optional
+        As for `contact`, with the same default. The simulation of a map answers for its
+        heights and lengths by similarity, without a hardness.
 
     Returns
     -------
@@ -121,33 +113,30 @@ def sensitivity(
     --------
     >>> from mbma_tables import Surface, sensitivity
     >>> ground = Surface.from_roughness(Rq=0.5, Rdq=0.1, longest=100, hurst=0.8, h_max=1.8, unit="um")
-    >>> found = sensitivity(ground, pressure="10 MPa", E_star="100 GPa")
+    >>> found = sensitivity(ground, "100 GPa", pressure="10 MPa")
     >>> print(f"area goes like Rdq^{found.slopes['Rdq']['area']:.2f}")
     area goes like Rdq^-1.15
-    >>> found = sensitivity(ground, pressure="10 MPa", materials="steel 1020", theory="calibrated")
+    >>> found = sensitivity(ground, "steel 1020", pressure="10 MPa", theory="calibrated")
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.68'
     """
-    by, value = one_known(
+    by, value = one_given(
         separation=separation,
         mean_separation=mean_separation,
         pressure=pressure,
         area=area,
     )
-    chosen = chosen_theory(
-        surface, theory, by, island_model=island_model, variant=variant, rtol=rtol
-    )
-    E_star, hardness, _ = bodies(materials, E_star, hardness)
-    modulus, units = modulus_and_units(E_star, surface)
+    chosen = chosen_theory(surface, theory, by)
+    in_units = Bodies.of(bodies).in_units(surface)
     return relative_derivatives(
         unknowns_of(surface, chosen),
         chosen,
-        units,
-        moduli={"E_star": modulus},
+        in_units.units,
+        moduli={"E_star": in_units.E_star},
         modulus_of=_itself,
         by=by,
-        value=units.number(by, value),
-        hardness=hardness_in(units, np.inf if hardness is None else hardness),
+        value=in_units.units.number(by, value),
+        hardness=in_units.hardness,
     )
 
 
@@ -179,9 +168,8 @@ class Unknowns:
         """`ANSWERS` of the surface of these numbers."""
         pressed: Any = contact(
             self.make(**numbers),
+            Bodies(modulus, hardness=cap),
             **{by: value},
-            E_star=modulus,
-            hardness=cap,
             theory=theory,
         )
         answers = {

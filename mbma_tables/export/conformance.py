@@ -119,7 +119,7 @@ def surface_rows(
     )
     if len(shares):
         u = own.h_max * np.asarray(shares)
-        found = contact(own, mean_separation=u, theory="calibrated", E_star=E_star)
+        found = contact(own, E_star, mean_separation=u, theory="calibrated")
         values = found.pressure, found.area, found.stiffness
         yield from rows(
             "calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY)

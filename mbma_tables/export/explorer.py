@@ -18,10 +18,10 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import number_in, positive_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
-from mbma_tables.contacts import source
 from mbma_tables.export import c_code
 from mbma_tables.export.text import page_file
 from mbma_tables.materials import hardness_in
+from mbma_tables.quantities.validity import MAX_GRADIENT
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import OF_MAPS, tested, theory_name
@@ -79,7 +79,7 @@ def _limits() -> dict[str, Any]:
             )
             for name, rows in deviations.log_rms.items()
         },
-        "gradient": source.MAX_GRADIENT,
+        "gradient": MAX_GRADIENT,
         "mbma_area": mbma.MAX_AREA,
         "hurst": tested.HURST,
         "zeta_1": tested.ZETA_1,
@@ -143,7 +143,9 @@ def explorer_page(
     """
     measured = isinstance(surface, MeasuredSurface)
     chosen = get_variant(variant)
-    theory = theory_name(surface, theory, variant=chosen.name)
+    if theory is None and chosen != get_variant("reported"):
+        theory = "mbma"
+    theory = theory_name(surface, theory)
     # a page has no simulation of a map
     theory = "calibrated" if theory in OF_MAPS else theory
     if theory == "mbma" and measured:

@@ -10,17 +10,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables import __version__
+from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import Units, factor, in_unit, modulus_and_units
+from mbma_tables.common.units import Units, factor, in_unit
 from mbma_tables.contacts.contact import chosen_theory, contact
 from mbma_tables.export.text import about, number
 from mbma_tables.law import block as at
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.leakage import LeakageLaw
-from mbma_tables.law.make import contact_law
-from mbma_tables.materials import ELASTIC_PSI, hardness_in
+from mbma_tables.law.make import law_of
+from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.quantities.conductances import conductance_of_gas
+from mbma_tables.quantities.gas import VACUUM
+from mbma_tables.quantities.interface import Gas
 from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.rough_body.rough_contact import pressed
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -52,20 +56,19 @@ OWN_NUMBERS = (
 
 
 class GasInGaps(NamedTuple):
-    """Gas that conducts heat beside the solid spots of an exported law, by `Contact.gap_conductance`."""
+    """Gas that conducts heat beside the solid spots of an exported law."""
 
-    name: str  # "air", "helium" or "vacuum"
-    temperature: float  # K
-    pressure: float | str  # Pa, or with its unit
+    gas: Gas
     unit: float  # one W/(m^2 K) in the unit of the law's conductance
 
     def __str__(self) -> str:
-        pressure = Units(stress="Pa").number("pressure", self.pressure)
-        return f"{self.name} at {about(self.temperature)} K and {about(pressure, 6)} Pa"
+        pressure = Units(stress="Pa").number("gas_pressure", self.gas.pressure)
+        temperature = about(float(np.asarray(self.gas.temperature)))
+        return f"{self.gas.name} at {temperature} K and {about(pressure, 6)} Pa"
 
     def conductance(self, found: Any) -> FloatArray:
         """Of contacts, in the unit of the law's conductance."""
-        of_gas = found.gap_conductance(self.name, self.temperature, self.pressure)
+        of_gas = conductance_of_gas(found, self.gas)
         return self.unit * np.asarray(of_gas, dtype=float)
 
 
@@ -159,19 +162,14 @@ class ExportedLaw:
         """The theory itself at mean separations; of a body the contacts at approaches that are left to the largest."""
         if self.force is not None:
             return pressed(self.force.body, self.law.h_max + self.force.first - u)
-        return contact(
-            self.surface,
-            mean_separation=u,
-            E_star=self.modulus,
-            theory=self.theory,
-            hardness=self.hardness,
-        )
+        bodies = Bodies(self.modulus, hardness=self.hardness)
+        return contact(self.surface, bodies, mean_separation=u, theory=self.theory)
 
     def of_gas(
         self, gas: GasInGaps | None, unit: str, end: float, included: bool
     ) -> tuple[str, ...]:
         """Lines of a header on what conductance is of: solid spots, and gas in gaps up to an overclosure."""
-        if gas is None or gas.name == "vacuum":
+        if gas is None or gas.gas.name == VACUUM:
             return (
                 "conductance is that of the solid spots alone, without gas in the gaps",
             )
@@ -380,16 +378,27 @@ def exported_law(
             body.surface, surface.law, body.theory, *numbers, force=surface
         )
     one: AnySurface = in_unit(surface, length_unit)
-    modulus, units = modulus_and_units(E_star, one, stress_unit)
-    length, stress = _known(units.length, units.stress)
+    bodies = Bodies(E_star, hardness=hardness).in_units(one, stress_unit)
+    length, stress = _known(bodies.units.length, bodies.units.stress)
     if one.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
-    modulus = number_in("E_star", modulus, 1e-300, 1e300)
-    cap = float(hardness_in(units, hardness))
-    own = chosen_theory(one, theory, variant=variant)
-    law = contact_law(one, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
-    law = dataclasses.replace(law, units=units)
-    return ExportedLaw(one, law, own, modulus, cap, length, stress, made_by, direction)
+    number_in("E_star", bodies.E_star, 1e-300, 1e300)
+    chosen = chosen_theory(one, _with_variant(theory, variant))
+    law = law_of(one, bodies, chosen, LAW_RTOL)
+    return ExportedLaw(
+        one, law, chosen, law.E_star, law.hardness, length, stress, made_by, direction
+    )
+
+
+def _with_variant(
+    theory: str | Theory | UserTheory | None, variant: str | Variant
+) -> Any:
+    """MBMA in a variant of the paper, which other theories do not have."""
+    if variant == "reported":
+        return theory
+    if theory not in (None, "mbma"):
+        raise InputError("variant: an option of theory 'mbma' alone, given by its name")
+    return Mbma(variant=variant)
 
 
 def _known(length: str | None, stress: str | None) -> tuple[str, str]:

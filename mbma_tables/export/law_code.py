@@ -167,7 +167,7 @@ def asked_law(
             )
     if leakage:
         more["leakage"] = f"{length}^3"
-    sloped, factor = law.unloading if slopes else (law, 1.0)
+    sloped, factor = law.unloading() if slopes else (law, 1.0)
     what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure "
     what += f"[{stress} {length}]{''.join(f', {quantity} [{unit}]' for quantity, unit in more.items())}"
     begin = (

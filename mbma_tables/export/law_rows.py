@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.film import flow_factors
@@ -471,9 +472,12 @@ def _film_rows(
         np.geomspace(max(FILM_RANGE[0] * h_rms, h_max - end), FILM_RANGE[1] * h_rms, rows)
     )
     at = functools.partial(
-        flow_factors, exported.surface, peklenik=peklenik, theory=exported.theory, E_star=exported.modulus,
-        hardness=exported.hardness,
-    )  # fmt: skip
+        flow_factors,
+        exported.surface,
+        bodies=Bodies(exported.modulus, hardness=exported.hardness),
+        peklenik=peklenik,
+        theory=exported.theory,
+    )
     found, middle = at(u), at((u[1:] + u[:-1]) / 2)
     tested = found.pressure[found.area >= TESTED_AREA[0]]
     floor = least if least is not None else float(tested.min()) if tested.size else np.inf

@@ -16,6 +16,8 @@ from mbma_tables.export.law_code import LOADING_ALONE
 from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import Target, targets
+from mbma_tables.quantities.gas import VACUUM
+from mbma_tables.quantities.interface import Gas
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory
 
@@ -29,13 +31,11 @@ class ExportedJoint(NamedTuple):
     E_star: str
     theory: str | Theory | None
     hardness: float | str  # infinite where it is not known
-    conductivity: float  # k_s = 2 k1 k2/(k1 + k2) [W/(m K)]
+    conductivity: float | None  # k_s = 2 k1 k2/(k1 + k2) [W/(m K)]
     kappa: Callable[[Any], Any]  # normal over tangential stiffness at a contact area
     kappa_varies: bool  # whether it depends on the contact area
     friction: float | None
-    gas: str
-    temperature: float  # K
-    gas_pressure: float | str  # Pa, or with its unit
+    gas: Gas
 
 
 def joint_files(
@@ -171,6 +171,11 @@ def _conductivity(
     joint: ExportedJoint, units: Mapping[str, str]
 ) -> tuple[dict[str, Any], float]:
     """k_s in units of the law: of power mW with N, mm and MPa, else W; and one W/(m^2 K) in those of conductance."""
+    if joint.conductivity is None:
+        raise InputError(
+            "conductance needs the thermal conductivity of the bodies: "
+            "Bodies(..., conductivity='45 W/(m K)'), or heat=False, which leaves conductance out"
+        )
     length = units["length_unit"]
     metre = factor("m", length)
     consistent = (length, units["stress_unit"]) == ("mm", "MPa")
@@ -197,7 +202,7 @@ def _rows(
     if quantity == "conductance":
         heat, unit = _conductivity(joint, units)
         asked |= heat
-        gas = GasInGaps(joint.gas, joint.temperature, joint.gas_pressure, unit)
+        gas = GasInGaps(joint.gas, unit)
         if program.conducts_gas:
             asked["gas"] = gas
     if rubbed or quantity == "tangential_stiffness":
@@ -223,17 +228,19 @@ def _of_code(
     else:
         arguments["kappa"] = float(joint.kappa(None))
     if heat:
-        if target in LANGUAGES and LANGUAGES[target].subroutine and joint.gas != "vacuum":
+        if (
+            target in LANGUAGES
+            and LANGUAGES[target].subroutine
+            and joint.gas.name != VACUUM
+        ):
             raise InputError(
-                f"{target} has the conductance of the solid spots alone, without that of {joint.gas} in the gaps: "
+                f"{target} has the conductance of the solid spots alone, without that of {joint.gas.name} in the gaps: "
                 "take rows, which have both, such as target 'abaqus' or 'calculix', or a joint with gas='vacuum'; "
                 "heat=False leaves conductance out"
             )
         conductivity, unit = _conductivity(joint, units)
         arguments |= conductivity
-        arguments["gas"] = GasInGaps(
-            joint.gas, joint.temperature, joint.gas_pressure, unit
-        )
+        arguments["gas"] = GasInGaps(joint.gas, unit)
     return arguments
 
 

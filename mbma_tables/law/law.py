@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import collections
 import ctypes
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -21,18 +23,24 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
+from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.shared import frozen
-from mbma_tables.common.units import UNKNOWN, Units, unit_of
-from mbma_tables.contacts.source import MEANINGS, LawPoint, LawValues
+from mbma_tables.common.units import Units, unit_of
+from mbma_tables.contacts.result import Setup
 from mbma_tables.core import core
 from mbma_tables.law import block as at
 from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
-from mbma_tables.law.derived import Derived
-from mbma_tables.materials import Pair
+from mbma_tables.law.continued import ContinuedLaw
+from mbma_tables.quantities import registry
+from mbma_tables.quantities.properties import LawQuantities
 from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 if TYPE_CHECKING:
     from scipy import LowLevelCallable
+
+    from mbma_tables.law.contact_of_law import LawContact
+    from mbma_tables.law.leakage import LeakageLaw
+    from mbma_tables.quantities.tangential import Tangential
 
     class Law:
         """Type of the law in `core/binding.c`, which evaluates floats and small arrays without Python."""
@@ -54,10 +62,39 @@ SPACED = (
     0.2,
 )  # shares of the compression: geometric spacing between them, then even
 ROUNDING = 4 * float(np.finfo(float).eps)
+LIGHT, HEAVY = (
+    1e-2,
+    0.99,
+)  # overclosures of the default ends of a continued law, over that of the law's last
+SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
+DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors of the polynomials
+
+
+class LawPoint(
+    collections.namedtuple(
+        "LawPoint", ("separation", "mean_separation", "area", "stiffness", "pressure")
+    )
+):
+    """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape."""
+
+    units = Units()  #: the law's
+
+    def __repr__(self) -> str:
+        texts = [
+            f"{name} {shown(value, unit_of(name, self.units))}"
+            for name, value in self._asdict().items()
+        ]
+        return f"LawPoint({', '.join(texts)})"
+
+
+#: results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape
+LawValues = collections.namedtuple(
+    "LawValues", ("pressure", "area", "stiffness", "energy")
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ContactLaw(Law, Derived, Displayed):
+class ContactLaw(Law, LawQuantities, Displayed):
     """Pressure and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
     Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the
@@ -66,7 +103,7 @@ class ContactLaw(Law, Derived, Displayed):
     Examples
     --------
     >>> from mbma_tables import Surface, contact_law
-    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), "mbma", E_star=100e3)  # um, MPa
+    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), 100e3, theory="mbma")  # um, MPa
     >>> round(float(law.pressure(separation=1.0)), 4), round(float(law.separation(pressure=7.9825)), 4)
     (7.9825, 1.0)
     >>> round(float(law.stiffness(2.0)), 3)  # -dp/du [MPa/um]
@@ -75,10 +112,10 @@ class ContactLaw(Law, Derived, Displayed):
     (0.00287, 1.06)
     """
 
+    setup: Setup  #: the surface, the bodies and the theory of the law
     # : highest point [length]; if contact ends there, results are zero at this gap and
     # above
     h_max: float
-    E_star: float  #: effective modulus, in whose unit force is
     lowest: float  #: least gap d that the law covers
     highest: float  #: largest one; infinite where contact ends at h_max
     # : bound on the relative error of force and area, of the polynomials and what they were
@@ -89,24 +126,51 @@ class ContactLaw(Law, Derived, Displayed):
         float | None
     )  #: gap below which force decreases under compression, if it does; inverses end there
     area_turning_point: float | None  #: the same of the area
-    theory: str
-    variant: str  #: empty where the theory is not MBMA, as is `island_model`
-    island_model: str
     block: FloatArray  #: the polynomials, in the layout that `mbma_tables/core/mbma.h` describes
     # : bounds on the relative error of a record's values, and of its slopes over F/x,
     # (records, 2)
     errors: FloatArray
-    # : of lengths and stresses, as far as the surface and the modulus knew theirs
-    units: Units = UNKNOWN
-    surface: AnySurface | None = None  #: the surface of the law
-    hardness: float = math.inf  #: infinite where nothing yields
     elastic: Callable[[], ContactLaw] | None = (
         None  #: with a hardness, makes the law of the elastic contact
     )
-    materials: Pair | None = None  #: where they are named
     gaps: Any = (
         None  #: of a simulated map, the theory that knows the flow through its gaps
     )
+
+    @property
+    def surface(self) -> AnySurface:
+        """The surface of the law."""
+        return self.setup.surface
+
+    @property
+    def units(self) -> Units:
+        """Units of lengths and stresses, as far as the surface and the modulus have them."""
+        return self.setup.bodies.units
+
+    @property
+    def E_star(self) -> float:
+        """Effective modulus, in whose unit force is."""
+        return float(self.setup.bodies.E_star)
+
+    @property
+    def hardness(self) -> float:
+        """Hardness of the softer body; infinite where nothing yields."""
+        return float(self.setup.bodies.hardness)
+
+    @property
+    def theory(self) -> str:
+        """Name of the theory."""
+        return self.setup.theory.name
+
+    @property
+    def variant(self) -> str:
+        """Name of MBMA's variant; empty for other theories."""
+        return self.setup.theory.variant_name
+
+    @property
+    def island_model(self) -> str:
+        """Name of MBMA's island model; empty for other theories."""
+        return self.setup.theory.island_model_name
 
     @property
     def records(self) -> FloatArray:
@@ -383,7 +447,7 @@ class ContactLaw(Law, Derived, Displayed):
             separation=d
         )._asdict()
         return {
-            name: Variable(value, unit_of(name, self.units), MEANINGS[name])
+            name: Variable(value, unit_of(name, self.units), registry.get(name).meaning)
             for name, value in values.items()
         }
 
@@ -431,3 +495,159 @@ class ContactLaw(Law, Derived, Displayed):
         # pickle restores arrays as writable
         frozen((state["block"], state["errors"]))
         self.__dict__.update(state)
+
+    def unloading_stiffness(
+        self,
+        mean_separation: ArrayLike | None = None,
+        *,
+        separation: ArrayLike | None = None,
+    ) -> Numbers:
+        """-dp/du of a small unloading at constant contact area [stress/length]; `stiffness` where nothing yields.
+
+        With a hardness it is made from the law of the elastic contact, which is fitted when
+        this is first called.
+        """
+        law, factor = self.unloading()
+        stiffness: Numbers = factor * law.stiffness(
+            mean_separation, separation=separation
+        )
+        return stiffness
+
+    def unloading(self) -> tuple[ContactLaw, float]:
+        """The law of the elastic contact, and `unloading_stiffness` over its stiffness."""
+        if self.elastic is None:
+            return self, 1.0
+        return self._elastic_law_and_factor
+
+    @functools.cached_property
+    def _elastic_law_and_factor(self) -> tuple[ContactLaw, float]:
+        from mbma_tables.theories.yielding.formulas import frozen_factor
+
+        assert self.elastic is not None
+        gradient = float(self.surface.rms_gradient)
+        return self.elastic(), float(
+            frozen_factor(self.hardness / (self.E_star * gradient))
+        )
+
+    def at(
+        self,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+    ) -> LawContact:
+        """The contact at mean separations, separations or pressures, with every quantity, as of `contact`."""
+        from mbma_tables.law.contact_of_law import LawContact
+
+        return LawContact.of(self, mean_separation, separation, pressure)
+
+    def tangential(
+        self,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        pressure: ArrayLike | str | None = None,
+        friction: float | None = None,
+        direction: str | None = None,
+    ) -> Tangential:
+        """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`."""
+        return self.at(mean_separation, pressure=pressure).tangential(friction, direction)
+
+    def continued(self, pressures: tuple[Any, Any] | None = None) -> ContinuedLaw:
+        """The law continued by its tangents beyond two pressures, for the trial steps of Newton's method.
+
+        With the tangents, Newton's method returns from trial steps without contact, where
+        the law has neither pressure nor stiffness, and from steps beyond full compression,
+        where it raises an error. Check `inside` at the solution; if the bodies are apart
+        there, continue the iteration with the law itself.
+
+        Parameters
+        ----------
+        pressures : pair of float or str, optional
+            Pressures between which the law itself is used; default: those at 1% and 99% of
+            its compression, or where its stiffness begins to decrease.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> law = contact_law(Surface.named("concrete"), "13.3 MPa", theory="calibrated")
+        >>> trial, u = law.continued(), law.h_max
+        >>> for _ in range(12):  # the load is 0.1 MPa
+        ...     pressure, stiffness = trial.pressure_and_stiffness(u)
+        ...     u += (pressure - 0.1) / stiffness
+        >>> bool(trial.inside(u)), round(float(law.pressure(u)), 12)
+        (True, 0.1)
+        """
+        if pressures is None:
+            end = self.lowest if self.turning_point is None else self.turning_point
+            light, heavy = (
+                self.h_max - share * (self.h_max - end) / 2 for share in (LIGHT, HEAVY)
+            )
+            if (
+                self.softening is not None
+            ):  # beyond it tangents fall, to zero where pressure turns down
+                heavy = max(heavy, self.softening)
+        elif isinstance(pressures, tuple | list | np.ndarray) and len(pressures) == 2:
+            light, heavy = (
+                float(self.at_pressure(pressure).mean_separation)
+                for pressure in pressures
+            )
+        else:
+            raise InputError(f"pressures must be two rising numbers, got {pressures!r}")
+        if not heavy < light or not float(self.stiffness(light)) > 0:
+            raise InputError(
+                f"pressures must be two rising numbers above zero, got {pressures!r}"
+            )
+        return ContinuedLaw(self, light, heavy)
+
+    @functools.cached_property
+    def softening(self) -> float | None:
+        """Mean separation u [length] below which the stiffness decreases with compression; None if it never does."""
+        from scipy.optimize import minimize_scalar
+
+        lowest = max(self.lowest, -self.h_max)
+        step = (self.h_max - lowest) / 2 / SCAN
+        u = self.h_max - step * np.arange(1, SCAN + 1)
+        u[-1] = max(u[-1], (self.h_max + lowest) / 2)
+        values = np.asarray(self.stiffness(u))
+        falls = values[1:] < values[:-1] * (1 - DIGITS * self.error)
+        if not falls.any():
+            return None
+        peak = int(falls.argmax())
+        low, high = u[peak + 1], min(u[peak] + step, self.h_max)
+        near = {
+            "bounds": (low, high),
+            "method": "bounded",
+            "options": {"xatol": 1e-7 * high},
+        }
+        return float(minimize_scalar(lambda x: -self.stiffness(x), **near).x)
+
+    @functools.cached_property
+    def leakage(self) -> LeakageLaw:
+        """Flow coefficient at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`, made when read.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> law = contact_law(seal, "10 MPa", theory="calibrated")
+        >>> f"{law.leakage(pressure='0.05 MPa'):.1g} um^3"
+        '0.001 um^3'
+        """
+        from mbma_tables.law.leakage import leakage_law
+
+        if self.surface is None:
+            raise InputError("leakage needs the surface, which this law does not contain")
+        return leakage_law(self, self.surface)
+
+    def _figure(self) -> Any:
+        held = self._variables()
+        lines = (held[name].values for name in ("mean_separation", "pressure", "area"))
+        pressure, gap = (
+            pressure_label(unit_of("pressure", self.units)),
+            self.units.length or "length",
+        )
+        curve, gap = (
+            Curve(theory_label(self.theory), *lines),
+            f"mean separation u [{gap}]",
+        )
+        return draw_compression([curve], pressure_label=pressure, gap_label=gap)

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.shared import frozen
-from mbma_tables.contacts.leakage import along, degrees, flow, shipped_flow
 from mbma_tables.core import core
 from mbma_tables.law import block as fit
 from mbma_tables.quantities.effective_medium import wide_gap
+from mbma_tables.quantities.leakage import along, degrees, flow, shipped_flow
 from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 RTOL, SHARE = (

@@ -1,34 +1,31 @@
-"""`contact_law`: pressure and area of one surface by any theory, as functions of its gap.
-
-They are fitted by the polynomials of `law.block`.
-"""
+"""`contact_law`: pressure and area of one surface by any theory, fitted by polynomials of the gap (`law.block`)."""
 
 import contextlib
+import dataclasses
 import functools
 import math
 import sys
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.shared import frozen
-from mbma_tables.common.units import modulus_and_units
 from mbma_tables.contacts.contact import chosen_theory
+from mbma_tables.contacts.result import Setup
 from mbma_tables.law import block as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
-from mbma_tables.materials import Metal, Pair, bodies, hardness_in
+from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.base import Theory, UserTheory
 from mbma_tables.theories.mbma.island import check_band
-from mbma_tables.theories.mbma.island_models import MAX_RTOL, MIN_RTOL, AnyModel
+from mbma_tables.theories.mbma.island_models import MAX_RTOL, MIN_RTOL
 from mbma_tables.theories.mbma.profile import profile
 from mbma_tables.theories.mbma.tables import get_model
 from mbma_tables.theories.mbma.theory import Mbma
-from mbma_tables.theories.mbma.variants import Variant
 
 MIN_LAW_RTOL = 1e-9
 # for polynomials this accurate the last coefficients estimate the error
@@ -53,33 +50,28 @@ SHARE = 0.1
 @hinted
 def contact_law(
     surface: AnySurface,
+    bodies: Bodies | float | str = 1.0,
     theory: str | Theory | UserTheory | None = None,
     *,
     rtol: float = 1e-8,
-    island_model: str | AnyModel = "universal",
-    variant: str | Variant = "reported",
-    E_star: float | str = 1.0,
-    hardness: float | str | None = None,
-    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> ContactLaw:
-    """Pressure and area of one surface as functions of its gap, for many gaps and inverses.
+    """Pressure and area of one surface as functions of its gap, for many gaps and for inverses.
 
     Parameters
     ----------
     surface : Surface
         One surface, not a batch.
+    bodies : Bodies or float or str
+        The bodies in contact, as for `contact`, each constant one number. With a hardness
+        it is the law of loading; its `energy` is then the work of loading, not that
+        recovered on unloading.
     theory : str or theory, optional
-        As for `contact`.
+        As for `contact`; by default "simulated" for a resolved map, else "calibrated".
     rtol : float
         Requested relative error of the polynomials against the theory (MBMA's island
         model), in [1e-9, 0.1]; for other theories not below a tenth of their own error (its
         median over gaps), or not below that error where their results are not smooth within
         it.
-    island_model, variant, E_star : optional
-        As for `contact`.
-    hardness, materials : optional
-        As for `contact`: the law of loading. Its `energy` is then the work of loading, not
-        that recovered on unloading.
 
     Returns
     -------
@@ -96,7 +88,7 @@ def contact_law(
     --------
     >>> from mbma_tables import Surface, contact_law
     >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
-    >>> law = contact_law(surface, "mbma", rtol=1e-6)
+    >>> law = contact_law(surface, theory="mbma", rtol=1e-6)
     >>> f"{law.pressure(separation=1.0):.4g}"
     '7.982e-05'
     >>> law.error < 2e-6
@@ -105,52 +97,66 @@ def contact_law(
     >>> f"{persson.pressure(2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
-    E_star, hardness, pair = bodies(materials, E_star, hardness)
-    E_star_number, units = modulus_and_units(E_star, surface)
-    modulus = number_in("E_star", E_star_number, sys.float_info.min, sys.float_info.max)
-    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant)
-    hardness_number = hardness_in(units, math.inf if hardness is None else hardness)
-    cap = checked_hardness(hardness_number)
-    if cap.ndim:
+    return law_of(surface, bodies, theory, rtol)
+
+
+def law_of(
+    surface: AnySurface,
+    bodies: Any,
+    theory: str | Theory | UserTheory | None,
+    rtol: float,
+    interface: Interface = NOTHING_BETWEEN,
+) -> ContactLaw:
+    """The law of one surface, with what a joint has between its bodies."""
+    given = (
+        bodies
+        if isinstance(bodies, BodiesInUnits)
+        else Bodies.of(bodies).in_units(surface)
+    )
+    modulus = number_in("E_star", given.E_star, sys.float_info.min, sys.float_info.max)
+    hardness = checked_hardness(given.hardness)
+    if hardness.ndim:
         raise InputError(
-            f"hardness must be one number, got shape {cap.shape}: a law is of one surface"
+            f"hardness must be one number, got shape {hardness.shape}: a law is of one surface"
         )
-    yields: dict[str, Any] = {}
-    if cap < math.inf:
-        # what follows unloading is calculated from the law without the hardness, on demand
-        elastic = functools.partial(
-            contact_law, surface, chosen, rtol=rtol, E_star=modulus
-        )
-        yields = {"hardness": float(cap), "elastic": elastic}
-        chosen = chosen.with_hardness(float(cap), modulus)
-    one = _without_labels(surface)
-    if one.shape != ():
-        raise InputError(f"a law needs one surface, got a batch of shape {one.shape}")
+    one = _one_surface(surface)
     tolerance = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
-    facts = {
-        "surface": one,
-        "E_star": modulus,
-        "units": units,
-        "materials": pair,
-        "gaps": chosen.gaps(),
-        **yields,
-    }
-    if isinstance(chosen, Mbma):
-        return _mbma_law(one, chosen.island_model, chosen.variant, tolerance, facts)
+    setup = Setup(
+        one, given.at(modulus, float(hardness)), chosen_theory(surface, theory), interface
+    )
+    loading = setup.theory_of(setup.bodies)
     try:
-        return theory_law(one, chosen, tolerance, facts)
+        if isinstance(loading, Mbma):
+            return _mbma_law(setup, loading, tolerance)
+        return theory_law(setup, loading, tolerance)
     except ConvergenceError as fault:
+        if isinstance(loading, Mbma):
+            raise
         raise ConvergenceError(
-            f"theory {chosen.name!r}: {fault}; use a larger rtol", fault.mask
+            f"theory {loading.name!r}: {fault}; use a larger rtol", fault.mask
         ) from None
 
 
-def _without_labels(surface: AnySurface) -> AnySurface:
-    """The surface with plain arrays in place of labelled ones."""
-    if not surface.labelled:
-        return surface
-    numbers = [np.asarray(getattr(surface, name)) for name in surface.parameters]
-    return surface.with_numbers(*numbers)
+def _one_surface(surface: AnySurface) -> AnySurface:
+    """A surface of plain numbers; a batch is refused."""
+    one = surface
+    if one.labelled:
+        one = one.with_numbers(
+            *(np.asarray(getattr(one, name)) for name in one.parameters)
+        )
+    if one.shape != ():
+        raise InputError(f"a law needs one surface, got a batch of shape {one.shape}")
+    return one
+
+
+def _elastic_law(setup: Setup, rtol: float) -> ContactLaw:
+    """The law of the same contact without a hardness."""
+    elastic = dataclasses.replace(setup.bodies.bodies, hardness=np.inf)
+    bodies = dataclasses.replace(setup.bodies, bodies=elastic, hardness=np.inf)
+    setup = dataclasses.replace(setup, bodies=bodies)
+    if isinstance(setup.theory, Mbma):
+        return _mbma_law(setup, setup.theory, rtol)
+    return theory_law(setup, setup.theory, rtol)
 
 
 class _Fitting(NamedTuple):
@@ -167,22 +173,18 @@ class _Fitting(NamedTuple):
     leverage: float  # error of slopes over F/x per error of answers
 
 
-def _mbma_law(
-    surface: AnySurface,
-    island_model: str | AnyModel,
-    variant: Variant,
-    rtol: float,
-    facts: dict[str, Any],
-) -> ContactLaw:
+def _mbma_law(setup: Setup, theory: Mbma, rtol: float) -> ContactLaw:
     """A law of the MBMA model: x rises from 0 at first contact, d = h_max, to 1 at the end.
 
     Below half of the boundary layer force and area are powers of x times polynomials.
     """
+    surface: Any = setup.surface
+    variant = theory.variant
     h_max = float(surface.h_max)
     h_rms = float(surface.h_rms)
     # the sums over islands are to be ten times as accurate as the polynomials
     rtol_of_sums = max(0.1 * rtol, MIN_RTOL)
-    model = get_model(island_model, rtol_of_sums, variant)
+    model = get_model(theory.island_model, rtol_of_sums, variant)
     stress = 1.0
     shape: Any = surface
     if isinstance(surface, Surface):
@@ -214,7 +216,6 @@ def _mbma_law(
     # a power of 1/2 within the layer, and down to the smallest double at most
     octaves = range(math.ceil(-math.log2(min(layer, *kinks))), 1100)
     start, first = fit.first_record(record_below, octaves, tolerance)
-    facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
     fitting = _Fitting(
         scale=1 / end,
         sides=[fit.Side(-1, start, force_and_area, tuple(kinks))],
@@ -224,17 +225,16 @@ def _mbma_law(
         answer_errors=[np.array([totals.error])],
         leverage=totals.leverage,
     )
-    return _fitted_law(fitting, tolerance, facts)
+    return _fitted_law(fitting, tolerance, setup)
 
 
-def theory_law(
-    surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]
-) -> ContactLaw:
+def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
     """A law fitted to a theory's answers at mean separations u.
 
     x rises from first contact, from u = 0, or from both where the force at u = 0 has no
     bound.
     """
+    surface: Any = setup.surface
     h_max = float(surface.h_max)
     lowest, highest = _covered(surface, theory)
     answer_errors: list[FloatArray] = []
@@ -268,7 +268,6 @@ def theory_law(
     else:
         largest_gap = 2 * highest - h_max
         energy_beyond = 2 * float(theory.energy(surface, np.array(highest)))
-    facts |= {"theory": theory.name, "variant": "", "island_model": ""}
     fitting = _Fitting(
         scale=1 / (2 * width),
         sides=sides,
@@ -279,12 +278,12 @@ def theory_law(
         leverage=0.0,
     )
     try:
-        return _fitted_law(fitting, tolerance, facts)
+        return _fitted_law(fitting, tolerance, setup)
     except ConvergenceError:
         # answers need not be smooth below their own error
         if error_of_answers <= tolerance:
             raise
-        return _fitted_law(fitting, error_of_answers, facts)
+        return _fitted_law(fitting, error_of_answers, setup)
 
 
 def _covered(surface: AnySurface, theory: Theory) -> tuple[float, float]:
@@ -344,9 +343,9 @@ def _sides(
     return width, [above._replace(start=start)], first
 
 
-def _fitted_law(fitting: _Fitting, tolerance: float, facts: dict[str, Any]) -> ContactLaw:
+def _fitted_law(fitting: _Fitting, tolerance: float, setup: Setup) -> ContactLaw:
     """Fit the sides, put the block together, and look for turning points."""
-    h_max = float(facts["surface"].h_max)
+    h_max = float(setup.surface.h_max)
     scale = fitting.scale
     lowest, highest = fitting.limits
     sides: list[fit.Side] = []
@@ -374,13 +373,18 @@ def _fitted_law(fitting: _Fitting, tolerance: float, facts: dict[str, Any]) -> C
     for x, sign in fit.first_falls(records[order], signs):
         turns.append(None if x is None else sign * (x / scale - h_max))
     # forces carry the modulus
-    records[:, fit.FORCE_AT : fit.AREA_AT] *= facts["E_star"]
-    records[:, fit.ENERGY_AT] *= facts["E_star"]
+    modulus = float(setup.bodies.E_star)
+    records[:, fit.FORCE_AT : fit.AREA_AT] *= modulus
+    records[:, fit.ENERGY_AT] *= modulus
     error_of_fit = float(errors[:, 0].max())
     error_of_answers = float(np.concatenate(fitting.answer_errors).max())
     errors = errors + np.array([0.0, fitting.leverage * error_of_answers])
+    elastic = None
+    if setup.bodies.yields:
+        # what follows unloading is calculated from the law without the hardness, on demand
+        elastic = functools.partial(_elastic_law, setup, tolerance)
     return ContactLaw(
-        **facts,
+        setup,
         h_max=h_max,
         lowest=lowest,
         highest=highest,
@@ -389,6 +393,8 @@ def _fitted_law(fitting: _Fitting, tolerance: float, facts: dict[str, Any]) -> C
         area_turning_point=turns[1],
         block=frozen(block),
         errors=frozen(errors),
+        elastic=elastic,
+        gaps=setup.theory_of(setup.bodies).gaps(),
     )
 
 

@@ -29,7 +29,7 @@ R = 8.314462618  # J/(mol K)
 TEMPERATURES = (200.0, 300.0, 400.0, 500.0, 600.0)  # K
 
 
-class Gas(NamedTuple):
+class GasConstants(NamedTuple):
     """A gas at low pressure."""
 
     mass: float  # kg/mol
@@ -63,10 +63,10 @@ ARGON = (
     (15.9e-6, 22.7e-6, 28.6e-6, 33.9e-6, 38.8e-6),
 )
 GASES = {
-    "air": Gas(28.97e-3, 1.4, 0.85, *AIR),
-    "helium": Gas(4.0026e-3, 5 / 3, 0.45, *HELIUM),
-    "nitrogen": Gas(28.014e-3, 1.4, 0.85, *NITROGEN),
-    "argon": Gas(39.948e-3, 5 / 3, 0.95, *ARGON),
+    "air": GasConstants(28.97e-3, 1.4, 0.85, *AIR),
+    "helium": GasConstants(4.0026e-3, 5 / 3, 0.45, *HELIUM),
+    "nitrogen": GasConstants(28.014e-3, 1.4, 0.85, *NITROGEN),
+    "argon": GasConstants(39.948e-3, 5 / 3, 0.95, *ARGON),
 }
 VACUUM = "vacuum"
 

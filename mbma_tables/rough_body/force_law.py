@@ -19,9 +19,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
+from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, require
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.units import SIZES, Units, factor, unit_of
+from mbma_tables.contacts.result import Setup
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import theory_law
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -364,10 +366,7 @@ def force_law(body: Body, top: float, rtol: float) -> ForceLaw:
         first = body.approach_at(LIGHT * body.integral(largest, largest.p))
     # in place of a surface: first contact is where so much of the approach is left
     span: Any = types.SimpleNamespace(h_max=top - first)
-    facts = {
-        "surface": span,
-        "E_star": body.law.E_star * body.newtons,
-        "units": Units(body.law.units.length),
-    }
-    law = theory_law(span, _Pressed(body, top, 0.01 * rtol), rtol, facts)
-    return ForceLaw(dataclasses.replace(law, surface=None), first, body)
+    theory = _Pressed(body, top, 0.01 * rtol)
+    scale = body.law.E_star * body.newtons
+    bodies = BodiesInUnits(Bodies(scale), scale, math.inf, Units(body.law.units.length))
+    return ForceLaw(theory_law(Setup(span, bodies, theory), theory, rtol), first, body)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
@@ -25,7 +25,6 @@ from mbma_tables.common.plots import new_figure
 from mbma_tables.contacts.contact import chosen_theory, contact
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
-from mbma_tables.materials import Metal, Pair
 from mbma_tables.rough_body.force_law import (
     RTOL,
     Body,
@@ -111,7 +110,7 @@ class RoughContact(Displayed):
         --------
         >>> from mbma_tables import Surface, rough_contact
         >>> face = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
-        >>> ball = rough_contact(face, "5 mm", approach=["1.5 um"], E_star="110 GPa").law(rtol=1e-3)
+        >>> ball = rough_contact(face, "5 mm", "110 GPa", approach=["1.5 um"]).law(rtol=1e-3)
         >>> f"{ball.force('1 um'):.4g} N, {ball.stiffness('1 um'):.3g} N/um, {ball.approach('10 N'):.4g} um"
         '18.41 N, 17.1 N/um, 0.4478 um'
         """
@@ -166,15 +165,13 @@ class RoughContact(Displayed):
 def rough_contact(
     surface: AnySurface,
     radius: float | str,
+    bodies: Bodies | float | str = 1.0,
     *,
     shape: str = "sphere",
     approach: ArrayLike | None = None,
     force: Any = None,
     reference: float | str | None = None,
     theory: str | Theory | None = None,
-    E_star: float | str = 1.0,
-    hardness: float | str | None = None,
-    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> RoughContact:
     """Press a rough sphere or cylinder on a flat: an elastic half-space behind the layer of a contact law.
 
@@ -188,6 +185,9 @@ def rough_contact(
         Roughness of both faces together (`combined`).
     radius : float or str
         R [length]; of two curved bodies 1/R = 1/R1 + 1/R2.
+    bodies : Bodies or float or str
+        As for `contact`. With a hardness, the roughness yields and the bodies do not;
+        results are for loading only.
     shape : {"sphere", "cylinder"}
         A cylinder is long, in plane strain.
     approach, force : array_like or str
@@ -197,9 +197,8 @@ def rough_contact(
         For a cylinder, the distance along the face [length] with zero displacement; by
         default 2 R/e, so that Hertz's approach is that of a cylinder's axis (K. L. Johnson,
         Contact Mechanics, 1985, Eq. 5.57).
-    theory, E_star, hardness, materials : optional
-        As for `contact`. With a hardness, the roughness yields and the bodies do not;
-        results are for loading only.
+    theory : str or theory, optional
+        As for `contact`.
 
     Returns
     -------
@@ -216,7 +215,7 @@ def rough_contact(
     --------
     >>> from mbma_tables import Surface, rough_contact
     >>> face = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
-    >>> found = rough_contact(face, "5 mm", force=["1 N", "100 N"], E_star="110 GPa", theory="calibrated")
+    >>> found = rough_contact(face, "5 mm", "110 GPa", force=["1 N", "100 N"], theory="calibrated")
     >>> print(found.approach.round(3), found.contact_radius.round(1), found.units["force"])
     [-0.601  4.211] [ 63.6 157.8] N
     >>> print((1000 * found.pressure[:, 0]).round(), "MPa in the middle")
@@ -226,14 +225,7 @@ def rough_contact(
         raise InputError(
             f"shape must be one of {SHAPES}, got {shape!r}{nearest(str(shape), SHAPES)}"
         )
-    law = contact_law(
-        surface,
-        theory,
-        rtol=LAYER_RTOL,
-        E_star=E_star,
-        hardness=hardness,
-        materials=materials,
-    )
+    law = contact_law(surface, bodies, theory, rtol=LAYER_RTOL)
     units, plane, largest = law.units, shape == "cylinder", 1e30 * law.h_max
     R = number_in("radius", units.number("radius", radius), law.h_max, largest)
     fixed = JOHNSON * R if reference is None else units.number("reference", reference)
@@ -314,13 +306,8 @@ def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
     """Standard deviation of ln F by that of the law, alike at all places, and reasons against the law."""
     law, ends = body.law, body.ends
     u = np.clip(found.u, *ends)
-    known = contact(
-        body.surface,
-        mean_separation=u,
-        theory=body.theory,
-        E_star=law.E_star,
-        hardness=law.hardness,
-    )
+    bodies = Bodies(law.E_star, hardness=law.hardness)
+    known = contact(body.surface, bodies, mean_separation=u, theory=body.theory)
     spread = np.nan_to_num(known.scatter, nan=0.0)
     scatter = body.integral(found, found.raised(spread * found.p)) / force
     if body.integral(found, found.p * np.isnan(known.scatter)) > COUNTED * force:

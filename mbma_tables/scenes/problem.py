@@ -125,8 +125,10 @@ class Problem:
         needs_islands = bool(self.outputs.intersection(OF_ISLANDS))
         if self.dropped or needs_islands or self.island_model is not None:
             return "mbma"
-        by = "separation" if self.separations is not None else None
-        by_rule: str = theory_name(self.surface, None, by, variant=self.variant)
+        if get_variant(self.variant) != get_variant("reported"):
+            return "mbma"
+        given_name = "separation" if self.separations is not None else None
+        by_rule: str = theory_name(self.surface, None, given_name)
         return by_rule
 
     def _set_tolerance(self) -> None:

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
 from mbma_tables.common.units import unit_of
-from mbma_tables.contacts.source import MEANINGS
 from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.quantities.registry import registry
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -89,9 +90,10 @@ def _contact(run: Run, step: Step) -> None:
         arguments = {"separation": run.gap}
     else:
         arguments = {problem.prescribed[:-1]: problem.gaps}
-    if problem.hardness is not None:
-        arguments["hardness"] = problem.hardness
-    pressed = contact(run.surface, E_star=problem.E_star, theory=theory, **arguments)
+    bodies = Bodies(
+        problem.E_star, hardness=problem.hardness, conductivity=problem.conductivities
+    )
+    pressed = contact(run.surface, bodies, theory=theory, **arguments)
     if run.gap is None:
         run.gap = pressed.separation
     _keep_quantities(run, pressed)
@@ -115,8 +117,7 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
         names += YIELDED
     run.keep({name: getattr(pressed, name) for name in names})
     if "conductance" in requested:
-        assert problem.conductivities is not None
-        run.keep({"conductance": pressed.conductance(*problem.conductivities)})
+        run.keep({"conductance": pressed.conductance})
     if "leakage" in requested:
         leakage = pressed.leakage
         run.keep(
@@ -170,7 +171,7 @@ def _law(run: Run, step: Step) -> None:
     problem = run.problem
     assert step.rtol is not None
     assert problem.prescribed is not None
-    law = contact_law(run.surface, problem.theory, rtol=step.rtol, E_star=problem.E_star)
+    law = contact_law(run.surface, problem.E_star, theory=problem.theory, rtol=step.rtol)
     amplification = 1.0
     if problem.prescribed in INVERTED:
         run.gap = law.separation(**{problem.prescribed[:-1]: problem.gaps})
@@ -411,7 +412,9 @@ OF_SCENES = {
 
 def _units(problem: Problem) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every quantity that a scene can hold."""
-    quantities = {name: (name, text) for name, text in MEANINGS.items()}
+    quantities = {}
+    for name, declared in registry().items():
+        quantities[name] = (name, declared.meaning)
     quantities |= OF_SCENES
     quantities["area"] = ("area", "real contact area A/A0")
     if "subscale_area" in problem.dropped:

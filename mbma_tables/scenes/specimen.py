@@ -178,7 +178,7 @@ def read_specimen(path: pathlib.Path) -> Specimen:
     """The specimen of a TOML file with the tables [surface] and [material] of a scene."""
     entries = read_toml(path, "surface")
     tables = {name: schema()["properties"][name] for name in ("surface", "material")}
-    if "materials" in entries or "part_a" in entries:
+    if "bodies" in entries or "part_a" in entries:
         raise InputError(
             f"{path} describes a joint, not one surface: `mbma joint {path} --pressure 1MPa` has its results, and "
             f"`mbma joint {path} --export TARGET --pressures 1MPa:50MPa --out FILE` writes it for other programs"

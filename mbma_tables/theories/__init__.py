@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mbma_tables.theories.calibrated.theory import Calibrated
     from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
     from mbma_tables.theories.mbma.theory import Mbma
+    from mbma_tables.theories.mbma.variants import Variant as Variant
     from mbma_tables.theories.persson import Method, Persson
     from mbma_tables.theories.simulated.one_map import BoundaryElements
     from mbma_tables.theories.simulated.theory import Simulated
@@ -31,6 +32,7 @@ __all__ = [
     "Theory",
     "TheoryAnswer",
     "UserTheory",
+    "Variant",
     "default_theory",
     "get_theory",
     "theory_name",
@@ -47,6 +49,7 @@ _NAMED = {
 # a theory's module is imported when first needed
 _HOMES = {
     "Mbma": "mbma.theory",
+    "Variant": "mbma.variants",
     "Calibrated": "calibrated.theory",
     "Persson": "persson",
     "Method": "persson",
@@ -121,10 +124,9 @@ def default_theory(name: str) -> Theory:
 def theory_name(
     surface: AnySurface,
     theory: str | Theory | UserTheory | None,
-    by: str | None = None,
-    **options: Any,
+    given_name: str | None = None,
 ) -> Any:
-    """The given theory, or the default one: the rule of `contact`, laws, joints, scenes, exports and commands.
+    """The given theory, or the default one: the rule of contacts, laws, joints, scenes, exports and commands.
 
     Parameters
     ----------
@@ -132,34 +134,30 @@ def theory_name(
         One surface or a batch.
     theory : str, theory or None
         What the caller gave; anything but None is returned as it is.
-    by : str, optional
+    given_name : str, optional
         The quantity at which the contact is asked for, "separation", "mean_separation",
         "pressure" or "area"; None for laws and curves, which are functions of the mean
         separation.
-    **options
-        Values of `OPTIONS`, MBMA's own.
 
     Returns
     -------
     str or theory
-        By default "mbma" at a given separation d, which is MBMA's coordinate, or where an
-        option of MBMA differs from its default; else "simulated" for a surface opened from
-        the table of its simulation, and for a map that is resolved and of at most 2^18
-        points, and "calibrated" for every other surface.
+        By default "mbma" at a given separation d, which is MBMA's coordinate; else
+        "simulated" for a surface opened from the table of its simulation, and for a map that
+        is resolved and of at most 2^18 points; and "calibrated" for every other
+        surface.
 
     Examples
     --------
     >>> from mbma_tables import Surface
     >>> from mbma_tables.theories import theory_name
     >>> road = Surface.named("concrete")
-    >>> theory_name(road, None, "pressure"), theory_name(road, None, "separation")
-    ('calibrated', 'mbma')
-    >>> theory_name(road, None, "pressure", island_model="exact"), theory_name(road, "persson")
-    ('mbma', 'persson')
+    >>> theory_name(road, None, "pressure"), theory_name(road, None, "separation"), theory_name(road, "persson")
+    ('calibrated', 'mbma', 'persson')
     """
     if theory is not None:
         return theory
-    if by == "separation" or OPTIONS | options != OPTIONS:
+    if given_name == "separation":
         return "mbma"
     if getattr(surface, "table", None) is not None:
         return "simulated"

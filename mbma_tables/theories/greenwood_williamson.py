@@ -25,7 +25,7 @@ class GreenwoodWilliamson(Theory):
     Examples
     --------
     >>> from mbma_tables import Surface, contact
-    >>> found = contact(Surface.named("concrete"), separation=[0.2, 0.5], E_star=10.0, theory="greenwood_williamson")
+    >>> found = contact(Surface.named("concrete"), 10.0, separation=[0.2, 0.5], theory="greenwood_williamson")
     >>> found.area.round(4), found.pressure.round(4)
     (array([0.064 , 0.0056]), array([0.4545, 0.0334]))
     """

@@ -77,7 +77,7 @@ class Persson(Theory):
     >>> found.mean_separation.round(4), found.area.round(5)
     (array([0.6721, 0.3801]), array([0.00217, 0.02171]))
     >>> light = theories.Persson("simplified")
-    >>> print(f"{contact(Surface.named('concrete'), mean_separation=0.6, E_star=10.0, theory=light).pressure:.4f}")
+    >>> print(f"{contact(Surface.named('concrete'), 10.0, mean_separation=0.6, theory=light).pressure:.4f}")
     0.0184
     """
 

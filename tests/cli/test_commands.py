@@ -13,11 +13,11 @@ import pytest
 from click.testing import CliRunner
 from helpers import run, told
 
-from mbma_tables import Surface, contact, island
+from mbma_tables import Bodies, Surface, contact, island
 from mbma_tables.cli import main
 from mbma_tables.materials import effective_modulus
 from mbma_tables.scenes.specimen import MAP_OPTIONS, MATERIAL, NUMBERS, schema
-from mbma_tables.theories import THEORIES
+from mbma_tables.theories import THEORIES, Mbma
 
 YANG_PERSSON = {
     "hurst": 0.8,
@@ -82,7 +82,10 @@ def test_contact_json_is_the_librarys_answer_digit_for_digit():
     found = json.loads(run("contact", "--surface", "concrete", *arguments, "--json"))
     surface = Surface.named("concrete")
     answer = contact(
-        surface, separation=[0.5, -0.2, -1.1], island_model="rigid", E_star=7.5, rtol=1e-6
+        surface,
+        7.5,
+        separation=[0.5, -0.2, -1.1],
+        theory=Mbma(island_model="rigid", rtol=1e-6),
     )
     for name in ("separation", "mean_separation", "pressure", "area", "error"):
         assert found["columns"][name] == getattr(answer, name).tolist()
@@ -101,9 +104,7 @@ def test_contact_by_pressure_and_by_area(theory):
     asked = ("contact", "--surface", "concrete", "--theory", theory, "--json")
     # so large that scatter is known at both
     found = json.loads(run(*asked, "-p", "4e-3,8e-3", "--E-star", "5"))
-    answer = contact(
-        Surface.named("concrete"), pressure=[4e-3, 8e-3], E_star=5.0, theory=theory
-    )
+    answer = contact(Surface.named("concrete"), 5.0, pressure=[4e-3, 8e-3], theory=theory)
     for name in (
         "separation",
         "mean_separation",
@@ -209,7 +210,7 @@ def test_material_from_options_and_from_a_file(folder):
     ):
         found = json.loads(run("contact", *source, "-d", "0.3", "--json"))
         expected = float(
-            contact(Surface.named("concrete"), separation=0.3, E_star=E_star).pressure
+            contact(Surface.named("concrete"), E_star, separation=0.3).pressure
         )
         assert (found["E_star"], found["surface"]["length_unit"]) == (E_star, unit)
         assert found["columns"]["pressure"] == pytest.approx([expected], rel=1e-12)
@@ -230,7 +231,7 @@ def test_a_curve_and_its_picture_beside_other_theories(folder):
     )
     found = json.loads(run("curve", *arguments, "--json"))["columns"]
     surface, area = Surface.named("concrete"), np.array(found["area"])
-    known = contact(surface, separation=found["separation"], E_star=3.0)
+    known = contact(surface, 3.0, separation=found["separation"])
     np.testing.assert_array_equal(found["pressure"], known.pressure)
     assert (found["separation"][0], found["separation"][-1]) == (
         surface.h_max,
@@ -458,16 +459,16 @@ def test_conductance_of_one_or_two_bodies():
         "100kPa",
         "--json",
     )
-    face = contact(
-        Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa"
-    )
-    for given, unit, bodies in (
-        ("0.3", "conductivity/mm", (0.3,)),
+    surface = Surface.named("challenge").to("mm")
+    for given, unit, conductivities in (
+        ("0.3", "conductivity/mm", 0.3),
         ("0.3 W/(m K),0.5 W/(m K)", "W/(m^2 K)", ("0.3 W/(m K)", "0.5 W/(m K)")),
     ):
         answer = json.loads(run(*asked, "--conductivity", given))
+        bodies = Bodies("25 MPa", conductivity=conductivities)
+        face = contact(surface, bodies, pressure="100 kPa")
         assert answer["columns"]["conductance"] == pytest.approx(
-            [face.conductance(*bodies)], rel=1e-9
+            [face.conductance], rel=1e-9
         )
         assert answer["units"]["conductance"] == unit
     assert "one or two, got 3" in helpers.refused(*asked, "--conductivity", "1,2,3")

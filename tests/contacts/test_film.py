@@ -74,8 +74,8 @@ def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
 def test_the_asperity_pressure_is_as_valid_as_that_of_the_contact():
     """Flow through the lightest contacts is nearly that before contact; their pressure was not simulated."""
     u = np.array([0.8, 1.0, 1.5, 1.7])
-    found = flow_factors(BEARING, u, E_star="110 GPa", theory="calibrated")
-    known = contact(BEARING, mean_separation=u, E_star="110 GPa", theory="calibrated")
+    found = flow_factors(BEARING, u, "110 GPa", theory="calibrated")
+    known = contact(BEARING, "110 GPa", mean_separation=u, theory="calibrated")
     assert found.valid.all()
     np.testing.assert_array_equal(found.pressure_valid, known.valid)
     assert list(found.pressure_valid) == [True, True, False, False]
@@ -84,8 +84,8 @@ def test_the_asperity_pressure_is_as_valid_as_that_of_the_contact():
 
 def test_isotropic_factors_are_those_of_the_leakage():
     u = np.array([0.6, 1.0, 1.7, 4.0])
-    found = flow_factors(BEARING, u, E_star="110 GPa")
-    known = contact(BEARING, mean_separation=u, E_star="110 GPa", theory="calibrated")
+    found = flow_factors(BEARING, u, "110 GPa")
+    known = contact(BEARING, "110 GPa", mean_separation=u, theory="calibrated")
     np.testing.assert_allclose(found.phi_x, known.leakage.flow_factor)
     np.testing.assert_array_equal(found.phi_x, found.phi_y)
     np.testing.assert_array_equal(found.pressure, known.pressure)
@@ -169,7 +169,7 @@ test_what_is_refused = refusals(
 
 
 def test_units_and_what_is_not_valid(tmp_path):
-    film = flow_factors(BEARING, ["1 um", "2000 nm"], E_star="110 GPa", peklenik=2.0)
+    film = flow_factors(BEARING, ["1 um", "2000 nm"], "110 GPa", peklenik=2.0)
     data = film.to_dataset()
     assert (data["K_x"].attrs["units"], data["pressure"].attrs["units"]) == (
         "um^3",

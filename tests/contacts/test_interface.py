@@ -10,9 +10,17 @@ from helpers import refusals
 
 from generate.boundary_elements.solve import load_at
 from generate.boundary_elements.surfaces import Recipe, heights
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import (
+    Bodies,
+    InputError,
+    OutOfRangeError,
+    Surface,
+    contact,
+    contact_law,
+)
+from mbma_tables.bodies import mean_conductivity
 from mbma_tables.materials import tangential_ratio
-from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
+from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
 from mbma_tables.quantities.gas import R, jump_of, mean_inverse
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.simulated.boundary_elements import Contact
@@ -32,9 +40,9 @@ class Spheres:
 
 
 def sheared(u=2.5):
-    return contact(FACE, mean_separation=u, E_star=1e3, theory=Spheres()).tangential(
-        FRICTION, NU
-    )
+    bodies = Bodies(1e3, nu=NU)
+    pressed = contact(FACE, bodies, mean_separation=u, theory=Spheres())
+    return pressed.tangential(FRICTION)
 
 
 def test_spheres_are_those_of_cattaneo_mindlin_and_deresiewicz():
@@ -64,13 +72,12 @@ def test_spheres_are_those_of_cattaneo_mindlin_and_deresiewicz():
 
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_laws_answer_as_contacts_do(theory):
-    one = contact(FACE, pressure="10 MPa", E_star="100 GPa", theory=theory).tangential(
-        0.2, 0.3
-    )
-    law = contact_law(FACE, E_star="100 GPa", theory=theory)
-    two = law.tangential(pressure="10 MPa", friction=0.2, nu=0.3)
+    bodies = Bodies("100 GPa", nu=0.3)
+    one = contact(FACE, bodies, pressure="10 MPa", theory=theory).tangential(0.2)
+    law = contact_law(FACE, bodies, theory=theory)
+    two = law.tangential(pressure="10 MPa", friction=0.2)
     assert two.stiffness == pytest.approx(one.stiffness, rel=1e-5)
-    assert law.tangential(one.mean_separation, nu=0.3).stiffness == pytest.approx(
+    assert law.tangential(one.mean_separation).stiffness == pytest.approx(
         one.stiffness, rel=1e-5
     )
     for slid in ("10 nm", ["0.05 um", "0.1 um"]):
@@ -85,13 +92,13 @@ def test_laws_answer_as_contacts_do(theory):
 
 @pytest.mark.parametrize("of_law", [False, True])
 def test_a_sheared_contact_is_the_same_after_pickling(of_law):
-    given = {"E_star": "100 GPa", "theory": "calibrated"}
+    bodies = Bodies("100 GPa", nu=0.3)
     if of_law:
-        sheared = contact_law(FACE, **given).tangential(
-            pressure="10 MPa", friction=0.2, nu=0.3
-        )
+        law = contact_law(FACE, bodies, theory="calibrated")
+        sheared = law.tangential(pressure="10 MPa", friction=0.2)
     else:
-        sheared = contact(FACE, pressure="10 MPa", **given).tangential(0.2, 0.3)
+        pressed = contact(FACE, bodies, pressure="10 MPa", theory="calibrated")
+        sheared = pressed.tangential(0.2)
     copy = pickle.loads(pickle.dumps(sheared))
     assert copy.gross_slip == sheared.gross_slip
     for ask, value in (
@@ -104,31 +111,33 @@ def test_a_sheared_contact_is_the_same_after_pickling(of_law):
 
 @pytest.mark.parametrize("theory", ["calibrated", "mbma", "persson"])
 def test_with_a_hardness_full_stick_alone(theory):
-    given = {"E_star": "100 GPa", "theory": theory, "hardness": "1.5 GPa"}
-    joint = contact(FACE, pressure=["1 MPa", "10 MPa"], **given)
-    law = pickle.loads(pickle.dumps(contact_law(FACE, **given)))
+    bodies = Bodies("100 GPa", hardness="1.5 GPa", nu=0.3)
+    joint = contact(FACE, bodies, pressure=["1 MPa", "10 MPa"], theory=theory)
+    law = pickle.loads(pickle.dumps(contact_law(FACE, bodies, theory=theory)))
     np.testing.assert_allclose(
         law.unloading_stiffness(joint.mean_separation),
         joint.unloading_stiffness,
         rtol=1e-5,
     )
     assert (joint.unloading_stiffness > 1.1 * joint.stiffness).all()
+    without_poisson = dataclasses.replace(bodies, nu=0.0)
+    alike = contact(FACE, without_poisson, pressure=["1 MPa", "10 MPa"], theory=theory)
     np.testing.assert_allclose(
-        joint.tangential(nu=0.0).stiffness, joint.unloading_stiffness, rtol=1e-15
+        alike.tangential().stiffness, joint.unloading_stiffness, rtol=1e-15
     )
     np.testing.assert_allclose(
-        law.tangential(joint.mean_separation, nu=0.3).stiffness,
-        joint.tangential(nu=0.3).stiffness,
+        law.tangential(joint.mean_separation).stiffness,
+        joint.tangential().stiffness,
         rtol=1e-5,
     )
     for slips in (
-        joint.tangential(0.2, 0.3),
-        law.tangential(pressure="1 MPa", friction=0.2, nu=0.3),
+        joint.tangential(0.2),
+        law.tangential(pressure="1 MPa", friction=0.2),
     ):
         for ask in (slips.shear, slips.displacement, slips.energy_loss):
             with pytest.raises(InputError, match="contact that yields is not known"):
                 ask(0.0)
-    elastic = contact_law(FACE, E_star="100 GPa", theory=theory)
+    elastic = contact_law(FACE, "100 GPa", theory=theory)
     assert elastic.unloading_stiffness(2.0) == elastic.stiffness(2.0)
 
 
@@ -144,9 +153,9 @@ def test_two_bodies_add_their_compliances():
     assert tangential_ratio(0.5) == pytest.approx(1.5)
     named = contact(
         FACE,
+        ("steel 4140 hard", "aluminium 6061 hard"),
         pressure="10 MPa",
         theory="calibrated",
-        materials=("steel 4140 hard", "aluminium 6061 hard"),
     )
     known = named.tangential()
     assert known.ratio == pytest.approx(tangential_ratio((0.29, 0.33), (205.0, 69.0)))
@@ -164,20 +173,21 @@ def test_two_bodies_add_their_compliances():
         {},
     ):
         with pytest.raises(InputError):
-            contact(FACE, pressure="10 MPa", E_star="100 GPa").tangential(**wrong)
+            contact(FACE, Bodies("100 GPa", **wrong), pressure="10 MPa").tangential()
 
 
 def test_what_is_refused():
+    bodies = Bodies(nu=NU)
     found, apart, law = (
         sheared(),
-        contact(FACE, mean_separation=2.5, theory=Spheres()),
-        contact_law(FACE, "calibrated"),
+        contact(FACE, bodies, mean_separation=2.5, theory=Spheres()),
+        contact_law(FACE, bodies, theory="calibrated"),
     )
     cases = [
         (ask, (-0.1,), "at least 0")
         for ask in (found.shear, found.displacement, found.energy_loss)
     ]
-    cases += [(apart.tangential, (mu, NU), "friction") for mu in (0.0, -1.0, np.nan)]
+    cases += [(apart.tangential, (mu,), "friction") for mu in (0.0, -1.0, np.nan)]
     cases += [(found.displacement, (1e9,), "at most the friction times the pressure")]
     cases += [
         (found.shear, ("1 MPa",), "pressure= takes"),
@@ -189,22 +199,23 @@ def test_what_is_refused():
         ):
             ask(*given)
     with pytest.raises(InputError, match="slip needs friction"):
-        _ = apart.tangential(nu=NU).gross_slip
+        _ = apart.tangential().gross_slip
     with pytest.raises(InputError, match="one of them"):
-        law.tangential(mean_separation=2.0, pressure=1e-3, nu=0.3)
+        law.tangential(mean_separation=2.0, pressure=1e-3)
 
 
 def test_batches_and_data_arrays():
     xr = pytest.importorskip("xarray")
     u = np.array([1.5, 2.0, 2.5])
-    plain = contact(FACE, mean_separation=u, theory="calibrated").tangential(0.3, 0.3)
+    bodies = Bodies(nu=0.3)
+    plain = contact(FACE, bodies, mean_separation=u, theory="calibrated").tangential(0.3)
     batch = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=[3.0, 3.5, 4.0])
-    many = contact(batch, mean_separation=u, theory="calibrated").tangential(0.3, 0.3)
+    many = contact(batch, bodies, mean_separation=u, theory="calibrated").tangential(0.3)
     assert many.shear(0.1).shape == (3,)
     assert many.shear(0.1)[0] == pytest.approx(plain.shear(0.1)[0], rel=1e-9)
     named = contact(
-        FACE, mean_separation=xr.DataArray(u, dims="gap"), theory="calibrated"
-    ).tangential(0.3, 0.3)
+        FACE, bodies, mean_separation=xr.DataArray(u, dims="gap"), theory="calibrated"
+    ).tangential(0.3)
     np.testing.assert_allclose(named.shear(0.1).values, plain.shear(0.1), rtol=1e-12)
     assert named.stiffness.dims == ("gap",)
 
@@ -218,21 +229,21 @@ def test_a_lay_is_stiffer_across():
     q = np.geomspace(0.1, 3.0, 50)
     plain = MeasuredSurface(q, q**-3.6, h_max=8.0)
     stretched = dataclasses.replace(plain, anisotropy=4.0)
+    bodies = Bodies(nu=0.3)
     for area, expected in LAY_OF_FOUR.items():
-        isotropic = contact(plain, area=area).tangential(nu=0.3).stiffness
-        found = contact(stretched, area=area)
+        isotropic = contact(plain, bodies, area=area).tangential().stiffness
+        found = contact(stretched, bodies, area=area)
         for way, ratio in zip(("along", "across"), expected, strict=True):
-            assert found.tangential(
-                nu=0.3, direction=way
-            ).stiffness / isotropic == pytest.approx(ratio, abs=0.02)
+            stiffness = found.tangential(direction=way).stiffness
+            assert stiffness / isotropic == pytest.approx(ratio, abs=0.02)
     with pytest.raises(InputError, match="direction"):
-        found.tangential(nu=0.3)
+        found.tangential()
     with pytest.raises(InputError, match="anisotropy"):
-        contact(plain, area=0.1).tangential(nu=0.3, direction="along")
+        contact(plain, bodies, area=0.1).tangential(direction="along")
     with pytest.raises(InputError, match="slip"):
-        found.tangential(0.2, nu=0.3, direction="along").shear(1e-9)
+        found.tangential(0.2, direction="along").shear(1e-9)
     with pytest.raises(OutOfRangeError, match="area"):
-        contact(stretched, area=0.001).tangential(nu=0.3, direction="along")
+        contact(stretched, bodies, area=0.001).tangential(direction="along")
 
 
 @pytest.mark.parametrize("eta", [np.inf, 0.1])
@@ -308,9 +319,7 @@ def test_conductivities_of_other_tables():
 
 
 def test_contacts_have_it_in_watts():
-    joint = contact(
-        FACE, pressure=["1 MPa", "10 MPa"], theory="calibrated", materials="steel 1020"
-    )
+    joint = contact(FACE, "steel 1020", pressure=["1 MPa", "10 MPa"], theory="calibrated")
     k, jump = jump_of("air", 300.0, 101325.0)
     eta = 1 / joint.psi
     plain = (
@@ -323,25 +332,22 @@ def test_contacts_have_it_in_watts():
     assert (joint.gap_conductance("helium") > 2 * plain).all()
     assert (joint.gap_conductance("vacuum") == 0).all()
     in_mm = contact(
-        FACE.to("mm"),
-        pressure=["1 MPa", "10 MPa"],
-        theory="calibrated",
-        materials="steel 1020",
+        FACE.to("mm"), "steel 1020", pressure=["1 MPa", "10 MPa"], theory="calibrated"
     )
     np.testing.assert_allclose(in_mm.gap_conductance(), plain, rtol=1e-9)
     xr = pytest.importorskip("xarray")
     named = contact(
         FACE,
+        "steel 1020",
         pressure=xr.DataArray([1e-3, 1e-2], dims="load"),
         theory="calibrated",
-        materials="steel 1020",
     )
     np.testing.assert_allclose(named.gap_conductance().values, plain, rtol=1e-9)
 
 
 test_gases_that_are_refused = refusals(
     lambda face, given: contact(
-        face, area=0.01, theory="calibrated", E_star="10 GPa"
+        face, "10 GPa", area=0.01, theory="calibrated"
     ).gap_conductance(**given),
     (FACE, {"gas": "xenon"}, "no gas is named 'xenon'"),
     (FACE, {"temperature": 100.0}, "from 200 to 600 K"),

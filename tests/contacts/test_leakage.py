@@ -6,14 +6,14 @@ import pickle
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import fresh, random_map
+from helpers import contact_of, fresh, random_map
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import Surface, contact, contact_law
+from mbma_tables import Bodies, Surface, contact, contact_law
 from mbma_tables.common.errors import InputError, OutOfRangeError
-from mbma_tables.contacts.leakage import flow, flow_of_spectrum, shipped_flow
 from mbma_tables.quantities import effective_medium as leakage
+from mbma_tables.quantities.leakage import flow, flow_of_spectrum, shipped_flow
 from mbma_tables.theories.calibrated.formulas import Spectrum
 from mbma_tables.theories.evidence import shipped_part
 
@@ -22,11 +22,11 @@ REFERENCE = pathlib.Path(__file__).parents[2] / "docs" / "data" / "leakage.csv"
 
 
 def k_of(found):
-    return found.K / np.asarray(found._contact._source.surface.h_rms) ** 3
+    return found.K / np.asarray(found._contact.surface.h_rms) ** 3
 
 
-def asked(surface=SEAL, theory="calibrated", **known):
-    return contact(surface, theory=theory, **known).leakage
+def asked(surface=SEAL, bodies=1.0, theory="calibrated", **given):
+    return contact_of(surface, bodies, theory=theory, **given).leakage
 
 
 class TestLimits:
@@ -129,11 +129,11 @@ class TestRates:
     def test_liquid(self):
         # 1 mm wide open gap: h^3 dp/(12 eta L)
         plates = 1000.0**3 * 0.1 / (12 * 1e-9 * 1e4)  # um^3 MPa/(MPa s um)
-        wide = asked(mean_separation="1 mm", E_star="10 MPa")
+        wide = asked(bodies="10 MPa", mean_separation="1 mm")
         assert wide.liquid("1e-3 Pa s", "0.1 MPa", "10 mm") == pytest.approx(
             plates, rel=2e-6
         )
-        found = asked(area=0.1, E_star="10 MPa")
+        found = asked(bodies="10 MPa", area=0.1)
         plain = found.K * 0.1 / (12 * 1e-9 * 2000)  # MPa, MPa s, um
         for known in (("1e-3 Pa s", "0.1 MPa", "2 mm"), (1e-9, 0.1, 2000.0)):
             assert found.liquid(*known) == pytest.approx(plain, rel=1e-12)
@@ -194,7 +194,7 @@ class TestLaw:
         np.testing.assert_allclose(law.leakage((d + law.h_max) / 2), found, rtol=1e-9)
 
     def test_blocked_below_its_gap_and_apart_above_h_max(self):
-        law = contact_law(SEAL, E_star=10.0, theory="calibrated")
+        law = contact_law(SEAL, 10.0, theory="calibrated")
         at = 2 * law.leakage.blocked_at - law.h_max
         assert law.area(separation=at) == pytest.approx(
             shipped_flow().constants.threshold, rel=1e-9
@@ -207,7 +207,7 @@ class TestLaw:
         assert law.leakage(separation=at + 1e-6) > 0
 
     def test_falls_with_pressure_in_units_and_labels(self):
-        law = contact_law(SEAL, E_star="10 MPa", theory="calibrated")
+        law = contact_law(SEAL, "10 MPa", theory="calibrated")
         pressure = np.geomspace(1e-6, law.pressure(law.leakage.blocked_at), 300)
         found = law.leakage(pressure=pressure)
         assert np.all(np.diff(found) < 0)
@@ -227,7 +227,7 @@ class TestLaw:
 
     def test_gaps_that_never_block(self):
         # the model's area stays far below the threshold here, and gaps close as u
-        law = contact_law(Surface(0.3, 0.02, 160.0, 3.0, 9.0), "mbma")
+        law = contact_law(Surface(0.3, 0.02, 160.0, 3.0, 9.0), theory="mbma")
         assert law.leakage.blocked_at == -np.inf
         k = law.leakage(separation=-9.0 + np.array([1e-9, 1e-6]))
         assert k[1] / k[0] == pytest.approx(1e9, rel=1e-4)
@@ -321,9 +321,8 @@ def test_rates_of_named_arrays_keep_their_dimensions_and_units():
         xr.DataArray([1.9, 2.0], dims="gap"),
         xr.DataArray([2.0, 3.0, 4.0], dims="width"),
     )
-    known = {"theory": "calibrated", "E_star": "10 MPa"}
-    named = contact(seal, mean_separation=gaps, **known).leakage
-    plain = contact(seal, mean_separation=gaps.values[:, None], **known).leakage
+    named = asked(seal, "10 MPa", mean_separation=gaps)
+    plain = asked(seal, "10 MPa", mean_separation=gaps.values[:, None])
     found, expected = (
         named.liquid("1e-3 Pa s", "0.1 MPa", width),
         plain.liquid("1e-3 Pa s", "0.1 MPa", width.values),
@@ -357,13 +356,13 @@ def test_waves_of_a_map_that_are_rounding_alone_do_not_stop_it():
 def test_a_yielded_contact_is_not_called_blocked(pressure):
     """Simulated yielded contacts leak where the elastic contact of the same area blocks."""
     face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
-    asked = {"E_star": "58 GPa", "hardness": "0.95 GPa", "theory": "calibrated"}
-    leak = contact(face, pressure=pressure, **asked).leakage
+    bodies = Bodies("58 GPa", hardness="0.95 GPa")
+    leak = asked(face, bodies, pressure=pressure)
     heavy = np.ravel(leak.K)[-1]
     assert np.isnan(heavy)
     assert not np.any(leak.blocked)
     assert not np.any(leak.valid)
-    law = contact_law(face, **asked)
+    law = contact_law(face, bodies, theory="calibrated")
     assert np.isnan(np.ravel(law.leakage(pressure=pressure))[-1])
     assert np.isnan(law.leakage(0.99 * law.leakage.blocked_at))
     assert law.leakage(1.01 * law.leakage.blocked_at) > 0
@@ -371,7 +370,7 @@ def test_a_yielded_contact_is_not_called_blocked(pressure):
 
 def test_the_separation_at_which_gaps_block_is_a_mean_separation():
     law = contact_law(
-        Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5), "calibrated"
+        Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5), theory="calibrated"
     )
     u = law.leakage.blocked_at
     assert law.area(u) == pytest.approx(

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 from catalogue import LEVEL, OWN
-from helpers import difference_weights, random_map, refusals, run
+from helpers import difference_weights, random_map, refusals, run, sensitivity_of
 
-from mbma_tables import InputError, Surface, contact, sensitivity
+from mbma_tables import Bodies, InputError, Surface, contact, sensitivity
 from mbma_tables.theories import THEORIES, Mbma
 from mbma_tables.theories.mbma.geometry import kinks
 from mbma_tables.theories.mbma.variants import get_variant
@@ -58,9 +58,7 @@ def differences(numbers, variant, step, names):
     found = contact(
         Surface(*points[:5]),
         separation=points[5],
-        island_model="exact",
-        variant=variant,
-        rtol=1e-11,
+        theory=Mbma(island_model="exact", variant=variant, rtol=1e-11),
     )
     return [
         np.einsum("nk,nk->n", spans, values) for values in (found.pressure, found.area)
@@ -122,8 +120,7 @@ def test_sensitivity_against_differences(case, variant):
 def test_units_shapes_and_no_contact():
     surface, gap = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4), np.array([1.0, 2.4, 5.0])
     found, stiff = (
-        contact(surface, separation=gap, E_star=e).stiffness
-        for e in (1.0, [2.0, 3.0, 4.0])
+        contact(surface, e, separation=gap).stiffness for e in (1.0, [2.0, 3.0, 4.0])
     )
     assert found.shape == (2, 3)
     assert (found[:, 1:] == 0).all()
@@ -144,7 +141,7 @@ SLOW = [
 @pytest.mark.parametrize("theory", SLOW)
 @pytest.mark.parametrize("by", HELD)
 def test_answers_scale_as_they_must(theory, by):
-    found = sensitivity(SURFACE, **{by: HELD[by]}, E_star="10 GPa", theory=theory)
+    found = sensitivity_of(SURFACE, "10 GPa", **{by: HELD[by]}, theory=theory)
     powers = {
         "mean_separation": (1, 0),
         "pressure": (0, 1),
@@ -170,7 +167,7 @@ def test_answers_scale_as_they_must(theory, by):
 def test_numbers_of_a_drawing_are_the_unknowns():
     drawing = {"hurst": 0.8, "Ra": 0.4, "Rdq": 0.1, "longest": 100.0, "h_max": 1.8}
     surface = Surface.from_roughness(**drawing, unit="um")
-    found = sensitivity(surface, pressure=0.02, E_star=10.0, theory="persson")
+    found = sensitivity(surface, 10.0, pressure=0.02, theory="persson")
     assert list(found.parameters) == [
         "hurst",
         "Ra",
@@ -184,7 +181,7 @@ def test_numbers_of_a_drawing_are_the_unknowns():
     slopes = {name: row["area"] for name, row in found.slopes.items()}
     assert slopes["Rdq"] == pytest.approx(-slopes["pressure"], abs=1e-6)
     assert max(abs(slopes[name]) for name in ("hurst", "Ra", "h_max", "longest")) < 1e-6
-    assert "q1" in sensitivity(surface.to("mm"), pressure=0.02, E_star=10.0).parameters
+    assert "q1" in sensitivity(surface.to("mm"), 10.0, pressure=0.02).parameters
     moved = sensitivity(
         dataclasses.replace(surface, h_max=2.5), mean_separation=1.0, theory="calibrated"
     )
@@ -193,7 +190,7 @@ def test_numbers_of_a_drawing_are_the_unknowns():
 
 
 test_what_is_refused = refusals(
-    lambda changed: sensitivity(**({"surface": SURFACE, "E_star": 10.0} | changed)),
+    lambda changed: sensitivity_of(**({"surface": SURFACE, "bodies": 10.0} | changed)),
     ({}, "give exactly one of separation"),
     ({"pressure": 0.1, "area": 0.1}, "got pressure and area"),
     ({"separation": 2.0}, "there is no contact at this separation"),
@@ -208,7 +205,7 @@ test_what_is_refused = refusals(
 def test_the_command():
     arguments = ["--surface", "challenge", "--E-star", "25MPa", "-p", "100kPa"]
     answer = json.loads(run("sensitivity", *arguments, "--json"))
-    found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa")
+    found = sensitivity(Surface.named("challenge"), "25 MPa", pressure=0.1)
     assert answer["slopes"] == found.slopes
     assert [answer["units"][name] for name in found.parameters] == [
         "-",
@@ -229,7 +226,7 @@ def test_a_spectrum_in_samples_has_the_slopes_of_its_five_numbers(theory):
         q, SURFACE.power_spectrum(q), h_max=SURFACE.h_max, unit="um"
     )
     found, five = (
-        sensitivity(s, pressure=0.03, E_star="10 GPa", theory=theory).slopes
+        sensitivity(s, "10 GPa", pressure=0.03, theory=theory).slopes
         for s in (sampled, SURFACE)
     )
     for answer, slope in found["heights"].items():
@@ -248,7 +245,7 @@ def test_a_spectrum_in_samples_has_the_slopes_of_its_five_numbers(theory):
         h_rms=SURFACE.h_rms * float(short.s / short.h_rms * SURFACE.h_rms / SURFACE.s),
     )
     areas = [
-        float(contact(s, pressure=0.03, E_star="10 GPa", theory=theory).area)
+        float(contact(s, "10 GPa", pressure=0.03, theory=theory).area)
         for s in (short, SURFACE)
     ]
     assert found["shortest"]["area"] == pytest.approx(
@@ -259,7 +256,7 @@ def test_a_spectrum_in_samples_has_the_slopes_of_its_five_numbers(theory):
 def test_unknowns_of_a_map_and_of_its_extrapolation():
     heights = 0.1 * random_map(64, 0.03, 0.25, power=0)
     given = {"pressure": 0.01, "theory": "calibrated"}
-    found = sensitivity(Surface.from_map(heights, 1.0, periodic=True), **given)
+    found = sensitivity_of(Surface.from_map(heights, 1.0, periodic=True), **given)
     assert set(found.slopes) == {"heights", "lengths", "pressure"}
     # a force over E* and the gradient, whatever the size
     assert found.slopes["heights"]["area"] == pytest.approx(
@@ -271,14 +268,13 @@ def test_unknowns_of_a_map_and_of_its_extrapolation():
     longer = Surface.from_map(
         heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8
     )
-    assert sensitivity(longer, **given).slopes["extrapolate_hurst"]["area"] > 0
+    assert sensitivity_of(longer, **given).slopes["extrapolate_hurst"]["area"] > 0
 
 
-def simulated_anew(heights, spacing, **given):
+def simulated_anew(heights, spacing, modulus="30 GPa", pressure="0.1 GPa"):
     """Logarithms of the answers of a map, which is simulated for this call."""
-    pressed = contact(
-        Surface.from_map(heights, spacing, periodic=True, unit="um"), **given
-    )
+    surface = Surface.from_map(heights, spacing, periodic=True, unit="um")
+    pressed = contact(surface, modulus, pressure=pressure, theory="simulated")
     known = (
         pressed.mean_separation,
         pressed.area,
@@ -292,22 +288,16 @@ def simulated_anew(heights, spacing, **given):
 def test_a_map_answers_by_the_theory_that_contact_takes():
     """Maps with larger heights and lengths, simulated each, have the differences that the rows give."""
     heights, step = 0.1 * random_map(64, 0.03, 0.2, power=0), 0.01
-    given = {"pressure": "0.1 GPa", "theory": "simulated", "E_star": "30 GPa"}
     surface = Surface.from_map(heights, 1.0, periodic=True, unit="um")
-    slopes = sensitivity(surface, **given).slopes
+    slopes = sensitivity(surface, "30 GPa", pressure="0.1 GPa", theory="simulated").slopes
     rows = {
-        "heights": [
-            simulated_anew(heights * (1 + sign * step), 1.0, **given) for sign in (1, -1)
-        ],
-        "lengths": [
-            simulated_anew(heights, 1 + sign * step, **given) for sign in (1, -1)
-        ],
+        "heights": [simulated_anew(heights * (1 + sign * step), 1.0) for sign in (1, -1)],
+        "lengths": [simulated_anew(heights, 1 + sign * step) for sign in (1, -1)],
     }
-    for name, change in (("pressure", 0.1), ("E_star", 30.0)):
-        texts = [f"{change * (1 + sign * step)!r} GPa" for sign in (1, -1)]
-        rows[name] = [
-            simulated_anew(heights, 1.0, **given | {name: text}) for text in texts
-        ]
+    pressures = [f"{0.1 * (1 + sign * step)!r} GPa" for sign in (1, -1)]
+    moduli = [f"{30.0 * (1 + sign * step)!r} GPa" for sign in (1, -1)]
+    rows["pressure"] = [simulated_anew(heights, 1.0, pressure=text) for text in pressures]
+    rows["E_star"] = [simulated_anew(heights, 1.0, modulus=text) for text in moduli]
     # conductance is the stiffness over the modulus
     for row, sign in zip(rows["E_star"], (1, -1), strict=True):
         row[3] -= np.log(1 + sign * step)
@@ -320,7 +310,12 @@ def test_a_map_answers_by_the_theory_that_contact_takes():
         differences_by_hand = (up - down) / np.log((1 + step) / (1 - step))
         np.testing.assert_allclose(known, differences_by_hand, atol=0.01, err_msg=name)
     with pytest.raises(InputError, match="theory='calibrated'"):
-        sensitivity(surface, hardness="0.6 GPa", **given)
+        sensitivity(
+            surface,
+            Bodies("30 GPa", hardness="0.6 GPa"),
+            pressure="0.1 GPa",
+            theory="simulated",
+        )
 
 
 @pytest.mark.slow

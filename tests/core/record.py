@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbma_tables import Bodies
 from mbma_tables import core as package
+from mbma_tables.theories import Mbma
 
 MOST_CALLS = 12  # of each function
 MOST_BYTES = 5_000_000  # of an array
@@ -103,8 +105,8 @@ def use():
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
     many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)
     assert contact(one, separation=[0.5, 1.0]).stiffness.all()
-    contact(many, separation=np.linspace(-2, 2.9, 40), rtol=1e-6)
-    law, gaps = contact_law(one, "mbma"), np.linspace(-2.9, 2.9, 100)
+    contact(many, separation=np.linspace(-2, 2.9, 40), theory=Mbma(rtol=1e-6))
+    law, gaps = contact_law(one, theory="mbma"), np.linspace(-2.9, 2.9, 100)
     for quantity in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy):
         quantity(separation=0.5)
         quantity(separation=np.linspace(-2.9, 2.9, 2000))
@@ -115,11 +117,11 @@ def use():
         for cap in (np.inf, 0.05):
             found = contact(
                 one,
+                Bodies(hardness=cap),
                 mean_separation=np.linspace(0.2, 2.5, 30),
                 theory=theory,
-                hardness=cap,
             )
-            contact(one, pressure=found.pressure, theory=theory, hardness=cap)
+            contact(one, Bodies(hardness=cap), pressure=found.pressure, theory=theory)
     contact(many, mean_separation=1.0, theory="calibrated")
     # outside the calibrated table
     contact(Surface(0.05, 1.0, 30.0, 1.0, 3.0), pressure=[0.01, 0.1], theory="calibrated")

@@ -7,8 +7,9 @@ import shutil
 
 import numpy as np
 import pytest
+from helpers import law_of_names
 
-from mbma_tables import ContactLaw, Surface, contact_law
+from mbma_tables import ContactLaw, Surface
 from mbma_tables.export.law_code import law_text
 
 PLAIN = (
@@ -70,7 +71,7 @@ class Points:
 
     def assert_slopes(self, conductance, sheared):
         """Conductance and tangential stiffness by the unloading stiffness."""
-        law, factor = self.law.unloading
+        law, factor = self.law.unloading()
         slope = factor * np.asarray(law.stiffness(separation=self.law.h_max - 2 * self.c))
         allowed = 1e-11 * np.maximum(np.abs(slope), 1e-2 * self.p / np.abs(self.c))
         assert (np.abs(conductance * 13.3 / CONDUCTIVITY - slope) <= allowed).all()
@@ -94,7 +95,7 @@ class Points:
 @functools.cache
 def points(name):
     surface, options = ASKED[name]
-    law = contact_law(surface, E_star="13.3 MPa", **options)
+    law = law_of_names(surface, "13.3 MPa", **options)
     h, rng = law.h_max, np.random.default_rng(18)
     ends = math.isinf(law.highest)
     near = h - 2 * h * 10 ** rng.uniform(-12, -0.6, POINTS // 2)

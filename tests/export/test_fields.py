@@ -54,13 +54,13 @@ def test_rows_of_a_film_are_the_flow_factors():
     film = rows_of(**FILM)
     assert (film.x.size, film.quantity) == (200, "film")
     assert film.x[[0, -1]] == pytest.approx([1e-7, 5e-6], rel=1e-8)
-    own = flow_factors(BEARING, film.x * 1e6, E_star="110 GPa", peklenik=3)
+    own = flow_factors(BEARING, film.x * 1e6, "110 GPa", peklenik=3)
     for name, (values, unit) in list(film.columns.items())[1:-1]:
         scale = 1e9 if unit == "Pa" else 1
         np.testing.assert_allclose(
             values, scale * np.asarray(getattr(own, name)), rtol=1e-6, err_msg=name
         )
-    law = contact_law(BEARING, "calibrated", E_star="110 GPa")
+    law = contact_law(BEARING, "110 GPa", theory="calibrated")
     inner = film.x < 1.5e-6
     np.testing.assert_allclose(
         film.more["stiffness"][0][inner],
@@ -73,7 +73,7 @@ def test_rows_of_a_film_are_the_flow_factors():
 def test_the_stated_error_of_a_film_is_its_largest(rows):
     film = rows_of(**FILM, rows=rows)
     u = np.random.default_rng(3).uniform(film.x[0], film.x[-1], 2000)
-    own = flow_factors(BEARING, u * 1e6, E_star="110 GPa", peklenik=3)
+    own = flow_factors(BEARING, u * 1e6, "110 GPa", peklenik=3)
     off = []
     for name in ("phi_x", "phi_y", "shear_x", "shear_y", "pressure"):
         value = np.asarray(getattr(own, name)) * (1e9 if name == "pressure" else 1)
@@ -172,7 +172,7 @@ def test_geos_takes_the_tables():
         ]
         for found in root.iter("TableFunction")
     }
-    own = contact_law(BEARING, "calibrated", E_star="110 GPa")
+    own = contact_law(BEARING, "110 GPa", theory="calibrated")
     aperture = lambda u: np.cbrt(np.asarray(own.leakage(u * 1e6))) * 1e-6  # noqa: E731
     # `validateApertureTable`: ends at zero with a slope below 1; coordinates rise
     jump, w = held["rough_byJump"]

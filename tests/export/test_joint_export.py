@@ -32,7 +32,7 @@ ROUTINES = ("abaqus-uinter", "abaqus-gapcon", "calculix-gapcon")
 def joint():
     parts = FACE, FACE | {"Rq": "0.7 um"}
     return Joint(
-        *parts, materials=METALS, nominal_area="4 cm^2", friction=0.2, theory="calibrated"
+        *parts, bodies=METALS, nominal_area="4 cm^2", friction=0.2, theory="calibrated"
     )
 
 

@@ -14,10 +14,10 @@ import types
 import law_points
 import numpy as np
 import pytest
-from helpers import compiled_law, refusals
+from helpers import compiled_law, law_of_names, refusals
 from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 
-from mbma_tables import Surface, contact, contact_law
+from mbma_tables import Surface, contact
 from mbma_tables.core import core
 from mbma_tables.export import LAWS
 from mbma_tables.export.law_code import asked_law, core_text, law_files, law_text, text_of
@@ -368,8 +368,8 @@ def test_laws_of_any_modulus_are_written():
         c = surface.h_max * np.arange(1, 64) / 64
         known = contact(
             surface,
+            modulus,
             mean_separation=surface.h_max - c,
-            E_star=modulus,
             theory="greenwood_williamson",
         )
         # doubles near the smallest one have fewer digits, in the polynomials too
@@ -749,7 +749,7 @@ def test_c_of_a_polynomial_over_many_decades(tmp_path):
     u = 0.125 * (1 - np.geomspace(1e-12, 1, 500)[:-1])
     found = compiled_law(tmp_path / "law.c", *STRICT)("pressure", 0.125 - u)
     np.testing.assert_allclose(
-        found, contact_law(surface, E_star="1 MPa", **asked).pressure(u), rtol=1e-10
+        found, law_of_names(surface, "1 MPa", **asked).pressure(u), rtol=1e-10
     )
 
 

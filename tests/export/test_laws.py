@@ -10,11 +10,11 @@ import pytest
 from helpers import refusals
 from law_points import PLAIN
 
-from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
+from mbma_tables import Bodies, InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.export import data, law_table, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix
-from mbma_tables.theories import THEORIES
+from mbma_tables.theories import THEORIES, Mbma
 from mbma_tables.theories.mbma.variants import PRINTED
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
@@ -43,7 +43,7 @@ def test_rows_of_any_theory(theory):
     )
     x = np.append(np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500), near)
     model = contact(
-        CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory
+        CONCRETE, 13.3, mean_separation=CONCRETE.h_max - x, theory=theory
     ).pressure
     kept = model > FLOOR * law.y[-1]
     assert (
@@ -75,13 +75,13 @@ def test_the_header_says_from_where_a_law_is_valid(pressures):
         rows=40,
         pressures=pressures,
     )
-    root = contact(surface, area=1e-3, E_star=115e3, theory="calibrated").pressure
+    root = contact(surface, 115e3, area=1e-3, theory="calibrated").pressure
     (light,) = (
         line for line in law.comments if line.startswith("not valid") and "0.001" in line
     )
     said = float(light.split("below p = ")[1].split()[0])
     assert root <= said <= root * 1.001
-    found = contact(surface, pressure=[0.01, said], E_star=115e3, theory="calibrated")
+    found = contact(surface, 115e3, pressure=[0.01, said], theory="calibrated")
     assert found.valid.tolist() == [False, True]
 
 
@@ -94,7 +94,7 @@ def test_the_header_says_up_to_where_a_law_is_valid():
         if line.startswith("not valid") and "areas" in line
     )
     root, said = (
-        contact(CONCRETE, area=0.1, E_star=13.3, theory="mbma").pressure,
+        contact(CONCRETE, 13.3, area=0.1, theory="mbma").pressure,
         float(areas.split("above p = ")[1].split()[0]),
     )
     assert root * 0.999 <= said <= root
@@ -115,7 +115,7 @@ def test_the_stated_error_and_better_than_even_rows(name, rows):
     law = law_of(surface, rows=rows)
     x = np.random.default_rng(rows).uniform(0, law.x[-1], 2000)
     gaps = np.maximum(surface.h_max - 2 * x, -surface.h_max)
-    model = contact(surface, separation=gaps, E_star=13.3, rtol=1e-9).pressure
+    model = contact(surface, 13.3, separation=gaps, theory=Mbma(rtol=1e-9)).pressure
     kept = model > FLOOR * law.y[-1]
     error = np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max()
     assert 0.5 * law.largest_error <= error <= 1.02 * law.largest_error
@@ -285,7 +285,7 @@ def test_rows_without_a_last_contact_begin_with_one_step():
 def test_rows_of_leakage_without_a_block():
     surface = Surface(0.8, 1.0, 1e3, 1.0, 3.0, unit="mm")  # 26% contact at most
     law = describe_law(surface, "900 MPa", quantity="leakage", rtol=1e-2, theory="mbma")
-    known = contact_law(surface, "mbma", E_star=900.0)
+    known = contact_law(surface, 900.0, theory="mbma")
     assert law.y[-1] == 0
     assert known.leakage.blocked_at == -np.inf
     assert "where contact blocks" not in " ".join(law.comments)
@@ -304,7 +304,7 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
     asked = HEAT if quantity == "conductance" else {}
     law = law_of(rows=None, rtol=1e-2, pressures=("10 Pa", 0.1), theory=theory, **asked)
     pressure = np.geomspace(1.001e-5, 0.0999, 400)
-    found = contact(CONCRETE, pressure=pressure, E_star=13.3, theory=theory)
+    found = contact(CONCRETE, 13.3, pressure=pressure, theory=theory)
     if quantity == "pressure":
         model, read = (
             pressure,
@@ -335,9 +335,7 @@ def test_rows_reach_the_largest_pressure(target, largest, choice):
     assert p[-1] >= largest
     at = (
         CONCRETE.h_max
-        - contact(
-            CONCRETE, pressure=largest, E_star=13.3, theory="calibrated"
-        ).mean_separation
+        - contact(CONCRETE, 13.3, pressure=largest, theory="calibrated").mean_separation
     )
     # the law itself is within 6e-6 of the theory
     assert np.interp(at * (1 + 1e-4), c, p) >= largest
@@ -355,7 +353,7 @@ def test_rows_against_pressure_reach_the_largest(quantity):
         )
     )
     assert law.x[-1] >= 0.1234567890123
-    found = contact(CONCRETE, pressure=0.1234567890123, E_star=13.3, theory="calibrated")
+    found = contact(CONCRETE, 13.3, pressure=0.1234567890123, theory="calibrated")
     model = found.stiffness * 50.0 / 13.3 if heat else found.leakage.K
     assert law.y[-1] == pytest.approx(model, rel=law.largest_error + 1e-4)
     if law.behaviour:
@@ -368,7 +366,7 @@ def test_rows_of_leakage_are_the_contacts_flow_to_the_blocked_pressure():
     assert law.x[0] == law.y[-1] == 0
     assert (np.diff(law.y) < 0).all()
     pressure = np.geomspace(law.x[1], law.x[-2], 400)
-    model = contact(CONCRETE, pressure=pressure, E_star=13.3, theory="calibrated")
+    model = contact(CONCRETE, 13.3, pressure=pressure, theory="calibrated")
     error = (
         np.interp(pressure, law.x, law.y)
         / np.where(model.area < 0.3, model.leakage.K, np.nan)
@@ -405,7 +403,7 @@ def test_rows_of_a_law_with_a_hardness():
     )
     asked = {"hardness": "1500 MPa", "pressures": ("1 MPa", "500 MPa")}
     known = functools.partial(
-        contact, HARD, E_star=100e3, theory="calibrated", hardness=1500.0
+        contact, HARD, Bodies(100e3, hardness=1500.0), theory="calibrated"
     )
     law, elastic = joint(**asked), joint()
     # chords lie about the law by as much as they may miss it

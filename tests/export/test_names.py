@@ -338,7 +338,7 @@ def rows():
 def test_messages_move_no_cursor():
     said = []
     for ask in (
-        lambda: contact(ROAD, pressure="1 \x1b[2Jkg", E_star="13.3 MPa"),
+        lambda: contact(ROAD, "13.3 MPa", pressure="1 \x1b[2Jkg"),
         lambda: Surface.from_map("no\x1b[31m\x07such\u202emap.csv"),
         lambda: ROAD.to("\x9b31m"),
     ):
@@ -346,8 +346,8 @@ def test_messages_move_no_cursor():
             ask()
         said.append(str(caught.value))
     said += [
-        repr(contact_law(ROAD, Renamed(), E_star="13.3 MPa")),
-        repr(contact(ROAD, pressure="1 kPa", E_star="13.3 MPa", theory=Renamed())),
+        repr(contact_law(ROAD, "13.3 MPa", Renamed())),
+        repr(contact(ROAD, "13.3 MPa", pressure="1 kPa", theory=Renamed())),
         repr(rows()),
     ]
     for text in said:

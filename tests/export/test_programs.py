@@ -113,7 +113,7 @@ def conductance(flux, side=10.0):
 
 @needs("ccx")
 def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
-    law = contact_law(ROUGH, "mbma", E_star="25 MPa")
+    law = contact_law(ROUGH, "25 MPa", theory="mbma")
     asked = HEAT | {"pressures": ("10 kPa", "2 MPa"), "rows": 20, "theory": "mbma"}
     rows = describe_law(ROUGH, "25 MPa", quantity="conductance", **asked)
     card, c = (
@@ -162,7 +162,7 @@ def test_calculix_feels_the_law(tmp_path, length, stress, theory):
         theory=theory,
     )
     pressures = np.geomspace(1.01e-5, 0.99, 30) * top
-    found = contact(surface, pressure=pressures, E_star=E_star, theory=theory)
+    found = contact(surface, E_star, pressure=pressures, theory=theory)
     deck = pressed(
         solvers.calculix(law),
         float(surface.h_max) - found.mean_separation,
@@ -194,7 +194,7 @@ def test_calculix_feels_rows_of_nanometres_in_any_unit(tmp_path, length, side):
         rtol=1e-3,
     )
     pressures = np.geomspace(1.01 * low, 0.99 * high, 15)
-    found = contact(surface, pressure=pressures, E_star=E_star, theory="calibrated")
+    found = contact(surface, E_star, pressure=pressures, theory="calibrated")
     deck = pressed(
         solvers.calculix(law),
         float(surface.h_max) - found.mean_separation,
@@ -257,7 +257,7 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
     forces = (f"*CLOAD\n{each(TOP, f'3, {-p * side**2 / 4:.9e}')}" for p in pressures)
     said, _, flux = calculix(heated(card, forces, side, 1e6 * unit), tmp_path, side)
     assert len(flux) == 8, said.stdout[-2000:]
-    found = contact(ROUGH.to(length), pressure=pressures, E_star=25 * unit, theory="mbma")
+    found = contact(ROUGH.to(length), 25 * unit, pressure=pressures, theory="mbma")
     np.testing.assert_allclose(
         conductance(flux, side), found.stiffness * CONDUCTIVITY / (25 * unit), rtol=1e-2
     )

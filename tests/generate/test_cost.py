@@ -10,6 +10,7 @@ from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
 from mbma_tables import contact
 from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma import greenwood_tripp
 
 COST, SECONDS = 2.0, 1e-3
@@ -30,8 +31,7 @@ def test_references_agree_with_the_solver():
     answer = contact(
         surface,
         separation=cost.gaps_of(surface)[:: cost.EVERY],
-        island_model="exact",
-        rtol=1e-10,
+        theory=Mbma(island_model="exact", rtol=1e-10),
     )
     for name in ("pressure", "area"):
         assert getattr(answer, name) == pytest.approx(truth[name], rel=1e-10, abs=0)

@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from helpers import Springs, refusals
+from helpers import Springs, contact_of, refusals
 
-from mbma_tables import InputError, Scene, Surface, contact
-from mbma_tables.quantities.conductance import mean_conductivity
+from mbma_tables import Bodies, InputError, Scene, Surface, contact
+from mbma_tables.bodies import mean_conductivity
 from mbma_tables.theories import THEORIES
 
 CONCRETE = Surface.named("concrete")
@@ -29,7 +29,7 @@ def test_quantities_at_a_pressure_are_the_contacts(theory):
     found = scene_of(
         theory, effects=QUANTITIES, pressures=PRESSURES, conductivities=(1.0, 3.0)
     ).run()
-    truth = contact(CONCRETE, pressure=PRESSURES, E_star=MODULUS, theory=theory)
+    truth = contact(CONCRETE, MODULUS, pressure=PRESSURES, theory=theory)
     expected = {
         "separation": truth.separation,
         "mean_separation": truth.mean_separation,
@@ -74,7 +74,7 @@ def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
     ).error.max()
     rtol = max(1e-5, 3 * own)
     some = slice(None, None, 3700)
-    truth = contact(CONCRETE, mean_separation=u[some], E_star=MODULUS, theory=theory)
+    truth = contact(CONCRETE, MODULUS, mean_separation=u[some], theory=theory)
     for asked, by_law, seen in ((u, True, some), (u[some], False, slice(None))):
         scene = scene_of(theory, mean_separations=asked, rtol=rtol)
         (step,) = scene.plan().steps
@@ -147,9 +147,8 @@ def test_a_scene_yields_as_contact_does(theory):
     found = scene.run()
     known = contact(
         SURFACE,
+        Bodies(100e3, hardness=1500.0),
         pressure=PRESSED["pressures"],
-        E_star=100e3,
-        hardness=1500.0,
         theory=theory,
     )
     for name in (
@@ -182,15 +181,13 @@ def test_theories_beside_one_another(cap):
     effects = ["pressure", "area", "comparison", *(["yield"] if cap else [])]
     found = Scene(SURFACE, effects, theories=others, theory="mbma", **asked).run()
     for name in others:
-        known = contact(
-            SURFACE, mean_separation=[0.5, 1.5], E_star=100e3, theory=name, **cap
-        )
+        known = contact_of(SURFACE, 100e3, mean_separation=[0.5, 1.5], theory=name, **cap)
         for quantity in ("pressure", "area"):
             assert found[f"{name}_{quantity}"].values == pytest.approx(
                 getattr(known, quantity), rel=1e-9
             )
     elastic = Scene(**PRESSED, effects=["area"], theory="calibrated").run()
-    known = contact(SURFACE, pressure=1.0, E_star=100e3, theory="calibrated")
+    known = contact(SURFACE, 100e3, pressure=1.0, theory="calibrated")
     assert elastic.attrs["elastic_hardness"] == pytest.approx(known.elastic_hardness)
     assert f"elastic_hardness {float(known.elastic_hardness):.4g}" in repr(known)
 
@@ -214,14 +211,15 @@ def test_a_file_may_call_for_it():
     }
     found = Scene.from_mapping(content).run()
     known = contact(
-        SURFACE, pressure=30.0, E_star=100e3, hardness=1500.0, theory="calibrated"
+        SURFACE,
+        Bodies(100e3, hardness=1500.0, conductivity=(16.0, 167.0)),
+        pressure=30.0,
+        theory="calibrated",
     )
     assert found.area.values == pytest.approx([known.area], rel=1e-9)
     assert found.unloading_stiffness.units == "GPa/um"
     assert found.conductance.units == "W/(m^2 K)"
-    assert found.conductance.values == pytest.approx(
-        [1e6 * known.conductance(16.0, 167.0)], rel=1e-9
-    )
+    assert found.conductance.values == pytest.approx([1e6 * known.conductance], rel=1e-9)
 
 
 test_what_contradicts = refusals(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mbma_tables import MbmaError, Surface, contact
+from mbma_tables import Bodies, MbmaError, Surface, contact
 from mbma_tables.theories import THEORIES
 
 # plasticity indices from where an eighth of the contact yields to where nothing does
@@ -28,9 +28,9 @@ def pairs(theory):
                         elastic,
                         contact(
                             surface,
+                            Bodies(hardness=caps),
                             pressure=elastic.pressure,
                             theory=theory,
-                            hardness=caps,
                         ),
                     )
 
@@ -58,7 +58,9 @@ def test_persson_at_light_loads_where_nothing_yields():
     cap = float(surface.rms_gradient) / 0.2
     for area in (1e-10, 1e-6, 1e-4):
         elastic = contact(surface, area=area, theory="persson")
-        hard = contact(surface, pressure=elastic.pressure, theory="persson", hardness=cap)
+        hard = contact(
+            surface, Bodies(hardness=cap), pressure=elastic.pressure, theory="persson"
+        )
         for name in QUANTITIES:
             assert getattr(hard, name) == pytest.approx(
                 getattr(elastic, name), rel=2e-5
@@ -70,7 +72,9 @@ def test_force_rises_with_the_hardness_without_a_jump(theory):
     surface = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=5.0)
     caps = float(surface.rms_gradient) * np.geomspace(1e-3, 1e3, 2001)
     for u in (0.05, 1.0, 3.0, 4.5):
-        pressed = contact(surface, mean_separation=u, theory=theory, hardness=caps)
+        pressed = contact(
+            surface, Bodies(hardness=caps), mean_separation=u, theory=theory
+        )
         steps = np.diff(np.log(pressed.pressure)) / np.diff(np.log(caps))
         assert steps.min() >= -1e-6
         # of next to no hardness pressure is in proportion to it; what an elastic contact
@@ -85,7 +89,9 @@ def test_where_valid_unloading_is_as_stiff_as_loading(theory):
             surface = Surface(hurst, 1e-3, 1e-3 * zeta_1, 1.0, 4.5)
             u = 4.5 * np.linspace(0.02, 0.98, 25)[:, None]
             caps = float(surface.rms_gradient) / np.geomspace(0.3, 30, 12)
-            pressed = contact(surface, mean_separation=u, theory=theory, hardness=caps)
+            pressed = contact(
+                surface, Bodies(hardness=caps), mean_separation=u, theory=theory
+            )
             ratio = pressed.unloading_stiffness / pressed.stiffness
             # the frozen stiffness is known to 5%
             assert ratio[pressed.valid].min() > 0.95

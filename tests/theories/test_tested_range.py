@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import contact_of
 
 from generate.boundary_elements.evidence import evidence
-from mbma_tables import Surface, contact
+from mbma_tables import Bodies, Surface, contact
 from mbma_tables.theories import THEORIES
 
 each = pytest.mark.parametrize("theory", THEORIES)
@@ -31,7 +32,7 @@ def test_valid_implies_within_the_range_of_the_simulations(theory):
         rng.uniform(0.2, 0.99, 2000),
     )
     options = {"outside": "nan"} if theory == "mbma" else {}
-    pressed = contact(
+    pressed = contact_of(
         surface, mean_separation=surface.h_max * (1 - depth), theory=theory, **options
     )
     valid = pressed.valid
@@ -52,7 +53,7 @@ def test_extreme_surfaces_are_not_valid(theory):
     for hurst, zeta_1 in ((0.05, 1e8), (0.01, 1e6)):
         surface = Surface(hurst, 1e-12, 1e-12 * zeta_1, 1.0, 4.0)
         options = {"outside": "exact"} if theory == "mbma" else {}
-        pressed = contact(surface, area=1e-12, theory=theory, **options)
+        pressed = contact_of(surface, area=1e-12, theory=theory, **options)
         assert not pressed.valid
         assert np.isnan(pressed.scatter)
         assert any(
@@ -93,7 +94,9 @@ def test_the_bulk_yields_from_a_third_of_the_hardness_on(theory):
     # smooth faces, so that much of them is in contact below the hardness
     surface = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=0.2, h_max=0.66)
     share = np.array([0.02, 0.33, 0.34, 0.7])
-    pressed = contact(surface, pressure=1e-3 * share, theory=theory, hardness=1e-3)
+    pressed = contact(
+        surface, Bodies(hardness=1e-3), pressure=1e-3 * share, theory=theory
+    )
     masks = [
         mask.tolist()
         for text, mask in pressed.reasons.items()
@@ -101,5 +104,7 @@ def test_the_bulk_yields_from_a_third_of_the_hardness_on(theory):
     ]
     assert masks == [[False, False, True, True]]
     assert not pressed.valid[2:].any()
-    elastic = contact(surface, pressure=1e-3 * share, theory=theory, hardness=np.inf)
+    elastic = contact(
+        surface, Bodies(hardness=np.inf), pressure=1e-3 * share, theory=theory
+    )
     assert not any("a third of the hardness" in reason for reason in elastic.reasons)

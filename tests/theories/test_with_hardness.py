@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from helpers import fresh, random_map
 
-from mbma_tables import Surface, contact
+from mbma_tables import Bodies, Surface, contact
 from mbma_tables.theories import THEORIES, BoundaryElements, Simulated, get_theory
 from mbma_tables.theories.yielding.theory import Yielding
 
@@ -18,13 +18,13 @@ HARDNESS = 0.02
 # reads pickled pairs of a theory and a surface, and prints the bits of their contacts
 OTHER_PROCESS = """
 import json, pickle, sys
-from mbma_tables import contact
+from mbma_tables import Bodies, contact
 with open(sys.argv[1], "rb") as file:
     pairs, pressures, hardness = pickle.load(file)
 bits = {}
 for name, (theory, surface) in pairs.items():
     for cap in (None, hardness):
-        pressed = contact(surface, pressure=pressures, theory=theory, hardness=cap)
+        pressed = contact(surface, Bodies(hardness=cap), pressure=pressures, theory=theory)
         fields = pressed.area, pressed.mean_separation, pressed.unloading_stiffness
         bits[f"{name}, hardness {cap}"] = [value.hex() for field in fields for value in field.tolist()]
 print(json.dumps(bits))
@@ -58,7 +58,9 @@ def test_every_theory_has_the_same_bits_in_a_new_process(pairs, tmp_path, names)
     for name in names:
         theory, surface = pairs[name]
         for cap in (None, HARDNESS):
-            pressed = contact(surface, pressure=PRESSURES, theory=theory, hardness=cap)
+            pressed = contact(
+                surface, Bodies(hardness=cap), pressure=PRESSURES, theory=theory
+            )
             fields = pressed.area, pressed.mean_separation, pressed.unloading_stiffness
             rows = [value.hex() for field in fields for value in field.tolist()]
             bits[f"{name}, hardness {cap}"] = rows
@@ -73,9 +75,14 @@ def test_every_theory_has_the_same_bits_in_a_new_process(pairs, tmp_path, names)
 def test_workers_of_dask_have_the_same_bits(pairs):
     theory, surface = pairs["full"]
     pressures = xr.DataArray(PRESSURES, dims="load")
-    here = contact(surface, pressure=pressures, theory=theory, hardness=HARDNESS).area
+    here = contact(
+        surface, Bodies(hardness=HARDNESS), pressure=pressures, theory=theory
+    ).area
     chunks = contact(
-        surface, pressure=pressures.chunk(load=1), theory=theory, hardness=HARDNESS
+        surface,
+        Bodies(hardness=HARDNESS),
+        pressure=pressures.chunk(load=1),
+        theory=theory,
     ).area
     there = chunks.compute(scheduler="processes", num_workers=1)
     np.testing.assert_array_equal(there, here)

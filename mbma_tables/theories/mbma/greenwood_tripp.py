@@ -137,7 +137,7 @@ def height_integral(n: float, x: ArrayLike) -> Any:
 
     Examples
     --------
-    >>> from mbma_tables import height_integral
+    >>> from mbma_tables.theories.mbma.greenwood_tripp import height_integral
     >>> height_integral(1.5, [-1.0, 0.0, 1.0]).round(6)
     array([1.404597, 0.43002 , 0.075668])
     """

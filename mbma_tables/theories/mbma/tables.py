@@ -64,11 +64,14 @@ def open_table(
     Examples
     --------
     >>> from mbma_tables import Surface, contact, open_table
+    >>> from mbma_tables.theories import Mbma
     >>> table = open_table("universal")
     >>> phi_F, phi_A, error = table.answer(2.0, 1e-3)
     >>> round(float(phi_F), 6), round(float(phi_A), 4)
     (0.005178, 7.8328)
-    >>> float(contact(Surface(0.8, 1.0, 200.0, 0.1, 0.3), separation=0.1, island_model=table).error) < 1e-8
+    >>> surface = Surface(0.8, 1.0, 200.0, 0.1, 0.3)
+    >>> summed = contact(surface, separation=0.1, theory=Mbma(island_model=table))
+    >>> float(summed.error) < 1e-8
     True
     """
     if not isinstance(table, str | os.PathLike):

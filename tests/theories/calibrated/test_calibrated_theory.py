@@ -8,7 +8,7 @@ import types
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import random_map
+from helpers import contact_of, random_map
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.special import erf
@@ -133,7 +133,7 @@ class TestAnswers:
         )
         for by, value, told in wrong:
             with pytest.raises(OutOfRangeError, match=told):
-                contact(SURFACE, **{by: value}, theory="calibrated")
+                contact_of(SURFACE, **{by: value}, theory="calibrated")
 
     @given(st.floats(0.1, 1.0), st.floats(np.log(3.5), np.log(1e5)), st.floats(2.0, 6.0))
     @settings(deadline=None, max_examples=60)
@@ -397,7 +397,7 @@ def test_what_is_told_of_a_measured_surface():
         ("mbma", {}),
         ("persson", {}),
     ):
-        found = contact(worn, mean_separation=0.5 * worn.h_max, theory=theory, **more)
+        found = contact_of(worn, mean_separation=0.5 * worn.h_max, theory=theory, **more)
         assert not found.valid
         assert any("skewness of heights is -" in reason for reason in found.reasons)
         assert np.isnan(

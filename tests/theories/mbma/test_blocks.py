@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface
-from mbma_tables.quantities.conductance import mean_conductivity
+from mbma_tables.bodies import mean_conductivity
 from mbma_tables.quantities.effective_medium import FlowConstants
 from mbma_tables.quantities.gas import mean_inverse
 from mbma_tables.quantities.lay import factors

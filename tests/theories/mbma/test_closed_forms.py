@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma import closed_forms
 from mbma_tables.theories.mbma.closed_forms import (
     FUNCTIONS,
@@ -65,8 +66,7 @@ def test_totals_are_within_a_tenth_of_the_exact_solver_in_the_corners():
     exact = contact(
         Surface(hurst, 1.0, zeta_1, 1.0, h_max),
         separation=gap,
-        island_model="exact",
-        rtol=1e-6,
+        theory=Mbma(island_model="exact", rtol=1e-6),
     )
     some = exact.area > RANGES[TOTALS]["area"][0]
     for name, function in FUNCTIONS[TOTALS].items():
@@ -122,7 +122,7 @@ def test_totals_by_the_island_model_are_within_one_percent():
     surface = Surface(rng.uniform(0.35, 1, 150), 1.0, zeta_1, 1.0, h_max)
     gap = rng.uniform(-1, 0.999, 150) * h_max
     found, exact = (
-        contact(surface, separation=gap, island_model="formula", rtol=1e-3),
+        contact(surface, separation=gap, theory=Mbma(island_model="formula", rtol=1e-3)),
         contact(surface, separation=gap),
     )
     for name in ("pressure", "area"):
@@ -166,7 +166,7 @@ def test_units_and_shapes_of_closed_totals():
     surface = Surface(0.8, [[0.1], [0.2]], [[10.0], [20.0]], 0.5, 1.7)
     gaps = np.array([0.3, 0.9, -1.0])
     force, area, error = closed_totals(surface, gaps, 200.0)
-    exact = contact(surface, separation=gaps, E_star=200.0)
+    exact = contact(surface, 200.0, separation=gaps)
     assert force.shape == area.shape == (2, 3)
     assert np.abs(force / exact.pressure - 1).max() < error
     assert np.abs(area / exact.area - 1).max() < error

@@ -1,18 +1,21 @@
 """`contact` against brute force, its own bound, the paper's case, power laws, limits, invariants, bad input."""
 
-import functools
 import math
 
 import numpy as np
 import pytest
 from catalogue import LEVEL, OWN
 
-from mbma_tables import ConvergenceError, OutOfRangeError, Surface, greenwood_tripp
-from mbma_tables import contact as contact_by_island_model
+from mbma_tables import (
+    ConvergenceError,
+    OutOfRangeError,
+    Surface,
+    contact,
+    greenwood_tripp,
+)
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.geometry import geometry, kinks
 from mbma_tables.theories.mbma.variants import get_variant
-
-contact = functools.partial(contact_by_island_model, island_model="exact")
 
 
 def brute(surface, separation, variant):
@@ -81,7 +84,9 @@ BRUTE_POINTS = [
 def test_against_brute_force(hurst, zeta_1, share, variant):
     surface = one_surface(hurst, zeta_1, h_max=3.3, h_rms=0.7)
     separation = share * surface.h_max
-    found = contact(surface, separation=separation, variant=variant, rtol=1e-9)
+    found = contact(
+        surface, separation=separation, theory=Mbma("exact", variant=variant, rtol=1e-9)
+    )
     force, area = brute(surface, separation, variant)
     assert abs(found.pressure / force - 1) <= 1e-9
     assert abs(found.area / area - 1) <= 1e-9
@@ -92,7 +97,11 @@ def test_against_brute_force(hurst, zeta_1, share, variant):
 
 
 def test_the_papers_yang_persson_case():
-    found = contact(Surface.named("yang-persson"), separation=2.0, variant="printed")
+    found = contact(
+        Surface.named("yang-persson"),
+        separation=2.0,
+        theory=Mbma("exact", variant="printed"),
+    )
     assert found.pressure == pytest.approx(2.5114e-5, abs=5e-10)
     assert found.area == pytest.approx(3.1145e-5, abs=5e-10)
     assert found.mean_separation == 2.5
@@ -105,7 +114,9 @@ def test_no_contact_is_exactly_zero(island_model):
         one_surface(0.8, 216.0),
         np.array([3.0, math.nextafter(3, 4), 50.0, 1e300]),
     )
-    found = contact(surface, separation=separation, island_model=island_model)
+    found = contact(
+        surface, separation=separation, theory=Mbma(island_model=island_model)
+    )
     assert (
         found.pressure.tolist()
         == found.area.tolist()
@@ -114,7 +125,9 @@ def test_no_contact_is_exactly_zero(island_model):
     )
     assert (
         contact(
-            surface, separation=math.nextafter(3, 2), island_model=island_model
+            surface,
+            separation=math.nextafter(3, 2),
+            theory=Mbma(island_model=island_model),
         ).pressure
         > 0
     )
@@ -131,7 +144,7 @@ def test_below_full_compression():
     with pytest.raises(
         OutOfRangeError, match="at least -h_max, where the model ends"
     ) as caught:
-        contact(surfaces, separation=[0.0, -3.5, -5.0])
+        contact(surfaces, separation=[0.0, -3.5, -5.0], theory=Mbma("exact"))
     assert caught.value.mask.tolist() == [[False, True, True], [False, False, True]]
 
 
@@ -141,7 +154,7 @@ def test_failure_has_the_shape_of_the_arguments(monkeypatch):
     )  # too few nodes for any island at 1e-8
     surfaces = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, [[3.0], [4.0]])
     with pytest.raises(ConvergenceError) as caught:
-        contact(surfaces, separation=[0.0, 3.5, 1.0])
+        contact(surfaces, separation=[0.0, 3.5, 1.0], theory=Mbma("exact"))
     assert caught.value.mask.tolist() == [[True, False, True], [True, True, True]]
 
 
@@ -161,7 +174,8 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_layout_does_not_matter(kind):
     found, expected = (
-        contact_by_island_model(ROUGH, separation=gaps) for gaps in (KINDS[kind], GAPS)
+        contact(ROUGH, separation=gaps, theory=Mbma("exact"))
+        for gaps in (KINDS[kind], GAPS)
     )
     np.testing.assert_array_equal(np.ravel(found.pressure), expected.pressure)
     np.testing.assert_array_equal(np.ravel(found.area), expected.area)
@@ -197,7 +211,7 @@ def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(
     surfaces = Surface(hurst, 1.0, zeta_1, 1.0, np.full((30, 1), top))
     gaps = top - compression * (1 + np.linspace(-1e-3, 1e-3, 41))
     found, known = (
-        contact_by_island_model(surfaces, separation=gaps, variant=variant, rtol=asked)
+        contact(surfaces, separation=gaps, theory=Mbma("exact", variant, asked))
         for asked in (rtol, 1e-11)
     )
     for name in ("pressure", "area"):

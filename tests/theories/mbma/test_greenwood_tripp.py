@@ -19,8 +19,8 @@ from mbma_tables import (
     InputError,
     OutOfRangeError,
     greenwood_tripp,
-    height_integral,
 )
+from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 
 PUBLISHED = pathlib.Path(__file__).parents[2] / "data" / "greenwood_tripp.csv"
 

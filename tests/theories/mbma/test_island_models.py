@@ -10,7 +10,7 @@ import runpy
 import numpy as np
 import pytest
 from catalogue import LEVEL, OWN, random_gaps, random_surfaces
-from helpers import refusals
+from helpers import contact_of, law_of_names, refusals
 
 from mbma_tables import (
     InputError,
@@ -39,7 +39,9 @@ def solved(variant):
         surfaces,
         gaps,
         contact(
-            surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-10
+            surfaces,
+            separation=gaps,
+            theory=Mbma(island_model="exact", variant=variant, rtol=1e-10),
         ),
     )
 
@@ -54,7 +56,7 @@ def apart(found, true):
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8, 1e-10])
 def test_universal_within_1e7_and_its_tolerance_of_exact(variant, rtol):
     surfaces, gaps, true = solved(variant)
-    found = contact(surfaces, separation=gaps, variant=variant, rtol=rtol)
+    found = contact(surfaces, separation=gaps, theory=Mbma(variant=variant, rtol=rtol))
     assert found.island_model == "universal"
     error = apart(found, true)
     assert (error <= found.error).all()
@@ -64,7 +66,9 @@ def test_universal_within_1e7_and_its_tolerance_of_exact(variant, rtol):
 
 def test_island4d_within_1e3_of_exact():
     surfaces, gaps, true = solved("reported")
-    found = contact(surfaces, separation=gaps, island_model="island4d", rtol=1e-6)
+    found = contact(
+        surfaces, separation=gaps, theory=Mbma(island_model="island4d", rtol=1e-6)
+    )
     assert found.island_model == "island4d"
     assert (apart(found, true) <= found.error).all()
     assert found.error.max() <= 1e-3
@@ -77,9 +81,11 @@ def test_a_variant_of_ones_own(variant):
     surfaces = random_surfaces(25, seed=102, hurst=(0.4, 1.0), zeta_1=(3.6, 1e4))
     gaps = random_gaps(surfaces, seed=103)
     true = contact(
-        surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-9
+        surfaces,
+        separation=gaps,
+        theory=Mbma(island_model="exact", variant=variant, rtol=1e-9),
     )
-    found = contact(surfaces, separation=gaps, variant=variant, rtol=1e-9)
+    found = contact(surfaces, separation=gaps, theory=Mbma(variant=variant, rtol=1e-9))
     assert (found.variant, true.variant) == (variant.name, variant.name)
     error = apart(found, true)
     assert (error <= found.error + true.error).all()
@@ -93,17 +99,20 @@ def test_a_floor_above_the_largest_magnification_or_at_it(island_model):
     with pytest.raises(
         OutOfRangeError, match=r"q1/q0 must be greater than 3\.5, the variant's floor"
     ) as caught:
-        contact(Surface([0.5, 0.8, 0.8], 0.2, [0.68, 40.0, 0.7], 1.0, 3.0), **options)
+        contact_of(Surface([0.5, 0.8, 0.8], 0.2, [0.68, 40.0, 0.7], 1.0, 3.0), **options)
     assert caught.value.mask.tolist() == [True, False, True]
     assert (
-        contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), **options).pressure
+        contact_of(
+            Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), **options
+        ).pressure
         > 0
     )
     with pytest.raises(
         InputError, match=r"greater than 5\.14, the variant's floor of zeta_u"
     ):
         contact_law(
-            Surface(0.8, 1.0, 5.0, 1.0, 3.0), variant="fitted", island_model=island_model
+            Surface(0.8, 1.0, 5.0, 1.0, 3.0),
+            theory=Mbma(island_model=island_model, variant="fitted"),
         )
 
 
@@ -120,8 +129,7 @@ def test_the_four_parameter_table_is_of_one_variant(variant):
         contact(
             Surface(0.8, 0.2, 40.0, 1.0, 3.0),
             separation=1.0,
-            island_model="island4d",
-            variant=variant,
+            theory=Mbma(island_model="island4d", variant=variant),
         )
 
 
@@ -134,7 +142,7 @@ MISSING = np.array([[False, True, True, False], [False] * 4])
 
 def test_outside_raises_with_a_mask_in_the_callers_shape():
     with pytest.raises(OutOfRangeError) as caught:
-        contact(ROUGH, separation=GAPS, variant="reported")
+        contact(ROUGH, separation=GAPS, theory=Mbma(variant="reported"))
     np.testing.assert_array_equal(caught.value.mask, MISSING)
     facts = (
         "2 of 8 entries",
@@ -147,7 +155,7 @@ def test_outside_raises_with_a_mask_in_the_callers_shape():
         contact(one, separation=0.0)
     assert caught.value.mask.shape == ()
     assert caught.value.mask
-    assert math.isnan(contact(one, separation=0.0, outside="nan").pressure)
+    assert math.isnan(contact(one, separation=0.0, theory=Mbma(outside="nan")).pressure)
 
 
 # of the second variant, with hardly any deformation, islands are deeper than the table at any gap
@@ -155,11 +163,13 @@ def test_outside_raises_with_a_mask_in_the_callers_shape():
 def test_outside_answered_by_the_solver(variant):
     surface = ROUGH if variant is REPORTED else Surface(0.9, 0.2, 400.0, 1.0, 3.0)
     found, table = (
-        contact(surface, separation=GAPS, variant=variant, outside=way)
+        contact(surface, separation=GAPS, theory=Mbma(variant=variant, outside=way))
         for way in ("exact", "nan")
     )
     true, missing = (
-        contact(surface, separation=GAPS, variant=variant, island_model="exact"),
+        contact(
+            surface, separation=GAPS, theory=Mbma(island_model="exact", variant=variant)
+        ),
         np.isnan(table.pressure),
     )
     assert missing.any()
@@ -170,7 +180,7 @@ def test_outside_answered_by_the_solver(variant):
 
 
 def test_outside_as_nan():
-    found = contact(ROUGH, separation=GAPS, outside="nan")
+    found = contact(ROUGH, separation=GAPS, theory=Mbma(outside="nan"))
     inside = contact(Surface(0.8, 0.2, 0.2 * 1e8, 1.0, 3.0), separation=GAPS)
     for name in ("pressure", "area", "error", "stiffness"):
         np.testing.assert_array_equal(np.isnan(getattr(found, name)), MISSING)
@@ -179,7 +189,9 @@ def test_outside_as_nan():
 
 
 test_bad_options = refusals(
-    lambda options: contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, **options),
+    lambda options: contact_of(
+        Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, **options
+    ),
     ({"outside": "clamp"}, "outside must be one of"),
     ({"variant": "guessed"}, "variant must be one of"),
     *(({"rtol": rtol}, "rtol") for rtol in (0.0, 1e-12, 0.5, math.nan, "tight")),
@@ -193,8 +205,10 @@ def test_what_is_nearly_nothing_ends_and_states_its_digits(island_model):
     """Heights of 32 standard deviations: totals below the normal numbers, whose digits no halving brings back."""
     surface = Surface(0.12887275768129156, 1.0, 7.092276972058787, 1.0, 32.0)
     gaps = np.array([31.9, 31.998, 31.999])
-    found = contact(surface, separation=gaps, island_model=island_model)
-    known = contact(surface, separation=gaps, island_model="exact", rtol=1e-10)
+    found = contact(surface, separation=gaps, theory=Mbma(island_model=island_model))
+    known = contact(
+        surface, separation=gaps, theory=Mbma(island_model="exact", rtol=1e-10)
+    )
     assert (
         np.abs(found.pressure - known.pressure)
         <= (found.error + known.error) * known.pressure
@@ -218,11 +232,13 @@ def test_cover_is_what_islands_at_random_leave_uncovered():
     assert covered.area_slope == pytest.approx(
         added.area_slope * np.exp(-added.area), rel=1e-14
     )
-    law = contact_law(COVERED, variant=COVER)
+    law = contact_law(COVERED, theory=Mbma(variant=COVER))
     assert law.area(separation=COVERED_GAPS) == pytest.approx(covered.area, rel=2e-8)
     assert not any(
         "added" in reason
-        for reason in contact(COVERED, separation=COVERED_GAPS, variant=COVER).reasons
+        for reason in contact(
+            COVERED, separation=COVERED_GAPS, theory=Mbma(variant=COVER)
+        ).reasons
     )
     with pytest.raises(InputError, match="addition must be"):
         dataclasses.replace(REPORTED, addition="integral")
@@ -244,8 +260,7 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
         found = contact(
             surface,
             separation=np.linspace(-1, 0.99, 200) * surface.h_max,
-            variant="fitted",
-            rtol=1e-5,
+            theory=Mbma(variant="fitted", rtol=1e-5),
         )
         branch = slice(int(np.argmax(found.pressure)), None)
         log_force, log_area = (
@@ -280,7 +295,7 @@ class Own:
 
 def test_totals_laws_islands_and_scenes():
     for ask, given, load in (
-        (contact, {"separation": OWN_GAPS}, "pressure"),
+        (contact_of, {"separation": OWN_GAPS}, "pressure"),
         (island, {"delta": [0.1, 1.0]}, "force"),
     ):
         found, known = (
@@ -293,7 +308,7 @@ def test_totals_laws_islands_and_scenes():
                 getattr(found, name), getattr(known, name), rtol=1e-13
             )
     law, known = (
-        contact_law(FLAT, rtol=1e-4, island_model=island_model)
+        contact_law(FLAT, rtol=1e-4, theory=Mbma(island_model=island_model))
         for island_model in (Own(), "rigid")
     )
     assert law.island_model == "own"
@@ -303,7 +318,7 @@ def test_totals_laws_islands_and_scenes():
     scene = Scene(
         FLAT, effects=("pressure",), separations=[1.0], rtol=1e-4, island_model=Own()
     ).run()
-    expected = contact(FLAT, separation=1.0, island_model="rigid").pressure
+    expected = contact(FLAT, separation=1.0, theory=Mbma(island_model="rigid")).pressure
     assert float(scene["pressure"][0]) == pytest.approx(expected, rel=1e-4, abs=0)
 
 
@@ -312,8 +327,8 @@ def test_totals_laws_islands_and_scenes():
 )
 def test_what_is_no_island_model(bad):
     for ask, given in (
-        (contact, {"separation": 1.0}),
-        (contact_law, {}),
+        (contact_of, {"separation": 1.0}),
+        (law_of_names, {}),
         (island, {"delta": 1.0}),
     ):
         with pytest.raises(InputError, match="island_model must be one of"):
@@ -325,22 +340,28 @@ def test_answers_are_checked():
         InputError, match=r"'own' must answer Phi_F, Phi_A and error of shape"
     ):
         contact(
-            FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F[:3], A, error))
+            FLAT,
+            separation=1.0,
+            theory=Mbma(island_model=Own(lambda F, A, error: (F[:3], A, error))),
         )
     with pytest.raises(InputError, match=r"'own' must answer"):
-        contact(FLAT, separation=1.0, island_model=Own(lambda F, A, error: F))
+        contact(
+            FLAT, separation=1.0, theory=Mbma(island_model=Own(lambda F, A, error: F))
+        )
     silent = Own(lambda F, A, error: (np.where(F > 10, np.nan, F), A, error))
     with pytest.raises(
         OutOfRangeError, match="1 of 2 entries lie outside of island model 'own'"
     ) as caught:
-        contact(FLAT, separation=[2.5, 1.0], island_model=silent)
+        contact(FLAT, separation=[2.5, 1.0], theory=Mbma(island_model=silent))
     assert caught.value.mask.tolist() == [False, True]
     found = contact(
-        FLAT, separation=[2.5, 1.0], island_model=silent, outside="nan"
+        FLAT, separation=[2.5, 1.0], theory=Mbma(island_model=silent, outside="nan")
     ).pressure
     assert np.isnan(found).tolist() == [False, True]
     one = contact(
-        FLAT, separation=1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3))
+        FLAT,
+        separation=1.0,
+        theory=Mbma(island_model=Own(lambda F, A, error: (F, A, 1e-3))),
     )
     assert 1e-3 <= one.error < 1.1e-3
 

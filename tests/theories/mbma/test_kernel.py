@@ -8,6 +8,7 @@ from catalogue import LEVEL
 
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma import sums as sums
 from mbma_tables.theories.mbma.geometry import FIELDS, geometry
 from mbma_tables.theories.mbma.tables import universal_model
@@ -100,7 +101,7 @@ def test_what_cannot_be_resolved_is_said(monkeypatch):
     with pytest.raises(
         ConvergenceError, match="quadrature did not reach its tolerance"
     ) as caught:
-        contact(surface, separation=[0.0, 1.0], outside="nan")
+        contact(surface, separation=[0.0, 1.0], theory=Mbma(outside="nan"))
     assert np.argwhere(caught.value.mask).tolist() == [[1, 1]]
 
 

@@ -117,7 +117,7 @@ def test_slopes_hold_in_thin_panels():
 @pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
 def test_a_law_is_the_contacts(count, h_max):
     surface = rough(count=count, h_max=h_max)
-    law, d = contact_law(surface, "mbma"), surface.h_max * (1 - DEPTHS)
+    law, d = contact_law(surface, theory="mbma"), surface.h_max * (1 - DEPTHS)
     d = d[d >= law.lowest]
     found = contact(surface, separation=d, theory="mbma")
     for name in ("pressure", "area"):
@@ -134,7 +134,7 @@ def test_a_law_is_the_contacts(count, h_max):
 def test_a_law_ends_with_the_table():
     # high peaks: the islands of full compression lie outside of the table
     surface = rough(h_max=30.0)
-    law = contact_law(surface, "mbma")
+    law = contact_law(surface, theory="mbma")
     assert -surface.h_max < law.lowest < surface.h_max / 2
     d = law.lowest + np.array([1e-9, 0.1, 1.0])
     np.testing.assert_allclose(
@@ -172,7 +172,7 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
     with pytest.raises(
         InputError, match=r"use 'universal' or 'exact', or surface\.fit\(\)"
     ):
-        contact(surface, separation=1.0, island_model="island4d")
+        contact(surface, separation=1.0, theory=Mbma(island_model="island4d"))
     with pytest.raises(InputError, match=r"surface\.fit\(\)"):
         island(surface, 1.0, island_model="island4d")
     q = np.geomspace(1, 10, 30)
@@ -186,7 +186,7 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
         np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0
     )
     deep = contact(
-        steep, separation=-29.0, island_model="universal", outside="nan", theory="mbma"
+        steep, separation=-29.0, theory=Mbma(island_model="universal", outside="nan")
     ).pressure
     assert deep > 0 or np.isnan(deep)
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from helpers import topographies
+from helpers import contact_of, topographies
 from scipy.ndimage import gaussian_filter
 
 from generate.boundary_elements.solve import Contact
 from generate.machined.makers import Part, heights
 from generate.pages import maps
 from generate.pages.maps import BARS, ratios, read_rows
-from mbma_tables import Scene, Surface, contact, contact_law
+from mbma_tables import Bodies, Scene, Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories import Calibrated, Simulated, theory_name
 from mbma_tables.theories.simulated.own_map import law_loads
@@ -127,7 +127,7 @@ class TestDefaultTheory:
         assert found.valid.tolist() == [True, False, True, True, False]
         assert contact(surface, separation=2 * float(surface.h_max)).pressure == 0
         assert contact(surface.combined(surface), pressure=0.01).theory == "calibrated"
-        assert theory_name(surface, None, variant="printed") == "mbma"
+        assert theory_name(surface, None, "separation") == "mbma"
 
     def test_small_unresolved_and_large_ones_and_spectra_are_calibrated(self):
         values = (
@@ -152,9 +152,9 @@ class TestDefaultTheory:
 
     def test_its_law_with_a_hardness_is_as_accurate_as_its_answers(self):
         wafer = Surface.from_map("docs/data/maps/top-1.top", short_cutoff="9.4 nm")
-        law = contact_law(wafer, E_star="70 GPa", hardness="12 GPa")
+        law = contact_law(wafer, Bodies("70 GPa", hardness="12 GPa"))
         pressure = np.array([0.01, 0.1, 0.5, 2.0, 8.0])
-        truth = contact(wafer, pressure=pressure, E_star="70 GPa", hardness="12 GPa")
+        truth = contact(wafer, Bodies("70 GPa", hardness="12 GPa"), pressure=pressure)
         np.testing.assert_allclose(
             law.pressure(truth.mean_separation),
             pressure,
@@ -218,7 +218,7 @@ def test_no_answer_beyond_where_the_tops_and_valleys_of_a_map_leave_no_gap():
         {"pressure": [1e-3, 0.02]},
     ):
         with pytest.raises(OutOfRangeError) as refused:
-            contact(surface, **wanted, theory="calibrated")
+            contact_of(surface, **wanted, theory="calibrated")
         assert refused.value.mask.tolist() == [False, True]
     law = contact_law(surface, theory="calibrated")
     last = contact(surface, separation=law.lowest, theory="calibrated")

@@ -7,7 +7,7 @@ import pathlib
 import netCDF4
 import numpy as np
 import pytest
-from helpers import refused, run
+from helpers import contact_of, refused, run
 from scipy.special import erf
 from small_tables import edited
 
@@ -44,10 +44,8 @@ def own(file):
 def test_it_opens_without_the_map(surface, own):
     assert own.map is None
     for theory in (None, "calibrated"):
-        found = contact(own, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory)
-        known = contact(
-            surface, area=[0.01, 0.1, 0.5], E_star="1 GPa", theory=theory or FULL
-        )
+        found = contact(own, "1 GPa", area=[0.01, 0.1, 0.5], theory=theory)
+        known = contact(surface, "1 GPa", area=[0.01, 0.1, 0.5], theory=theory or FULL)
         assert found.theory == known.theory
         for name in (
             "pressure",
@@ -64,8 +62,8 @@ def test_it_opens_without_the_map(surface, own):
         )
     hard = {"pressure": 0.005, "hardness": 0.05}
     # a law of hardness without the map, simulated with it
-    assert contact(own, **hard).yielded == pytest.approx(
-        contact(surface, **hard, theory=FULL).yielded, abs=0.1
+    assert contact_of(own, **hard).yielded == pytest.approx(
+        contact_of(surface, **hard, theory=FULL).yielded, abs=0.1
     )
     assert own.provenance[0]["points"] == [64, 64]
     with pytest.raises(InputError, match="this surface has none"):
@@ -152,7 +150,7 @@ def test_exports_have_the_leakage_along_an_axis(file, own, tmp_path):
     run("export", "csv", *words, "30", "--out", tmp_path / "rows.csv")
     rows = np.genfromtxt(tmp_path / "rows.csv", delimiter=",", comments="#")
     rows = rows[np.isfinite(rows).all(axis=1)]
-    known = contact(own, pressure=rows[5, 0], E_star=1.0).leakage.along(30.0)
+    known = contact(own, 1.0, pressure=rows[5, 0]).leakage.along(30.0)
     assert rows[5, 1] == pytest.approx(known, rel=0.02)
     assert "must be 'x', 'y' or degrees" in refused(
         "export", "csv", *words, "z", "--out", tmp_path / "no.csv"
@@ -174,7 +172,7 @@ def test_on_the_command_line(tmp_path):
     assert found["theory"] == "simulated"
     own = BoundaryElements.from_netcdf(table).surface
     assert found["columns"]["area"] == pytest.approx(
-        contact(own, pressure="5 MPa", E_star="1 GPa").area
+        contact(own, "1 GPa", pressure="5 MPa").area
     )
     assert run("curve", "--map", table, "--points", 7, "--length-unit", "nm")
     assert "leave dx out" in refused(
@@ -208,7 +206,7 @@ class TestBeyondTheLoads:
             ({"area": 1.0}, "less than 1"),
         ):
             with pytest.raises(InputError, match=match):
-                contact(own, **given)
+                contact_of(own, **given)
 
     def test_closed_forms(self):
         # force (2 - u)^3 and its energy between loads, and beyond them the same

@@ -10,7 +10,7 @@ from scipy.special import erf
 from generate.boundary_elements.solve import Contact
 from generate.machined import makers
 from generate.machined.makers import Part
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.theories import BoundaryElements, Simulated
 from mbma_tables.theories.simulated.boundary_elements import Contact as OwnContact
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
@@ -150,8 +150,8 @@ class TestOfASurface:
 
     def test_laws_and_other_units(self, part):
         surface = part[1]
-        law = contact_law(surface, theory=FULL, E_star="1 GPa")
-        point = contact(surface, pressure="5 MPa", theory=FULL, E_star="1 GPa")
+        law = contact_law(surface, "1 GPa", theory=FULL)
+        point = contact(surface, "1 GPa", pressure="5 MPa", theory=FULL)
         assert law.at_pressure("5 MPa").area == pytest.approx(point.area, rel=0.01)
         assert law.theory == "simulated"
         for axis in ("x", "y"):
@@ -308,8 +308,8 @@ def test_a_hardness_is_simulated(eta):
     area, u, yielded, frozen = np.array(rows).T
     found = contact(
         surface,
+        Bodies(hardness=[cap, cap, cap, np.inf]),
         pressure=[*pressure, pressure[1]],
-        hardness=[cap, cap, cap, np.inf],
         theory=FULL,
     )
     np.testing.assert_allclose(found.area[:3], area, rtol=0.03)
@@ -323,14 +323,14 @@ def test_a_hardness_is_simulated(eta):
     )
     # towards the hardness everywhere
     heavy = contact(
-        surface, pressure=cap * np.array([0.95, 0.999]), hardness=cap, theory=FULL
+        surface, Bodies(hardness=cap), pressure=cap * np.array([0.95, 0.999]), theory=FULL
     )
     assert (np.diff(heavy.area) > 0).all()
     assert heavy.area[1] == pytest.approx(1, abs=2e-3)
-    law = contact_law(surface, theory=FULL, hardness=cap)
+    law = contact_law(surface, Bodies(hardness=cap), theory=FULL)
     assert law.at_pressure(pressure[1]).area == pytest.approx(found.area[1], rel=1e-3)
     with pytest.raises(OutOfRangeError, match="at most the hardness"):
-        contact(surface, pressure=1.1 * cap, hardness=cap, theory=FULL)
+        contact(surface, Bodies(hardness=cap), pressure=1.1 * cap, theory=FULL)
 
 
 pytest.importorskip("tamaas")
@@ -344,7 +344,7 @@ def honed():
 
 
 def test_pressures_gaps_and_contact_fit_each_other(honed):
-    found = contact(honed, pressure="20 MPa", E_star="2 GPa", theory=FULL)
+    found = contact(honed, "2 GPa", pressure="20 MPa", theory=FULL)
     pressed = found.map()
     data = pressed.to_dataset()
     assert data.pressure.mean() == pytest.approx(0.02, rel=1e-3)
@@ -379,7 +379,7 @@ def test_its_picture(honed, tmp_path):
 def test_what_has_no_map(honed, tmp_path):
     for found in (
         contact(honed, pressure=[0.01, 0.02]),
-        contact(honed, pressure=0.01, hardness=[0.1, 0.2]),
+        contact(honed, Bodies(hardness=[0.1, 0.2]), pressure=0.01),
         contact(honed, mean_separation=2 * float(honed.h_max)),
         contact(Surface(0.8, 0.1, 2.0, 1.0, 3.0), separation=1.0),
     ):
@@ -388,4 +388,4 @@ def test_what_has_no_map(honed, tmp_path):
     BoundaryElements.of(honed).to_netcdf(tmp_path / "own.nc")
     own = BoundaryElements.from_netcdf(tmp_path / "own.nc").surface
     with pytest.raises(InputError, match="this surface has none"):
-        contact(own, pressure=0.01, hardness=math.inf).map()
+        contact(own, Bodies(hardness=math.inf), pressure=0.01).map()

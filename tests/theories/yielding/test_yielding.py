@@ -7,15 +7,15 @@ import mpmath
 import numpy as np
 import pytest
 import xarray as xr
-from helpers import random_map, refusals
+from helpers import contact_of, law_of_names, random_map, refusals
 from scipy.differentiate import derivative
 
 from generate.boundary_elements.solve import Contact as Elastic
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.surfaces.bearing_curve import bearing
-from mbma_tables.theories import THEORIES, get_theory
+from mbma_tables.theories import THEORIES, Mbma, get_theory
 from mbma_tables.theories.evidence import shipped_deviations, shipped_part
 from mbma_tables.theories.simulated.boundary_elements import Contact, project
 from mbma_tables.theories.yielding import formulas as hardness
@@ -31,11 +31,11 @@ each = pytest.mark.parametrize("theory", THEORIES)
 def test_each_stiffness_has_its_own_uncertainty(theory):
     """With a hardness the simulated stiffness is that of unloading; the slope of loading has no stated uncertainty."""
     numbers = {"area": 0.05, "E_star": MODULUS, "theory": theory}
-    elastic = contact(SURFACE, **numbers)
+    elastic = contact_of(SURFACE, **numbers)
     assert elastic.unloading_stiffness_scatter == pytest.approx(
         elastic.stiffness_scatter, nan_ok=True
     )
-    both = contact(SURFACE, **numbers, hardness=[np.inf, HARDNESS])
+    both = contact_of(SURFACE, Bodies(hardness=[np.inf, HARDNESS]), **numbers)
     np.testing.assert_allclose(
         both.stiffness_scatter, [elastic.stiffness_scatter, np.nan], rtol=1e-12
     )
@@ -44,7 +44,7 @@ def test_each_stiffness_has_its_own_uncertainty(theory):
     )
     if theory == "calibrated":
         # what the file of simulations states for the frozen contact
-        own = contact(SURFACE, **numbers, hardness=HARDNESS)
+        own = contact_of(SURFACE, Bodies(hardness=HARDNESS), **numbers)
         assert 0.02 < own.unloading_stiffness_scatter < 0.3
         assert both.unloading_stiffness_scatter[1] == own.unloading_stiffness_scatter
 
@@ -52,24 +52,24 @@ def test_each_stiffness_has_its_own_uncertainty(theory):
 def test_the_text_of_contacts_that_yield_names_first_loading():
     """Pressures that fall in a request are not unloading, which the text must not leave open."""
     falling = {"pressure": [50.0, 25.0], "E_star": MODULUS, "theory": "calibrated"}
-    found = contact(SURFACE, **falling, hardness=HARDNESS)
+    found = contact_of(SURFACE, Bodies(hardness=HARDNESS), **falling)
     assert "loading first; each pressure is reached from no contact" in repr(found)
     assert (
         found.mean_separation[1]
-        == contact(
-            SURFACE, **falling | {"pressure": 25.0}, hardness=HARDNESS
+        == contact_of(
+            SURFACE, Bodies(hardness=HARDNESS), **falling | {"pressure": 25.0}
         ).mean_separation
     )
-    assert "each pressure is reached" not in repr(contact(SURFACE, **falling))
+    assert "each pressure is reached" not in repr(contact_of(SURFACE, **falling))
 
 
 @each
 def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
     u = [0.5, 1.9, 2.9]
-    elastic = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory)
+    elastic = contact(SURFACE, MODULUS, mean_separation=u, theory=theory)
     for cap in (np.inf, [np.inf, np.inf, HARDNESS]):
         found = contact(
-            SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap
+            SURFACE, Bodies(MODULUS, hardness=cap), mean_separation=u, theory=theory
         )
         for name in ("pressure", "area", "stiffness", "error", "unloading_stiffness"):
             rel = (
@@ -90,13 +90,13 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
         np.array([1e-3, 1.0, 30.0, 300.0]),
         {"E_star": MODULUS, "theory": theory, "hardness": HARDNESS},
     )
-    found = contact(SURFACE, pressure=pressure, **known)
+    found = contact_of(SURFACE, pressure=pressure, **known)
     assert found.pressure == pytest.approx(pressure, rel=1e-10)
     assert (found.area >= pressure / HARDNESS * (1 - 1e-10)).all()
     assert (found.mean_pressure <= HARDNESS * (1 + 1e-12)).all()
     step = 1e-5
     near = [
-        contact(
+        contact_of(
             SURFACE, mean_separation=found.mean_separation + way * step, **known
         ).pressure
         for way in (-1, 1)
@@ -126,8 +126,8 @@ def test_a_law_with_a_hardness_is_a_law(theory, rtol, surface, shares):
         "E_star": MODULUS,
         "hardness": HARDNESS if theory != "mbma" else 0.5 * MODULUS,
     }
-    law, u = contact_law(surface, rtol=rtol, **asked), shares * surface.h_max
-    found = contact(surface, mean_separation=u, **asked)
+    law, u = law_of_names(surface, rtol=rtol, **asked), shares * surface.h_max
+    found = contact_of(surface, mean_separation=u, **asked)
     for name in ("pressure", "area"):
         np.testing.assert_allclose(
             getattr(law, name)(u), getattr(found, name), rtol=max(rtol, law.error)
@@ -140,7 +140,7 @@ def test_a_law_with_a_hardness_is_a_law(theory, rtol, surface, shares):
     if theory == "mbma":
         assert law.lowest == pytest.approx((2e-6 - 1) * surface.h_max)
     with pytest.raises(InputError, match="hardness must be one number"):
-        contact_law(surface, theory=theory, hardness=[0.01, 0.02])
+        contact_law(surface, Bodies(hardness=[0.01, 0.02]), theory=theory)
 
 
 @each
@@ -204,21 +204,20 @@ def test_batches_labels_and_units():
     caps = np.array([500.0, 1500.0, np.inf])
     plain = contact(
         SURFACE,
+        Bodies(MODULUS, hardness=caps),
         pressure=[[1.0], [30.0]],
-        E_star=MODULUS,
-        hardness=caps,
         theory="calibrated",
     )
     assert plain.area.shape == (2, 3)
     one = contact(
-        SURFACE, pressure=30.0, E_star=MODULUS, hardness=1500.0, theory="calibrated"
+        SURFACE, Bodies(MODULUS, hardness=1500.0), pressure=30.0, theory="calibrated"
     )
     assert plain.area[1, 1] == pytest.approx(one.area, rel=1e-12)
     named = {
         "pressure": xr.DataArray([1.0, 30.0], dims="load"),
         "hardness": xr.DataArray(caps, dims="metal"),
     }
-    labelled = contact(SURFACE, **named, E_star=MODULUS, theory="calibrated")
+    labelled = contact_of(SURFACE, MODULUS, **named, theory="calibrated")
     for name in ("area", "yielded", "unloading_stiffness", "scatter", "psi", "valid"):
         own = getattr(labelled, name)
         assert set(own.dims) <= {"load", "metal"}
@@ -228,7 +227,7 @@ def test_batches_labels_and_units():
             expected, rel=1e-12, nan_ok=name == "scatter"
         ), name
     given = {"pressure": "30 MPa", "E_star": "100 GPa", "hardness": "1500 MPa"}
-    named = contact(
+    named = contact_of(
         Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um"), **given, theory="calibrated"
     )
     assert named.area == pytest.approx(one.area, rel=1e-12)
@@ -241,22 +240,24 @@ def test_a_map_yields_by_its_own_heights():
     soft = 1e-5 * float(surface.rms_gradient)
     level = np.quantile(heights - heights.mean(), 0.8)
     u = np.maximum(level - (heights - heights.mean()), 0).mean()
-    found = contact(surface, mean_separation=u, theory="calibrated", hardness=soft)
+    found = contact(
+        surface, Bodies(hardness=soft), mean_separation=u, theory="calibrated"
+    )
     assert found.area == pytest.approx(0.2, rel=0.03)
     assert found.scatter < shipped_deviations().standard_deviation(
         "calibrated", "pressure", found.area
     )
     law = contact_law(
         surface,
+        Bodies(hardness=0.3 * float(surface.rms_gradient)),
         theory="calibrated",
-        hardness=0.3 * float(surface.rms_gradient),
         rtol=1e-3,
     )
     assert law.turning_point is None
 
 
 test_what_cannot_be_asked = refusals(
-    lambda asked: contact(
+    lambda asked: contact_of(
         SURFACE,
         **({"E_star": MODULUS, "hardness": HARDNESS, "theory": "calibrated"} | asked),
     ),
@@ -298,35 +299,39 @@ def test_scatter_of_any_theory():
 
 def test_reasons_and_what_elastic_answers_say():
     known = {"E_star": MODULUS, "theory": "calibrated"}
-    found = contact(SURFACE, pressure=[1.0, 2.0], hardness=[30.0, 3000.0], **known)
+    found = contact_of(
+        SURFACE, Bodies(hardness=[30.0, 3000.0]), pressure=[1.0, 2.0], **known
+    )
     masks = [
         mask.tolist()
         for reason, mask in found.reasons.items()
         if "hardness over E*" in reason
     ]
     assert masks == [[True, False]]
-    elastic = contact(SURFACE, pressure=30.0, **known)
-    limit = contact(
-        SURFACE, pressure=30.0, hardness=float(elastic.elastic_hardness), **known
+    elastic = contact_of(SURFACE, pressure=30.0, **known)
+    limit = contact_of(
+        SURFACE, Bodies(hardness=float(elastic.elastic_hardness)), pressure=30.0, **known
     )
     assert limit.area == pytest.approx(elastic.area, rel=0.05)
     assert limit.psi == pytest.approx(1.1)
     # rms gradient 0.054: E* g/2 is 2.7 GPa
     for pressure, told in ((2.0, False), (4.0, True)):
-        found = contact(SURFACE, pressure=pressure, E_star="100 GPa", theory="calibrated")
+        found = contact(SURFACE, "100 GPa", pressure=pressure, theory="calibrated")
         assert ("above E* g/2 = 2.7" in repr(found)) is told
-    found = contact(
-        SURFACE, area=[0.1, 0.3, 0.5], hardness=[HARDNESS, np.inf, 50.0], **known
+    found = contact_of(
+        SURFACE, Bodies(hardness=[HARDNESS, np.inf, 50.0]), area=[0.1, 0.3, 0.5], **known
     )
     assert found.area == pytest.approx([0.1, 0.3, 0.5], rel=1e-10)
     # asperities that lie on one another have areas above one
     asked = {"mean_separation": 0.01, "theory": "greenwood_williamson"}
-    elastic = contact(SURFACE, **asked)
+    elastic = contact_of(SURFACE, **asked)
     assert elastic.area > 1
-    assert contact(SURFACE, hardness=[1e3, 1e200], **asked).area == pytest.approx(
-        [elastic.area] * 2, rel=1e-12
+    assert contact_of(
+        SURFACE, Bodies(hardness=[1e3, 1e200]), **asked
+    ).area == pytest.approx([elastic.area] * 2, rel=1e-12)
+    found = contact(
+        SURFACE, Bodies(hardness=0.02), separation=0.5, theory=Mbma(variant="printed")
     )
-    found = contact(SURFACE, separation=0.5, variant="printed", hardness=0.02)
     assert (found.variant, found.island_model) == ("printed", "universal")
 
 
@@ -341,7 +346,7 @@ def test_hardnesses_of_any_size(theory, cap):
     ]
     pressure, area = (cap * share, share) if cap < 1 else (elastic.pressure, elastic.area)
     for asked in ({"pressure": pressure}, {"mean_separation": u}, {"area": area}):
-        found = contact(SURFACE, **asked, theory=theory, hardness=cap)
+        found = contact_of(SURFACE, Bodies(hardness=cap), **asked, theory=theory)
         if cap < 1:
             rel = 1e-2 if cap < 1e-310 else 1e-12
             assert found.pressure == pytest.approx(cap * share, rel=0.01)
@@ -373,7 +378,7 @@ def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
     for pressure in (0.1, 3.0, 30.0, 500.0):
         asked.clear()
         contact(
-            SURFACE, pressure=pressure, E_star=MODULUS, theory=theory, hardness=HARDNESS
+            SURFACE, Bodies(MODULUS, hardness=HARDNESS), pressure=pressure, theory=theory
         )
         assert len(asked) <= most
 
@@ -381,14 +386,16 @@ def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
 @each
 def test_pressures_short_of_the_hardness_are_held_or_refused(theory):
     concrete, known = Surface.named("concrete"), {"theory": theory, "hardness": 0.02}
-    deepest = contact(concrete, mean_separation=1e-9 * concrete.h_rms, **known).pressure
+    deepest = contact_of(
+        concrete, mean_separation=1e-9 * concrete.h_rms, **known
+    ).pressure
     for share in (0.9, 0.9795, 0.99995, 1 - 5e-9):
         if 0.02 * share < deepest or (theory == "calibrated" and share < 1 - 1e-6):
-            found = contact(concrete, pressure=0.02 * share, **known)
+            found = contact_of(concrete, pressure=0.02 * share, **known)
             assert found.pressure == pytest.approx(0.02 * share, rel=1e-11)
         else:
             with pytest.raises(OutOfRangeError, match="must be at most what theory"):
-                contact(concrete, pressure=0.02 * share, **known)
+                contact_of(concrete, pressure=0.02 * share, **known)
 
 
 def test_the_lightest_pressures_are_held():
@@ -396,10 +403,12 @@ def test_the_lightest_pressures_are_held():
     surface = Surface(hurst=0.096, q0=0.0015, q1=0.27, h_rms=0.043, h_max=0.3)
     cap = 0.3 * float(surface.rms_gradient)
     for depth in np.geomspace(1e-5, 1e-3, 9):
-        force = contact(surface, mean_separation=0.3 * (1 - depth), hardness=cap).pressure
-        assert contact(surface, pressure=force, hardness=cap).pressure == pytest.approx(
-            force, rel=1e-9
-        )
+        force = contact(
+            surface, Bodies(hardness=cap), mean_separation=0.3 * (1 - depth)
+        ).pressure
+        assert contact(
+            surface, Bodies(hardness=cap), pressure=force
+        ).pressure == pytest.approx(force, rel=1e-9)
 
 
 def between_walls(x, tau):

@@ -22,7 +22,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.shared import shared, shared_property
-from mbma_tables.common.units import unit_of
+from mbma_tables.common.units import Dimension, unit_of
 from mbma_tables.core import core
 from mbma_tables.quantities.effective_medium import (
     LARGEST_AREA,
@@ -30,6 +30,9 @@ from mbma_tables.quantities.effective_medium import (
     contact_factor,
     wide_gap,
 )
+from mbma_tables.quantities.registry import DIMENSIONLESS, quantity
+from mbma_tables.quantities.state import State
+from mbma_tables.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.surfaces.any_surface import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory
@@ -136,7 +139,7 @@ class Leakage(Displayed):
         --------
         >>> from mbma_tables import Surface, contact
         >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
-        >>> found = contact(seal, area=0.1, E_star="10 MPa", theory="calibrated").leakage
+        >>> found = contact(seal, "10 MPa", area=0.1, theory="calibrated").leakage
         >>> bool(abs(found.along(30.0) / found.K - 1) < 1e-12)
         True
         """
@@ -170,15 +173,13 @@ class Leakage(Displayed):
                 np.hypot(stated, np.interp(np.log(area), np.log(MAP_AREAS), of_maps)),
             )
 
-        return self._contact._source.map(
-            stated, self._contact, 1, {"area": self._contact.area}
-        )[0]
+        return self._contact.evaluate(stated, 1, {"area": self._contact.area})[0]
 
     @shared_property
     def valid(self) -> Any:
         """Whether flow through such contacts was simulated; if not, `reasons` explains why."""
         contact = self._contact
-        return contact.valid & contact._source.valid(
+        return contact.valid & valid_where_none(
             contact, reasons_against, {"area": contact.area}
         )
 
@@ -186,14 +187,14 @@ class Leakage(Displayed):
     def reasons(self) -> Any:
         """Reasons why entries are not valid, each with its mask; for plain arrays."""
         contact = self._contact
-        return contact.reasons | contact._source.reasons(
+        return contact.reasons | reasons_with_masks(
             contact, reasons_against, {"area": contact.area}
         )
 
     @property
     def units(self) -> dict[str, str]:
         """Units of the quantities that are not dimensionless."""
-        units = self._contact._source.units
+        units = self._contact.unit_system
         return {
             "K": unit_of("leakage", units),
             "hydraulic_aperture": unit_of("separation", units),
@@ -226,7 +227,7 @@ class Leakage(Displayed):
         --------
         >>> from mbma_tables import Surface, contact
         >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
-        >>> found = contact(seal, area=0.1, E_star="10 MPa", theory="calibrated").leakage
+        >>> found = contact(seal, "10 MPa", area=0.1, theory="calibrated").leakage
         >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.1e} um^2/s"
         '3.0e+02 um^2/s'
         """
@@ -242,7 +243,7 @@ class Leakage(Displayed):
                     raise InputError(
                         f"viscosity = {viscosity!r} must be a stress times seconds, such as '1e-3 Pa s'"
                     )
-            number = self._contact._source.units.number(name, value)
+            number = self._contact.unit_system.number(name, value)
             array = positive_array(name, number)
             found[name] = number if is_labelled(number) else array
         agree(K=self.K, **found)
@@ -269,7 +270,7 @@ def leakage_of(contact: Any) -> Leakage:
         K = unknown_where_blocked(K) if yields else K
         return K, K, K, np.zeros_like(K)
 
-    K, x, y, xy = contact._source.map(answer, contact, 4, {"area": contact.area})
+    K, x, y, xy = contact.evaluate(answer, 4, {"area": contact.area})
     return Leakage(K, x, y, xy, contact)
 
 
@@ -463,3 +464,37 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
         law = self_affine_law(float(given[0, row]), float(np.exp(given[1, row])), None)
         out[mine] = flow_of_spectrum(law.spectrum, u[mine], contact[mine])
     return out.reshape(shape)
+
+
+@quantity(
+    Dimension(length=3),
+    "flow coefficient K: flow per length of seal is K dp/(12 viscosity width)",
+    uncertainty="leakage_scatter",
+    is_column=False,
+    is_listed=False,
+)
+def flow_coefficient(contact: State) -> Any:
+    """Flow coefficient K of the gaps [length^3], `leakage.K`."""
+    return contact.leakage.K
+
+
+@quantity(
+    Dimension(length=1),
+    "hydraulic aperture K^(1/3)",
+    is_column=False,
+    is_listed=False,
+)
+def hydraulic_aperture(contact: State) -> Any:
+    """K^(1/3) [length], the gap of parallel plates with the same flow."""
+    return contact.leakage.hydraulic_aperture
+
+
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln K",
+    is_column=False,
+    is_listed=False,
+)
+def leakage_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln of the flow coefficient."""
+    return contact.leakage.scatter

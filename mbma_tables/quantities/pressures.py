@@ -1,0 +1,57 @@
+"""Pressure, contact area, and how far a contact yields."""
+
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.common.units import Dimension
+from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.quantities.registry import DIMENSIONLESS, quantity
+from mbma_tables.quantities.state import State
+
+STRESS = Dimension(stress=1)
+
+
+def _yields(contact: State) -> bool:
+    return contact.yields
+
+
+@quantity(STRESS, "force over nominal area", uncertainty="scatter")
+def pressure(contact: State) -> Any:
+    """F/A0 in the unit of E*; F/(A0 E*) where that is 1."""
+    return contact.quantity("pressure")
+
+
+@quantity(DIMENSIONLESS, "real over nominal contact area", uncertainty="area_scatter")
+def area(contact: State) -> Any:
+    """A/A0; that of MBMA does not end at 1 under full compression, and is not clamped."""
+    return contact.quantity("area")
+
+
+@quantity(
+    STRESS, "mean pressure in the contact", uncertainty="area_scatter", is_column=False
+)
+def mean_pressure(contact: State) -> Any:
+    """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
+    with np.errstate(invalid="ignore"):
+        return contact.pressure / contact.area
+
+
+@quantity(DIMENSIONLESS, "share of the contact area at the hardness", applies=_yields)
+def yielded(contact: State) -> Any:
+    """Share of the contact area at the hardness, 0 to 1."""
+    if not contact.yields:
+        return 0.0 * contact.mean_separation
+    return contact.of_loading("yielded")
+
+
+@quantity(DIMENSIONLESS, "plasticity index E* g/p_m", applies=_yields, is_column=False)
+def psi(contact: State) -> Any:
+    """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
+    return (contact.E_star * contact.surface.rms_gradient / contact.bodies.hardness)[()]
+
+
+@quantity(STRESS, "hardness above which the elastic area is within 5%", is_column=False)
+def elastic_hardness(contact: State) -> Any:
+    """Hardness above which the elastic area is within 5%, E* g/1.1 [stress]."""
+    return (contact.E_star * contact.surface.rms_gradient / ELASTIC_PSI)[()]

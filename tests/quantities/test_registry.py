@@ -1,0 +1,139 @@
+"""The registry of quantities: what is declared once shows everywhere."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from generate.quantities import FILE, properties
+from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
+from mbma_tables.cli import main
+from mbma_tables.common.units import (
+    ELECTRICAL_CONDUCTANCE,
+    HEAT_CONDUCTANCE,
+    Dimension,
+    Units,
+)
+from mbma_tables.quantities import registry
+
+FACE = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
+METALS = ("steel 4140 hard", "aluminium 6061 hard")
+LAYER = 3.7e3  # heat capacity per area of the layer of `thermal_time` [J/(m^2 K)]
+
+
+@pytest.fixture
+def thermal_time(monkeypatch):
+    """A quantity that is declared in a file of its own (`thermal_time.py` beside this one), and listed."""
+    monkeypatch.syspath_prepend(__file__.rpartition("/")[0])
+    monkeypatch.setattr(registry, "MODULES", [*registry.MODULES, "thermal_time"])
+
+
+def test_a_declared_quantity_shows_in_contacts_laws_joints_datasets_and_commands(
+    thermal_time,
+):
+    pressures = ["10 MPa", "50 MPa"]
+    pressed = contact(FACE, METALS, pressure=pressures, theory="calibrated")
+    seconds = LAYER / pressed.conductance
+    np.testing.assert_allclose(pressed.thermal_time, seconds, rtol=1e-14)
+    assert pressed.units["thermal_time"] == "s"
+    np.testing.assert_array_equal(
+        pressed.scatter_of("thermal_time"), pressed.unloading_stiffness_scatter
+    )
+    data = pressed.to_dataset()
+    assert data["thermal_time"].attrs["units"] == "s"
+    np.testing.assert_array_equal(data["thermal_time"], pressed.thermal_time)
+
+    law = contact_law(FACE, METALS, "calibrated")
+    np.testing.assert_allclose(
+        law.at(pressure=pressures).thermal_time, seconds, rtol=1e-5
+    )
+
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    np.testing.assert_allclose(
+        joint.table(pressures)["thermal_time"], seconds, rtol=1e-12
+    )
+
+    words = [
+        "contact",
+        "--hurst",
+        "0.8",
+        "--q0",
+        "0.06",
+        "--q1",
+        "3",
+        "--h-rms",
+        "1",
+        "--h-max",
+        "3.5",
+    ]
+    words += [
+        "--length-unit",
+        "um",
+        "--E-star",
+        "57.5GPa",
+        "--hardness",
+        "0.95GPa",
+        "--theory",
+        "calibrated",
+    ]
+    words += ["--conductivity", "45W/(m K),167W/(m K)", "-p", "10MPa", "--json"]
+    answer = CliRunner().invoke(main, words, catch_exceptions=False)
+    assert answer.exit_code == 0, answer.output
+    report = json.loads(answer.output)
+    conductance = report["columns"]["conductance"][0]
+    assert report["columns"]["thermal_time"][0] == pytest.approx(
+        LAYER / conductance, rel=1e-12
+    )
+    assert report["units"]["thermal_time"] == "s"
+
+
+def test_what_a_quantity_needs_is_named_with_the_remedy(thermal_time):
+    pressed = contact(FACE, "100 GPa", pressure="10 MPa", theory="calibrated")
+    with pytest.raises(
+        InputError,
+        match=r"thermal_time needs conductivity.*Bodies\(\.\.\., conductivity=",
+    ):
+        _ = pressed.thermal_time
+    assert "thermal_time" not in pressed.available()
+
+
+def test_an_unknown_quantity_is_refused_with_the_nearest():
+    pressed = contact(FACE, "100 GPa", pressure="10 MPa", theory="calibrated")
+    with pytest.raises(InputError, match="did you mean 'stiffness'"):
+        pressed.quantity("stifness")
+    with pytest.raises(AttributeError):
+        _ = pressed.stifness
+
+
+def test_typed_properties_are_those_of_the_registry():
+    assert FILE.read_text(encoding="utf-8") == properties()
+
+
+@pytest.mark.parametrize(
+    ("dimension", "unit"),
+    [
+        (Dimension(), "1"),
+        (Dimension(length=1), "um"),
+        (Dimension(stress=1, length=-1), "MPa/um"),
+        (Dimension(stress=1, length=1), "MPa um"),
+        (Dimension(length=3), "um^3"),
+        (HEAT_CONDUCTANCE, "W/(m^2 K)"),
+        (ELECTRICAL_CONDUCTANCE, "S/m^2"),
+        (Dimension(time=1), "s"),
+        (Dimension(stress=1, time=1), "Pa s"),
+    ],
+)
+def test_units_follow_from_powers(dimension, unit):
+    assert dimension.unit(Units("um", "MPa")) == unit
+
+
+def test_bodies_are_what_people_type():
+    numbers = contact(FACE, "57.5 GPa", pressure="10 MPa", theory="calibrated")
+    same = contact(FACE, Bodies("57.5 GPa"), pressure="10 MPa", theory="calibrated")
+    assert numbers.area == same.area
+    metals = contact(FACE, METALS, pressure="10 MPa", theory="calibrated")
+    same = contact(FACE, Bodies(metals=METALS), pressure="10 MPa", theory="calibrated")
+    assert metals.conductance == same.conductance
+    with pytest.raises(InputError, match="give one of them"):
+        Bodies("100 GPa", metals="silver")
