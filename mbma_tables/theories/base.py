@@ -1,4 +1,7 @@
-"""The interface of theories, and what has no closed form: energy, and the separation at a given load or area."""
+"""The interface of theories, and what has no closed form.
+
+These are the elastic energy, and the separation at a given load or area.
+"""
 
 from __future__ import annotations
 
@@ -17,29 +20,13 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import tested
 from mbma_tables.theories.evidence import shipped_deviations
 
-LOOKS, FEW_LOOKS = (
-    128,
-    8,
-)  # initial gaps of an inversion, for one surface and for each of a batch,
-LOOKED_AT, FAR = (
-    7.0,
-    12.0,
-)  # range of ln u - ln(h_max - u) for these, and largest u/h_rms without last contact
-STEPS, MISSED = (
-    200,
-    0.5,
-)  # of an inversion; largest miss of ln of a value between two adjacent floats u
-# last steps of a logarithm (its error is about the square) and of y; product of the last
-# two where slopes are not known
-SETTLED, SETTLED_STEP, SETTLED_BOTH = 1e-7, 1e-4, 1e-14
-FARTHEST = 40.0  # step of y
-INTEGRAL_RTOL = 1e-9
-# least level for energies: error estimates on coarse intervals may be too small by chance
-LEAST_LEVEL = 4
-DISTINCT = 8.9e-16  # smallest relative difference of distinct gaps
+LOOKS = 128  # initial gaps of an inversion, for one surface
+FEW_LOOKS = 8  # and for each of a batch
 
 # values at mean separations, approximately their -d/du, and whether this is exact
-Curve = Callable[[FloatArray], tuple[Any, Any, bool]]
+Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray, bool]]
+# flat indices into a broadcast shape; scipy's integrator passes them on as floats
+Indices = FloatArray | NDArray[np.integer]
 
 
 class TheoryAnswer(NamedTuple):
@@ -70,12 +57,12 @@ class Theory(abc.ABC):
     """A theory, with quantities derived from its forces."""
 
     name: str
-    variant_name = island_model_name = (
-        ""  # names of its variant of the paper and its island model in results
-    )
-    advice = origin = (
-        ""  # one line of advice; origin of its numbers, if not a shipped file
-    )
+    # names of its variant of the paper and of its island model in results
+    variant_name = ""
+    island_model_name = ""
+    # one line of advice; origin of its numbers, if not a shipped file
+    advice = ""
+    origin = ""
     looks = LOOKS  # initial gaps of an inversion, for one surface
     reached = 0.0  # relative amount by which a wanted value may exceed the largest
     bends_in_area = False  # whether at its `bends` only the area is not smooth
@@ -87,7 +74,10 @@ class Theory(abc.ABC):
         """Pressure, area and stiffness at mean separations u [length]."""
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """Reasons why a measured surface violates the theory's assumptions, or differs from those tested."""
+        """Reasons why a measured surface violates the theory's assumptions.
+
+        Or why it differs from the surfaces that were tested.
+        """
         return surface.departures()
 
     def scatter_name(self, surface: AnySurface) -> str:
@@ -127,48 +117,56 @@ class Theory(abc.ABC):
         """
         # it needs scipy, which takes long to import, and it imports this module
         yielding = importlib.import_module("mbma_tables.theories.yielding.theory")
-        with np.errstate(over="ignore"):  # beyond the largest number nothing yields
-            wrapped: Theory = yielding.Yielding(
-                self, np.asarray(hardness, dtype=float) / E_star
-            )
+        # beyond the largest number nothing yields
+        with np.errstate(over="ignore"):
+            hardness_over_E_star = np.asarray(hardness, dtype=float) / E_star
+            wrapped: Theory = yielding.Yielding(self, hardness_over_E_star)
         return wrapped
 
-    def at(self, shape: tuple[int, ...], place: Any) -> Theory:
+    def at(self, shape: tuple[int, ...], place: Indices) -> Theory:
         """The theory at flat indices of a broadcast shape, if it contains arrays."""
         return self
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
-        return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
+        u, _ = self.inverted(surface, "pressure", pressure)
+        return self.answer(surface, u).area
 
     def heights(self, surface: AnySurface) -> Any:
-        """End of the Gaussian heights over h_rms, or a map's own `BearingCurve`; for a hardness."""
-        return (
-            np.asarray(surface.h_max) / np.asarray(surface.h_rms)
-            if self.ends_at_h_max
-            else np.inf
-        )
+        """End of the Gaussian heights over h_rms, or a map's `BearingCurve`; for a hardness."""
+        if not self.ends_at_h_max:
+            return np.inf
+        return np.asarray(surface.h_max) / np.asarray(surface.h_rms)
 
     def interval(
         self, surface: AnySurface, quantity: str = "pressure"
     ) -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] between which "pressure" or "area" decreases: full compression and last contact."""
+        """Mean separations [length] between which "pressure" or "area" decreases.
+
+        These are full compression and last contact.
+        """
         high = np.asarray(surface.h_max, dtype=float)
         return np.zeros_like(high), high
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separations [length], two at most, at which derivatives of force or area jump; as rows for a batch."""
+        """Mean separations [length], two at most, at which derivatives of force or area jump.
+
+        Rows for a batch.
+        """
         return np.empty(0)
 
     def reasons(
         self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
-    ) -> Mapping[str, Any]:
+    ) -> Mapping[str, NDArray[np.bool_]]:
         """Reasons why results lie outside the tested range of the theory, each with a mask."""
         reasons = tested.untested(surface, answer.area)
         if self.ends_at_h_max:
             return reasons
         beyond = mean_separation > np.asarray(surface.h_max)
-        text = "u is above h_max, where the surface has no contact but the theory's heights are unbounded"
+        text = (
+            "u is above h_max, where the surface has no contact "
+            "but the theory's heights are unbounded"
+        )
         return {text: beyond, **reasons}
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
@@ -182,12 +180,12 @@ class Theory(abc.ABC):
         shape = np.broadcast_shapes(np.shape(area), surface.shape)
         if self.departures(surface):
             return np.full(shape, np.nan)
-        scatter = shipped_deviations().standard_deviation(
+        deviations = shipped_deviations()
+        scatter = deviations.standard_deviation(
             self.scatter_name(surface), quantity, area
         )
-        return np.where(
-            tested.is_compared(surface), np.broadcast_to(scatter, shape), np.nan
-        )
+        scatter = np.broadcast_to(scatter, shape)
+        return np.where(tested.is_compared(surface), scatter, np.nan)
 
     def gaps(self) -> Any:
         """Of a simulated map, the theory that knows the flow through its gaps."""
@@ -198,46 +196,51 @@ class Theory(abc.ABC):
         from scipy.integrate import tanhsinh
 
         u = np.asarray(mean_separation, dtype=float)
-        high = np.broadcast_to(self.interval(surface)[1], u.shape)
-        low = np.minimum(u, high)
+        shape = u.shape
+        last_contact = np.broadcast_to(self.interval(surface)[1], shape)
+        first = np.minimum(u, last_contact)
         # from bend to bend, across which no rule converges
-        edges = np.sort(
-            [low, *(np.clip(bend, low, high) for bend in self.bends(surface)), high],
-            axis=0,
-        )
+        bends = [np.clip(bend, first, last_contact) for bend in self.bends(surface)]
+        edges = np.sort([first, *bends, last_contact], axis=0)
 
         def force(x: FloatArray, place: FloatArray) -> FloatArray:
-            return self.at(u.shape, place).answer(select(surface, u.shape, place), x)[0]
+            """F/(A0 E*) of the entries that the integrator has not finished."""
+            theory = self.at(shape, place)
+            return theory.answer(select(surface, shape, place), x).pressure
 
-        place = np.arange(float(u.size)).reshape(u.shape)
-        found = tanhsinh(
+        place = np.arange(float(u.size)).reshape(shape)
+        integral = tanhsinh(
             force,
             edges[:-1],
             edges[1:],
             args=(place,),
-            rtol=INTEGRAL_RTOL,
-            minlevel=LEAST_LEVEL,
+            rtol=1e-9,
+            # error estimates on coarser intervals may be too small by chance
+            minlevel=4,
         )
-        if not found.success.all():
-            raise unfinished(~found.success.all(axis=0), "the elastic energy")
-        return np.asarray(found.integral.sum(axis=0))
+        if not integral.success.all():
+            unresolved = ~integral.success.all(axis=0)
+            raise unfinished(unresolved, "the elastic energy")
+        return np.asarray(integral.integral.sum(axis=0))
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
-        """Unchecked force or area by mean separation for inversions: value, nearly its -d/du or NaN, whether exact."""
+        """Unchecked force or area by mean separation for inversions.
 
-        def values(u: FloatArray) -> tuple[Any, Any, bool]:
-            found = self.answer(surface, u)
-            if quantity == "pressure":
-                return found.pressure, found.stiffness, True
-            # area increases nearly as force does
-            return found.area, found.area * found.stiffness / found.pressure, False
+        Its results are the value, nearly its -d/du or NaN, and whether that is exact.
+        """
+
+        def values(u: FloatArray) -> tuple[FloatArray, FloatArray, bool]:
+            pressure, area, stiffness, _ = self.answer(surface, u)
+            return curve_values(quantity, pressure, area, stiffness)
 
         return values
 
     def mean_separation_at(
         self, surface: AnySurface, quantity: str, wanted: FloatArray
     ) -> FloatArray:
-        """Mean separation u [length] at which "pressure" (over A0 E*) or "area" has a wanted value; h_max at zero.
+        """Mean separation u [length] at a wanted "pressure" (over A0 E*) or "area".
+
+        At zero it is h_max.
 
         Raises
         ------
@@ -253,209 +256,299 @@ class Theory(abc.ABC):
     def inverted(
         self, surface: AnySurface, quantity: str, wanted: FloatArray
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """`mean_separation_at` by Newton's method in a bracket, and a mask where rounding of u excludes the value."""
+        """`mean_separation_at` by Newton's method in a bracket.
+
+        The second result is a mask where rounding of u excludes the value.
+        """
         first, last = self.interval(surface, quantity)
         end = surface.h_max if self.ends_at_h_max else np.inf
         (goal, ends, low, high), shape = rows(wanted, end, first, last)
         if not self.ends_at_h_max:
+            goals = goal.reshape(shape)
             allowed = f"positive: there is no last contact in theory {self.name!r}"
-            require(quantity, goal.reshape(shape), goal.reshape(shape) != 0, allowed)
-        near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
-        shares = _shares(FEW_LOOKS if surface.shape else self.looks).reshape(
-            -1, *[1] * len(shape)
-        )
-        looked = np.asarray(first + (near - first) * shares)
+            require(quantity, goals, goals != 0, allowed)
+
         curve = self.curve(surface, quantity)
-        value, steep, exact = curve(looked)
-        # one column of gaps for all entries, or one for each
-        seen = np.empty(
-            (
-                3,
-                *(
-                    shares.shape
-                    if max(looked.size, np.size(value)) == shares.size
-                    else (shares.size, *shape)
-                ),
-            )
-        )
-        seen[0], seen[1], seen[2] = looked, value, steep
-        search = Search(seen.reshape(3, len(shares), -1), exact, goal, ends, low, high)
-        at_end = goal > seen[1][-1].ravel()
+        sampled, exact = self._sampled(surface, curve, first, last, shape)
+        search = Search(sampled, exact, goal, ends, low, high)
+
+        # goals beyond the value at the smallest gap, whose answer is that gap or an error
+        at_end = goal > sampled[1][-1].ravel()
         if at_end.any():
-            largest = np.broadcast_to(
-                getattr(self.answer(surface, first), quantity), shape
-            )
-            wanted = goal.reshape(shape)
-            at_end, out = (
-                (wanted >= largest).ravel(),
-                wanted > largest * (1 + self.reached),
-            )
-            if out.any():
-                raise OutOfRangeError(
-                    f"{quantity} must be at most what theory {self.name!r} reaches on this surface "
-                    f"({describe_entries(largest, out)}), got {describe_entries(wanted, out)}",
-                    out,
-                )
+            at_end = self._at_full_compression(
+                surface, quantity, first, goal.reshape(shape)
+            ).ravel()
+
+        # steps of Newton's method for the entries that are left
         left = np.flatnonzero((goal > 0) & ~at_end)
-        for _ in range(STEPS):
+        for _ in range(200):
             if not left.size:
                 break
-            theory, own = self.at(shape, left), select(surface, shape, left)
-            value, steep, _ = (
-                curve
-                if theory is self and own is surface
-                else theory.curve(own, quantity)
-            )(search.gap[left])
-            left = search.step(left, value, steep)
-        missed = (
-            (np.isnan(search.gap) | (np.abs(search.before[0] - np.log(goal)) > MISSED))
-            & (goal > 0)
-            & ~at_end
-        )
+            theory = self.at(shape, left)
+            part = select(surface, shape, left)
+            is_whole = theory is self and part is surface
+            curve_of_left = curve if is_whole else theory.curve(part, quantity)
+            value, slope, _ = curve_of_left(search.gap[left])
+            left = search.step(left, value, slope)
+
+        # between two adjacent floats u, ln of a steep value may miss its goal
+        log_miss = np.abs(search.before[0] - np.log(goal))
+        is_wrong = np.isnan(search.gap) | (log_miss > 0.5)
+        missed = is_wrong & (goal > 0) & ~at_end
         missed[left] = True
-        u = np.where(goal == 0, high, np.where(at_end, low, search.gap))
+        u = np.where(at_end, low, search.gap)
+        u = np.where(goal == 0, high, u)
         return u.reshape(shape), missed.reshape(shape)
+
+    def _sampled(
+        self,
+        surface: AnySurface,
+        curve: Curve,
+        first: FloatArray,
+        last: FloatArray,
+        shape: tuple[int, ...],
+    ) -> tuple[FloatArray, bool]:
+        """The initial gaps of an inversion with their values and slopes, (3, gaps, entries).
+
+        In order from last contact on; with them, whether the slopes are exact.
+        """
+        # without a last contact from 12 h_rms on, which 2e-33 of Gaussian heights exceed
+        farthest = last if self.ends_at_h_max else np.minimum(last, 12.0 * surface.h_rms)
+        count = FEW_LOOKS if surface.shape else self.looks
+        shares = _shares(count).reshape(-1, *[1] * len(shape))
+        gaps = np.asarray(first + (farthest - first) * shares)
+        value, slope, exact = curve(gaps)
+        # one column of gaps for all entries, or one for each
+        is_shared = max(gaps.size, np.size(value)) == shares.size
+        columns = shares.shape if is_shared else (shares.size, *shape)
+        sampled = np.empty((3, *columns))
+        sampled[0] = gaps
+        sampled[1] = value
+        sampled[2] = slope
+        return sampled.reshape(3, count, -1), exact
+
+    def _at_full_compression(
+        self,
+        surface: AnySurface,
+        quantity: str,
+        first: FloatArray,
+        wanted: FloatArray,
+    ) -> NDArray[np.bool_]:
+        """Where a wanted value is the largest that the theory reaches; an error beyond it."""
+        full = self.answer(surface, first)
+        largest = np.broadcast_to(getattr(full, quantity), wanted.shape)
+        beyond = wanted > largest * (1 + self.reached)
+        if beyond.any():
+            reached = describe_entries(largest, beyond)
+            raise OutOfRangeError(
+                f"{quantity} must be at most what theory {self.name!r} reaches on this "
+                f"surface ({reached}), got {describe_entries(wanted, beyond)}",
+                beyond,
+            )
+        return np.asarray(wanted >= largest)
+
+
+def curve_values(
+    quantity: str, pressure: FloatArray, area: FloatArray, stiffness: FloatArray
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Results of a `Curve` of "pressure" or "area" from those of a theory."""
+    if quantity == "pressure":
+        return pressure, stiffness, True
+    # area increases nearly as force does
+    return area, area * stiffness / pressure, False
 
 
 @shared()
 def _shares(count: int) -> FloatArray:
-    """Points from 1 to 0, denser at either end."""
-    return np.asarray(1 / (1 + np.exp(np.linspace(-LOOKED_AT, LOOKED_AT, count))))
+    """Points from 1 to 0, denser at either end: equal steps of ln u - ln(h_max - u)."""
+    # at 7 the outer ones are 0.1% of the interval from its ends
+    logits = np.linspace(-7.0, 7.0, count)
+    return np.asarray(1 / (1 + np.exp(logits)))
 
 
-def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurface:
+def select(surface: AnySurface, shape: tuple[int, ...], place: Indices) -> AnySurface:
     """The surfaces of a batch, broadcast to `shape`, at flat indices."""
     if surface.shape == ():
         return surface
     chosen = np.asarray(place).astype(np.intp)
-    numbers = (
+    numbers = [
         np.broadcast_to(getattr(surface, name), shape).ravel()[chosen]
         for name in surface.parameters
-    )
+    ]
     return surface.with_numbers(*numbers)
 
 
 def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:
     """The error for entries without a solution."""
-    return ConvergenceError(
-        f"{what} was not found for {int(failed.sum())} entries", failed
-    )
+    count = int(failed.sum())
+    return ConvergenceError(f"{what} was not found for {count} entries", failed)
+
+
+# Inversions search in the plane of x = ln(value) and y = ln(u/(1 - u/end)), in which powers of
+# u near full contact, and of end - u beside last contact, are straight lines.
+LONGEST_STEP = 40.0  # of y, whose exponential is finite
 
 
 def _places(
-    u: FloatArray, value: FloatArray, steep: FloatArray, end: FloatArray
+    u: FloatArray, value: FloatArray, slope: FloatArray, end: FloatArray
 ) -> FloatArray:
-    """Rows of ln value, y, and the derivative of y by that logarithm."""
-    return np.array(
-        [np.log(value), np.log(u / (rest := 1 - u / end)), -value / (steep * u * rest)]
-    )
+    """Rows of x = ln value, y, and dy/dx, from `slope`, the value's -d/du."""
+    rest = 1 - u / end
+    x = np.log(value)
+    y = np.log(u / rest)
+    rate = -value / (slope * u * rest)
+    return np.array([x, y, rate])
 
 
 def _through(places: FloatArray, goal: FloatArray) -> FloatArray:
-    """y at a goal by the polynomial through places, (3, places, n), and their rates, by divided differences."""
-    x, found = places[0].repeat(2, axis=0), places[1, 0]
-    difference, product = places[1].repeat(2, axis=0), 1.0
+    """y at x = goal by the polynomial through places (3, places, n), with their slopes.
+
+    Hermite's interpolation by divided differences, in which each place counts twice.
+    """
+    x = places[0].repeat(2, axis=0)
+    difference = places[1].repeat(2, axis=0)
+    y = places[1, 0]
+    product = 1.0
     for order in range(1, len(x)):
-        difference = (difference[1:] - difference[:-1]) / (x[order:] - x[:-order])
+        span = x[order:] - x[:-order]
+        difference = (difference[1:] - difference[:-1]) / span
         if order == 1:
+            # the difference of a place and itself is its slope
             difference[::2] = places[2]
         product = product * (goal - x[order - 1])
-        found = found + product * difference[0]
-    return np.asarray(found)
+        y = y + product * difference[0]
+    return np.asarray(y)
 
 
 def _middle(low: FloatArray, high: FloatArray) -> FloatArray:
-    apart = np.where(
-        (high > 2 * low) & (low > 0), np.sqrt(low) * np.sqrt(high), 0.5 * (low + high)
-    )
-    return np.where(high == np.inf, 2 * low, apart)
+    """A gap between two others, by their logarithms where these are far apart."""
+    geometric = np.sqrt(low) * np.sqrt(high)
+    far_apart = (high > 2 * low) & (low > 0)
+    middle = np.where(far_apart, geometric, 0.5 * (low + high))
+    # without an upper end the gap is doubled
+    return np.where(high == np.inf, 2 * low, middle)
 
 
 class Search:
-    """Solutions from values at gaps in order from last contact on; differences are used unless `steep` is exact."""
+    """Gaps at which values are reached, from values sampled in order from last contact on.
+
+    Each has a bracket `low` to `high`, a next `gap` to evaluate, and the place `before`, the
+    last one evaluated. Slopes that are not `exact` are scaled by differences.
+    """
 
     def __init__(
         self,
-        seen: FloatArray,
+        sampled: FloatArray,
         exact: bool,
         wanted: FloatArray,
         end: FloatArray,
         low: FloatArray,
         high: FloatArray,
     ) -> None:
-        self.exact, self.wanted, self.end = exact, wanted, end
-        # the branch of first contact: the first gap from there at which the value is reached
-        reached, count = seen[1] >= wanted, seen.shape[1]
-        number = (
-            np.where(reached.any(axis=0), reached.argmax(axis=0), count)
-            + np.arange(-2, 2)[:, None]
-        )
-        column = np.arange(wanted.size) if seen.shape[2] == wanted.size else 0
-        u, value, steep = seen[:, number.clip(0, count - 1), column]
-        inside, goal = (number >= 0) & (number < count), np.log(wanted)
-        self.low, self.high = (
-            np.where(inside[2], u[2], low),
-            np.where(inside[1], u[1], high),
-        )
-        known = inside & (value > 0) & (value < np.inf)
-        around = np.where(known, _places(u, value, steep, end), np.nan)
-        (_, light, heavy, _), y, _ = around
-        nearer = known[2] & ~(goal - light <= heavy - goal)
-        self.before: FloatArray = np.where(nearer, around[:, 2], around[:, 1])
-        x0, y0, rate = self.before
-        straight = y[1] + (goal - light) / (heavy - light) * (y[2] - y[1])
-        found = np.where(heavy > light, straight, y0 + rate * (goal - x0))
-        if exact:
-            curved = _through(around, goal)
-            rises = (around[0, 1:] > around[0, :-1]).all(axis=0)
-            good = rises & (curved <= y[1]) & (curved >= y[2])
-            found = np.where(good, curved, found)
-        ratio = np.exp(y0 + np.minimum(np.maximum(found - y0, -FARTHEST), FARTHEST))
-        gap = ratio / (1 + ratio / end)
-        self.gap = np.where(
-            (gap > self.low) & (gap < self.high), gap, _middle(self.low, self.high)
+        self.exact = exact
+        self.wanted = wanted
+        self.end = end
+
+        # the branch of first contact: the first sample from there that reaches the value,
+        # the one after it, and two before, one row each, of which some may not exist
+        count = sampled.shape[1]
+        reaches = sampled[1] >= wanted
+        tight = np.where(reaches.any(axis=0), reaches.argmax(axis=0), count)
+        number = tight + np.arange(-2, 2)[:, None]
+        exists = (number >= 0) & (number < count)
+        nearest = number.clip(0, count - 1)
+        has_columns = sampled.shape[2] == wanted.size
+        column = np.arange(wanted.size) if has_columns else 0
+        u, value, slope = sampled[:, nearest, column]
+        # rows 1 and 2, which bracket the goal
+        self.low = np.where(exists[2], u[2], low)
+        self.high = np.where(exists[1], u[1], high)
+
+        usable = exists & (value > 0) & (value < np.inf)
+        around = np.where(usable, _places(u, value, slope, end), np.nan)
+        x, y, _ = around
+        log_goal = np.log(wanted)
+        wide_x, tight_x = x[1:3]
+        wide_y, tight_y = y[1:3]
+        is_nearer_to_wide = log_goal - wide_x <= tight_x - log_goal
+        start_at_tight_side = usable[2] & ~is_nearer_to_wide
+        self.before: FloatArray = np.where(
+            start_at_tight_side, around[:, 2], around[:, 1]
         )
 
+        # the straight line through both sides, or the tangent at one
+        x0, y0, slope0 = self.before
+        part_of_way = (log_goal - wide_x) / (tight_x - wide_x)
+        straight = wide_y + part_of_way * (tight_y - wide_y)
+        tangent = y0 + slope0 * (log_goal - x0)
+        next_y = np.where(tight_x > wide_x, straight, tangent)
+        if exact:
+            # a polynomial of degree 7 through all four, where it stays between both sides
+            curved = _through(around, log_goal)
+            rises = (x[1:] > x[:-1]).all(axis=0)
+            is_between = rises & (curved <= wide_y) & (curved >= tight_y)
+            next_y = np.where(is_between, curved, next_y)
+        step = np.minimum(np.maximum(next_y - y0, -LONGEST_STEP), LONGEST_STEP)
+        ratio = np.exp(y0 + step)
+        gap = ratio / (1 + ratio / end)
+        is_inside = (gap > self.low) & (gap < self.high)
+        self.gap = np.where(is_inside, gap, _middle(self.low, self.high))
+
     def step(
-        self, left: NDArray[np.intp], value: FloatArray, steep: FloatArray
+        self, left: NDArray[np.intp], value: FloatArray, slope: FloatArray
     ) -> NDArray[np.intp]:
-        """A step of the gaps with indices `left`, by the cubic through their values and the previous ones."""
-        u, end, miss = self.gap[left], self.end[left], np.log(value / self.wanted[left])
-        here = x, y, rate = _places(u, value, steep, end)
-        x0, y0, rate0 = self.before[:, left]
-        low, high = (
-            np.where(miss > 0, u, self.low[left]),
-            np.where(miss > 0, self.high[left], u),
-        )
-        apart, straight = x - x0, -miss * rate
+        """A step of the gaps with indices `left`, whose values these are; those still left."""
+        u = self.gap[left]
+        end = self.end[left]
+        miss = np.log(value / self.wanted[left])
+        place = _places(u, value, slope, end)
+        low = np.where(miss > 0, u, self.low[left])
+        high = np.where(miss > 0, self.high[left], u)
+
+        step, apart = self._step_of_y(place, self.before[:, left], miss)
+        # the gap there is u exp(step)/(1 + u (exp(step) - 1)/end)
+        short_step = np.minimum(np.maximum(step, -LONGEST_STEP), LONGEST_STEP)
+        following = u * np.exp(short_step)
+        following = following / (1 + (following - u) / end)
+
+        # the error after a step is about its square
+        is_settled = (np.abs(miss) <= 1e-7) & (np.abs(step) <= 1e-4)
+        if not self.exact:
+            # without exact slopes it is about the product of the last two
+            is_settled &= np.abs(miss * apart) <= 1e-14
+        is_inside = (following > low) & (following < high)
+        bracketed = np.where(is_inside, following, _middle(low, high))
+        clipped = np.minimum(np.maximum(following, low), high)
+        gap = np.where(is_settled, clipped, bracketed)
+        gap[np.isnan(miss) | ~(u > 0)] = np.nan
+
+        self.gap[left] = gap
+        self.low[left] = low
+        self.high[left] = high
+        self.before[:, left] = place
+        # a bracket of four roundings holds no distinct gaps
+        is_narrow = high - low <= 8.9e-16 * high
+        is_done = is_settled | is_narrow | (gap == u) | np.isnan(gap)
+        return np.asarray(left[~is_done])
+
+    def _step_of_y(
+        self, place: FloatArray, before: FloatArray, miss: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """The step of y, by the cubic through this place and the one before, and their dx."""
+        x, y, slope = place
+        x0, y0, slope0 = before
+        apart = x - x0
+        tangent = -miss * slope
         mean = (y - y0) / apart
         # slopes that are not exact are scaled to the straight line through both
-        scale = 1.0 if self.exact else 2 * mean / (rate + rate0)
-        second = (scale * rate - mean) / apart
-        third = (second - (mean - scale * rate0) / apart) / apart
-        curved, by_both = (
-            miss * miss * (third * (apart - miss) + second),
-            -miss * scale * rate,
-        )
-        other = np.where(mean < 0, -mean * miss, straight)
-        cubic = np.where(np.abs(curved) <= 0.5 * np.abs(by_both), by_both + curved, other)
-        step = np.where(np.isfinite(apart) & (apart != 0), cubic, straight)
-        following = u * np.exp(np.minimum(np.maximum(step, -FARTHEST), FARTHEST))
-        following = following / (1 + (following - u) / end)
-        near = (np.abs(miss) <= SETTLED) & (np.abs(step) <= SETTLED_STEP)
-        if not self.exact:
-            near &= np.abs(miss * apart) <= SETTLED_BOTH
-        held = np.where(
-            (following > low) & (following < high), following, _middle(low, high)
-        )
-        gap = np.where(near, np.minimum(np.maximum(following, low), high), held)
-        gap[np.isnan(miss) | ~(u > 0)] = np.nan
-        self.gap[left], self.low[left], self.high[left], self.before[:, left] = (
-            gap,
-            low,
-            high,
-            here,
-        )
-        return np.asarray(
-            left[~(near | (high - low <= DISTINCT * high) | (gap == u) | np.isnan(gap))]
-        )
+        scale = 1.0 if self.exact else 2 * mean / (slope + slope0)
+        second = (scale * slope - mean) / apart
+        third = (second - (mean - scale * slope0) / apart) / apart
+        curved = miss * miss * (third * (apart - miss) + second)
+        scaled_tangent = -miss * scale * slope
+        # where the cubic bends too much, the straight line through both if it falls
+        straight = np.where(mean < 0, -mean * miss, tangent)
+        is_nearly_straight = np.abs(curved) <= 0.5 * np.abs(scaled_tangent)
+        cubic = np.where(is_nearly_straight, scaled_tangent + curved, straight)
+        has_two_places = np.isfinite(apart) & (apart != 0)
+        return np.where(has_two_places, cubic, tangent), apart

@@ -12,7 +12,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -37,81 +37,108 @@ from mbma_tables.theories.mbma.island_models import AnyModel, answer_islands
 from mbma_tables.theories.mbma.universal import UniversalModel
 from mbma_tables.theories.mbma.variants import Variant
 
-NODES, FEWER, NARROW = (
-    16,
-    8,
-    0.3,
-)  # nodes of a panel, and of one whose width is less than NARROW of its approaches
+NODES = 16  # nodes of a panel, MBMA_PANEL_NODES of mbma.h
 GAPS = 10  # largest number of gaps of a panel: a series has 2 GAPS terms
-CHECKS = np.array(
-    [1e-5, 0.5, 1 - 1e-5]
-)  # points where the polynomials' errors are largest
-# leading powers of delta of force, area, number of islands and Hertz area
-POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
-KEPT = 64  # profiles in the cache
-WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
-MAX_ROUNDS = 30
+# points where the polynomials' errors are largest, as shares of the panel
+CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])
+# leading powers of delta of force, area, number of islands and Hertz area, in rows
+POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None]
 BLOCK = 1 << 14  # gaps between two checks for interrupts
-MOST = 1000  # panels evaluated together
 
-Shape = (
-    tuple[float, float, float] | MeasuredSurface
-)  # hurst, zeta_1 and h_max/h_rms of self-affine ones
+# hurst, zeta_1 and h_max/h_rms of self-affine surfaces, or a measured one
+Shape = tuple[float, float, float] | MeasuredSurface
 # function of approaches and which of them are used: rows of `Panels.fields`, and their error
 Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
+# islands at nodes: weights (rows, nodes), shift and rate of heights, and how many lie below
+# each panel, and in all
+Nodes = tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]
 
 
-def _rule(n: int, power: int) -> tuple[FloatArray, Any]:
-    """`mbma_panel_rule` of mbma.h, and the positions of its nodes and checks."""
-    x, weights = np.polynomial.legendre.leggauss(n)
-    nodes, gaps = (1 + x) / 2, (n + 4) // 2
-    points, terms = chebyshev.chebpts1(gaps), np.eye(2 * gaps)
-    to_series: Any = np.linalg.inv(chebyshev.chebvander(x, n - 1)).T
-    reach = np.append(((1 + points) / 2) ** (1 / power), 1.0)
-    places = (
-        CHECKS,
-        np.concatenate([nodes, 1 + nodes]) / 2,
-        np.outer(reach, nodes).ravel(),
-        reach[:-1],
-    )
-    matrices = [to_series @ chebyshev.chebvander(2 * at - 1, n - 1).T for at in places]
-    both = [
-        chebyshev.chebval(points, terms),
-        chebyshev.chebval(points, chebyshev.chebder(terms)),
+def _series_matrices(gap_points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Matrices to Chebyshev series: of values and slopes, and of slopes and the mean value.
+
+    Rows are values at the gaps, then slopes.
+    """
+    gaps = gap_points.size
+    terms = np.eye(2 * gaps)
+    values = chebyshev.chebval(gap_points, terms)
+    slopes = chebyshev.chebval(gap_points, chebyshev.chebder(terms))
+    by_both = np.linalg.inv(np.concatenate([values, slopes], axis=1))
+    # the mean value is the constant term; the others are the integral of the slopes' series
+    slopes_to_series = np.linalg.inv(values[:gaps])
+    by_slopes = np.zeros_like(by_both)
+    by_slopes[:gaps, 0] = 1 / gaps
+    integrals = chebyshev.chebint(slopes_to_series, axis=1)
+    by_slopes[gaps:, 1 : gaps + 1] = integrals[:, 1:]
+    return by_both, by_slopes
+
+
+def _padded(part: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """An array with zeros behind it along each axis, flat, as a rule's field in C."""
+    field = np.zeros(shape)
+    field[tuple(slice(size) for size in part.shape)] = part
+    return field.ravel()
+
+
+def _rule(count: int, power: int) -> tuple[FloatArray, FloatArray]:
+    """`mbma_panel_rule` of mbma.h, of so many nodes, along which delta rises like place^power.
+
+    The second result are its nodes and then `CHECKS`, as shares of the panel of delta; 1
+    where a rule has fewer than `NODES`.
+    """
+    gauss_points, weights = np.polynomial.legendre.leggauss(count)
+    nodes = (1 + gauss_points) / 2
+    gaps = (count + 4) // 2
+    gap_points = chebyshev.chebpts1(gaps)
+    # places of the gaps, and the end of the panel
+    reach = np.append(((1 + gap_points) / 2) ** (1 / power), 1.0)
+
+    vandermonde = chebyshev.chebvander(gauss_points, count - 1)
+    nodes_to_series = np.linalg.inv(vandermonde).T
+
+    def interpolation_at(places: FloatArray) -> FloatArray:
+        """The matrix that takes values at the nodes to those at other places."""
+        return np.asarray(
+            nodes_to_series @ chebyshev.chebvander(2 * places - 1, count - 1).T
+        )
+
+    at_halves = np.concatenate([nodes, 1 + nodes]) / 2
+    at_parts = np.outer(reach, nodes).ravel()
+    by_both, by_slopes = _series_matrices(gap_points)
+    fields = [
+        np.array([power, count, gaps], float),
+        _padded(nodes, (NODES,)),
+        _padded(weights / 2, (NODES,)),
+        _padded(reach, (GAPS + 1,)),
+        _padded(interpolation_at(CHECKS), (NODES, CHECKS.size)),
+        _padded(interpolation_at(at_halves), (NODES, 2 * NODES)),
+        _padded(interpolation_at(at_parts), (NODES, NODES * (GAPS + 1))),
+        _padded(interpolation_at(reach[:-1]), (NODES, GAPS)),
+        _padded(by_both, (2 * GAPS, 2 * GAPS)),
+        _padded(by_slopes, (2 * GAPS, 2 * GAPS)),
     ]
-    series: Any = np.linalg.inv(np.concatenate(both, axis=1))
-    slopes: Any = np.linalg.inv(both[0][:gaps])
-    integrated = np.zeros_like(series)
-    integrated[:gaps, 0], integrated[gaps:, 1 : gaps + 1] = (
-        1 / gaps,
-        chebyshev.chebint(slopes, axis=1)[:, 1:],
-    )
-    vectors: list[tuple[int, ...]] = [(NODES,), (NODES,), (GAPS + 1,)]
-    columns = CHECKS.size, 2 * NODES, NODES * (GAPS + 1), GAPS
-    shapes = [
-        *vectors,
-        *((NODES, count) for count in columns),
-        (2 * GAPS, 2 * GAPS),
-        (2 * GAPS, 2 * GAPS),
-    ]
-    held = [np.array([power, n, gaps], float)]
-    for part, shape in zip(
-        (nodes, weights / 2, reach, *matrices, series, integrated), shapes, strict=True
-    ):
-        held.append(np.zeros(shape))
-        held[-1][tuple(slice(size) for size in part.shape)] = part
+
     shares = np.ones(NODES + CHECKS.size)
-    shares[:n], shares[NODES:] = nodes**power, CHECKS**power
-    return np.concatenate([part.ravel() for part in held]), shares
+    shares[:count] = nodes**power
+    shares[NODES:] = CHECKS**power
+    return np.concatenate(fields), shares
 
 
-# rules of the panel from 0, where delta is the square of the place, of others, and of narrow ones
-_RULES = [_rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)]
+# rules of the panel from 0, where delta is the square of the place, of others, and of narrow
+# ones, which need fewer nodes
+FIRST, USUAL, NARROW = range(3)
+_RULES = [_rule(NODES, 2), _rule(NODES, 1), _rule(8, 1)]
 RULES = np.concatenate([rule for rule, _ in _RULES])
-# positions in panels at which islands are evaluated, nodes and then CHECKS, and which of
-# them are used
+# where panels have islands, by rule, and which of these places are used
 SHARES = np.array([shares for _, shares in _RULES])
 COUNTED = SHARES < 1
+
+
+def _rules_of(low: FloatArray, high: FloatArray) -> NDArray[np.intp]:
+    """Numbers of the rules for panels between these approaches [h_rms]."""
+    # above delta = h_rms/2 the curvature is that of the Gaussian
+    is_narrow = high - low <= 0.3 * np.minimum(low, 0.5)
+    return np.where(is_narrow, NARROW, (low > 0).astype(np.intp))
 
 
 class Panels(NamedTuple):
@@ -124,47 +151,63 @@ class Panels(NamedTuple):
     # checks)
     fields: FloatArray
 
-    def some(self, chosen: Any) -> Panels:
-        """The panels at these indices."""
+    def some(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Panels:
+        """The panels under a mask, or at these indices."""
         fields = np.ascontiguousarray(self.fields[:, chosen])
         return Panels(self.kind[chosen], self.low[chosen], self.high[chosen], fields)
 
     def joined(self, other: Panels) -> Panels:
         """These panels, followed by others."""
-        kind, low, high = (
-            np.concatenate(pair) for pair in zip(self[:3], other[:3], strict=True)
-        )
         return Panels(
-            kind, low, high, np.concatenate([self.fields, other.fields], axis=1)
+            np.concatenate([self.kind, other.kind]),
+            np.concatenate([self.low, other.low]),
+            np.concatenate([self.high, other.high]),
+            np.concatenate([self.fields, other.fields], axis=1),
+        )
+
+    def halves(
+        self, chosen: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+        """Rules, lower and upper ends of the halves of panels, all lower halves first."""
+        low = self.low[chosen]
+        high = self.high[chosen]
+        kind = self.kind[chosen]
+        middle = (low + high) / 2
+        # the upper half of the panel from 0 does not begin there
+        upper_kind = np.maximum(kind, USUAL)
+        return (
+            np.concatenate([kind, upper_kind]),
+            np.concatenate([low, middle]),
+            np.concatenate([middle, high]),
         )
 
     def missed(self, last: float) -> FloatArray:
         """Bound on the relative error of each: of the interpolated islands, and of its sums."""
         error = np.empty(self.low.size)
-        core.profile_missed(RULES, *self, len(self.fields) - 2, last, error)
+        rows = len(self.fields) - 2
+        core.profile_missed(RULES, *self, rows, last, error)
         return error
 
-    def series(self) -> tuple[FloatArray, FloatArray, tuple[Any, ...]]:
-        """Chebyshev series of ln of each row's sum, (panels, rows, 2 GAPS), their errors, and the islands at nodes.
+    def series(self) -> tuple[FloatArray, FloatArray, Nodes]:
+        """Chebyshev series of ln of each row's sum, (panels, rows, 2 GAPS), with their errors.
 
-        The last as weights, (rows, nodes), shift and rate of heights, and how many lie
-        below each panel, and in all.
+        The third result are the islands at nodes.
         """
-        count, rows = self.low.size, len(self.fields) - 2
-        series, error = np.empty((count, rows, 2 * GAPS)), np.empty(count)
-        weights, (shift, rate) = (
-            np.zeros((rows, NODES * count)),
-            np.zeros((2, NODES * count)),
-        )
+        count = self.low.size
+        rows = len(self.fields) - 2
+        series = np.empty((count, rows, 2 * GAPS))
+        error = np.empty(count)
+        # narrow panels have fewer nodes, so that these arrays may end early
+        weights = np.zeros((rows, NODES * count))
+        shift = np.zeros(NODES * count)
+        rate = np.zeros(NODES * count)
         stops = np.empty(count + 1, np.int64)
         core.profile_series(
             RULES, *self, rows, series, error, weights, shift, rate, stops
         )
-        return (
-            series,
-            error,
-            (weights[:, : stops[-1]], shift[: stops[-1]], rate[: stops[-1]], stops),
-        )
+        total = stops[-1]
+        nodes = weights[:, :total], shift[:total], rate[:total], stops
+        return series, error, nodes
 
 
 class Source(NamedTuple):
@@ -179,24 +222,26 @@ class Source(NamedTuple):
     jacobian: float  # K1 (47) below at_d
 
     def density(
-        self, g: dict[str, FloatArray], x: FloatArray, height: Any = 0.0
+        self, g: dict[str, FloatArray], x: FloatArray, height: FloatArray | float = 0.0
     ) -> FloatArray:
-        """Islands per area and approach (42, 43, 46) in the units of `g`, at `height` z'/sigma_d."""
+        """Islands per area and approach (42, 43, 46) in the units of `g`.
+
+        `height` is z'/sigma_d.
+        """
         K1 = np.where(x < self.at_d, self.jacobian, 1.0)
-        return np.asarray(
-            g["D_d"]
-            * np.exp(-0.5 * height * height)
-            / (math.sqrt(2.0 * math.pi) * g["sigma_d"])
-            * K1
-        )
+        gaussian = g["D_d"] * np.exp(-0.5 * height * height)
+        norm = math.sqrt(2.0 * math.pi) * g["sigma_d"]
+        return np.asarray(gaussian / norm * K1)
 
     def heights(
         self, g: dict[str, FloatArray], x: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Shift and rate of z'/sigma_d (41) = shift - rate compression; nothing cancels at first contact."""
-        return ((self.peak + x) * self.h_rms - g["h_d"]) / g["sigma_d"], self.h_rms / g[
-            "sigma_d"
-        ]
+        """Shift and rate of z'/sigma_d (41) = shift - rate compression.
+
+        Nothing cancels at first contact.
+        """
+        shift = ((self.peak + x) * self.h_rms - g["h_d"]) / g["sigma_d"]
+        return shift, self.h_rms / g["sigma_d"]
 
 
 def _jacobian_below(rms_over_s: float, variant: Variant) -> float:
@@ -208,37 +253,56 @@ def _jacobian_below(rms_over_s: float, variant: Variant) -> float:
 
 def source_of(surface: Shape, variant: Variant) -> Source:
     """The islands of a surface."""
-    if not isinstance(surface, MeasuredSurface):
-        hurst, zeta_1, peak = surface
-        h_rms = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
-        breaks = np.array(kinks(hurst, zeta_1, variant))
+    if isinstance(surface, MeasuredSurface):
+        return _measured_source(surface, variant)
+    hurst, zeta_1, peak = surface
+    h_rms_over_s = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
+    breaks = np.array(kinks(hurst, zeta_1, variant))
 
-        def islands(x: FloatArray) -> dict[str, FloatArray]:
-            return geometry(x, hurst, zeta_1, variant) | {"hurst": np.full(x.size, hurst)}
+    def islands(x: FloatArray) -> dict[str, FloatArray]:
+        return geometry(x, hurst, zeta_1, variant) | {"hurst": np.full(x.size, hurst)}
 
-        jacobian = _jacobian_below(h_rms, variant)
-        return Source(
-            islands, h_rms, peak, zeta_1**-hurst, float(breaks[0]), breaks, jacobian
-        )
-    own, h_rms, laws, floors = (
-        surface,
-        float(surface.h_rms),
-        surface.laws,
-        floors_of(surface, variant),
-    )
-    roots = np.sqrt(laws.above(Place(np.arange(laws.width.size), laws.width)))
-    samples = [
-        roots[roots < floors.root_d] / floors.slope_d,
-        roots[roots < floors.root_u] / floors.slope_u,
-    ]
-    # T is a straight line up to a part of it
-    layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
-    jacobian = _jacobian_below(1 / s_over_h_rms(surface), variant)
-    ends = floors.root_d / floors.slope_d, floors.root_u / floors.slope_u
     return Source(
-        lambda x: measured_islands(own, x * h_rms, variant), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
-        ends[0] / h_rms, np.concatenate([*samples, ends]) / h_rms, jacobian,
-    )  # fmt: skip
+        islands,
+        h_rms_over_s,
+        peak,
+        layer=zeta_1**-hurst,
+        at_d=float(breaks[0]),
+        breaks=breaks,
+        jacobian=_jacobian_below(h_rms_over_s, variant),
+    )
+
+
+def _measured_source(surface: MeasuredSurface, variant: Variant) -> Source:
+    """The islands of a surface given by a spectrum."""
+    h_rms = float(surface.h_rms)
+    laws = surface.laws
+    floors = floors_of(surface, variant)
+
+    def islands(x: FloatArray) -> dict[str, FloatArray]:
+        return measured_islands(surface, x * h_rms, variant)
+
+    # approaches [length] at which an end of the band passes a sample of the spectrum, up to
+    # its floor
+    samples = Place(np.arange(laws.width.size), laws.width)
+    roots = np.sqrt(laws.above(samples))
+    samples_d = roots[roots < floors.root_d] / floors.slope_d
+    samples_u = roots[roots < floors.root_u] / floors.slope_u
+    at_d = floors.root_d / floors.slope_d
+    at_u = floors.root_u / floors.slope_u
+    breaks = np.concatenate([samples_d, samples_u, (at_d, at_u)]) / h_rms
+    # T is a straight line up to a part of it
+    root_of_slope = math.sqrt(2 * math.pi * surface.C[-1])
+    layer = root_of_slope * float(surface.q1) / floors.slope_d
+    return Source(
+        islands,
+        h_rms,
+        float(surface.h_max) / h_rms,
+        layer=layer / h_rms,
+        at_d=at_d / h_rms,
+        breaks=breaks,
+        jacobian=_jacobian_below(1 / s_over_h_rms(surface), variant),
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -250,10 +314,10 @@ class Profile:
     edges: FloatArray
     # ln(F), ln(A) and so on as Chebyshev series of the compression, (panels, rows, terms);
     # in the first panel without the logarithms of the powers that they begin with
-    series: Any
+    series: FloatArray
     error: float  # bound on the relative error of totals, of panels and islands together
     islands: int  # evaluated for it
-    nodes: tuple[Any, ...]  # the islands of the panels, of `Panels.series`
+    nodes: Nodes  # the islands of the panels
 
     @shared_property
     def end(self) -> float:
@@ -261,10 +325,11 @@ class Profile:
         return float(self.edges[-1]) * (1 + 1e-14)
 
     def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
-        """Totals at (h_max - d)/h_rms > 0 within the profile, shape (rows, gaps), and slopes by the compression below.
+        """Totals at (h_max - d)/h_rms > 0 within the profile, shape (rows, gaps).
 
         F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area
-        and the Hertz area; of a measured surface F/(A0 E*).
+        and the Hertz area; of a measured surface F/(A0 E*). With `slopes`, their
+        derivatives by the compression below.
         """
         if compression.size > BLOCK:
             parts = in_blocks(
@@ -275,61 +340,60 @@ class Profile:
             return np.concatenate(parts, axis=1)
         rows = self.series.shape[1]
         out = np.empty((2 * rows if slopes else rows, compression.size))
-        core.profile_totals(
-            np.ascontiguousarray(compression),
-            self.edges,
-            self.series,
-            rows,
-            int(slopes),
-            out,
-        )
+        gaps = np.ascontiguousarray(compression)
+        core.profile_totals(gaps, self.edges, self.series, rows, int(slopes), out)
         return out
 
     @shared_property
     def leverage(self) -> float:
-        """Error of slopes over F/l per relative error of islands: 1.5 times the largest at some panels' ends.
+        """Error of slopes over F/l per relative error of islands.
 
-        An error e of f in F = integral of f G up to l changes l dF/dl by at most e (l f G +
-        integral of f |l dG/dl|).
+        It is 1.5 times the largest at some panels' ends. An error e of f in F = integral of
+        f G up to l changes l dF/dl by at most e (l f G + integral of f |l dG/dl|).
         """
-        ends = np.arange(9) * (self.edges.size - 2) // 8
-        c, series, (weights, shift, rate, stops) = (
-            self.edges[1 + ends],
-            self.series[ends],
-            self.nodes,
-        )
+        # nine panels from the first to the last
+        panels = np.arange(9) * (self.edges.size - 2) // 8
+        low = self.edges[panels]
+        compression = self.edges[1 + panels]
+        series = self.series[panels]
         # at a panel's end Chebyshev polynomials are 1, and their slopes squares of degrees
-        steep = (
-            2 * c / (c - self.edges[ends]) * (series @ np.arange(series.shape[-1]) ** 2).T
-        )
-        steep[:, ends == 0] += POWERS[:2, 0] + 1
-        heights = shift - rate * c[:, None]
+        squares = np.arange(series.shape[-1]) ** 2
+        log_slopes = 2 * compression / (compression - low) * (series @ squares).T
+        # where the series is without the powers that ln F and ln A begin with
+        log_slopes[:, panels == 0] += POWERS[:2] + 1
+
+        # |l dG/dl| is l dG/dl, which the slope has, less twice its part where z' is negative
+        weights, shift, rate, stops = self.nodes
+        heights = shift - rate * compression[:, None]
         negative = np.exp(-0.5 * heights * heights) * np.minimum(heights, 0)
-        negative *= np.arange(shift.size) < stops[1 + ends][:, None]
-        turned, own = (weights * rate) @ negative.T, self.totals(c)
-        return 1.5 * float(
-            (
-                steep
-                - 2 * c * np.divide(turned, own, out=np.zeros_like(own), where=own > 0)
-            ).max()
-        )
+        numbers_below = stops[1 + panels]
+        is_below = np.arange(shift.size) < numbers_below[:, None]
+        negative *= is_below
+        turned = (weights * rate) @ negative.T
+        totals = self.totals(compression)
+        shares = np.divide(turned, totals, out=np.zeros_like(totals), where=totals > 0)
+        return 1.5 * float((log_slopes - 2 * compression * shares).max())
 
 
 def _edges(source: Source, last: float) -> FloatArray:
-    """Panels of doubling width from the first on, with ends at all breaks, and equal ones above zeta_d's floor."""
+    """Ends of panels: of doubling width from the first on, and equal ones above zeta_d's floor.
+
+    All breaks are among them.
+    """
     breaks = [place for place in source.breaks.tolist() if place < last]
-    first, top = min(source.layer, last, *breaks), min(source.at_d, last)
-    doubled, count = math.ceil(math.log2(top / first)), math.ceil((last - top) / WIDEST)
+    first = min(source.layer, last, *breaks)
+    top = min(source.at_d, last)
+    doubled = math.ceil(math.log2(top / first))
     graded = [first * (top / first) ** (k / doubled) for k in range(doubled)] or [first]
+    # up to 1.25 h_rms wide
+    count = math.ceil((last - top) / 1.25)
     equal = [top + (last - top) * k / count for k in range(count)]
     edges = sorted([0.0, *graded, *breaks, *equal, last])
     # breaks that coincide but for rounding
-    return np.array(
-        [
-            *(low for low, high in itertools.pairwise(edges) if high - low > 1e-12 * low),
-            last,
-        ]
-    )
+    distinct = [
+        low for low, high in itertools.pairwise(edges) if high - low > 1e-12 * low
+    ]
+    return np.array([*distinct, last])
 
 
 class _EndOfTable(Exception):
@@ -337,108 +401,121 @@ class _EndOfTable(Exception):
 
 
 def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
+    """Islands by any model, as fields of panels."""
+
     def fields(places: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
         x = places[used]
         g = source.islands(x)
         phi = answer_islands(model, g, outside)
+        force = scale_force(g) * phi.phi_F
         area = scale_area(g) * phi.phi_A
-        weights = [scale_force(g) * phi.phi_F, area, np.ones(x.size), area / g["eta"]]
+        weights = [force, area, np.ones(x.size), area / g["eta"]]
         density = source.density(g, x) * source.h_rms
-        found = np.zeros((rows + 2, *used.shape))
-        found[:, used] = [
-            *(weight * density for weight in weights[:rows]),
-            *source.heights(g, x),
-        ]
-        return found, float(np.nanmax(phi.error, initial=0.0))
+        out = np.zeros((rows + 2, *used.shape))
+        for row, weight in enumerate(weights[:rows]):
+            out[row, used] = weight * density
+        out[rows:, used] = source.heights(g, x)
+        return out, float(np.nanmax(phi.error, initial=0.0))
 
     return fields
 
 
 def _fields_by_table(
-    shape: tuple[float, ...], model: UniversalModel, variant: Variant
+    shape: tuple[float, float, float], model: UniversalModel, variant: Variant
 ) -> Fields:
-    """Profile of a self-affine surface by the universal table, force and area in one pass."""
+    """Islands of a self-affine surface by the universal table, force and area in one pass."""
     hurst, zeta_1, peak = shape
 
     def fields(x: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
-        found, error = np.empty((4, x.size)), np.empty(1)
+        out = np.empty((4, x.size))
+        error = np.empty(1)
         core.profile_islands(
-            x.ravel(), peak, hurst, zeta_1, variant.numbers, *model.cells, found, error
+            x.ravel(), peak, hurst, zeta_1, variant.numbers, *model.cells, out, error
         )
-        return found.reshape(4, *x.shape), float(error[0])
+        return out.reshape(4, *x.shape), float(error[0])
 
     return fields
 
 
-def _answered(
-    fields: Fields, kind: NDArray[np.intp], low: FloatArray, high: FloatArray, last: float
-) -> tuple[Panels, FloatArray, int, float]:
-    """Panels and their errors, the number of islands, and their own error."""
-    x, used = low[:, None] + (high - low)[:, None] * SHARES[kind], COUNTED[kind]
-    found, error = fields(x, used)
-    if not (found[:-2] >= 0).all():
-        unknown = np.isnan(found).any(axis=0)
-        known = x[x < x[unknown].min(initial=math.inf)]
-        if not unknown.any():
+def _evaluated(
+    fields: Fields, kind: NDArray[np.intp], low: FloatArray, high: FloatArray
+) -> tuple[Panels, int, float]:
+    """Panels with their islands, the number of these, and their own error."""
+    x = low[:, None] + (high - low)[:, None] * SHARES[kind]
+    used = COUNTED[kind]
+    rows, error = fields(x, used)
+    weights = rows[:-2]
+    if not (weights >= 0).all():
+        is_missing = np.isnan(rows).any(axis=0)
+        if not is_missing.any():
             raise ConvergenceError("K1 (47) is negative", np.array(True))
-        if not known.size:
+        covered = x[x < x[is_missing].min(initial=math.inf)]
+        if not covered.size:
             raise OutOfRangeError("no island of this surface lies inside the table")
-        raise _EndOfTable(float(known.max()))
-    if kind[0] == 0:
-        found[:-2, 0] /= x[0] ** POWERS[: len(found) - 2, 0]
-    made = Panels(kind, low, high, found)
-    return made, made.missed(last), int(used.sum()), error
+        raise _EndOfTable(float(covered.max()))
+    if kind[0] == FIRST:
+        weights[:, 0] /= x[0] ** POWERS[: len(weights)]
+    return Panels(kind, low, high, rows), int(used.sum()), error
 
 
 def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Profile:
-    """Panels, halved until polynomials through their islands, and those of their sums, are good to `rtol`."""
-    low, high, last = edges[:-1], edges[1:], float(edges[-1])
-    # above delta = h_rms/2 the curvature is that of the Gaussian
-    kind = np.where(
-        high - low <= NARROW * np.minimum(low, 0.5), 2, (low > 0).astype(np.intp)
-    )
-    islands, worst, known, errors = 0, 0.0, None, edges[:0]
-    for _ in range(MAX_ROUNDS):
-        fresh, missed, count, error = _answered(fields, kind, low, high, last)
-        order = np.argsort(np.append(known.low, low)) if known else slice(None)
-        known, errors = (
-            known.joined(fresh).some(order) if known else fresh,
-            np.append(errors, missed)[order],
-        )
-        islands, worst = islands + count, max(worst, error)
-        # not closer than the error of the islands
-        limit = max(0.5 * rtol, worst)
-        bad = ~(errors <= limit)
-        if not bad.any():
-            ends, bound = np.append(known.low, last), float(errors.max()) + worst
-            series, tails, nodes = known.series()
-            bad = ~(tails <= limit)
-            if not bad.any():
-                return Profile(
-                    source, ends, series, bound + float(tails.max()), islands, nodes
-                )
-        low, high = known.low[bad], known.high[bad]
-        middle, parents = (low + high) / 2, known.kind[bad]
-        kind = np.concatenate([parents, np.maximum(parents, 1)])
-        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
-        known, errors = known.some(~bad), errors[~bad]
-        if low.size > MOST + edges.size:
-            break
-    raise ConvergenceError(
-        f"a profile of islands did not reach {rtol:.1e}", np.array(True)
-    )
+    """Panels, halved until polynomials through their islands, and of their sums, are good.
 
-
-@shared(KEPT)
-def _profile(
-    surface: Shape, model: AnyModel, variant: Variant, rtol: float,
-    outside: str = "nan", rows: int = 2, last: float = math.inf,
-) -> Profile:  # fmt: skip
-    """The profile of a surface to `rtol` and the model's error.
-
-    It ends at the compression `last`, or with a table unless `outside` is "exact". Rows 3
-    and 4: number and Hertz area.
+    That is, to `rtol`.
     """
+    last = float(edges[-1])
+    low = edges[:-1]
+    high = edges[1:]
+    kind = _rules_of(low, high)
+    panels: Panels | None = None
+    errors = edges[:0]
+    islands = 0
+    islands_error = 0.0
+    for _ in range(30):
+        fresh, count, error = _evaluated(fields, kind, low, high)
+        fresh_errors = fresh.missed(last)
+        if panels is None:
+            panels = fresh
+            errors = fresh_errors
+        else:
+            order = np.argsort(np.append(panels.low, low))
+            panels = panels.joined(fresh).some(order)
+            errors = np.append(errors, fresh_errors)[order]
+        islands += count
+        islands_error = max(islands_error, error)
+
+        # not closer than the error of the islands
+        limit = max(0.5 * rtol, islands_error)
+        is_coarse = ~(errors <= limit)
+        if not is_coarse.any():
+            series, tails, nodes = panels.series()
+            is_coarse = ~(tails <= limit)
+            if not is_coarse.any():
+                ends = np.append(panels.low, last)
+                bound = float(errors.max()) + islands_error + float(tails.max())
+                return Profile(source, ends, series, bound, islands, nodes)
+
+        kind, low, high = panels.halves(is_coarse)
+        panels = panels.some(~is_coarse)
+        errors = errors[~is_coarse]
+        # panels that are evaluated together, of 19 islands each
+        if low.size > 1000 + edges.size:
+            break
+    message = f"a profile of islands did not reach {rtol:.1e}"
+    raise ConvergenceError(message, np.array(True))
+
+
+@shared(64)
+def _profile(
+    surface: Shape,
+    model: AnyModel,
+    variant: Variant,
+    rtol: float,
+    outside: str,
+    rows: int,
+    last: float,
+) -> Profile:
+    """`profile`, made anew."""
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
     source = source_of(surface, variant)
@@ -453,15 +530,25 @@ def _profile(
             try:
                 return _built(source, fields, edges, rtol)
             except _EndOfTable as fault:
-                edges = np.append(
-                    edges[edges < fault.args[0] * (1 - 1e-12)], fault.args[0]
-                )
+                end = fault.args[0]
+                edges = np.append(edges[edges < end * (1 - 1e-12)], end)
 
 
-def profile(surface: Any, model: Any, *more: Any, **options: Any) -> Profile:
-    """`_profile`, kept of the library's own island models; objects of users may change."""
-    own = type(model).__module__.startswith("mbma_tables.")
-    made: Profile = (_profile if own else _profile.__wrapped__)(
-        surface, model, *more, **options
-    )
-    return made
+def profile(
+    surface: Shape,
+    model: AnyModel,
+    variant: Variant,
+    rtol: float,
+    outside: str = "nan",
+    rows: int = 2,
+    last: float = math.inf,
+) -> Profile:
+    """The profile of a surface to `rtol` and the model's error.
+
+    It ends at the compression `last`, or with a table unless `outside` is "exact". Rows 3
+    and 4: number and Hertz area. Profiles of the library's own island models are cached;
+    objects of users may change.
+    """
+    is_of_library = type(model).__module__.startswith("mbma_tables.")
+    make: Callable[..., Profile] = _profile if is_of_library else _profile.__wrapped__
+    return make(surface, model, variant, rtol, outside, rows, last)

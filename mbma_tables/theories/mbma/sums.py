@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, grouped, spread
-from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.errors import ConvergenceError, MbmaError, OutOfRangeError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.core import OK, UNRESOLVED, core
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.mbma.island_models import AnyModel, exact_model
-from mbma_tables.theories.mbma.profile import profile
+from mbma_tables.theories.mbma.profile import Shape, profile
 from mbma_tables.theories.mbma.universal import UniversalModel
 from mbma_tables.theories.mbma.variants import Variant
 
@@ -29,8 +29,10 @@ QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes 
 BLOCK = 256  # pairs between two checks for interrupts
 # most surfaces evaluated by profiles, in numpy; of more surfaces, those with enough gaps
 # each for this to cost less
-FEW_SURFACES, MANY_GAPS = 16, 300
-LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
+FEW_SURFACES = 16
+MANY_GAPS = 300
+LEAST = 1e-290  # sums below which the digits that are lost count
+SUBNORMAL = float(np.finfo(float).smallest_subnormal)
 
 
 class Sums(NamedTuple):
@@ -60,8 +62,13 @@ def totals_at(
     modulus: Any = 1.0,
     slopes: bool = False,
 ) -> Totals:
-    """Force and area, perhaps with their slopes, at separations d >= -h_max of the surface's broadcast shape."""
-    shape, depth = gap.shape, np.asarray(surface.h_max - gap)
+    """Force and area, perhaps with their slopes, at separations d >= -h_max.
+
+    The separations have the surface's broadcast shape.
+    """
+    shape = gap.shape
+    depth = np.asarray(surface.h_max - gap)
+    # the unit of stress of the islands (Section 1), E* q0 s; of a measured surface, E*
     stress = modulus * surface.q0 * surface.s if isinstance(surface, Surface) else modulus
     try:
         rows, islands = _sums(surface, depth, how, slopes)
@@ -69,29 +76,62 @@ def totals_at(
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
         raise
-    force, area, *_, error = rows
-    # nearly vanishing values have few digits
-    least = np.minimum(force, area)
-    if (
-        not least.min() >= LEAST
-        and (tiny := (least < LEAST) & (np.maximum(force, area) > 0)).any()
-    ):
-        error[tiny] = np.minimum(
-            error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0
-        )
-    by: list[Any] = [-row.reshape(shape) / surface.h_rms for row in rows[2:-1]]
-    by[:1] = [stress * slope for slope in by[:1]]
-    if how.variant.addition == "cover":
-        by[1:] = [
-            slope * np.exp(-area.reshape(shape)) for slope in by[1:]
-        ]  # dA = exp(-sum) dsum
-        area = how.variant.area_of(area)
-    pressure, area, error = (
-        (force.reshape(shape) * stress)[()],
-        area.reshape(shape)[()],
-        error.reshape(shape)[()],
+    _add_error_of_underflow(rows)
+    force = rows[0].reshape(shape)
+    area_sum = rows[1].reshape(shape)
+    error = rows[-1].reshape(shape)
+    pressure = force * stress
+    is_cover = how.variant.addition == "cover"
+    area = how.variant.area_of(area_sum) if is_cover else area_sum
+    if not slopes:
+        return Totals(pressure[()], area[()], error[()], islands)
+
+    # by the compression (h_max - d)/h_rms in the sums
+    pressure_slope = stress * (-rows[2].reshape(shape) / surface.h_rms)
+    area_slope = -rows[3].reshape(shape) / surface.h_rms
+    if is_cover:
+        # dA = exp(-sum) dsum
+        area_slope = area_slope * np.exp(-area_sum)
+    return Totals(
+        pressure[()],
+        area[()],
+        error[()],
+        islands,
+        pressure_slope[()],
+        area_slope[()],
     )
-    return Totals(pressure, area, error, islands, *(slope[()] for slope in by))
+
+
+def _add_error_of_underflow(rows: FloatArray) -> None:
+    """Add to the errors, the last row, those of nearly vanishing sums, which have few digits."""
+    force = rows[0]
+    area = rows[1]
+    error = rows[-1]
+    least = np.minimum(force, area)
+    if least.min() >= LEAST:
+        return
+    tiny = (least < LEAST) & (np.maximum(force, area) > 0)
+    if tiny.any():
+        of_rounding = SUBNORMAL / least[tiny].clip(SUBNORMAL)
+        error[tiny] = np.minimum(error[tiny] + of_rounding, 1.0)
+
+
+def _entries_by_surface(
+    surface: AnySurface, shape: tuple[int, ...], places: NDArray[np.intp]
+) -> tuple[list[Shape], list[tuple[int, NDArray[np.intp]]]]:
+    """The surfaces of a batch as arguments of `profile`, and the places of each one's entries."""
+    if isinstance(surface, MeasuredSurface):
+        return [surface], [(0, places)]
+    assert isinstance(surface, Surface)
+    peak = surface.h_max / surface.h_rms
+    numbers = np.array([surface.hurst, surface.zeta_1, peak])
+    rows = numbers.reshape(3, -1).T.tolist()
+    shapes: list[Shape] = [(hurst, zeta_1, height) for hurst, zeta_1, height in rows]
+    if len(shapes) == 1:
+        return shapes, [(0, places)]
+    owner = np.arange(len(shapes)).reshape(surface.shape)
+    owner = np.broadcast_to(owner, shape).ravel()[places]
+    return shapes, [(k, places[mine]) for k, mine in grouped(owner)]
 
 
 def _by_profiles(
@@ -102,135 +142,151 @@ def _by_profiles(
     how: Sums,
     rows: FloatArray,
 ) -> tuple[int, NDArray[np.intp], Exception | None]:
-    """Fill in rows of sums and errors at flat places by profiles of islands; the islands, places left out, and why."""
-    shapes: list[Any] = [surface]
-    if isinstance(surface, Surface):
-        numbers = np.array([surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms])
-        shapes = list(map(tuple, numbers.reshape(3, -1).T.tolist()))
-    groups = [(0, places)]
-    if len(shapes) > 1:
-        number = np.broadcast_to(
-            np.arange(len(shapes)).reshape(surface.shape), compression.shape
-        ).ravel()[places]
-        groups = [(k, places[mine]) for k, mine in grouped(number)]
-    islands, left, why, gaps = 0, [places[:0]], None, compression.ravel()
+    """Fill in rows of sums and errors at flat places by profiles of islands.
+
+    Returns the number of islands, the places left out, and why.
+    """
+    shapes, groups = _entries_by_surface(surface, compression.shape, places)
+    gaps = compression.ravel()
+    rtol = QUADRATURE_SHARE * how.rtol
+    islands = 0
+    left = [places[:0]]
+    why: Exception | None = None
     # numbers of surfaces, places, and where a profile may end
-    asked: list[tuple[int, Any, float]] = [
-        (k, mine, math.inf) for k, mine in groups if mine.size
-    ]
-    while asked:
-        k, mine, last = asked.pop()
+    pending = [(k, mine, math.inf) for k, mine in groups if mine.size]
+    while pending:
+        k, mine, last = pending.pop()
         try:
-            kept = profile(
-                shapes[k], model, how.variant, QUADRATURE_SHARE * how.rtol, last=last
-            )
+            of_surface = profile(shapes[k], model, how.variant, rtol, last=last)
         except (ConvergenceError, OutOfRangeError) as fault:
             if last < math.inf or isinstance(model, UniversalModel):
-                left, why = [*left, mine], fault
-            else:
-                # one by one: a model need not have deeper islands than those of the gap
-                asked += [
-                    (k, mine[n : n + 1], float(gaps[place]))
-                    for n, place in enumerate(mine)
-                ]
+                left.append(mine)
+                why = fault
+                continue
+            # one by one: a model need not have deeper islands than those of the gap
+            for n, place in enumerate(mine):
+                pending.append((k, mine[n : n + 1], float(gaps[place])))
             continue
-        inside = gaps[mine] <= kept.end
-        if not inside.all():
-            left.append(mine[~inside])
-            mine = mine[inside]
-        islands += kept.islands
+        is_covered = gaps[mine] <= of_surface.end
+        if not is_covered.all():
+            left.append(mine[~is_covered])
+            mine = mine[is_covered]
+        islands += of_surface.islands
         # usually all gaps are of one surface and in contact, and slices are faster
         chosen: Any = slice(None) if mine.size == gaps.size else mine
-        rows[-1, chosen] = kept.error
-        rows[:-1, chosen] = kept.totals(gaps[chosen], len(rows) > 3)
+        rows[-1, chosen] = of_surface.error
+        rows[:-1, chosen] = of_surface.totals(gaps[chosen], slopes=len(rows) > 3)
     return islands, np.sort(np.concatenate(left)), why
 
 
 def by_table(
     surface: Surface,
     compression: FloatArray,
-    places: Any,
+    places: NDArray[np.intp],
     model: UniversalModel,
     how: Sums,
     rows: FloatArray,
 ) -> tuple[int, NDArray[np.intp]]:
-    """The same by the universal table, gap by gap."""
-    shape, fields = (
-        compression.shape,
-        (surface.hurst, surface.zeta_1, compression, surface.h_max / surface.h_rms),
-    )
-    pairs = [spread(field, shape).ravel()[places] for field in fields]
-    bound, status, out = (
-        np.empty(places.size),
-        np.empty(places.size, np.uint8),
-        np.empty((places.size, 2, 2)),
-    )
+    """The same by the universal table, gap by gap; the number of islands, and places left out."""
+    shape = compression.shape
+    peak = surface.h_max / surface.h_rms
+    arguments = [
+        spread(field, shape).ravel()[places]
+        for field in (surface.hurst, surface.zeta_1, compression, peak)
+    ]
+    bound = np.empty(places.size)
+    status = np.empty(places.size, np.uint8)
+    # force and area, each with its slope
+    sums = np.empty((places.size, 2, 2))
     options = QUADRATURE_SHARE * how.rtol, how.variant.numbers, *model.cells
 
     def fill(block: slice) -> int:
-        islands = np.zeros(1, np.int64)
+        count = np.zeros(1, np.int64)
         core.totals(
-            *(pair[block] for pair in pairs),
+            *(argument[block] for argument in arguments),
             *options,
-            out[block],
+            sums[block],
             bound[block],
             status[block],
-            islands,
+            count,
         )
-        return int(islands[0])
+        return int(count[0])
 
     islands = sum(in_blocks(fill, places.size, BLOCK))
-    if (bad := places[status == UNRESOLVED]).size:
-        raise ConvergenceError(
-            "quadrature did not reach its tolerance",
-            np.isin(np.arange(compression.size), bad),
-        )
+    unresolved = places[status == UNRESOLVED]
+    if unresolved.size:
+        mask = np.isin(np.arange(compression.size), unresolved)
+        raise ConvergenceError("quadrature did not reach its tolerance", mask)
     rows[-1, places] = bound
-    rows[:-1, places] = out[:, :, : len(rows) // 2].T.reshape(len(rows) - 1, -1)
+    # rows are force, area and, where they are wanted, both slopes
+    wanted = sums[:, :, : len(rows) // 2]
+    rows[:-1, places] = wanted.T.reshape(len(rows) - 1, -1)
     return islands, places[status != OK]
 
 
 def _sums(
     surface: AnySurface, depth: FloatArray, how: Sums, slopes: bool
 ) -> tuple[FloatArray, int]:
-    """Force, area, perhaps slopes of both by the compression, and their error as rows, and the number of islands.
+    """Force, area, perhaps slopes of both by the compression, and their error as rows.
 
-    By profiles of islands; of many surfaces by the universal table gap by gap.
+    With the number of islands. By profiles of islands; of many surfaces by the universal
+    table gap by gap.
     """
-    size, islands, model, why = depth.size, 0, how.model, None
+    size = depth.size
     compression = np.asarray(depth / surface.h_rms)
-    rows, left = np.zeros((5 if slopes else 3, size)), np.flatnonzero(compression > 0)
-    tabulated, ranges = (
-        isinstance(surface, Surface) and isinstance(model, UniversalModel),
-        "",
-    )
-    if not tabulated or math.prod(surface.shape) <= max(FEW_SURFACES, size // MANY_GAPS):
-        islands, left, why = _by_profiles(surface, compression, left, model, how, rows)
-    if left.size and isinstance(surface, Surface) and isinstance(model, UniversalModel):
-        more, left = by_table(surface, compression, left, model, how, rows)
-        X, mu = model.content.axes
-        islands, why, ranges = (
-            islands + more,
-            None,
-            f" ({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g})",
+    rows = np.zeros((5 if slopes else 3, size))
+    left = np.flatnonzero(compression > 0)
+    islands = 0
+    why: Exception | None = None
+    ranges = ""
+    table = how.model if isinstance(how.model, UniversalModel) else None
+    has_table = isinstance(surface, Surface) and table is not None
+
+    few = max(FEW_SURFACES, size // MANY_GAPS)
+    if not has_table or math.prod(surface.shape) <= few:
+        islands, left, why = _by_profiles(
+            surface, compression, left, how.model, how, rows
         )
+    # gap by gap, where profiles were not made, or end
+    if left.size and isinstance(surface, Surface) and table is not None:
+        more, left = by_table(surface, compression, left, table, how, rows)
+        islands += more
+        why = None
+        X, mu = table.content.axes
+        ranges = f" ({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g})"
     if left.size and how.outside == "exact":
-        more, left, why = _by_profiles(
-            surface, compression, left, exact_model(how.rtol), how, rows
-        )
+        exact = exact_model(how.rtol)
+        more, left, why = _by_profiles(surface, compression, left, exact, how, rows)
         islands += more
     if left.size and (how.outside != "nan" or isinstance(why, ConvergenceError)):
-        numbers = {"h_max - d": depth}
-        if isinstance(surface, Surface):
-            numbers |= {"hurst": surface.hurst, "zeta_1": surface.zeta_1}
-        first = (
-            f"{name} = {spread(n, depth.shape).ravel()[left[0]]:g}"
-            for name, n in numbers.items()
-        )
-        raise type(why or OutOfRangeError(""))(
-            f"islands of {left.size} of {size} entries lie outside of island model {model.name!r}{ranges}, the first "
-            f"at {', '.join(first)}; outside='exact' solves these{f' ({why})' if why else ''}",
-            np.isin(np.arange(size), left),
-        )
+        raise _not_covered(surface, depth, left, how.model, ranges, why)
     rows[:, left] = np.nan
     return rows, islands
+
+
+def _not_covered(
+    surface: AnySurface,
+    depth: FloatArray,
+    left: NDArray[np.intp],
+    model: AnyModel,
+    ranges: str,
+    why: Exception | None,
+) -> MbmaError:
+    """The error for entries whose islands lie outside of a model, of the kind of `why`."""
+    numbers = {"h_max - d": depth}
+    if isinstance(surface, Surface):
+        numbers |= {"hurst": surface.hurst, "zeta_1": surface.zeta_1}
+    first = []
+    for name, number in numbers.items():
+        entry = spread(number, depth.shape).ravel()[left[0]]
+        first.append(f"{name} = {entry:g}")
+    cause = f" ({why})" if why else ""
+    message = (
+        f"islands of {left.size} of {depth.size} entries lie outside of island model "
+        f"{model.name!r}{ranges}, the first at {', '.join(first)}; outside='exact' solves "
+        f"these{cause}"
+    )
+    mask = np.isin(np.arange(depth.size), left)
+    if isinstance(why, ConvergenceError):
+        return ConvergenceError(message, mask)
+    return OutOfRangeError(message, mask)
