@@ -1,14 +1,14 @@
-"""Roughness parameters: the surface with those of a drawing, each assumption stated; those of a height map.
+"""Roughness parameters: the surface with those of a drawing, and those of a height map.
 
-A profile along any line of an isotropic surface has its variance of height m0 and, for the
-variance of slope, m2, while the gradient of the surface has 2 m2. Everything else that is
-assumed follows from Gaussian heights.
+Each assumption is stated. A profile along any line of an isotropic surface has its variance
+of height m0 and, for the variance of slope, m2, while the gradient of the surface has 2 m2.
+Everything else that is assumed follows from Gaussian heights.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -31,31 +31,62 @@ SLOPES = ("Rdq", "Sdq", "Rsm")
 WAVES = ("longest", "shortest")
 TOPS = ("h_max", "Sp", "nominal_area")
 ROUGHNESS = (*HEIGHTS, *SLOPES, *WAVES, "rolloff", *TOPS[1:])
-ASSUMED = "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled or worn face"
+ASSUMED = (
+    "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled "
+    "or worn face"
+)
 SAID = {
-    "Rq": "h_rms = Rq: the profile is long and no filter removed wavelengths of the surface",
-    "Ra": "h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered",
+    "Rq": (
+        "h_rms = Rq: the profile is long and no filter removed wavelengths of the surface"
+    ),
+    "Ra": (
+        "h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered"
+    ),
     "Sq": "h_rms = Sq: the map is large and no filter removed wavelengths of the surface",
     "Sa": "h_rms = sqrt(pi/2) Sa: heights are Gaussian; the map is large and unfiltered",
-    "Rdq": "m2 = Rdq^2: the surface is isotropic, and Rdq was measured down to the shortest wavelength",
-    "Sdq": "m2 = Sdq^2/2: the surface is isotropic, and Sdq was measured down to the shortest wavelength",
-    "Rsm": "m2 = (2 pi h_rms/Rsm)^2: heights are Gaussian, every upward crossing of the mean line counts (Rice 1945);"
-    " if an instrument omits small ones, the slope found here is a lower bound",
+    "Rdq": (
+        "m2 = Rdq^2: the surface is isotropic, and Rdq was measured down to the shortest "
+        "wavelength"
+    ),
+    "Sdq": (
+        "m2 = Sdq^2/2: the surface is isotropic, and Sdq was measured down to the "
+        "shortest wavelength"
+    ),
+    "Rsm": (
+        "m2 = (2 pi h_rms/Rsm)^2: heights are Gaussian, every upward crossing of the mean "
+        "line counts (Rice 1945); if an instrument omits small ones, the slope found here "
+        "is a lower bound"
+    ),
     "longest": "q0 = 2 pi/longest: no roughness of longer wavelengths",
     "shortest": "q1 = 2 pi/shortest: no roughness of shorter wavelengths",
-    "rolloff": "the spectrum is flat from the longest wave to this one, and one power law from there on",
-    "hurst": "the spectrum is one power law with this Hurst exponent between its longest and its shortest wave",
+    "rolloff": (
+        "the spectrum is flat from the longest wave to this one, and one power law from "
+        "there on"
+    ),
+    "hurst": (
+        "the spectrum is one power law with this Hurst exponent between its longest and "
+        "its shortest wave"
+    ),
     "h_max": "contact begins at h_max above the mid-plane",
-    "nominal_area": "contact begins at the highest point of a Gaussian surface of this area, the median",
-    "Sp": "h_max = Sp: contact begins at the highest point of the map; a larger map has a higher one",
+    "nominal_area": (
+        "contact begins at the highest point of a Gaussian surface of this area, the "
+        "median"
+    ),
+    "Sp": (
+        "h_max = Sp: contact begins at the highest point of the map; a larger map has a "
+        "higher one"
+    ),
 }
-TYPICAL = "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) times it of N independent points"
-CORE = 0.4  # share of the material ratio curve that the straight line is fitted to
+TYPICAL = (
+    "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) times it of N "
+    "independent points"
+)
+BAND = "two of longest, shortest and Rdq (or Sdq, Rsm)"
 
 
-def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str) -> str:
-    """The one of the names that is given, "" for none; an error for several."""
-    several = [name for name in names if name in given]
+def _one_of(names: tuple[str, ...], numbers: Mapping[str, Any], what: str) -> str:
+    """The one of the names that has a number, "" for none; an error for several."""
+    several = [name for name in names if name in numbers]
     if len(several) > 1:
         raise InputError(
             f"{what}: give one of {', '.join(names)}; got {' and '.join(several)}"
@@ -65,67 +96,41 @@ def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str) -> str:
 
 def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of `Surface` from numbers of a drawing; see `Surface.from_roughness`."""
-    given, unit = resolve(
-        {name: value for name, value in numbers.items() if value is not None}, unit
-    )
-    height = _one_of(HEIGHTS, given, "the height of roughness")
-    slope = _one_of(SLOPES, given, "the slope of roughness")
-    top = _one_of(TOPS, given, "the highest point")
-    band = [name for name in (slope, *WAVES) if name in given]
-    missing = []
-    if not height:
-        missing.append(f"the height of roughness, one of {', '.join(HEIGHTS)}")
-    if "hurst" not in given:
-        missing.append(
-            "hurst, which a drawing does not tell (0.8 is common, and `sensitivity` gives its influence)"
-        )
-    if len(band) < 2:
-        others = " and ".join(band) or "none"
-        missing.append(
-            f"the band of wavelengths, two of longest, shortest and Rdq (or Sdq, Rsm); got {others}"
-        )
-    if not top:
-        missing.append(
-            f"the highest point, one of {', '.join(TOPS)}, which Rq and Ra do not determine ({TYPICAL})"
-        )
-    if missing:
-        raise InputError(
-            f"roughness has {', '.join(given) or 'no numbers'}; missing: {'; '.join(missing)}"
-        )
+    stated = {name: value for name, value in numbers.items() if value is not None}
+    stated, unit = resolve(stated, unit)
+    height = _one_of(HEIGHTS, stated, "the height of roughness")
+    slope = _one_of(SLOPES, stated, "the slope of roughness")
+    top = _one_of(TOPS, stated, "the highest point")
+    band = [name for name in (slope, *WAVES) if name in stated]
+    _refuse_missing(stated, height, band, top)
     if len(band) > 2:
         raise InputError(
-            f"the band of wavelengths needs two of longest, shortest and Rdq (or Sdq, Rsm); got {' and '.join(band)}"
+            f"the band of wavelengths needs {BAND}; got {' and '.join(band)}"
         )
-    arrays = {name: positive_array(name, value) for name, value in given.items()}
+    arrays = {name: positive_array(name, value) for name, value in stated.items()}
     require("hurst", arrays["hurst"], arrays["hurst"] <= 1, "in (0, 1]")
     shape = broadcast_shape(**arrays)
     at = {name: np.broadcast_to(array, shape) for name, array in arrays.items()}
-    h_rms = at[height] * (math.sqrt(math.pi / 2) if height in ("Ra", "Sa") else 1.0)
-    said = f" [{unit}]" if unit else ""
+    # of Gaussian heights the mean absolute one is sqrt(2/pi) times the rms
+    is_mean = height in ("Ra", "Sa")
+    h_rms = at[height] * (math.sqrt(math.pi / 2) if is_mean else 1.0)
+    in_unit = f" [{unit}]" if unit else ""
     if top != "nominal_area":
-        require(
-            f"{top}{said}", at[top], at[top] > h_rms, f"above the rms height; {TYPICAL}"
-        )
+        allowed = f"above the rms height; {TYPICAL}"
+        require(f"{top}{in_unit}", at[top], at[top] > h_rms, allowed)
     if not slope:
-        long, short = at["longest"], at["shortest"]
-        few = long <= spectrum.MIN_ZETA_1 * short
-        require(
-            f"longest{said}",
-            long,
-            ~few,
-            f"more than 3 times shortest, {describe_entries(short, few)}",
-        )
+        _require_waves(at["longest"], at["shortest"], in_unit)
     if slope and "rolloff" in at:
         q0, q1 = _band_with_rolloff(at, h_rms, slope)
     else:
         q0, q1 = _band(at, h_rms, slope)
-    used = ("hurst", height, top, *band, *(["rolloff"] if "rolloff" in given else []))
-    shown = {
-        name: given[name].tolist() if hasattr(given[name], "tolist") else given[name]
-        for name in used
-    }
+
+    used = ["hurst", height, top, *band]
+    if "rolloff" in stated:
+        used.append("rolloff")
     record = {
-        "given": shown,
+        "step": "from_roughness",
+        "given": {name: _plain(stated[name]) for name in used},
         "unit": unit,
         "assumed": [ASSUMED, *(SAID[name] for name in used)],
     }
@@ -135,25 +140,71 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         "q1": q1,
         "h_rms": h_rms,
         "unit": unit,
+        "provenance": (record,),
     }
-    surface |= {"provenance": ({"step": "from_roughness", **record},)}
     surface["nominal_area" if top == "nominal_area" else "h_max"] = at[top]
-    return surface if "rolloff" not in given else _rolled_off(surface, at["rolloff"])
+    return surface if "rolloff" not in stated else _rolled_off(surface, at["rolloff"])
+
+
+def _refuse_missing(
+    stated: Mapping[str, Any], height: str, band: list[str], top: str
+) -> None:
+    """Raise an error that names every kind of number that is missing."""
+    missing = []
+    if not height:
+        missing.append(f"the height of roughness, one of {', '.join(HEIGHTS)}")
+    if "hurst" not in stated:
+        missing.append(
+            "hurst, which a drawing does not tell (0.8 is common, and `sensitivity` gives "
+            "its influence)"
+        )
+    if len(band) < 2:
+        others = " and ".join(band) or "none"
+        missing.append(f"the band of wavelengths, {BAND}; got {others}")
+    if not top:
+        missing.append(
+            f"the highest point, one of {', '.join(TOPS)}, which Rq and Ra do not "
+            f"determine ({TYPICAL})"
+        )
+    if missing:
+        raise InputError(
+            f"roughness has {', '.join(stated) or 'no numbers'}; "
+            f"missing: {'; '.join(missing)}"
+        )
+
+
+def _require_waves(longest: FloatArray, shortest: FloatArray, in_unit: str) -> None:
+    """Raise an error for a band too narrow for a rough surface."""
+    too_narrow = longest <= spectrum.MIN_ZETA_1 * shortest
+    allowed = f"more than 3 times shortest, {describe_entries(shortest, too_narrow)}"
+    require(f"longest{in_unit}", longest, ~too_narrow, allowed)
+
+
+def _plain(value: Any) -> Any:
+    """A number or a list of them, for a record."""
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
     """Arguments of a surface whose spectrum is flat down to a wavelength."""
     if rolloff.ndim:
         raise InputError(f"rolloff is of one surface, got shape {rolloff.shape}")
-    hurst, q0, q1, h_rms = (
-        float(surface.pop(name)) for name in ("hurst", "q0", "q1", "h_rms")
-    )
+    hurst = float(surface.pop("hurst"))
+    q0 = float(surface.pop("q0"))
+    q1 = float(surface.pop("q1"))
+    h_rms = float(surface.pop("h_rms"))
     start = 2 * math.pi / float(rolloff)
     good = np.asarray(q0 < start < q1 / spectrum.MIN_ZETA_1)
-    allowed = f"between 3 times shortest, {6 * math.pi / q1:.6g}, and longest, {2 * math.pi / q0:.6g}"
+    # 6 pi/q1 is 3 times the shortest wavelength
+    allowed = (
+        f"between 3 times shortest, {6 * math.pi / q1:.6g}, "
+        f"and longest, {2 * math.pi / q0:.6g}"
+    )
     require("rolloff", rolloff, good, allowed)
+    # h_rms^2 = 2 pi level start^2 (flat + law), the integrals of q dq over start^2
+    flat = (1 - (q0 / start) ** 2) / 2
     law = -math.expm1(-2 * hurst * math.log(q1 / start)) / (2 * hurst)
-    level = h_rms**2 / (2 * math.pi * start**2 * ((1 - (q0 / start) ** 2) / 2 + law))
+    level = h_rms**2 / (2 * math.pi * start**2 * (flat + law))
     C = level * np.array([1.0, 1.0, (q1 / start) ** (-2 - 2 * hurst)])
     return surface | {"q": np.array([q0, start, q1]), "C": C}
 
@@ -161,42 +212,48 @@ def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
 def _band(
     at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str
 ) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest wavenumber: q1/q0 is where m2/m0 over q0^2, or over q1^2, has the wanted value."""
-    end, *other = (2 * math.pi / at[wave] for wave in WAVES if wave in at)
+    """Smallest and largest wavenumber, of both wavelengths or of one and a slope.
+
+    q1/q0 is where m2/m0 over q0^2, or over q1^2, has the value of the slope.
+    """
     if not slope:
-        return end, other[0]
+        return 2 * math.pi / at["longest"], 2 * math.pi / at["shortest"]
     from scipy.optimize.elementwise import find_root
 
-    power = 0 if "longest" in at else 2
+    hurst = at["hurst"]
+    from_longest = "longest" in at
+    end = 2 * math.pi / at["longest" if from_longest else "shortest"]
+    power = 0 if from_longest else 2
     wanted = _slope_variance(at, h_rms, slope) / (h_rms * end) ** 2
 
-    def ratio(x: Any, h: Any) -> Any:
-        zeta = np.exp(x)
-        return (
-            spectrum.band_moment(2, h, 1.0, zeta)
-            / spectrum.band_moment(0, h, 1.0, zeta)
-            / zeta**power
-        )
+    def ratio(log_zeta: FloatArray | float, exponent: FloatArray) -> FloatArray:
+        """m2/m0 of a band over the square of the wavenumber at its end."""
+        zeta = np.exp(log_zeta)
+        m2 = spectrum.band_moment(2, exponent, 1.0, zeta)
+        m0 = spectrum.band_moment(0, exponent, 1.0, zeta)
+        return np.asarray(m2 / m0 / zeta**power)
 
-    ends = math.log(spectrum.MIN_ZETA_1), math.log(spectrum.MAX_ZETA_1)
-    least, most = np.sort(np.stack([ratio(x, at["hurst"]) for x in ends]), axis=0)
-    bounds = np.stack(
-        [
-            at[slope] * (each / wanted) ** (-0.5 if slope == "Rsm" else 0.5)
-            for each in (least, most)
-        ]
+    def excess(
+        log_zeta: FloatArray, exponent: FloatArray, goal: FloatArray
+    ) -> FloatArray:
+        return np.log(ratio(log_zeta, exponent) / goal)
+
+    ends = (math.log(spectrum.MIN_ZETA_1), math.log(spectrum.MAX_ZETA_1))
+    at_ends = np.stack([ratio(log_zeta, hurst) for log_zeta in ends])
+    least, most = np.sort(at_ends, axis=0)
+    # a slope is as the root of m2, Rsm as its inverse
+    root = -0.5 if slope == "Rsm" else 0.5
+    bounds = np.stack([at[slope] * (limit / wanted) ** root for limit in (least, most)])
+    allowed = (
+        f"between {bounds.min():.4g} and {bounds.max():.4g}, for a band of "
+        "3 < q1/q0 < 1e8 at these wavelengths"
     )
-    allowed = f"between {bounds.min():.4g} and {bounds.max():.4g}, for a band of 3 < q1/q0 < 1e8 at these wavelengths"
     require(slope, at[slope], (wanted > least) & (wanted < most), allowed)
-    args = (at["hurst"], wanted)
-    found = find_root(
-        lambda x, h, goal: np.log(ratio(x, h) / goal),
-        ends,
-        args=args,
-        tolerances={"xrtol": 1e-15},
+    root_of_excess = find_root(
+        excess, ends, args=(hurst, wanted), tolerances={"xrtol": 1e-15}
     )
-    zeta = np.asarray(np.exp(found.x))
-    return (end, end * zeta) if power == 0 else (end / zeta, end)
+    zeta = np.asarray(np.exp(root_of_excess.x))
+    return (end, end * zeta) if from_longest else (end / zeta, end)
 
 
 def _slope_variance(
@@ -211,28 +268,12 @@ def _slope_variance(
 def _band_with_rolloff(
     at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str
 ) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest wavenumber of a spectrum that is flat down to a wavelength and has a given slope."""
+    """Smallest and largest wavenumber of a spectrum with a flat part and a given slope."""
     if h_rms.ndim:
         raise InputError(f"rolloff is of one surface, got shape {h_rms.shape}")
-    from scipy.optimize import brentq
-
     start = 2 * math.pi / float(at["rolloff"])
     hurst = float(at["hurst"])
     wanted = float(_slope_variance(at, h_rms, slope) / (h_rms * start) ** 2)
-
-    def excess(longer: float, zeta: float) -> float:
-        """ln of m2/(m0 start^2) over the wanted one, for q0 = start/longer and q1 = zeta start.
-
-        m0 = 2 pi C (flat_0 + law_0) and m2 = pi C (flat_2 + law_2), with the integrals of q
-        dq and q^3 dq.
-        """
-        flat_0 = (1 - longer**-2) / 2
-        flat_2 = (1 - longer**-4) / 4
-        law_0 = -math.expm1(-2 * hurst * math.log(zeta)) / (2 * hurst)
-        law_2 = math.log(zeta)
-        if hurst < 1:
-            law_2 = math.expm1((2 - 2 * hurst) * math.log(zeta)) / (2 - 2 * hurst)
-        return math.log((flat_2 + law_2) / (2 * (flat_0 + law_0)) / wanted)
 
     # the wavelength that is not given follows from the slope: it rises with q1, and falls
     # with the longest
@@ -242,38 +283,66 @@ def _band_with_rolloff(
             raise InputError(
                 "rolloff must be at most longest, from which on the spectrum is flat"
             )
-        ends = spectrum.MIN_ZETA_1 * (1 + 1e-9), spectrum.MAX_ZETA_1
 
-        def residual(x: float) -> float:
-            return excess(longer, math.exp(x))
-    else:
-        zeta = 2 * math.pi / float(at["shortest"]) / start
-        if zeta <= spectrum.MIN_ZETA_1:
-            raise InputError(
-                "rolloff must be more than 3 times shortest, between which the spectrum falls"
-            )
-        ends = 1 + 1e-9, spectrum.MAX_ZETA_1
+        def excess_at_zeta(log_zeta: float) -> float:
+            return _excess_of_slope(longer, math.exp(log_zeta), hurst, wanted)
 
-        def residual(x: float) -> float:
-            return excess(math.exp(x), zeta)
+        lowest = spectrum.MIN_ZETA_1 * (1 + 1e-9)
+        zeta = _root_for(slope, at[slope], excess_at_zeta, lowest)
+        return np.asarray(start / longer), np.asarray(start * zeta)
 
-    low, high = map(math.log, ends)
-    # of m2 over the wanted one at both ends, its root; of Rsm the inverse
-    ratios = sorted(math.exp(residual(x) / 2) for x in (low, high))
-    number = float(at[slope])
-    bounds = sorted(
-        number / ratio if slope == "Rsm" else number * ratio for ratio in ratios
-    )
-    allowed = f"between {bounds[0]:.4g} and {bounds[1]:.4g}, which spectra with this rolloff have"
-    require(slope, at[slope], np.asarray(bounds[0] < number < bounds[1]), allowed)
-    found = math.exp(brentq(residual, low, high, xtol=1e-14, rtol=1e-14))
-    if "longest" in at:
-        return np.asarray(start / longer), np.asarray(start * found)
-    return np.asarray(start / found), np.asarray(start * zeta)
+    zeta = 2 * math.pi / float(at["shortest"]) / start
+    if zeta <= spectrum.MIN_ZETA_1:
+        raise InputError(
+            "rolloff must be more than 3 times shortest, between which the spectrum falls"
+        )
+
+    def excess_at_longest(log_longer: float) -> float:
+        return _excess_of_slope(math.exp(log_longer), zeta, hurst, wanted)
+
+    longer = _root_for(slope, at[slope], excess_at_longest, 1 + 1e-9)
+    return np.asarray(start / longer), np.asarray(start * zeta)
+
+
+def _excess_of_slope(longer: float, zeta: float, hurst: float, wanted: float) -> float:
+    """ln of m2/(m0 start^2) over the wanted one, for q0 = start/longer and q1 = zeta start.
+
+    m0 = 2 pi C (flat_0 + law_0) and m2 = pi C (flat_2 + law_2), with the integrals of q dq
+    and q^3 dq.
+    """
+    flat_0 = (1 - longer**-2) / 2
+    flat_2 = (1 - longer**-4) / 4
+    law_0 = -math.expm1(-2 * hurst * math.log(zeta)) / (2 * hurst)
+    law_2 = math.log(zeta)
+    if hurst < 1:
+        law_2 = math.expm1((2 - 2 * hurst) * math.log(zeta)) / (2 - 2 * hurst)
+    return math.log((flat_2 + law_2) / (2 * (flat_0 + law_0)) / wanted)
+
+
+def _root_for(
+    slope: str, number: FloatArray, excess: Callable[[float], float], lowest: float
+) -> float:
+    """The ratio of wavenumbers, above the lowest, at which a spectrum has the slope."""
+    from scipy.optimize import brentq
+
+    low = math.log(lowest)
+    high = math.log(spectrum.MAX_ZETA_1)
+    # slopes at both ends over the stated one, of Rsm the inverse
+    ratios = sorted(math.exp(excess(end) / 2) for end in (low, high))
+    stated = float(number)
+    bounds = [stated * ratio for ratio in ratios]
+    if slope == "Rsm":
+        bounds = [stated / ratio for ratio in reversed(ratios)]
+    least, most = bounds
+    allowed = f"between {least:.4g} and {most:.4g}, which spectra with this rolloff have"
+    require(slope, number, np.asarray(least < stated < most), allowed)
+    return math.exp(brentq(excess, low, high, xtol=1e-14, rtol=1e-14))
 
 
 def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str, float]:
-    """Sq, Sa, Ssk, Sku, Sp, Sv, Sz, Sdq, Sk, Spk, Svk, Smr1, Smr2 and the direction of the lay.
+    """Areal roughness parameters of a map, and the direction of its lay.
+
+    Sq, Sa, Ssk, Sku, Sp, Sv, Sz, Sdq, Sk, Spk, Svk, Smr1 and Smr2.
 
     Parameters
     ----------
@@ -295,8 +364,8 @@ def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str
     >>> from mbma_tables.surfaces.roughness import areal_parameters
     >>> x = np.arange(200.0)
     >>> ridges = np.repeat(np.sin(2 * np.pi * x / 40)[:, None], 100, axis=1)  # along y
-    >>> found = areal_parameters(ridges, (1.0, 1.0))
-    >>> f"Sq = {found['Sq']:.3f}, Sku = {found['Sku']:.2f}, lay at {found['lay']:.0f} degrees"
+    >>> sizes = areal_parameters(ridges, (1.0, 1.0))
+    >>> f"Sq = {sizes['Sq']:.3f}, Sku = {sizes['Sku']:.2f}, lay at {sizes['lay']:.0f} degrees"
     'Sq = 0.707, Sku = 1.50, lay at 90 degrees'
     """
     values = finite_array("heights", heights)
@@ -308,8 +377,11 @@ def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str
         raise InputError("heights are all the same")
     slopes = np.stack(np.gradient(values, *steps)).reshape(2, -1)
     tensor = slopes @ slopes.T / values.size
-    along = np.linalg.eigh(tensor)[1][:, 0]
-    top, bottom = float(values.max()), float(values.min())
+    # the eigenvector of the smaller eigenvalue
+    _, directions = np.linalg.eigh(tensor)
+    along_x, along_y = directions[:, 0]
+    top = float(values.max())
+    bottom = float(values.min())
     return {
         "Sq": Sq,
         "Sa": float(np.mean(np.abs(values))),
@@ -320,7 +392,7 @@ def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str
         "Sz": top - bottom,
         "Sdq": float(np.sqrt(np.trace(tensor))),
         **core(values),
-        "lay": float(np.degrees(np.arctan2(along[1], along[0])) % 180),
+        "lay": float(np.degrees(np.arctan2(along_y, along_x)) % 180),
     }
 
 
@@ -334,18 +406,25 @@ def core(heights: FloatArray) -> dict[str, float]:
     """
     curve = np.sort(heights, axis=None)[::-1]
     count = curve.size
-    ratio, width = (np.arange(count) + 0.5) / count, max(round(CORE * count), 2)
+    ratio = (np.arange(count) + 0.5) / count
+    # ISO 25178-2: the straight line is fitted to 40% of the curve
+    width = max(round(0.4 * count), 2)
     secants = curve[: count - width + 1] - curve[width - 1 :]
-    # the middle one if several are least, as for uniform heights
     least = np.flatnonzero(secants <= secants.min() * (1 + 1e-12))
-    part = slice(first := int(least[least.size // 2]), first + width)
-    centre, level = ratio[part].mean(), curve[part].mean()
-    slope = ((ratio[part] - centre) @ (curve[part] - level)) / np.sum(
-        (ratio[part] - centre) ** 2
-    )
-    upper, lower = level - slope * centre, level + slope * (1 - centre)
-    peaks, valleys = np.maximum(curve - upper, 0.0), np.maximum(lower - curve, 0.0)
-    above, below = np.count_nonzero(peaks) / count, np.count_nonzero(valleys) / count
+    # the middle one if several are least, as for uniform heights
+    first = int(least[least.size // 2])
+    part = slice(first, first + width)
+    centre = ratio[part].mean()
+    level = curve[part].mean()
+    from_centre = ratio[part] - centre
+    slope = (from_centre @ (curve[part] - level)) / np.sum(from_centre**2)
+    # the line at ratios 0 and 1
+    upper = level - slope * centre
+    lower = level + slope * (1 - centre)
+    peaks = np.maximum(curve - upper, 0.0)
+    valleys = np.maximum(lower - curve, 0.0)
+    above = np.count_nonzero(peaks) / count
+    below = np.count_nonzero(valleys) / count
     return {
         "Sk": float(upper - lower),
         "Spk": float(2 * peaks.mean() / above) if above else 0.0,
