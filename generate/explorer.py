@@ -1,4 +1,9 @@
-"""``python -m generate explorer``: the WebAssembly of the page of `mbma explore`; its size and speed in a browser."""
+"""``python -m generate explorer``: the WebAssembly of the page of `mbma explore`.
+
+And the page's size and speed in a browser.
+"""
+
+from __future__ import annotations
 
 import contextlib
 import hashlib
@@ -9,12 +14,12 @@ import statistics
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from generate.files import ROOT
-from generate.page import Measured, table
+from generate.page import Cell, Measured, table
 from mbma_tables import Surface
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
@@ -23,6 +28,9 @@ from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import core_file
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import REPORTED
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
 
 # with two numbers at a time, which browsers have learned by 2023
 ZIG = (
@@ -37,26 +45,25 @@ ZIG = (
     "-msimd128",
 )
 FUNCTIONS = (
-    *(
-        "mbma_total_of",
-        "mbma_calibrated_of",
-        "mbma_message",
-        "mbma_spectrum_of",
-        "mbma_surface_spectrum_of",
-    ),
-    *("mbma_spectrum_contact_of", "mbma_spectrum_separation_of"),
+    "mbma_total_of",
+    "mbma_calibrated_of",
+    "mbma_message",
+    "mbma_spectrum_of",
+    "mbma_surface_spectrum_of",
+    "mbma_spectrum_contact_of",
+    "mbma_spectrum_separation_of",
 )
 LAW_FUNCTIONS = (
-    *(
-        "mbma_law_open",
-        "mbma_law_at_overclosure",
-        "mbma_law_and_slope",
-        "mbma_law_overclosure",
-        "mbma_law_flow",
-    ),
+    "mbma_law_open",
+    "mbma_law_at_overclosure",
+    "mbma_law_and_slope",
+    "mbma_law_overclosure",
+    "mbma_law_flow",
 )
 
-OPENINGS, STEPS = 5, 40
+# how often is measured
+OPENINGS = 5
+STEPS = 40
 # moves a slider; milliseconds to the end of the drawing that follows
 STEP = """async (place) => {
   const slider = document.getElementById("slide-hurst"), start = performance.now();
@@ -69,9 +76,11 @@ STEP = """async (place) => {
 
 def c_sources() -> tuple[dict[str, str], dict[str, Any]]:
     """The C of the page by file, and the tables that are variables in it by name."""
-    model, heads = universal_model(), dict.fromkeys(c_code.MODEL, "")
-    data = {"mbma_data.c": c_code.data_text(model, REPORTED, later=True)}
-    return c_code.core_texts() | c_code.model_texts(heads) | data, c_code.tables(model)
+    model = universal_model()
+    without_heads = dict.fromkeys(c_code.MODEL, "")
+    texts = c_code.core_texts() | c_code.model_texts(without_heads)
+    texts["mbma_data.c"] = c_code.data_text(model, REPORTED, later=True)
+    return texts, c_code.tables(model)
 
 
 def law_sources() -> dict[str, str]:
@@ -79,7 +88,7 @@ def law_sources() -> dict[str, str]:
 
 
 def compiled(texts: dict[str, str], names: Iterable[str]) -> bytes:
-    """The module, with the digest of what it was compiled from in a section of its own at the end."""
+    """The module, at its end a section with the digest of what it was compiled from."""
     section = b"\x06digest" + digest_of(texts)
     exports = [f"-Wl,--export={name}" for name in names]
     module = c_code.built_by([sys.executable, *ZIG, *exports], texts, "mbma.wasm")
@@ -92,7 +101,10 @@ def digest_of(texts: dict[str, str]) -> bytes:
 
 @click.command()
 def explorer() -> None:
-    """Compile the C of the page and of laws in JavaScript into mbma_tables/export/page; needs ziglang."""
+    """Compile the C of the page and of laws in JavaScript; needs ziglang.
+
+    Into mbma_tables/export/page.
+    """
     texts, values = c_sources()
     folder = pathlib.Path(ROOT, "mbma_tables", "export", "page")
     write_file(folder / MODULE, compiled(texts, [*FUNCTIONS, "MBMA_VARIANT", *values]))
@@ -101,16 +113,16 @@ def explorer() -> None:
 
 
 def program() -> str | None:
-    return next(
-        filter(
-            None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
-        ),
-        None,
-    )
+    """The path of a browser, where one is installed."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        path = shutil.which(name)
+        if path:
+            return path
+    return None
 
 
 @contextlib.contextmanager
-def browser() -> Iterator[Any]:
+def browser() -> Iterator[Browser]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -122,14 +134,31 @@ def browser() -> Iterator[Any]:
         opened.close()
 
 
-def visit(opened: Any, address: str, **options: Any) -> Any:
+def visit(opened: Browser, address: str, **options: Any) -> Page:
     """A tab with the page, once it has drawn; in a context of its own."""
-    tab = opened.new_context(
-        **{"viewport": {"width": 1280, "height": 800}, **options}
-    ).new_page()
+    options = {"viewport": {"width": 1280, "height": 800}, **options}
+    tab = opened.new_context(**options).new_page()
     tab.goto(address)
     tab.wait_for_selector("html[data-ready]", state="attached")
     return tab
+
+
+def _clocks(opened: Browser, address: str) -> dict[str, list[float]]:
+    """Milliseconds that each action took, several times."""
+    clocks = {}
+    milliseconds = "document.documentElement.dataset.ready"
+    openings = []
+    for _ in range(OPENINGS):
+        tab = visit(opened, address)
+        openings.append(float(tab.evaluate(milliseconds)))
+    clocks["opening to the first curves"] = openings
+    for against in ("gap", "pressure"):
+        tab = visit(opened, f"{address}#against={against}&beside=mbma,calibrated,persson")
+        # what the opening still does ends before
+        tab.wait_for_timeout(1000)
+        clock = [tab.evaluate(STEP, 400 + 10 * step) for step in range(STEPS)]
+        clocks[f"a slider's step, three theories against {against}"] = clock
+    return clocks
 
 
 def measure() -> Measured:
@@ -141,30 +170,16 @@ def measure() -> Measured:
         "calibrated",
         title="concrete road of Lorenz",
     )
-    clocks, ready = dict[str, list[float]](), "document.documentElement.dataset.ready"
     with tempfile.TemporaryDirectory() as folder, browser() as opened:
         path = pathlib.Path(folder, "explorer.html")
         path.write_text(text, encoding="utf-8")
-        openings = (visit(opened, path.as_uri()) for _ in range(OPENINGS))
-        clocks["opening to the first curves"] = [
-            float(tab.evaluate(ready)) for tab in openings
-        ]
-        for against in ("gap", "pressure"):
-            tab = visit(
-                opened,
-                f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson",
-            )
-            tab.wait_for_timeout(1000)
-            clock = [tab.evaluate(STEP, 400 + 10 * k) for k in range(STEPS)]
-            clocks[f"a slider's step, three theories against {against}"] = clock
+        clocks = _clocks(opened, path.as_uri())
         tab = visit(opened, path.as_uri())
         tab.locator(".chart").first.hover(position={"x": 200, "y": 100})
         picture = tab.screenshot()
-    rows = [
-        [name, statistics.median(clock), max(clock)] for name, clock in clocks.items()
-    ]
-    size = ["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", ""]
-    parts = {
-        "numbers": table("quantity | median | largest", [size, *rows], "{} | {:.0f} ms")
-    }
-    return parts, {"docs/figures/explorer.png": picture}
+    megabytes = len(text.encode()) / 1e6
+    rows: list[list[Cell]] = [["size of the file", f"{megabytes:.2f} MB", ""]]
+    for name, clock in clocks.items():
+        rows.append([name, statistics.median(clock), max(clock)])
+    numbers = table("quantity | median | largest", rows, "{} | {:.0f} ms")
+    return {"numbers": numbers}, {"docs/figures/explorer.png": picture}

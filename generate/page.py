@@ -6,6 +6,8 @@ page, and figures and data by their path in the checkout. ``python -m generate p
 writes them.
 """
 
+from __future__ import annotations
+
 import contextlib
 import importlib
 import itertools
@@ -13,7 +15,7 @@ import math
 import pathlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 from click.testing import CliRunner
@@ -22,56 +24,72 @@ from generate.files import ROOT
 from mbma_tables.common.files import write_file
 from mbma_tables.common.plots import new_figure, to_picture
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 PAGES = {
-    **{
-        name: f"pages.library:{name}"
-        for name in ("architecture", "formula", "readme", "tables", "theories")
-    },
-    **{name: f"pages.laws:{name}" for name in ("calibrated", "leakage", "yielding")},
-    **{name: f"pages.maps:{name}" for name in ("gallery", "machined", "maps")},
-    **{
-        name: f"pages.simulations:{name}"
-        for name in ("data", "fidelity", "joints", "lubrication", "rough_bodies")
-    },
-    **{name: f"pages.{name}:measure" for name in ("cost", "stability")},
+    "architecture": "pages.library:architecture",
+    "formula": "pages.library:formula",
+    "readme": "pages.library:readme",
+    "tables": "pages.library:tables",
+    "theories": "pages.library:theories",
+    "calibrated": "pages.laws:calibrated",
+    "leakage": "pages.laws:leakage",
+    "gallery": "pages.maps:gallery",
+    "machined": "pages.maps:machined",
+    "maps": "pages.maps:maps",
+    "data": "pages.simulations:data",
+    "fidelity": "pages.simulations:fidelity",
+    "joints": "pages.simulations:joints",
+    "lubrication": "pages.simulations:lubrication",
+    "rough_bodies": "pages.simulations:rough_bodies",
+    "cost": "pages.cost:measure",
+    "stability": "pages.stability:measure",
     "explorer": "explorer:measure",
+    # `yield` is a word of the language
+    "yield": "pages.laws:yielding",
 }
-PAGES["yield"] = PAGES.pop("yielding")
-Measured = tuple[dict[str, str], dict[str, Any]]  # blocks and files
+Picture: TypeAlias = "bytes | Figure"  # the content of a file, or what it is drawn from
+Measured: TypeAlias = tuple[dict[str, str], dict[str, Picture]]  # blocks and files
+# of a table: a tuple fills a format of several fields
+Cell: TypeAlias = str | float | tuple[str | float, ...] | None
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def measured(name: str) -> Measured:
     module, _, function = PAGES[name].partition(":")
-    found: Measured = getattr(importlib.import_module(f"generate.{module}"), function)()
-    return found
+    measure = getattr(importlib.import_module(f"generate.{module}"), function)
+    parts_and_files: Measured = measure()
+    return parts_and_files
 
 
 def fill(text: str, parts: Mapping[str, str]) -> str:
     """Replace the marked blocks of a page; marks and parts must have the same names."""
-    found = [match[2] for match in MARKED.finditer(text)]
-    if sorted(found) != sorted(parts):
+    marked = [match[2] for match in MARKED.finditer(text)]
+    if sorted(marked) != sorted(parts):
         raise click.ClickException(
-            f"the page marks {sorted(found)}, measured were {sorted(parts)}"
+            f"the page marks {sorted(marked)}, measured were {sorted(parts)}"
         )
-    return MARKED.sub(lambda match: f"{match[1]}\n{parts[match[2]]}\n\n{match[3]}", text)
+
+    def filled(match: re.Match[str]) -> str:
+        return f"{match[1]}\n{parts[match[2]]}\n\n{match[3]}"
+
+    return MARKED.sub(filled, text)
 
 
 def write(
-    name: str, parts: Mapping[str, str], files: Mapping[str, Any], out: pathlib.Path
+    name: str, parts: Mapping[str, str], files: Mapping[str, Picture], out: pathlib.Path
 ) -> list[pathlib.Path]:
-    """Write a page and its files, given as bytes or as figures, below a folder; returns their paths."""
+    """Write a page and its files, given as bytes or as figures, below a folder.
+
+    Returns their paths.
+    """
     page = "README.md" if name == "readme" else f"docs/{name}.md"
-    contents = {
-        page: fill((ROOT / page).read_text(encoding="utf-8"), parts).encode(),
-        **files,
-    }
+    text = (ROOT / page).read_text(encoding="utf-8")
+    contents: dict[str, Picture] = {page: fill(text, parts).encode(), **files}
     for place, content in contents.items():
-        write_file(
-            out / place,
-            content if isinstance(content, bytes) else svg(content),
-            make_folders=True,
-        )
+        body = content if isinstance(content, bytes) else svg(content)
+        write_file(out / place, body, make_folders=True)
     return [out / place for place in contents]
 
 
@@ -84,28 +102,34 @@ def printed(command: str) -> str:
     return f"```\n$ {command}\n{done.stdout.strip()}\n```"
 
 
-def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> str:
-    """A Markdown table, of names and formats of columns with bars between them; the last format holds for the rest.
+def table(header: str, rows: Iterable[Iterable[Cell]], formats: str = "{}") -> str:
+    """A Markdown table.
 
+    Names and formats of columns have bars between them; the last format holds for the rest.
     Strings are copied, None leaves a cell empty, a number that is not finite becomes a
     dash, and a tuple fills a format of several fields.
     """
-    known = formats.split(" | ")
-
-    def cell(column: int, value: Any) -> str:
-        if isinstance(value, str) or value is None:
-            return value or ""
-        values = value if isinstance(value, tuple) else (value,)
-        if not all(math.isfinite(x) for x in values if not isinstance(x, str)):
-            return "—"
-        return known[min(column, len(known) - 1)].format(*values)
-
-    lines = [
-        header.split(" | "),
-        ["---"] * (header.count(" | ") + 1),
-        *(map(cell, itertools.count(), r) for r in rows),
-    ]
+    names = header.split(" | ")
+    format_of_column = formats.split(" | ")
+    lines = [names, ["---"] * len(names)]
+    for row in rows:
+        texts = []
+        for column, value in enumerate(row):
+            form = format_of_column[min(column, len(format_of_column) - 1)]
+            texts.append(_cell(value, form))
+        lines.append(texts)
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _cell(value: Cell, form: str) -> str:
+    """The text of a cell of `table`."""
+    if isinstance(value, str) or value is None:
+        return value or ""
+    values = value if isinstance(value, tuple) else (value,)
+    numbers = [part for part in values if not isinstance(part, str)]
+    if not all(math.isfinite(number) for number in numbers):
+        return "—"
+    return form.format(*values)
 
 
 def percent(value: float) -> str:
@@ -115,10 +139,10 @@ def percent(value: float) -> str:
 
 def duration(seconds: float) -> str:
     """A time to two digits, in its unit."""
-    unit, size = next(
-        ((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s),
-        ("ns", 1e-9),
-    )
+    longest_first = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+    fitting = (unit for unit, size in longest_first.items() if seconds >= size)
+    unit = next(fitting, "ns")
+    size = longest_first.get(unit, 1e-9)
     return f"{float(f'{seconds / size:.2g}'):g} {unit}"
 
 
@@ -129,11 +153,12 @@ def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
 
 def panels(
     rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any
-) -> tuple[Any, Any]:
+) -> tuple[Figure, Any]:
+    """A figure and its axes: one of them, or an array."""
     figure = new_figure(*size)
     return figure, figure.subplots(rows, columns, **options)
 
 
-def svg(figure: Any) -> bytes:
+def svg(figure: Figure) -> bytes:
     """A figure as the content of an SVG file, the same bytes for the same figure."""
     return to_picture(figure, "svg", dpi=100, outlines=True)

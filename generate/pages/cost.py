@@ -1,31 +1,42 @@
-"""docs/cost.md: error, and deviation from simulation, against time, as `python -m generate cost` measured them."""
+"""docs/cost.md: error, and deviation from simulation, against time.
+
+As `python -m generate cost` measured them.
+"""
+
+from __future__ import annotations
 
 import math
 import re
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from generate.calibrated_file import rms
 from generate.distances import DEEP, HUES, LOW, THEORIES
 from generate.files import ROOT, dataset, read_csv
-from generate.machined.evaluation import TITLES
 from generate.page import Measured, panels, printed
 from mbma_tables.scenes.plan import shipped_costs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
 GAUGES = {
     "area_light": "contact area at a given pressure",
     "force_light": "pressure at a given gap",
 }
-# simulations of a map, timed in docs/lookup.md, by what their columns of the data set begin with
-OWN = ("corrected", "simulated")
-COLOURS = (
-    dict(zip(THEORIES, HUES, strict=True))
-    | {"boundary elements": "C5"}
-    | {TITLES[form]: "C8" for form in OWN}
-)
+OWN = ("corrected", "simulated")  # theories of a map, timed in docs/lookup.md
+COLOURS = {
+    **dict(zip(THEORIES, HUES, strict=True)),
+    "boundary elements": "C5",
+    **dict.fromkeys(OWN, "C8"),
+}
+MARKS = "osD^vP*Xh<>d"
 
 
 def pareto_front(rows: pd.DataFrame) -> pd.DataFrame:
@@ -38,40 +49,28 @@ def groups(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Rows of one island and of one gap with an error, and the method of each."""
     what = rows["variant"].str.partition(" rtol=")[0]
     rows = rows.assign(method=rows["island_model"].replace(METHODS))
-    rows.loc[
-        (rows["island_model"] == "exact") & what.str.startswith("nodes="), "method"
-    ] += ", by nodes"
-    both = rows["error"].notna() & (rows["quantity"] == "both")
-    laws = rows[both & (rows["island_model"] == "universal") & (what == "law")]
+    is_by_nodes = (rows["island_model"] == "exact") & what.str.startswith("nodes=")
+    rows.loc[is_by_nodes, "method"] += ", by nodes"
+    is_of_both = rows["quantity"] == "both"  # force and area
+    has_error = rows["error"].notna() & is_of_both
+    is_law = (rows["island_model"] == "universal") & (what == "law")
     # a law's errors go with the price of evaluating it
-    laws = laws.assign(
-        method="law",
-        cost=rows["cost"][(what == "lookup") & (rows["quantity"] == "both")].iloc[0],
-    )
-    own = rows[both & what.str.match("island|nodes=|rings=")]
+    price_of_law = rows["cost"][(what == "lookup") & is_of_both].iloc[0]
+    laws = rows[has_error & is_law].assign(method="law", cost=price_of_law)
     return {
-        "one island": own,
-        "one gap of a surface": pd.concat([rows[both & (what == "gap")], laws]),
+        "one island": rows[has_error & what.str.match("island|nodes=|rings=")],
+        "one gap of a surface": pd.concat([rows[has_error & (what == "gap")], laws]),
     }
 
 
-def draw(costs: pd.DataFrame) -> Any:
+def draw(costs: pd.DataFrame) -> Figure:
     figure, axes = panels(1, 2, (9, 4.8), sharey=True)
-    own, handles = groups(costs), dict[str, Any]()
-    marks = dict(
-        zip(pd.concat(own.values())["method"].unique(), "osD^vP*Xh<>d", strict=False)
-    )
-    for panel, (title, rows) in zip(axes, own.items(), strict=True):
-        for k, (name, mark) in enumerate(marks.items()):
-            chosen = rows[rows["method"] == name]
-            if len(chosen):
-                style: dict[str, Any] = {
-                    "color": f"C{k % 10}",
-                    "marker": mark,
-                    "ls": "none",
-                    "ms": 5,
-                }
-                (handles[name],) = panel.loglog(chosen["cost"], chosen["error"], **style)
+    rows_by_title = groups(costs)
+    methods = pd.concat(rows_by_title.values())["method"].unique()
+    mark_of_method = dict(zip(methods, MARKS, strict=False))
+    handles: dict[str, Line2D] = {}
+    for panel, (title, rows) in zip(axes, rows_by_title.items(), strict=True):
+        handles |= _draw_methods(panel, rows, mark_of_method)
         front = pareto_front(rows)
         (handles["Pareto front"],) = panel.step(
             front["cost"], front["error"], "k-", lw=1, where="post", zorder=0
@@ -85,49 +84,77 @@ def draw(costs: pd.DataFrame) -> Any:
     return figure
 
 
+def _draw_methods(
+    panel: Axes, rows: pd.DataFrame, mark_of_method: Mapping[str, str]
+) -> dict[str, Line2D]:
+    """Dots of each method; what the legend shows of it."""
+    handles = {}
+    for number, (name, mark) in enumerate(mark_of_method.items()):
+        chosen = rows[rows["method"] == name]
+        if not len(chosen):
+            continue
+        (handles[name],) = panel.loglog(
+            chosen["cost"],
+            chosen["error"],
+            color=f"C{number % 10}",
+            marker=mark,
+            ls="none",
+            ms=5,
+        )
+    return handles
+
+
 def gauge_rows(distances: pd.DataFrame) -> pd.DataFrame:
-    """Microseconds a point, and percent of deviation at 1-10% contact, of theories and of the library's simulations."""
+    """Microseconds a point, and percent of deviation at 1-10% contact.
+
+    Of theories and of the library's simulations.
+    """
     # rigid islands are not the model
-    cold = distances[~distances["way"].str.contains("continued|rigid")].reset_index(
-        drop=True
-    )
+    is_left_out = distances["way"].str.contains("continued|rigid")
+    cold = distances[~is_left_out].reset_index(drop=True)
     rows = cold.assign(us=1e6 * cold["cost"] * shipped_costs().seconds)
-    data, benchmarks = (
-        dataset("machined"),
-        (ROOT / "docs" / "lookup.md").read_text(encoding="utf-8"),
-    )
-    for form in OWN:
+    machined = dataset("machined")
+    benchmarks = (ROOT / "docs" / "lookup.md").read_text(encoding="utf-8")
+    for theory in OWN:
         timed = re.search(
-            rf"256 x 256, periodic: {TITLES[form]}.* \| ([\d.]+) s \|", benchmarks
+            rf"256 x 256, periodic: {theory}.* \| ([\d.]+) s \|", benchmarks
         )
         assert timed is not None
-        seen = (
-            (data.area >= LOW) & (data.area <= DEEP) & (data[f"{form}_valid"] > 0)
-        ).values
-        off = (
-            (data[f"{form}_mean_separation"] - data.mean_separation)
-            * data.stiffness
-            / data.pressure
-        )
-        errors = np.log(data[f"{form}_area"] / data.area).values[seen], off.values[seen]
+        microseconds = 1e6 * float(timed[1])
+        deviations = _deviations(machined, theory)
         rows.loc[len(rows), ["theory", "us", *GAUGES]] = [
-            TITLES[form],
-            1e6 * float(timed[1]),
-            *map(rms, errors),
+            theory,
+            microseconds,
+            *deviations,
         ]
-    return rows.assign(
-        **{name: 100 * np.expm1(rows[name].astype(float)) for name in GAUGES}
-    )
+    percentages = {name: 100 * np.expm1(rows[name].astype(float)) for name in GAUGES}
+    return rows.assign(**percentages)
 
 
-def draw_gauge(rows: pd.DataFrame) -> Any:
-    """Deviation from boundary elements against time: a line joins the ways to evaluate a theory."""
+def _deviations(machined: xr.Dataset, theory: str) -> tuple[float, float]:
+    """Root mean squares of ln(theory/simulation) of area and of force, on machined maps."""
+    area = machined.area
+    is_light = (area >= LOW) & (area <= DEEP) & (machined[f"{theory}_valid"] > 0)
+    log_area = np.log(machined[f"{theory}_area"] / area)
+    # the error of the gap as one of the force at the gap
+    gap = machined[f"{theory}_mean_separation"] - machined.mean_separation
+    log_force = gap * machined.stiffness / machined.pressure
+    seen = is_light.values
+    return rms(log_area.values[seen]), rms(log_force.values[seen])
+
+
+def draw_gauge(rows: pd.DataFrame) -> Figure:
+    """Deviation from boundary elements against time.
+
+    A line joins the ways to evaluate a theory.
+    """
     figure, axes = panels(2, 1, (9, 9.2), sharex=True)
     for panel, (name, title) in zip(axes, GAUGES.items(), strict=True):
-        for (theory, colour), mark in zip(COLOURS.items(), "osD^vP*Xh<>d", strict=True):
-            own = rows[(rows["theory"] == theory) & rows[name].notna()].sort_values("us")
+        for (theory, colour), mark in zip(COLOURS.items(), MARKS, strict=True):
+            is_of_theory = (rows["theory"] == theory) & rows[name].notna()
+            ways = rows[is_of_theory].sort_values("us")
             panel.loglog(
-                own["us"], own[name], f"{mark}-", color=colour, ms=6, label=theory
+                ways["us"], ways[name], f"{mark}-", color=colour, ms=6, label=theory
             )
         panel.set_title(f"error of the {title}")
         panel.grid(alpha=0.25)
@@ -143,14 +170,13 @@ def draw_gauge(rows: pd.DataFrame) -> Any:
 
 
 def measure() -> Measured:
-    costs, distances = (
-        read_csv(ROOT / "tables" / f"{name}.csv") for name in ("cost", "distance")
-    )
-    figures = {
+    costs = read_csv(ROOT / "tables" / "cost.csv")
+    distances = read_csv(ROOT / "tables" / "distance.csv")
+    parts = {
+        "costs": printed("mbma cost"),
+        "distances": printed("mbma cost --distance"),
+    }
+    return parts, {
         "docs/figures/cost.svg": draw(costs),
         "docs/figures/gauge.svg": draw_gauge(gauge_rows(distances)),
     }
-    return {
-        "costs": printed("mbma cost"),
-        "distances": printed("mbma cost --distance"),
-    }, figures

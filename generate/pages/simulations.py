@@ -1,103 +1,128 @@
-"""The library beside simulations and published fits: joints, lubrication, rough bodies, fidelity, and the data set."""
+"""The library beside simulations and published fits.
+
+Joints, lubrication, rough bodies, fidelity, and the data set.
+"""
+
+from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from generate import distances
 from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import dataset
-from generate.page import Measured, panels, percent, table
+from generate.page import Cell, Measured, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Joint, Surface, flow_factors, rough_contact
-from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import boundary_elements
-from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
+from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
 from mbma_tables.rough_body.rough_contact import mean_wavelength
+from mbma_tables.surfaces.any_surface import AnySurface
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PAIRS = {
     "steel on aluminium": ("steel 4140 hard", "aluminium 6061 hard"),
     "copper on copper": "copper C11000 hard",
 }
-SHORTEST, PRESSURES = ("8 um", "2 um"), (1.0, 10.0, 100.0)  # MPa
-# C and r of phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978, Table 1
-PATIR_CHENG = {1 / 9: (1.48, 0.42), 1 / 6: (1.38, 0.42), 1 / 3: (1.18, 0.42), 1.0: (0.90, 0.56), 3.0: (0.225, 1.5),
-               6.0: (0.520, 1.5), 9.0: (0.870, 1.5)}  # fmt: skip
-FIRST, LAST = (
-    3.0,
-    6.0,
-)  # u/h_rms between which fits are compared: where there is no contact, and where they end
+SHORTEST = ("8 um", "2 um")
+PRESSURES = (1.0, 10.0, 100.0)  # MPa
+# C and r of phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978,
+# Table 1
+PATIR_CHENG = {
+    1 / 9: (1.48, 0.42),
+    1 / 6: (1.38, 0.42),
+    1 / 3: (1.18, 0.42),
+    1.0: (0.90, 0.56),
+    3.0: (0.225, 1.5),
+    6.0: (0.520, 1.5),
+    9.0: (0.870, 1.5),
+}
+# u/h_rms between which fits are compared: where there is no contact, and where they end
+FIRST = 3.0
+LAST = 6.0
 SMOOTH = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=1.0, h_max=2.9)
 WIDTHS = (1.0, 2.0, 3.0, 4.5, 7.0, 20.0)  # of the contact over the mean wavelength
 FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
 
 def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Conductance of the solid [W/(m^2 K)] at pressures [MPa], by the law and by the correlation."""
-    assert one.pair is not None
-    k = mean_conductivity(*(float(text.split()[0]) for text in one.pair.conductivities))
+    """Conductance of the solid [W/(m^2 K)] at pressures [MPa].
+
+    By the law and by the correlation.
+    """
+    conductivities = [float(text.split()[0]) for text in one.pair.conductivities]
+    k = mean_conductivity(*conductivities)
     assert one.pair.hardness is not None
     hardness = 1e3 * float(one.pair.hardness.split()[0])
-    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance
-    return np.asarray(law), 1e6 * np.asarray(
-        cooper_mikic_yovanovich(one.surface, pressure, k, 1.0, hardness)
-    )
+    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance()
+    # lengths in um, so that W/(m K) over um is 1e6 W/(m^2 K)
+    correlation = cooper_mikic_yovanovich(one.surface, pressure, k, 1.0, hardness)
+    return np.asarray(law), 1e6 * np.asarray(correlation)
 
 
 def joints() -> Measured:
-    """Stiffness at light loads against boundary elements, conductance against a usual correlation."""
-    by_waves, lines = dict[int, list[FloatArray]](), []
-    for one in surfaces(dataset("light_loads")):
-        by_waves.setdefault(int(one.waves), []).append(compared(one))
-    for waves, parts in by_waves.items():
-        area, stiffness, _ = np.concatenate(parts, axis=1)
-        bins = binned(area, stiffness, LIGHT_BINS)
-        lines.append(
-            [
-                str(waves),
-                *(
-                    f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else ""
-                    for part in bins
-                ),
-            ]
-        )
-    contacts = " | ".join(
-        f"{low:.2%} to {high:.2%}" for low, high in itertools.pairwise(LIGHT_BINS)
-    )
+    """Stiffness at light loads against boundary elements.
 
+    And conductance against a usual correlation.
+    """
     figure, axes = panels(size=(6.5, 4))
-    usual, pressure = [], np.geomspace(0.1, 300, 40)
-    for (name, materials), shortest in itertools.product(PAIRS.items(), SHORTEST):
-        face = {"hurst": 0.8, "longest": "250 um", "shortest": shortest}
-        joint = Joint(
-            face | {"Rq": "1.6 um"},
-            face | {"Rq": "0.8 um"},
-            bodies=materials,
-            nominal_area="4 cm^2",
-        )
-        pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
-        usual.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
-        law, correlation = conductances(joint, pressure)
-        (line,) = axes.loglog(pressure, law, label=f"{name}, {shortest}")
-        axes.loglog(pressure, correlation, "--", color=line.get_color())
+    blocks = {"light": _light_loads(), "usual": _usual_conductances(axes)}
     axes.set(
         xlabel="pressure [MPa]",
         ylabel="conductance [W/(m² K)]",
         title="law; dashed: Cooper-Mikic-Yovanovich",
     )
     axes.legend(fontsize=7)
-    header = (
-        f"joint | shortest wavelength | {' | '.join(f'{p:g} MPa' for p in PRESSURES)}"
-    )
-    blocks = {
-        "light": table(f"longest wavelengths a side | {contacts}", lines),
-        "usual": table(header, usual),
-    }
     return blocks, {"docs/figures/joints.svg": figure}
+
+
+def _light_loads() -> str:
+    """ln(simulated/law) of stiffness by contact and by longest wavelengths a side."""
+    by_waves: dict[int, list[FloatArray]] = {}
+    for one in surfaces(dataset("light_loads")):
+        by_waves.setdefault(int(one.waves), []).append(compared(one))
+    rows = []
+    for waves, parts in by_waves.items():
+        area, stiffness, _ = np.concatenate(parts, axis=1)
+        cells = [str(waves)]
+        for part in binned(area, stiffness, LIGHT_BINS):
+            text = f"{part.mean():+.2f} ± {part.std():.2f}" if part.size else ""
+            cells.append(text)
+        rows.append(cells)
+    ends = itertools.pairwise(LIGHT_BINS)
+    contacts = " | ".join(f"{low:.2%} to {high:.2%}" for low, high in ends)
+    return table(f"longest wavelengths a side | {contacts}", rows)
+
+
+def _usual_conductances(axes: Axes) -> str:
+    """Conductances by law and correlation: lines, and a table at `PRESSURES`."""
+    rows = []
+    pressure = np.geomspace(0.1, 300, 40)
+    for (name, materials), shortest in itertools.product(PAIRS.items(), SHORTEST):
+        face = {"hurst": 0.8, "longest": "250 um", "shortest": shortest}
+        joint = Joint(
+            face | {"Rq": "1.6 um"},
+            face | {"Rq": "0.8 um"},
+            materials=materials,
+            nominal_area="4 cm^2",
+        )
+        pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
+        rows.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
+        law, correlation = conductances(joint, pressure)
+        (line,) = axes.loglog(pressure, law, label=f"{name}, {shortest}")
+        axes.loglog(pressure, correlation, "--", color=line.get_color())
+    columns = " | ".join(f"{p:g} MPa" for p in PRESSURES)
+    return table(f"joint | shortest wavelength | {columns}", rows)
 
 
 def published(gamma: float, H: FloatArray) -> FloatArray:
@@ -106,98 +131,107 @@ def published(gamma: float, H: FloatArray) -> FloatArray:
 
 
 def lubrication() -> Measured:
-    H, rows = np.linspace(FIRST, LAST, 61), []
-    figure, (left, right) = panels(1, 2, (10, 4))
+    H = np.linspace(FIRST, LAST, 61)
     u = np.geomspace(0.5, 10, 120)
+    rows = []
+    figure, (left, right) = panels(1, 2, (10, 4))
     for number, gamma in enumerate(PATIR_CHENG):
+        # within what the library takes; the fits' outermost are 1/9 and 9
         peklenik = min(max(gamma, 1 / 8.5), 8.5)
-        known, found = (
-            published(gamma, H),
-            flow_factors(SMOOTH, H, peklenik=peklenik).phi_x,
-        )
+        by_fit = published(gamma, H)
+        by_library = flow_factors(SMOOTH, H, peklenik=peklenik).phi_x
         name = f"{gamma:g}" if gamma >= 1 else f"1/{1 / gamma:g}"
-        off = np.log(found / known)
+        off = np.log(by_library / by_fit)
         rows.append([name, np.sqrt(np.mean(off**2)), off[np.abs(off).argmax()]])
         film = flow_factors(SMOOTH, u, peklenik=peklenik)
         left.semilogx(u, film.phi_x, color=f"C{number}", label=name)
-        left.semilogx(H, known, "o", ms=2, markevery=5, color=f"C{number}")
+        left.semilogx(H, by_fit, "o", ms=2, markevery=5, color=f"C{number}")
         right.semilogx(u, film.shear_x, color=f"C{number}")
     left.set(xlabel="u/h_rms", ylabel="phi_x (points: Patir and Cheng 1978)", ylim=(0, 2))
     right.set(xlabel="u/h_rms", ylabel="phi_s")
     left.legend(title="gamma", fontsize="small")
-    parts = {
-        "published": table(
-            "gamma | root mean square of ln ratio | largest",
-            rows,
-            "{} | {:.3f} | {:+.3f}",
-        )
-    }
-    return parts, {"docs/figures/lubrication.svg": figure}
+    header = "gamma | root mean square of ln ratio | largest"
+    text = table(header, rows, "{} | {:.3f} | {:+.3f}")
+    return {"published": text}, {"docs/figures/lubrication.svg": figure}
 
 
 def spheres() -> dict[str, FloatArray]:
     """Every simulated contact, and the library's at the same approach and force."""
-    parts, contacts = [], dataset("rough_spheres").to_dataframe()
-    for (hurst, longest, h_rms, seed), rows in contacts.groupby(
-        ["hurst", "longest", "h_rms", "seed"]
-    ):
-        face = Surface.from_map(
-            heights(hurst, longest, h_rms, int(seed)), 1.0, periodic=True
-        )
-        force, approach, area, radius = (
-            rows[n].to_numpy() for n in ("force", "approach", "area", "mean_radius")
-        )
-        same, pushed = (
-            rough_contact(face, RADIUS, force=force),
-            rough_contact(face, RADIUS, approach=approach),
-        )
-        p, r = same.pressure, same.position
-        found = {
-            "width": 2 * same.contact_radius / mean_wavelength(face),
-            "off": (same.approach - approach) / h_rms,
-            "force": np.log(pushed.force / force),
-            "area": np.log(same.area / area),
-            "mean_radius": np.log(
-                np.trapezoid(p * r**2, r) / np.trapezoid(p * r, r) / radius
-            ),
-            "scatter": pushed.scatter,
-            "valid": pushed.valid,
-        }
-        parts.append(found)
+    contacts = dataset("rough_spheres").to_dataframe()
+    of_face = ["hurst", "longest", "h_rms", "seed"]
+    parts = []
+    for (hurst, longest, h_rms, seed), rows in contacts.groupby(of_face):
+        z = heights(hurst, longest, h_rms, int(seed))
+        face = Surface.from_map(z, 1.0, periodic=True)
+        parts.append(_sphere(face, h_rms, rows))
+    together = {}
+    for name in parts[0]:
+        together[name] = np.concatenate([np.asarray(part[name]) for part in parts])
+    return together
+
+
+def _sphere(face: AnySurface, h_rms: float, rows: pd.DataFrame) -> dict[str, FloatArray]:
+    """Contacts of one rough sphere, simulated and by the library."""
+    force = rows["force"].to_numpy()
+    approach = rows["approach"].to_numpy()
+    at_force = rough_contact(face, RADIUS, force=force)
+    at_approach = rough_contact(face, RADIUS, approach=approach)
+    # the mean distance from the axis, weighted by pressure
+    p = at_force.pressure
+    r = at_force.position
+    mean_radius = np.trapezoid(p * r**2, r) / np.trapezoid(p * r, r)
     return {
-        name: np.concatenate([np.asarray(part[name]) for part in parts])
-        for name in parts[0]
+        "width": 2 * at_force.contact_radius / mean_wavelength(face),
+        "off": (at_force.approach - approach) / h_rms,
+        "force": np.log(at_approach.force / force),
+        "area": np.log(at_force.area / rows["area"].to_numpy()),
+        "mean_radius": np.log(mean_radius / rows["mean_radius"].to_numpy()),
+        "scatter": at_approach.scatter,
+        "valid": at_approach.valid,
     }
 
 
 def rough_bodies() -> Measured:
     """Distances from boundary elements by the width of the contact, and the curves of one ball."""
-    seen, rows = spheres(), []
+    parts = {"spheres": _by_width(spheres())}
+    return parts, {"docs/figures/rough_bodies.svg": _draw_ball()}
+
+
+def _by_width(contacts: dict[str, FloatArray]) -> str:
+    rows = []
     for low, high in itertools.pairwise(WIDTHS):
-        mine = (seen["width"] >= low) & (seen["width"] < high)
-        off, valid = seen["off"][mine], mine & (seen["valid"] > 0)
-        cells = [
-            f"{low:g} to {high:g}",
-            int(mine.sum()),
-            (off.mean(), off.std(), np.abs(off).max()),
-        ]
-        cells += [
-            (v.mean(), v.std())
-            for v in (seen[name][mine] for name in ("force", "area", "mean_radius"))
-        ]
-        within = [
-            np.mean(np.abs(seen["force"] / seen["scatter"])[valid] < k) for k in (1, 2)
-        ]
-        rows.append([*cells, f"{within[0]:.0%}, {within[1]:.0%} of {valid.sum()}"])
-    header = "width over mean wavelength | contacts | approach [h_rms]: mean, sd, largest | ln F at the approach | "
-    header += "ln A at the force | ln mean radius | valid: within 1, 2 sd"
-    forms = "{} | {} | {:+.2f}, {:.2f}, {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f} | {:+.2f} ± {:.2f}"
+        inside = (contacts["width"] >= low) & (contacts["width"] < high)
+        off = contacts["off"][inside]
+        cells: list[Cell] = [f"{low:g} to {high:g}", int(inside.sum())]
+        cells.append((off.mean(), off.std(), np.abs(off).max()))
+        for name in ("force", "area", "mean_radius"):
+            values = contacts[name][inside]
+            cells.append((values.mean(), values.std()))
+
+        valid = inside & (contacts["valid"] > 0)
+        sizes = np.abs(contacts["force"] / contacts["scatter"])[valid]
+        shares = f"{np.mean(sizes < 1):.0%}, {np.mean(sizes < 2):.0%}"
+        rows.append([*cells, f"{shares} of {valid.sum()}"])
+    header = (
+        "width over mean wavelength | contacts | approach [h_rms]: mean, sd, largest"
+        " | ln F at the approach | ln A at the force | ln mean radius"
+        " | valid: within 1, 2 sd"
+    )
+    of_ratio = "{:+.2f} ± {:.2f}"
+    of_approach = "{:+.2f}, {:.2f}, {:.2f}"
+    forms = f"{{}} | {{}} | {of_approach} | {of_ratio} | {of_ratio} | {of_ratio}"
+    return table(header, rows, forms)
+
+
+def _draw_ball() -> Figure:
+    """Pressure by distance and force by approach, of one ball on a flat."""
     figure, (left, right) = panels(1, 2, (9, 4))
     forces = [f"{10.0**k} N" for k in (-1, 0, 1, 2)]
-    ball = rough_contact(FACE, "5 mm", "110 GPa", force=forces, theory="calibrated")
-    for r, p, force in zip(
-        ball.position, ball.pressure, np.asarray(ball.force), strict=True
-    ):
+    ball = rough_contact(
+        FACE, "5 mm", force=forces, E_star="110 GPa", theory="calibrated"
+    )
+    by_force = zip(ball.position, ball.pressure, np.asarray(ball.force), strict=True)
+    for r, p, force in by_force:
         left.semilogy(r, 1e3 * p, label=f"{force:.3g} N")
     left.set(
         xlabel="distance from the middle [um]",
@@ -212,9 +246,7 @@ def rough_bodies() -> Measured:
     right.set(xlabel="approach [um]", ylabel="force [N]", ylim=(1e-4, 200))
     for axes in (left, right):
         axes.legend(fontsize="small")
-    return {"spheres": table(header, rows, forms)}, {
-        "docs/figures/rough_bodies.svg": figure
-    }
+    return figure
 
 
 BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
@@ -224,48 +256,36 @@ def summary_table(sets: Iterable[distances.DataSet]) -> str:
     """Root mean square deviations of every theory from data sets: area, force and stiffness."""
     rows = []
     for one in sets:
-        cells = []
+        cells = [f"{one.title} ({len(one.seen)})"]
         for name, theory in distances.THEORIES.items():
-            found = distances.distances(one.seen, theory)
-            sums = [distances.summed_up(one.seen, values) for values in found.values()]
+            deviations = distances.distances(one.seen, theory).values()
+            sums = [distances.summed_up(one.seen, values) for values in deviations]
             text = " / ".join(percent(rms) for rms, _ in sums)
-            # stiffness may be missing at a last load by itself
-            short = " †" if 0 < sums[0][1] < 0.995 else ""
-            cells.append(
-                "—"
-                if text == "— / — / —"
-                else f"{text}{'*' if name in one.fitted else ''}{short}"
-            )
-        rows.append([f"{one.title} ({len(one.seen)})", *cells])
+            if text == "— / — / —":
+                cells.append("—")
+                continue
+            star = "*" if name in one.fitted else ""
+            # of the area: stiffness may be missing at a last load by itself
+            _, share_reached = sums[0]
+            dagger = " †" if 0 < share_reached < 0.995 else ""
+            cells.append(f"{text}{star}{dagger}")
+        rows.append(cells)
     return table(f"simulated surfaces (number) | {' | '.join(distances.THEORIES)}", rows)
 
 
-def by_contact() -> Any:
-    """Theory over simulation against contact on held-out surfaces: means, of two theories with a standard deviation."""
+def by_contact() -> Figure:
+    """Theory over simulation against contact on held-out surfaces.
+
+    Means, of two theories with a standard deviation.
+    """
     figure, axes = panels(3, 1, (9, 9), sharex=True)
     seen = distances.held_out()
-    area, middle = (
-        np.concatenate([one.area for one in seen]),
-        np.sqrt(np.multiply(BINS[1:], BINS[:-1])),
-    )
-    for (theory, make), hue in zip(
-        distances.THEORIES.items(), distances.HUES, strict=True
-    ):
-        for ax, values in zip(
-            axes, distances.distances(seen, make).values(), strict=True
-        ):
-            mean, spread, count = by_bin(area, values, BINS, np.mean, np.std, np.size).T
-            x, mean, spread = (each[count > 4] for each in (middle, mean, spread))
-            ax.plot(x, np.exp(mean), ".-", color=hue, label=theory)
-            if theory in ("MBMA reported", "calibrated"):
-                ax.fill_between(
-                    x,
-                    np.exp(mean - spread),
-                    np.exp(mean + spread),
-                    color=hue,
-                    alpha=0.15,
-                    lw=0,
-                )
+    area = np.concatenate([one.area for one in seen])
+    theories = zip(distances.THEORIES.items(), distances.HUES, strict=True)
+    for (name, theory), hue in theories:
+        deviations = distances.distances(seen, theory).values()
+        for ax, values in zip(axes, deviations, strict=True):
+            _draw_deviation(ax, area, values, name, hue)
     for ax, quantity in zip(axes, QUANTITIES, strict=True):
         ax.axhline(1, color="k", lw=0.5)
         ax.set(
@@ -292,43 +312,57 @@ def by_contact() -> Any:
     return figure
 
 
+def _draw_deviation(
+    ax: Axes, area: FloatArray, values: FloatArray, theory: str, hue: str
+) -> None:
+    """One line of `by_contact`, over bins with enough contacts."""
+    mean, spread, count = by_bin(area, values, BINS, np.mean, np.std, np.size).T
+    has_enough = count > 4
+    middle = np.sqrt(np.multiply(BINS[1:], BINS[:-1]))[has_enough]
+    mean = mean[has_enough]
+    spread = spread[has_enough]
+    ax.plot(middle, np.exp(mean), ".-", color=hue, label=theory)
+    if theory in ("MBMA reported", "calibrated"):
+        lower = np.exp(mean - spread)
+        upper = np.exp(mean + spread)
+        ax.fill_between(middle, lower, upper, color=hue, alpha=0.15, lw=0)
+
+
 def fidelity() -> Measured:
-    parts = {"summary": summary_table(distances.data_sets().values())}
-    parts["scores"] = distances.scores(
-        distances.THEORIES | distances.theories_of(distances.OTHERS)
-    )
+    of_others = distances.theories_of(distances.OTHERS)
+    parts = {
+        "summary": summary_table(distances.data_sets().values()),
+        "scores": distances.scores(distances.THEORIES | of_others),
+    }
     return parts, {"docs/figures/fidelity.svg": by_contact()}
 
 
-def draw_data(tree: Any) -> Any:
+def draw_data(tree: xr.DataTree) -> Figure:
     figure, (left, middle, right) = panels(1, 3, (11, 3.6))
-    hard, elastic, leaky = (
-        tree[name].to_dataset() for name in ("hardness", "elastic", "leakage")
-    )
-    style: dict[str, Any] = {"ms": 1.5, "alpha": 0.5, "rasterized": True}
-    for row in range(hard.sizes["hardness"]):
-        of = hard.isel(hardness=row)
-        left.loglog(
-            of.force.values.ravel(),
-            of.area.values.ravel(),
+    hard = tree["hardness"].to_dataset()
+    elastic = tree["elastic"].to_dataset()
+    leaky = tree["leakage"].to_dataset()
+
+    def dots(axes: Axes, x: xr.DataArray, y: xr.DataArray, colour: str) -> None:
+        axes.plot(
+            x.values.ravel(),
+            y.values.ravel(),
             ".",
-            color=str(0.8 - 0.13 * row),
-            **style,
+            color=colour,
+            ms=1.5,
+            alpha=0.5,
+            rasterized=True,
         )
-    middle.semilogy(
-        elastic.mean_separation.values.ravel(),
-        elastic.force.values.ravel(),
-        ".",
-        color="C0",
-        **style,
-    )
-    right.semilogy(
-        leaky.area.values.ravel(),
-        leaky.flow.max("axis").values.ravel(),
-        ".",
-        color="C2",
-        **style,
-    )
+
+    left.set(xscale="log", yscale="log")
+    for row in range(hard.sizes["hardness"]):
+        of_hardness = hard.isel(hardness=row)
+        grey = str(0.8 - 0.13 * row)
+        dots(left, of_hardness.force, of_hardness.area, grey)
+    middle.set(yscale="log")
+    dots(middle, elastic.mean_separation, elastic.force, "C0")
+    right.set(yscale="log")
+    dots(right, leaky.area, leaky.flow.max("axis"), "C2")
     left.set(xlabel="pressure F/(A0 E* g)", ylabel="contact area A/A0")
     middle.set(xlabel="mean gap u/h_rms", ylabel="pressure F/(A0 E* g)", xlim=(0, 5))
     right.set(
@@ -341,18 +375,20 @@ def draw_data(tree: Any) -> Any:
 
 
 def data() -> Measured:
-    tree, rows = boundary_elements(), []
-    for name, group in tree.children.items():
-        own = group.to_dataset()
-        of = own.to_dataframe() if "contact" in own.dims else None
-        count = (
-            own.sizes["surface"]
-            if of is None
-            else of.groupby([*of.columns[: of.columns.get_loc("force")]]).ngroups
-        )
-        rows.append(
-            [f"`{name}`", own.attrs["title"], count, int(np.isfinite(own.area).sum())]
-        )
-    return {"groups": table("group | content | surfaces | contacts", rows)}, {
-        "docs/figures/data.svg": draw_data(tree)
-    }
+    tree = boundary_elements()
+    rows = []
+    for name, node in tree.children.items():
+        group = node.to_dataset()
+        contacts = int(np.isfinite(group.area).sum())
+        rows.append([f"`{name}`", group.attrs["title"], _surfaces_of(group), contacts])
+    text = table("group | content | surfaces | contacts", rows)
+    return {"groups": text}, {"docs/figures/data.svg": draw_data(tree)}
+
+
+def _surfaces_of(group: xr.Dataset) -> int:
+    """Their number; where a row is a contact, that of different columns before the force."""
+    if "contact" not in group.dims:
+        return group.sizes["surface"]
+    frame = group.to_dataframe()
+    of_surface = [*frame.columns[: frame.columns.get_loc("force")]]
+    return int(frame.groupby(of_surface).ngroups)
